@@ -1,2 +1,56 @@
+//! Planar arm core: kinematics, dynamics and joint effects of a serial chain in a vertical plane.
+//!
+//! `no_std`, no allocation, no panic, no `unsafe`. Every algorithm is written once, over [`Scalar`], for `f32`, `f64`
+//! and [`Lanes`] (many simulations side by side), and over the number of segments `N`. All transcendental functions
+//! come through [`Scalar`], so that a run has the same bits on every platform.
+//!
+//! Conventions: y forward, z up, counter-clockwise positive; `q[0]` from +y, the others relative to the segment before;
+//! SI units and radians; forces are named by what they act on. Inside, the dynamics are in link form: one row for each
+//! link in absolute angles, which needs few operations and separates the base parameters.
+//!
+//! ```
+//! use arm_core::{models, gravity, Pose};
+//! let arm = models::mechanical_arm();
+//! let torque = gravity(&arm, &Pose::new(&[0.0, 0.0].into()));
+//! assert!((torque[1] - 9.81 * 1.160 * 0.115).abs() < 1e-12);
+//! ```
 #![no_std]
-//! Planar arm core.
+
+mod chain;
+mod contact;
+mod contribution;
+mod coriolis;
+mod dynamics;
+pub mod effect;
+mod energy;
+mod error;
+mod gravity;
+mod inertia;
+mod kinematics;
+mod lanes;
+pub mod models;
+mod regressor;
+mod scalar;
+mod setup;
+
+pub use chain::{Chain, Segment};
+pub use contact::Contact;
+pub use contribution::{Contributions, contributions};
+pub use coriolis::{centrifugal, coriolis, coriolis_matrix};
+pub use dynamics::{Load, forward_dynamics, inverse_dynamics, joint_force, static_torque};
+pub use energy::{kinetic_energy, potential_energy};
+pub use error::Invalid;
+pub use gravity::gravity;
+pub use inertia::{inertia, link_inertia};
+pub use kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};
+pub use lanes::Lanes;
+pub use regressor::{Regressor, regressor};
+pub use scalar::Scalar;
+pub use setup::{Reading, Setup};
+
+/// A value for each joint or link: angles, speeds, torques.
+pub type Joints<T, const N: usize> = nalgebra::SVector<T, N>;
+/// A square matrix over the joints or links.
+pub type JointMatrix<T, const N: usize> = nalgebra::SMatrix<T, N, N>;
+/// A vector of the plane, `[y, z]`.
+pub type Plane<T> = [T; 2];

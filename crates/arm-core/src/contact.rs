@@ -1,0 +1,52 @@
+//! The contact between the hand and the robot's handle.
+
+use crate::{Plane, Scalar};
+
+/// A spring and damper in y and z, with play.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact<T> {
+    /// Stiffness \[N/m\].
+    pub stiffness: Plane<T>,
+    /// Damping \[N s/m\].
+    pub damping: Plane<T>,
+    /// Half the free play: the spring acts beyond it \[m\].
+    pub play: Plane<T>,
+}
+
+impl<T: Scalar> Contact<T> {
+    /// A contact without play.
+    pub fn new(stiffness: Plane<T>, damping: Plane<T>) -> Self {
+        Self {
+            stiffness,
+            damping,
+            play: [T::ZERO; 2],
+        }
+    }
+
+    /// Force on the arm when the robot's handle is displaced from the arm's tip by `gap` and moves relative to it \[N\].
+    ///
+    /// * `gap` - handle minus tip \[m\]
+    /// * `gap_rate` - its time derivative \[m/s\]
+    ///
+    /// The force pulls the arm towards the handle (thesis 3.33 with the sign that makes the contact stable).
+    #[inline]
+    pub fn force_on_arm(&self, gap: Plane<T>, gap_rate: Plane<T>) -> Plane<T> {
+        core::array::from_fn(|i| {
+            let beyond = (gap[i].abs() - self.play[i]).max(T::ZERO);
+            let stretch = T::if_less(gap[i], T::ZERO, -beyond, beyond);
+            let touching = T::if_less(self.play[i], gap[i].abs(), T::ONE, T::ZERO);
+            let always = T::if_less(T::ZERO, self.play[i], touching, T::ONE);
+            self.stiffness[i] * stretch + always * self.damping[i] * gap_rate[i]
+        })
+    }
+
+    /// Energy held by the springs \[J\].
+    pub fn energy(&self, gap: Plane<T>) -> T {
+        let mut energy = T::ZERO;
+        for i in 0..2 {
+            let beyond = (gap[i].abs() - self.play[i]).max(T::ZERO);
+            energy += T::of(0.5) * self.stiffness[i] * beyond.squared();
+        }
+        energy
+    }
+}

@@ -1,0 +1,168 @@
+//! Inverse and forward dynamics.
+
+use core::array::from_fn;
+
+use crate::coriolis::link_coriolis;
+use crate::gravity::link_gravity;
+use crate::kinematics::{to_joint_torque, to_links};
+use crate::{Chain, JointMatrix, Joints, Plane, Pose, Scalar, link_inertia};
+
+/// What acts on the arm from outside and in its joints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load<T, const N: usize> {
+    /// Net torque of each joint on its distal segment: muscles or motors less all resisting torques \[N m\].
+    pub torque: Joints<T, N>,
+    /// Force on the arm at its tip \[N\].
+    pub force_on_arm: Plane<T>,
+    /// Moment on the arm at its tip, counter-clockwise \[N m\].
+    pub moment_on_arm: T,
+}
+
+impl<T: Scalar, const N: usize> Load<T, N> {
+    /// Nothing acts.
+    pub fn none() -> Self {
+        Self {
+            torque: Joints::repeat(T::ZERO),
+            force_on_arm: [T::ZERO; 2],
+            moment_on_arm: T::ZERO,
+        }
+    }
+}
+
+/// Joint torques `Jᵀ F` of a force and a moment on the arm at its tip \[N m\].
+#[inline]
+pub fn static_torque<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    force_on_arm: Plane<T>,
+    moment_on_arm: T,
+) -> Joints<T, N> {
+    let mut rows = link_force(chain, pose, force_on_arm);
+    if N > 0 {
+        rows[N - 1] += moment_on_arm;
+    }
+    to_joint_torque(&rows)
+}
+
+#[inline]
+fn link_force<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    force: Plane<T>,
+) -> [T; N] {
+    from_fn(|i| chain.segments[i].length * (pose.cos[i] * force[1] - pose.sin[i] * force[0]))
+}
+
+/// Joint torques that move the arm with `qd`, `qdd`: `B q̈ + C q̇ + G` \[N m\].
+///
+/// Equals [`regressor`](crate::regressor) times the base parameters.
+pub fn inverse_dynamics<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    qd: &Joints<T, N>,
+    qdd: &Joints<T, N>,
+) -> Joints<T, N> {
+    let acceleration = to_links(qdd);
+    let m = link_inertia(chain, pose);
+    let mut rows = link_coriolis(chain, pose, &to_links(qd));
+    let weight = link_gravity(chain, pose);
+    for i in 0..N {
+        rows[i] += weight[i];
+        for k in 0..N {
+            rows[i] += m[(i, k)] * acceleration[k];
+        }
+    }
+    to_joint_torque(&rows)
+}
+
+/// Joint accelerations under a load \[rad/s²\]; the inverse of [`inverse_dynamics`].
+///
+/// Solved in link angles by a square-root-free Cholesky factorisation. The arm of a validated [`Chain`] has a positive
+/// definite inertia matrix unless all inertia about a joint vanishes; then the result is not finite.
+#[inline]
+pub fn forward_dynamics<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    qd: &Joints<T, N>,
+    load: &Load<T, N>,
+) -> Joints<T, N> {
+    let force = link_force(chain, pose, load.force_on_arm);
+    let weight = link_gravity(chain, pose);
+    let turning = link_coriolis(chain, pose, &to_links(qd));
+    let mut rows: [T; N] = from_fn(|i| {
+        let beyond = if i + 1 < N {
+            load.torque[i + 1]
+        } else {
+            -load.moment_on_arm
+        };
+        load.torque[i] - beyond + force[i] - weight[i] - turning[i]
+    });
+    solve(link_inertia(chain, pose), &mut rows);
+    let mut qdd = Joints::<T, N>::repeat(T::ZERO);
+    for i in 0..N {
+        qdd[i] = if i == 0 {
+            rows[0]
+        } else {
+            rows[i] - rows[i - 1]
+        };
+    }
+    qdd
+}
+
+/// Solves `M x = b` in place for symmetric positive definite M by `L D Lᵀ`.
+#[inline]
+fn solve<T: Scalar, const N: usize>(mut m: JointMatrix<T, N>, b: &mut [T; N]) {
+    let mut reciprocal = [T::ONE; N];
+    for k in 0..N {
+        reciprocal[k] = T::ONE / m[(k, k)];
+        for i in k + 1..N {
+            let factor = m[(i, k)] * reciprocal[k];
+            for c in i..N {
+                m[(c, i)] = m[(c, i)] - factor * m[(c, k)];
+            }
+            b[i] -= factor * b[k];
+        }
+    }
+    for i in (0..N).rev() {
+        for k in i + 1..N {
+            b[i] -= m[(k, i)] * b[k];
+        }
+        b[i] = b[i] * reciprocal[i];
+    }
+}
+
+/// Force of the proximal side on each joint, from the motion and the force at the tip \[N\].
+///
+/// Newton's law summed over all segments beyond the joint; its magnitude is the load of the joint's bearing.
+pub fn joint_force<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    motion: (&Joints<T, N>, &Joints<T, N>),
+    force_on_arm: Plane<T>,
+) -> [Plane<T>; N] {
+    let (speed, acceleration) = (to_links(motion.0), to_links(motion.1));
+    let mut joint = [T::ZERO; 2];
+    let mut inertial = [[T::ZERO; 2]; N];
+    for (i, segment) in chain.segments.iter().enumerate() {
+        let turn = |along: T, normal: T| {
+            let along_axis = -(along * speed[i].squared() + normal * acceleration[i]);
+            let normal_axis = along * acceleration[i] - normal * speed[i].squared();
+            [
+                along_axis * pose.cos[i] - normal_axis * pose.sin[i],
+                along_axis * pose.sin[i] + normal_axis * pose.cos[i],
+            ]
+        };
+        let com = turn(segment.com[0], segment.com[1]);
+        for axis in 0..2 {
+            inertial[i][axis] = segment.mass * (joint[axis] + com[axis] - chain.gravity[axis]);
+        }
+        let end = turn(segment.length, T::ZERO);
+        joint = [joint[0] + end[0], joint[1] + end[1]];
+    }
+    let mut sum = [-force_on_arm[0], -force_on_arm[1]];
+    for force in inertial.iter_mut().rev() {
+        sum = [sum[0] + force[0], sum[1] + force[1]];
+        *force = sum;
+    }
+    inertial
+}

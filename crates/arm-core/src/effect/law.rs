@@ -1,0 +1,132 @@
+//! What a kind of effect is.
+
+use crate::{Reading, Scalar, Setup};
+
+/// Most parameters that one effect has.
+pub const MAX_PARAMETERS: usize = 6;
+
+/// Parameter values in the order of [`Info::parameters`]; unused places are zero.
+pub type Parameters<T> = [T; MAX_PARAMETERS];
+
+/// Where an effect acts, and so what its index means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In a joint.
+    Joint,
+    /// On a segment.
+    Segment,
+    /// On the whole arm.
+    Frame,
+    /// Between hand and robot.
+    Contact,
+    /// In a sensor of joint angles.
+    AngleSensor,
+    /// In the force sensor; the index is the channel, 0 = `Fy`, 1 = `Fz`, 2 = `Mx`.
+    ForceSensor,
+}
+
+impl Place {
+    /// The word for it in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::Segment => "segment",
+            Self::Frame => "frame",
+            Self::Contact => "contact",
+            Self::AngleSensor => "angle sensor",
+            Self::ForceSensor => "force sensor",
+        }
+    }
+}
+
+/// One parameter of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Name in files and results.
+    pub name: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Smallest value allowed.
+    pub min: f64,
+    /// Largest value allowed.
+    pub max: f64,
+    /// Value when none is given.
+    pub default: f64,
+    /// Whether the torque is linear in it. A fit takes linear parameters as unknowns and holds the others.
+    pub linear: bool,
+}
+
+/// What the catalogue says of a kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Info {
+    /// Stable name in models, reports and JSON.
+    pub kind: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// One line on what it is.
+    pub summary: &'static str,
+    /// The formula; `R` is a resisting torque.
+    pub formula: &'static str,
+    /// Where the formula comes from.
+    pub reference: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// Whether it carries a state of its own, advanced with the simulation.
+    pub memory: bool,
+}
+
+/// What a joint effect sees: one joint at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Local<T> {
+    /// Time since the start of the trial \[s\].
+    pub time: T,
+    /// Angle of the joint \[rad\].
+    pub q: T,
+    /// Its speed \[rad/s\].
+    pub qd: T,
+    /// Its acceleration \[rad/s²\].
+    pub qdd: T,
+    /// Angle of the joint before, zero at the first \[rad\].
+    pub proximal_q: T,
+    /// Magnitude of the force through the joint \[N\].
+    pub joint_force: T,
+    /// The effect's own state, zero at the start.
+    pub memory: T,
+}
+
+/// The behaviour of one kind of effect. What a kind does not do stays at its default, which is nothing.
+pub trait Law {
+    /// Name, parameters, formula and reference.
+    const INFO: Info;
+
+    /// Torque with which the joint resists \[N m\].
+    fn torque<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
+        T::ZERO
+    }
+    /// Derivatives of the torque to the parameters.
+    fn gradient<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> Parameters<T> {
+        [T::ZERO; MAX_PARAMETERS]
+    }
+    /// Factor with which the same torque also resists in the joint before.
+    fn proximal_share<T: Scalar>(_p: &Parameters<T>) -> T {
+        T::ZERO
+    }
+    /// Time derivative of the effect's own state.
+    fn memory_rate<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
+        T::ZERO
+    }
+    /// Changes the rig before a run.
+    fn alter<T: Scalar, const N: usize>(
+        _p: &Parameters<T>,
+        _index: usize,
+        _setup: &mut Setup<T, N>,
+    ) {
+    }
+    /// Changes what the sensors read.
+    fn distort<T: Scalar, const N: usize>(
+        _p: &Parameters<T>,
+        _index: usize,
+        _reading: &mut Reading<T, N>,
+    ) {
+    }
+}

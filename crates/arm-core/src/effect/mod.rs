@@ -1,0 +1,252 @@
+//! Effects: everything that can act on the arm and everything that can distort what is seen of it.
+//!
+//! A kind of effect is a [`Law`] in a file of its own: its name, its parameters with units and bounds, its formula, and
+//! what it does. An [`Effect`] is one instance: a kind at a joint, segment or channel, with values. Everything outside
+//! this folder works on `Effect`s and never names a kind.
+//!
+//! To add a kind, write its file and add one line to the `catalogue!` below.
+
+mod law;
+
+pub use law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+
+use crate::{Invalid, Joints, Plane, Reading, Scalar, Setup};
+
+/// Declares the kinds: their modules, the enum, and the dispatch to each [`Law`].
+macro_rules! catalogue {
+    ($($module:ident :: $law:ident),* $(,)?) => {
+        $(mod $module;)*
+
+        /// A kind of effect of the catalogue.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[non_exhaustive]
+        pub enum Kind {
+            $(#[doc = concat!("See `effect/", stringify!($module), ".rs`.")] $law),*
+        }
+
+        /// All kinds, in the order in which they are listed.
+        pub const KINDS: &[Kind] = &[$(Kind::$law),*];
+
+        impl Kind {
+            /// Name, parameters, formula and reference.
+            pub const fn info(self) -> &'static Info {
+                match self { $(Self::$law => &<$module::$law as Law>::INFO),* }
+            }
+        }
+
+        impl<T: Scalar> Effect<T> {
+            /// Torque with which the joint resists \[N m\].
+            #[inline]
+            pub fn torque(&self, at: &Local<T>) -> T {
+                if !self.on { return T::ZERO; }
+                match self.kind { $(Kind::$law => $module::$law::torque(&self.parameters, at)),* }
+            }
+            /// Derivatives of [`Effect::torque`] to the parameters.
+            #[inline]
+            pub fn gradient(&self, at: &Local<T>) -> Parameters<T> {
+                if !self.on { return [T::ZERO; MAX_PARAMETERS]; }
+                match self.kind { $(Kind::$law => $module::$law::gradient(&self.parameters, at)),* }
+            }
+            /// Factor with which the same torque also resists in the joint before.
+            #[inline]
+            pub fn proximal_share(&self) -> T {
+                match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters)),* }
+            }
+            /// Time derivative of the effect's own state.
+            #[inline]
+            pub fn memory_rate(&self, at: &Local<T>) -> T {
+                match self.kind { $(Kind::$law => $module::$law::memory_rate(&self.parameters, at)),* }
+            }
+            /// Changes the rig before a run.
+            pub fn alter<const N: usize>(&self, setup: &mut Setup<T, N>) {
+                if !self.on { return; }
+                match self.kind { $(Kind::$law => $module::$law::alter(&self.parameters, self.index, setup)),* }
+            }
+            /// Changes what the sensors read.
+            pub fn distort<const N: usize>(&self, reading: &mut Reading<T, N>) {
+                if !self.on { return; }
+                match self.kind { $(Kind::$law => $module::$law::distort(&self.parameters, self.index, reading)),* }
+            }
+        }
+    };
+}
+
+catalogue! {
+    viscous::Viscous,
+    coulomb::Coulomb,
+    elastic::Elastic,
+}
+
+impl Kind {
+    /// The kind with a stable name.
+    ///
+    /// # Errors
+    /// [`Invalid::Unknown`] when the catalogue does not hold it.
+    pub fn named(name: &str) -> Result<Self, Invalid> {
+        KINDS
+            .iter()
+            .copied()
+            .find(|k| k.info().kind == name)
+            .ok_or(Invalid::Unknown {
+                name: "kind of effect",
+            })
+    }
+}
+
+/// One effect: a kind, where it acts, and its values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effect<T> {
+    /// What it is.
+    pub kind: Kind,
+    /// Zero-based joint, segment or channel, see [`Place`].
+    pub index: usize,
+    /// Values in the order of [`Info::parameters`].
+    pub parameters: Parameters<T>,
+    /// The off switch: a run with an effect switched off has the bits of a run without it.
+    pub on: bool,
+}
+
+impl<T: Scalar> Effect<T> {
+    /// An effect with the default values of its kind.
+    pub fn new(kind: Kind, index: usize) -> Self {
+        let mut parameters = [T::ZERO; MAX_PARAMETERS];
+        for (value, parameter) in parameters.iter_mut().zip(kind.info().parameters) {
+            *value = T::of(parameter.default);
+        }
+        Self {
+            kind,
+            index,
+            parameters,
+            on: true,
+        }
+    }
+
+    /// The same effect with its leading parameters set.
+    pub fn with(mut self, values: &[T]) -> Self {
+        for (value, &given) in self.parameters.iter_mut().zip(values) {
+            *value = given;
+        }
+        self
+    }
+
+    /// Checks the values against the bounds of the kind, and the index against the number of joints.
+    ///
+    /// # Errors
+    /// [`Invalid`] names the first parameter that is outside.
+    pub fn validate(&self, joints: usize) -> Result<(), Invalid> {
+        let info = self.kind.info();
+        let places = match info.place {
+            Place::Joint | Place::Segment | Place::AngleSensor => joints,
+            Place::ForceSensor => 3,
+            Place::Frame | Place::Contact => usize::MAX,
+        };
+        if self.index >= places {
+            let found = (self.index + 1) as f64;
+            return Err(Invalid::OutOfRange {
+                name: info.place.name(),
+                index: 0,
+                found,
+                min: 1.0,
+                max: places as f64,
+            });
+        }
+        for (index, (value, parameter)) in self.parameters.iter().zip(info.parameters).enumerate() {
+            let name = parameter.name;
+            if !value.is_finite() {
+                return Err(Invalid::NotFinite { name, index });
+            }
+            let (min, max) = (parameter.min, parameter.max);
+            let found = core::cell::Cell::new(min);
+            if !value.every(|v| {
+                found.set(v);
+                v >= min && v <= max
+            }) {
+                return Err(Invalid::OutOfRange {
+                    name,
+                    index,
+                    found: found.get(),
+                    min,
+                    max,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A motion of the whole arm at one instant, as joint effects see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion<T, const N: usize> {
+    /// Time since the start of the trial \[s\].
+    pub time: T,
+    /// Joint angles \[rad\].
+    pub q: Joints<T, N>,
+    /// Joint speeds \[rad/s\].
+    pub qd: Joints<T, N>,
+    /// Joint accelerations \[rad/s²\].
+    pub qdd: Joints<T, N>,
+    /// Magnitude of the force through each joint \[N\].
+    pub joint_force: [T; N],
+}
+
+impl<T: Scalar, const N: usize> Motion<T, N> {
+    /// A motion without accelerations and joint forces.
+    pub fn new(time: T, q: Joints<T, N>, qd: Joints<T, N>) -> Self {
+        Self {
+            time,
+            q,
+            qd,
+            qdd: Joints::repeat(T::ZERO),
+            joint_force: [T::ZERO; N],
+        }
+    }
+
+    /// The same motion with the magnitudes of the forces through the joints, see [`joint_force`](crate::joint_force).
+    pub fn with_joint_force(mut self, force: &[Plane<T>; N]) -> Self {
+        self.joint_force = force.map(|[y, z]| (y.squared() + z.squared()).sqrt());
+        self
+    }
+
+    /// What an effect at a joint sees; zero for an index beyond the arm.
+    #[inline]
+    pub fn local(&self, joint: usize, memory: T) -> Local<T> {
+        let at = |values: &[T]| values.get(joint).copied().unwrap_or(T::ZERO);
+        Local {
+            time: self.time,
+            q: at(self.q.as_slice()),
+            qd: at(self.qd.as_slice()),
+            qdd: at(self.qdd.as_slice()),
+            proximal_q: if joint > 0 && joint <= N {
+                self.q[joint - 1]
+            } else {
+                T::ZERO
+            },
+            joint_force: at(&self.joint_force),
+            memory,
+        }
+    }
+}
+
+/// Sum of what all effects resist with, shoulder first \[N m\].
+///
+/// * `memory` - the state of each effect, in the same order; missing ones count as zero
+#[inline]
+pub fn resisting_torque<T: Scalar, const N: usize>(
+    effects: &[Effect<T>],
+    motion: &Motion<T, N>,
+    memory: &[T],
+) -> Joints<T, N> {
+    let mut total = Joints::<T, N>::repeat(T::ZERO);
+    for (i, effect) in effects.iter().enumerate() {
+        if effect.index >= N || !matches!(effect.kind.info().place, Place::Joint) {
+            continue;
+        }
+        let state = memory.get(i).copied().unwrap_or(T::ZERO);
+        let torque = effect.torque(&motion.local(effect.index, state));
+        total[effect.index] += torque;
+        if effect.index > 0 {
+            total[effect.index - 1] += effect.proximal_share() * torque;
+        }
+    }
+    total
+}

@@ -1,0 +1,73 @@
+//! What can be wrong with a value handed to the core.
+
+use core::fmt;
+
+/// An input that was refused: which one, what was found and what is allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Invalid {
+    /// A value that is NaN or infinite.
+    NotFinite {
+        /// Name of the quantity.
+        name: &'static str,
+        /// Zero-based index of the segment, joint or sample it belongs to.
+        index: usize,
+    },
+    /// A value outside what is allowed.
+    OutOfRange {
+        /// Name of the quantity.
+        name: &'static str,
+        /// Zero-based index of the segment, joint or sample it belongs to.
+        index: usize,
+        /// The value found.
+        found: f64,
+        /// Smallest value allowed.
+        min: f64,
+        /// Largest value allowed.
+        max: f64,
+    },
+    /// A point that the robot cannot reach.
+    OutOfReach {
+        /// Distance of the point from the robot's base \[m\].
+        distance: f64,
+        /// Shortest reach \[m\].
+        min: f64,
+        /// Longest reach \[m\].
+        max: f64,
+    },
+    /// A name that the catalogue does not hold.
+    Unknown {
+        /// What kind of name it is.
+        name: &'static str,
+    },
+}
+
+impl fmt::Display for Invalid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NotFinite { name, index } => write!(f, "{name} {} is not finite", index + 1),
+            Self::OutOfRange {
+                name,
+                index,
+                found,
+                min,
+                max,
+            } => {
+                write!(
+                    f,
+                    "{name} {} is {found}, allowed is {min} to {max}",
+                    index + 1
+                )
+            }
+            Self::OutOfReach { distance, min, max } => {
+                write!(
+                    f,
+                    "the point is {distance} m from the robot's base, its reach is {min} m to {max} m"
+                )
+            }
+            Self::Unknown { name } => write!(f, "unknown {name}"),
+        }
+    }
+}
+
+impl core::error::Error for Invalid {}

@@ -1,0 +1,101 @@
+//! Several numbers side by side, one simulation a lane.
+
+use core::array::from_fn;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use crate::scalar::{DOUBLE, LARGEST_REDUCED, Scalar, sin_cos_polynomial};
+
+/// `L` numbers that are computed with together; each lane has the bits of the same computation in `f64`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(32))]
+pub struct Lanes<const L: usize>(pub [f64; L]);
+
+impl<const L: usize> Lanes<L> {
+    #[inline]
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self(from_fn(|i| f(self.0[i], other.0[i])))
+    }
+}
+
+macro_rules! elementwise {
+    ($($trait:ident $method:ident $operator:tt)*) => {$(
+        impl<const L: usize> $trait for Lanes<L> {
+            type Output = Self;
+            #[inline]
+            fn $method(self, other: Self) -> Self {
+                self.zip(other, |a, b| a $operator b)
+            }
+        }
+    )*};
+}
+elementwise!(Add add + Sub sub - Mul mul * Div div /);
+
+impl<const L: usize> Neg for Lanes<L> {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self(self.0.map(|a| -a))
+    }
+}
+
+impl<const L: usize> AddAssign for Lanes<L> {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<const L: usize> SubAssign for Lanes<L> {
+    #[inline]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<const L: usize> Scalar for Lanes<L> {
+    const ZERO: Self = Self([0.0; L]);
+    const ONE: Self = Self([1.0; L]);
+    #[inline]
+    fn of(value: f64) -> Self {
+        Self([value; L])
+    }
+    #[inline]
+    fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
+        Self(from_fn(|i| {
+            if a.0[i] < b.0[i] {
+                then.0[i]
+            } else {
+                otherwise.0[i]
+            }
+        }))
+    }
+    #[inline]
+    fn every(self, condition: impl Fn(f64) -> bool) -> bool {
+        self.0.iter().all(|&a| condition(a))
+    }
+    #[inline]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self(self.0.map(f))
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        self.map(libm::sqrt)
+    }
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        if self.every(|a| f64::abs(a) <= LARGEST_REDUCED) {
+            sin_cos_polynomial(self, &DOUBLE)
+        } else {
+            let both = self.0.map(Scalar::sin_cos);
+            (Self(both.map(|(s, _)| s)), Self(both.map(|(_, c)| c)))
+        }
+    }
+    #[inline]
+    fn exp(self) -> Self {
+        self.map(libm::exp)
+    }
+    #[inline]
+    fn tanh(self) -> Self {
+        self.map(libm::tanh)
+    }
+}

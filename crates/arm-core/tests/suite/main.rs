@@ -1,0 +1,4 @@
+//! Tests of arm-core: identities between two independent ways, limits, arithmetic in the head, refused inputs.
+
+mod common;
+mod identities;
