@@ -16,6 +16,7 @@
 //! ```
 #![no_std]
 
+mod body;
 mod chain;
 mod contact;
 mod contribution;
@@ -33,6 +34,7 @@ mod regressor;
 mod scalar;
 mod setup;
 
+pub use body::Body;
 pub use chain::{Chain, Segment};
 pub use contact::Contact;
 pub use contribution::{Contributions, contributions};

@@ -80,6 +80,7 @@ pub(crate) struct Trigonometry<const S: usize, const C: usize> {
 }
 
 /// Coefficients of FreeBSD's `k_sin.c` and `k_cos.c` (error below 1 ulp on ±π/4).
+#[expect(clippy::excessive_precision, reason = "the digits of the source")]
 pub(crate) const DOUBLE: Trigonometry<6, 6> = Trigonometry {
     round: 6_755_399_441_055_744.0,
     half_pi: [
@@ -106,6 +107,7 @@ pub(crate) const DOUBLE: Trigonometry<6, 6> = Trigonometry {
 };
 
 /// Coefficients of Cephes `sinf.c` and `cosf.c`.
+#[allow(clippy::excessive_precision, reason = "the digits of the source")]
 const SINGLE: Trigonometry<3, 3> = Trigonometry {
     round: 12_582_912.0,
     half_pi: [

@@ -68,3 +68,15 @@ pub struct Reading<T, const N: usize> {
     /// Moment on the arm \[N m\].
     pub moment_on_arm: T,
 }
+
+impl<T: Scalar, const N: usize> Reading<T, N> {
+    /// A channel of the force sensor: 0 = `Fy`, 1 = `Fz`, 2 = `Mx`; none beyond.
+    #[inline]
+    pub fn channel_mut(&mut self, channel: usize) -> Option<&mut T> {
+        match channel {
+            0 | 1 => self.force_on_arm.get_mut(channel),
+            2 => Some(&mut self.moment_on_arm),
+            _ => None,
+        }
+    }
+}

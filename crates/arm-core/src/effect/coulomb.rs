@@ -1,4 +1,7 @@
-use super::law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+use super::law::{
+    Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
+    smooth_sign_slope,
+};
 use crate::Scalar;
 
 /// Dry friction: a torque against the direction of motion, whatever the speed.
@@ -12,22 +15,19 @@ impl Law for Coulomb {
         formula: "R = torque · tanh(q̇/smoothing)",
         reference: "Kodek 2004, equation 3.12; smoothed as in Andersson, Söderberg, Björklund 2007",
         parameters: &[
-            Parameter { name: "torque", unit: "N m", min: 0.0, max: 100.0, default: 0.0, linear: true },
-            Parameter { name: "smoothing", unit: "rad/s", min: 1e-4, max: 1.0, default: 0.01, linear: false },
+            Parameter::linear("torque", "N m", 0.0, 100.0, 0.0),
+            SMOOTHING,
         ],
         memory: false,
     };
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        p[0] * (at.qd / p[1]).tanh()
+        p[0] * smooth_sign(at.qd, p[1])
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
-        let t = (at.qd / p[1]).tanh();
-        let mut g = [T::ZERO; MAX_PARAMETERS];
-        g[0] = t;
-        g[1] = -p[0] * (T::ONE - t * t) * at.qd / (p[1] * p[1]);
-        g
+        let sign = smooth_sign(at.qd, p[1]);
+        leading([sign, p[0] * smooth_sign_slope(sign, at.qd, p[1])])
     }
 }

@@ -1,4 +1,4 @@
-use super::law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
 use crate::Scalar;
 
 /// A linear spring about a rest angle.
@@ -12,8 +12,8 @@ impl Law for Elastic {
         formula: "R = stiffness · (q − rest)",
         reference: "Kodek 2004, equation 3.13, with a rest angle",
         parameters: &[
-            Parameter { name: "stiffness", unit: "N m/rad", min: -10.0, max: 1000.0, default: 0.0, linear: true },
-            Parameter { name: "rest", unit: "rad", min: -7.0, max: 7.0, default: 0.0, linear: false },
+            Parameter::linear("stiffness", "N m/rad", -10.0, 1000.0, 0.0),
+            Parameter::shape("rest", "rad", -7.0, 7.0, 0.0),
         ],
         memory: false,
     };
@@ -24,9 +24,6 @@ impl Law for Elastic {
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
-        let mut g = [T::ZERO; MAX_PARAMETERS];
-        g[0] = at.q - p[1];
-        g[1] = -p[0];
-        g
+        leading([at.q - p[1], -p[0]])
     }
 }

@@ -21,8 +21,12 @@ pub enum Place {
     Contact,
     /// In a sensor of joint angles.
     AngleSensor,
-    /// In the force sensor; the index is the channel, 0 = `Fy`, 1 = `Fz`, 2 = `Mx`.
+    /// In one channel of the force sensor; the index is 0 = `Fy`, 1 = `Fz`, 2 = `Mx`.
     ForceSensor,
+    /// At the hand, the tip of the last segment.
+    Hand,
+    /// In all channels of the sensors together.
+    Sensors,
 }
 
 impl Place {
@@ -35,6 +39,17 @@ impl Place {
             Self::Contact => "contact",
             Self::AngleSensor => "angle sensor",
             Self::ForceSensor => "force sensor",
+            Self::Hand => "hand",
+            Self::Sensors => "sensors",
+        }
+    }
+
+    /// What an effect here has to be told besides its values: `"joint"` (for a segment its number), `"channel"` or nothing.
+    pub const fn address(self) -> Option<&'static str> {
+        match self {
+            Self::Joint | Self::Segment | Self::AngleSensor => Some("joint"),
+            Self::ForceSensor => Some("channel"),
+            Self::Frame | Self::Contact | Self::Hand | Self::Sensors => None,
         }
     }
 }
@@ -54,6 +69,40 @@ pub struct Parameter {
     pub default: f64,
     /// Whether the torque is linear in it. A fit takes linear parameters as unknowns and holds the others.
     pub linear: bool,
+}
+
+impl Parameter {
+    /// A parameter in which the torque is linear.
+    pub const fn linear(
+        name: &'static str,
+        unit: &'static str,
+        min: f64,
+        max: f64,
+        default: f64,
+    ) -> Self {
+        Self {
+            name,
+            unit,
+            min,
+            max,
+            default,
+            linear: true,
+        }
+    }
+
+    /// A parameter of the shape, which a linear fit holds.
+    pub const fn shape(
+        name: &'static str,
+        unit: &'static str,
+        min: f64,
+        max: f64,
+        default: f64,
+    ) -> Self {
+        Self {
+            linear: false,
+            ..Self::linear(name, unit, min, max, default)
+        }
+    }
 }
 
 /// What the catalogue says of a kind.
@@ -103,7 +152,8 @@ pub trait Law {
     fn torque<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
         T::ZERO
     }
-    /// Derivatives of the torque to the parameters.
+    /// Derivatives to the parameters of the torque that the motion needs at the joint: of [`Law::torque`], and for a kind
+    /// that alters the rig in one joint, of what inverse dynamics gains there. A state of its own counts as given.
     fn gradient<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> Parameters<T> {
         [T::ZERO; MAX_PARAMETERS]
     }
@@ -115,7 +165,7 @@ pub trait Law {
     fn memory_rate<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
         T::ZERO
     }
-    /// Changes the rig before a run.
+    /// Changes the rig before a run. What is changed here must not appear in [`Law::torque`] again.
     fn alter<T: Scalar, const N: usize>(
         _p: &Parameters<T>,
         _index: usize,
@@ -129,4 +179,31 @@ pub trait Law {
         _reading: &mut Reading<T, N>,
     ) {
     }
+}
+
+/// The sign of a speed, smooth through zero: `tanh(q̇/smoothing)`.
+///
+/// As in Andersson, Söderberg, Björklund 2007: friction without a sticking state, so that a fixed step stays stable.
+#[inline]
+pub(super) fn smooth_sign<T: Scalar>(speed: T, smoothing: T) -> T {
+    (speed / smoothing).tanh()
+}
+
+/// Derivative of [`smooth_sign`] to `smoothing`, from its value.
+#[inline]
+pub(super) fn smooth_sign_slope<T: Scalar>(sign: T, speed: T, smoothing: T) -> T {
+    -(T::ONE - sign.squared()) * speed / smoothing.squared()
+}
+
+/// The bounds of `smoothing` that all kinds of dry friction share.
+pub(super) const SMOOTHING: Parameter = Parameter::shape("smoothing", "rad/s", 1e-4, 1.0, 0.01);
+
+/// Values for the leading parameters, zero for the others.
+#[inline]
+pub(super) fn leading<T: Scalar, const P: usize>(values: [T; P]) -> Parameters<T> {
+    let mut all = [T::ZERO; MAX_PARAMETERS];
+    for (place, value) in all.iter_mut().zip(values) {
+        *place = value;
+    }
+    all
 }

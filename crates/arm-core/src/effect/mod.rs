@@ -50,11 +50,13 @@ macro_rules! catalogue {
             /// Factor with which the same torque also resists in the joint before.
             #[inline]
             pub fn proximal_share(&self) -> T {
+                if !self.on { return T::ZERO; }
                 match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters)),* }
             }
             /// Time derivative of the effect's own state.
             #[inline]
             pub fn memory_rate(&self, at: &Local<T>) -> T {
+                if !self.on { return T::ZERO; }
                 match self.kind { $(Kind::$law => $module::$law::memory_rate(&self.parameters, at)),* }
             }
             /// Changes the rig before a run.
@@ -74,7 +76,36 @@ macro_rules! catalogue {
 catalogue! {
     viscous::Viscous,
     coulomb::Coulomb,
+    stribeck::Stribeck,
+    load_friction::LoadFriction,
+    quadratic_drag::QuadraticDrag,
     elastic::Elastic,
+    cubic_elastic::CubicElastic,
+    relaxation::Relaxation,
+    thixotropy::Thixotropy,
+    constant_moment::ConstantMoment,
+    end_range::EndRange,
+    biarticular::Biarticular,
+    stretch_reflex::StretchReflex,
+    tremor::Tremor,
+    voluntary::Voluntary,
+    motor_inertia::MotorInertia,
+    added_mass::AddedMass,
+    gravity_moment::GravityMoment,
+    inertia::Inertia,
+    segment_length::SegmentLength,
+    gravity_tilt::GravityTilt,
+    shoulder_motion::ShoulderMotion,
+    backlash::Backlash,
+    contact_compliance::ContactCompliance,
+    contact_damping::ContactDamping,
+    robot_ripple::RobotRipple,
+    force_bias::ForceBias,
+    force_drift::ForceDrift,
+    force_gain::ForceGain,
+    force_misalignment::ForceMisalignment,
+    angle_offset::AngleOffset,
+    time_delay::TimeDelay,
 }
 
 impl Kind {
@@ -138,15 +169,17 @@ impl<T: Scalar> Effect<T> {
         let places = match info.place {
             Place::Joint | Place::Segment | Place::AngleSensor => joints,
             Place::ForceSensor => 3,
-            Place::Frame | Place::Contact => usize::MAX,
+            Place::Frame | Place::Contact | Place::Hand | Place::Sensors => usize::MAX,
         };
-        if self.index >= places {
-            let found = (self.index + 1) as f64;
+        // What also acts in the joint before needs one.
+        let shared = info.place == Place::Joint && !self.proximal_share().every(|s| s == 0.0);
+        let first = usize::from(shared);
+        if self.index < first || self.index >= places {
             return Err(Invalid::OutOfRange {
                 name: info.place.name(),
                 index: 0,
-                found,
-                min: 1.0,
+                found: (self.index + 1) as f64,
+                min: (first + 1) as f64,
                 max: places as f64,
             });
         }
@@ -238,7 +271,8 @@ pub fn resisting_torque<T: Scalar, const N: usize>(
 ) -> Joints<T, N> {
     let mut total = Joints::<T, N>::repeat(T::ZERO);
     for (i, effect) in effects.iter().enumerate() {
-        if effect.index >= N || !matches!(effect.kind.info().place, Place::Joint) {
+        let here = effect.on && effect.index < N && effect.kind.info().place == Place::Joint;
+        if !here {
             continue;
         }
         let state = memory.get(i).copied().unwrap_or(T::ZERO);

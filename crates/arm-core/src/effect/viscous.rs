@@ -1,4 +1,4 @@
-use super::law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
 use crate::Scalar;
 
 /// Resistance in proportion to the joint's speed.
@@ -11,14 +11,7 @@ impl Law for Viscous {
         summary: "resistance in proportion to joint speed",
         formula: "R = viscosity · q̇",
         reference: "Kodek 2004, equation 3.11",
-        parameters: &[Parameter {
-            name: "viscosity",
-            unit: "N m s/rad",
-            min: 0.0,
-            max: 100.0,
-            default: 0.0,
-            linear: true,
-        }],
+        parameters: &[Parameter::linear("viscosity", "N m s/rad", 0.0, 100.0, 0.0)],
         memory: false,
     };
 
@@ -28,8 +21,6 @@ impl Law for Viscous {
     }
 
     fn gradient<T: Scalar>(_p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
-        let mut g = [T::ZERO; MAX_PARAMETERS];
-        g[0] = at.qd;
-        g
+        leading([at.qd])
     }
 }

@@ -1,0 +1,42 @@
+use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use crate::Scalar;
+
+/// A spring over two adjacent joints, as of a muscle that crosses both; its joint is the distal one.
+///
+/// With the energy ½ · stiffness · (q + ratio · q_proximal − rest)² it resists in the joint before by `ratio` times the same
+/// torque. The gradient is that of the distal torque.
+pub struct Biarticular;
+
+impl Law for Biarticular {
+    const INFO: Info = Info {
+        kind: "biarticular",
+        place: Place::Joint,
+        summary: "spring over two adjacent joints; its joint is the distal one",
+        formula: "R = stiffness · (q + ratio · q_proximal − rest), R_proximal = ratio · R",
+        reference: "Hogan 1985",
+        parameters: &[
+            Parameter::linear("stiffness", "N m/rad", -10.0, 1000.0, 0.0),
+            Parameter::shape("ratio", "1", -5.0, 5.0, 1.0),
+            Parameter::shape("rest", "rad", -14.0, 14.0, 0.0),
+        ],
+        memory: false,
+    };
+
+    #[inline]
+    fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        p[0] * (at.q + p[1] * at.proximal_q - p[2])
+    }
+
+    fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
+        leading([
+            at.q + p[1] * at.proximal_q - p[2],
+            p[0] * at.proximal_q,
+            -p[0],
+        ])
+    }
+
+    #[inline]
+    fn proximal_share<T: Scalar>(p: &Parameters<T>) -> T {
+        p[1]
+    }
+}

@@ -1,0 +1,23 @@
+use super::law::{Info, Law, Parameter, Parameters, Place};
+use crate::{Scalar, Setup};
+
+/// A change of the moment of inertia of a segment about its centre of mass.
+pub struct Inertia;
+
+impl Law for Inertia {
+    const INFO: Info = Info {
+        kind: "inertia",
+        place: Place::Segment,
+        summary: "change of the moment of inertia of a segment",
+        formula: "inertia += change: J_j += change",
+        reference: "Kodek 2004, equation 3.4",
+        parameters: &[Parameter::linear("change", "kg m²", -1.0, 10.0, 0.0)],
+        memory: false,
+    };
+
+    fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, index: usize, setup: &mut Setup<T, N>) {
+        if let Some(segment) = setup.segments.get_mut(index) {
+            segment.inertia += p[0];
+        }
+    }
+}

@@ -1,0 +1,36 @@
+use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use crate::Scalar;
+
+/// A spring in series with a damper (Maxwell element): its torque fades when the joint rests.
+///
+/// Its state is the stretch of the spring \[rad\], zero at the start: a trial begins relaxed.
+pub struct Relaxation;
+
+impl Law for Relaxation {
+    const INFO: Info = Info {
+        kind: "relaxation",
+        place: Place::Joint,
+        summary: "spring whose torque fades at rest (Maxwell element)",
+        formula: "R = stiffness · e, ė = q̇ − e/time, e(0) = 0",
+        reference: "Maxwell 1867; Fung 1993 for living tissue",
+        parameters: &[
+            Parameter::linear("stiffness", "N m/rad", 0.0, 1000.0, 0.0),
+            Parameter::shape("time", "s", 0.01, 1000.0, 1.0),
+        ],
+        memory: true,
+    };
+
+    #[inline]
+    fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        p[0] * at.memory
+    }
+
+    fn gradient<T: Scalar>(_p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
+        leading([at.memory])
+    }
+
+    #[inline]
+    fn memory_rate<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        at.qd - at.memory / p[1]
+    }
+}

@@ -1,0 +1,31 @@
+use super::law::{Info, Law, Parameter, Parameters, Place};
+use crate::{Scalar, Setup};
+
+/// A periodic error of the robot's position, as of gears or of vibration.
+///
+/// With several of these the amplitudes add; the last one states frequency and phase.
+pub struct RobotRipple;
+
+impl Law for RobotRipple {
+    const INFO: Info = Info {
+        kind: "robot_ripple",
+        place: Place::Contact,
+        summary: "periodic error of the robot's position",
+        formula: "handle += (y, z) · sin(2π frequency t + phase)",
+        reference: "gear ripple: Sweet, Good 1985",
+        parameters: &[
+            Parameter::shape("y", "m", -0.1, 0.1, 0.0),
+            Parameter::shape("z", "m", -0.1, 0.1, 0.0),
+            Parameter::shape("frequency", "Hz", 0.01, 100.0, 1.0),
+            Parameter::shape("phase", "rad", -7.0, 7.0, 0.0),
+        ],
+        memory: false,
+    };
+
+    fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
+        setup.ripple[0] += p[0];
+        setup.ripple[1] += p[1];
+        setup.ripple_frequency = p[2];
+        setup.ripple_phase = p[3];
+    }
+}

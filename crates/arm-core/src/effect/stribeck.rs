@@ -1,0 +1,41 @@
+use super::law::{
+    Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
+    smooth_sign_slope,
+};
+use crate::Scalar;
+
+/// The excess of dry friction at low speed, which fades as the joint moves faster.
+///
+/// It comes on top of `coulomb`: together they are the friction curve of Stribeck, with `coulomb` as its plateau.
+pub struct Stribeck;
+
+impl Law for Stribeck {
+    const INFO: Info = Info {
+        kind: "stribeck",
+        place: Place::Joint,
+        summary: "excess of dry friction at low speed, on top of coulomb",
+        formula: "R = torque · exp(−|q̇|/speed) · tanh(q̇/smoothing)",
+        reference: "Bo, Pavelescu 1982; Armstrong-Hélouvry, Dupont, Canudas de Wit 1994",
+        parameters: &[
+            Parameter::linear("torque", "N m", 0.0, 100.0, 0.0),
+            Parameter::shape("speed", "rad/s", 0.001, 10.0, 0.06),
+            SMOOTHING,
+        ],
+        memory: false,
+    };
+
+    #[inline]
+    fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        p[0] * (-(at.qd.abs() / p[1])).exp() * smooth_sign(at.qd, p[2])
+    }
+
+    fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
+        let fading = (-(at.qd.abs() / p[1])).exp();
+        let sign = smooth_sign(at.qd, p[2]);
+        leading([
+            fading * sign,
+            p[0] * fading * sign * at.qd.abs() / p[1].squared(),
+            p[0] * fading * smooth_sign_slope(sign, at.qd, p[2]),
+        ])
+    }
+}
