@@ -1,1 +1,24 @@
-//! Python module `armrs._armrs`.
+//! Python module `armrs._armrs`: conversion and error mapping only, no mathematics.
+
+mod arm;
+mod catalogue;
+mod convert;
+mod errors;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add(
+        "build_profile",
+        if cfg!(debug_assertions) {
+            "debug"
+        } else {
+            "release"
+        },
+    )?;
+    m.add_class::<arm::Arm>()?;
+    m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
+    Ok(())
+}

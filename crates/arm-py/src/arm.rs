@@ -1,0 +1,366 @@
+//! `armrs.Arm`: the kernels of the core, each also over a batch.
+
+use arm_core::{Chain, Invalid, Joints, Load, Pose, Segment};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+
+use crate::convert::{Numbers, Rows, joints, over_rows};
+use crate::errors::{bad_input, invalid};
+
+/// Longest arm that is compiled in.
+const MOST: usize = 6;
+
+/// A chain whose length is known at run time.
+#[derive(Clone, Debug)]
+pub enum AnyChain {
+    One(Chain<f64, 1>),
+    Two(Chain<f64, 2>),
+    Three(Chain<f64, 3>),
+    Four(Chain<f64, 4>),
+    Five(Chain<f64, 5>),
+    Six(Chain<f64, 6>),
+}
+
+/// Runs the same expression on the chain of whatever length.
+macro_rules! each_length {
+    ($any:expr, $chain:ident => $body:expr) => {
+        match $any {
+            AnyChain::One($chain) => $body,
+            AnyChain::Two($chain) => $body,
+            AnyChain::Three($chain) => $body,
+            AnyChain::Four($chain) => $body,
+            AnyChain::Five($chain) => $body,
+            AnyChain::Six($chain) => $body,
+        }
+    };
+}
+
+impl AnyChain {
+    fn new(
+        segments: &[Segment<f64>],
+        base: [f64; 2],
+        gravity: [f64; 2],
+        rotor: &[f64],
+    ) -> PyResult<Self> {
+        fn build<const N: usize>(
+            segments: &[Segment<f64>],
+            base: [f64; 2],
+            gravity: [f64; 2],
+            rotor: &[f64],
+        ) -> Result<Chain<f64, N>, Invalid> {
+            Chain::new(std::array::from_fn(|i| segments[i]), base, gravity)?
+                .with_rotor_inertia(std::array::from_fn(|i| rotor[i]))
+        }
+        match segments.len() {
+            1 => build(segments, base, gravity, rotor).map(Self::One),
+            2 => build(segments, base, gravity, rotor).map(Self::Two),
+            3 => build(segments, base, gravity, rotor).map(Self::Three),
+            4 => build(segments, base, gravity, rotor).map(Self::Four),
+            5 => build(segments, base, gravity, rotor).map(Self::Five),
+            6 => build(segments, base, gravity, rotor).map(Self::Six),
+            n => return Err(bad_input("segments", n, &format!("1 to {MOST} segments"))),
+        }
+        .map_err(invalid)
+    }
+}
+
+fn put<const R: usize, const C: usize>(matrix: &nalgebra::SMatrix<f64, R, C>, out: &mut [f64]) {
+    for r in 0..R {
+        for c in 0..C {
+            out[r * C + c] = matrix[(r, c)];
+        }
+    }
+}
+
+type Array<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
+
+/// A planar arm: a rigid serial chain in a vertical plane.
+///
+/// Angles are relative, the first from +y (forward), counter-clockwise; z is up; SI units and radians. Every method
+/// takes a single state, shape `(n_joints,)`, or a batch, shape `(n_samples, n_joints)`.
+///
+/// Parameters
+/// ----------
+/// lengths, masses, coms, inertias : array_like, shape (n_joints,)
+///     Segment lengths [m], masses [kg], centres of mass from the proximal joint [m], moments of inertia about the
+///     centre of mass [kg m²], proximal first.
+/// com_normals : array_like, optional
+///     Offset of the centres of mass normal to the segments, counter-clockwise [m]. Default 0.
+/// gravity : float, default 9.81
+///     Acceleration along −z [m/s²].
+/// base : (float, float), default (0, 0)
+///     First joint, y and z [m].
+/// rotor_inertia : array_like, optional
+///     Inertia of a drive's rotor as seen at each joint [kg m²]. Default 0.
+#[pyclass(frozen, module = "armrs")]
+pub struct Arm {
+    chain: AnyChain,
+}
+
+#[pymethods]
+impl Arm {
+    #[new]
+    #[pyo3(signature = (lengths, masses, coms, inertias, *, com_normals=None, gravity=9.81, base=(0.0, 0.0), rotor_inertia=None))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "keyword arguments of a Python constructor"
+    )]
+    fn new(
+        lengths: Vec<f64>,
+        masses: Vec<f64>,
+        coms: Vec<f64>,
+        inertias: Vec<f64>,
+        com_normals: Option<Vec<f64>>,
+        gravity: f64,
+        base: (f64, f64),
+        rotor_inertia: Option<Vec<f64>>,
+    ) -> PyResult<Self> {
+        let n = lengths.len();
+        let com_normals = com_normals.unwrap_or_else(|| vec![0.0; n]);
+        let rotor = rotor_inertia.unwrap_or_else(|| vec![0.0; n]);
+        let named = [
+            ("masses", &masses),
+            ("coms", &coms),
+            ("inertias", &inertias),
+            ("com_normals", &com_normals),
+            ("rotor_inertia", &rotor),
+        ];
+        for (name, values) in named {
+            if values.len() != n {
+                return Err(bad_input(
+                    name,
+                    format!("{} values", values.len()),
+                    &format!("{n}, as many as lengths"),
+                ));
+            }
+        }
+        let segments: Vec<_> = (0..n)
+            .map(|i| Segment {
+                length: lengths[i],
+                mass: masses[i],
+                com: [coms[i], com_normals[i]],
+                inertia: inertias[i],
+            })
+            .collect();
+        let chain = AnyChain::new(&segments, [base.0, base.1], [0.0, -gravity], &rotor)?;
+        Ok(Self { chain })
+    }
+
+    /// Number of joints.
+    #[getter]
+    fn n_joints(&self) -> usize {
+        each_length!(&self.chain, c => c.segments().len())
+    }
+
+    /// First moments `X_j = m_j l_j + a_j Σ m_k` [kg m], what slow movement shows of the masses.
+    #[getter]
+    fn first_moments(&self) -> Vec<f64> {
+        each_length!(&self.chain, c => c.first_moments().to_vec())
+    }
+
+    /// Second moments `J_j = I_j + m_j l_j² + a_j² Σ m_k` [kg m²].
+    #[getter]
+    fn second_moments(&self) -> Vec<f64> {
+        each_length!(&self.chain, c => c.second_moments().to_vec())
+    }
+
+    fn __repr__(&self) -> String {
+        each_length!(&self.chain, c => {
+            let list = |f: fn(&Segment<f64>) -> f64| {
+                c.segments().iter().map(|s| format!("{:.4}", f(s))).collect::<Vec<_>>().join(", ")
+            };
+            format!("Arm(lengths=[{}] m, masses=[{}] kg)", list(|s| s.length), list(|s| s.mass))
+        })
+    }
+
+    /// Position of the tip, shape (2,) or (n_samples, 2) [m].
+    fn forward_kinematics<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
+        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
+            over_rows(py, [q], &[2], |[q], out| {
+                out.copy_from_slice(&arm_core::tip(c, &Pose::new(&joints(q))))
+            })
+        }
+        let q = Rows::new("q", &q, self.n_joints())?;
+        each_length!(&self.chain, c => run(c, py, q))
+    }
+
+    /// Derivative of the tip position to the joint angles, shape (2, n_joints) or (n_samples, 2, n_joints) [m/rad].
+    fn jacobian<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
+        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
+            over_rows(py, [q], &[2, N], |[q], out| {
+                put(&arm_core::jacobian(c, &Pose::new(&joints(q))), out)
+            })
+        }
+        let q = Rows::new("q", &q, self.n_joints())?;
+        each_length!(&self.chain, c => run(c, py, q))
+    }
+
+    /// Inertia matrix B(q), shape (n_joints, n_joints), with the batch in front [kg m²].
+    fn inertia<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
+        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
+            over_rows(py, [q], &[N, N], |[q], out| {
+                put(&arm_core::inertia(c, &Pose::new(&joints(q))), out)
+            })
+        }
+        let q = Rows::new("q", &q, self.n_joints())?;
+        each_length!(&self.chain, c => run(c, py, q))
+    }
+
+    /// Coriolis and centrifugal torques C(q, q̇) q̇, shape of `q` [N m].
+    fn coriolis<'py>(&self, py: Python<'py>, q: Numbers<'py>, qd: Numbers<'py>) -> Array<'py> {
+        fn run<'py, const N: usize>(
+            c: &Chain<f64, N>,
+            py: Python<'py>,
+            rows: [Rows<'_>; 2],
+        ) -> Array<'py> {
+            over_rows(py, rows, &[N], |[q, qd], out| {
+                out.copy_from_slice(
+                    arm_core::coriolis(c, &Pose::new(&joints(q)), &joints(qd)).as_slice(),
+                );
+            })
+        }
+        let n = self.n_joints();
+        let rows = [Rows::new("q", &q, n)?, Rows::new("qd", &qd, n)?];
+        each_length!(&self.chain, c => run(c, py, rows))
+    }
+
+    /// Gravity torques G(q), shape of `q` [N m].
+    fn gravity<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
+        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
+            over_rows(py, [q], &[N], |[q], out| {
+                out.copy_from_slice(arm_core::gravity(c, &Pose::new(&joints(q))).as_slice());
+            })
+        }
+        let q = Rows::new("q", &q, self.n_joints())?;
+        each_length!(&self.chain, c => run(c, py, q))
+    }
+
+    /// Joint torques of a force on the arm at its tip, Jᵀ F, shape of `q` [N m].
+    ///
+    /// `force_on_arm` has shape (2,) or (n_samples, 2) [N].
+    fn static_torque<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        force_on_arm: Numbers<'py>,
+    ) -> Array<'py> {
+        fn run<'py, const N: usize>(
+            c: &Chain<f64, N>,
+            py: Python<'py>,
+            rows: [Rows<'_>; 2],
+        ) -> Array<'py> {
+            over_rows(py, rows, &[N], |[q, force], out| {
+                let torque =
+                    arm_core::static_torque(c, &Pose::new(&joints(q)), [force[0], force[1]], 0.0);
+                out.copy_from_slice(torque.as_slice());
+            })
+        }
+        let rows = [
+            Rows::new("q", &q, self.n_joints())?,
+            Rows::new("force_on_arm", &force_on_arm, 2)?,
+        ];
+        each_length!(&self.chain, c => run(c, py, rows))
+    }
+
+    /// Joint torques of a motion of the rigid arm, B q̈ + C q̇ + G, shape of `q` [N m].
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        qd: Numbers<'py>,
+        qdd: Numbers<'py>,
+    ) -> Array<'py> {
+        fn run<'py, const N: usize>(
+            c: &Chain<f64, N>,
+            py: Python<'py>,
+            rows: [Rows<'_>; 3],
+        ) -> Array<'py> {
+            over_rows(py, rows, &[N], |[q, qd, qdd], out| {
+                out.copy_from_slice(
+                    arm_core::inverse_dynamics(
+                        c,
+                        &Pose::new(&joints(q)),
+                        &joints(qd),
+                        &joints(qdd),
+                    )
+                    .as_slice(),
+                );
+            })
+        }
+        let n = self.n_joints();
+        let rows = [
+            Rows::new("q", &q, n)?,
+            Rows::new("qd", &qd, n)?,
+            Rows::new("qdd", &qdd, n)?,
+        ];
+        each_length!(&self.chain, c => run(c, py, rows))
+    }
+
+    /// Joint accelerations under joint torques, the inverse of `inverse_dynamics`, shape of `q` [rad/s²].
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        qd: Numbers<'py>,
+        tau: Numbers<'py>,
+    ) -> Array<'py> {
+        fn run<'py, const N: usize>(
+            c: &Chain<f64, N>,
+            py: Python<'py>,
+            rows: [Rows<'_>; 3],
+        ) -> Array<'py> {
+            over_rows(py, rows, &[N], |[q, qd, torque], out| {
+                let load = Load {
+                    torque: joints(torque),
+                    ..Load::none()
+                };
+                let qdd: Joints<f64, N> =
+                    arm_core::forward_dynamics(c, &Pose::new(&joints(q)), &joints(qd), &load);
+                out.copy_from_slice(qdd.as_slice());
+            })
+        }
+        let n = self.n_joints();
+        let rows = [
+            Rows::new("q", &q, n)?,
+            Rows::new("qd", &qd, n)?,
+            Rows::new("tau", &tau, n)?,
+        ];
+        each_length!(&self.chain, c => run(c, py, rows))
+    }
+
+    /// The regressor of the base parameters, shape (n_joints, 3·n_joints) with the batch in front.
+    ///
+    /// Columns: first moments X_1…X_n, normal moments H_1…H_n, second moments J_1…J_n. Its product with them is
+    /// `inverse_dynamics` of an arm without rotor inertia.
+    fn regressor<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        qd: Numbers<'py>,
+        qdd: Numbers<'py>,
+    ) -> Array<'py> {
+        fn run<'py, const N: usize>(
+            c: &Chain<f64, N>,
+            py: Python<'py>,
+            rows: [Rows<'_>; 3],
+        ) -> Array<'py> {
+            over_rows(py, rows, &[N, 3 * N], |[q, qd, qdd], out| {
+                let y = arm_core::regressor(c, &Pose::new(&joints(q)), &joints(qd), &joints(qdd));
+                for r in 0..N {
+                    for k in 0..N {
+                        out[r * 3 * N + k] = y.x[(r, k)];
+                        out[r * 3 * N + N + k] = y.h[(r, k)];
+                        out[r * 3 * N + 2 * N + k] = y.j[(r, k)];
+                    }
+                }
+            })
+        }
+        let n = self.n_joints();
+        let rows = [
+            Rows::new("q", &q, n)?,
+            Rows::new("qd", &qd, n)?,
+            Rows::new("qdd", &qdd, n)?,
+        ];
+        each_length!(&self.chain, c => run(c, py, rows))
+    }
+}

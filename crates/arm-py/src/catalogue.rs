@@ -1,0 +1,35 @@
+//! The catalogue of effects as Python data.
+
+use arm_core::effect::KINDS;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+/// All kinds of effects: name, where, parameters with units and bounds, formula, reference.
+#[pyfunction]
+pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
+    let list = PyList::empty(py);
+    for kind in KINDS {
+        let info = kind.info();
+        let parameters = PyList::empty(py);
+        for p in info.parameters {
+            let entry = PyDict::new(py);
+            entry.set_item("name", p.name)?;
+            entry.set_item("unit", p.unit)?;
+            entry.set_item("min", p.min)?;
+            entry.set_item("max", p.max)?;
+            entry.set_item("default", p.default)?;
+            entry.set_item("linear", p.linear)?;
+            parameters.append(entry)?;
+        }
+        let entry = PyDict::new(py);
+        entry.set_item("kind", info.kind)?;
+        entry.set_item("where", info.place.name())?;
+        entry.set_item("summary", info.summary)?;
+        entry.set_item("formula", info.formula)?;
+        entry.set_item("reference", info.reference)?;
+        entry.set_item("parameters", parameters)?;
+        entry.set_item("address", info.place.address())?;
+        list.append(entry)?;
+    }
+    Ok(list)
+}

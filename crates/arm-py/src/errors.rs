@@ -1,0 +1,49 @@
+//! The one place that turns errors of the core into Python's.
+
+use arm_core::Invalid;
+use pyo3::prelude::*;
+
+/// `armrs.errors.BadInput` for an argument.
+pub fn bad_input(place: &str, found: impl std::fmt::Display, allowed: &str) -> PyErr {
+    Python::attach(|py| {
+        let made = py.import("armrs.errors").and_then(|errors| {
+            let text = errors.getattr("Text")?.call1((found.to_string(),))?;
+            errors.getattr("BadInput")?.call1((place, text, allowed))
+        });
+        match made {
+            Ok(error) => PyErr::from_value(error),
+            Err(error) => error,
+        }
+    })
+}
+
+/// A refusal of the core as `BadInput`.
+pub fn invalid(error: Invalid) -> PyErr {
+    match error {
+        Invalid::NotFinite { name, index } => bad_input(
+            &format!("{name} {}", index + 1),
+            "a value that is not finite",
+            "a finite number",
+        ),
+        Invalid::OutOfRange {
+            name,
+            index,
+            found,
+            min,
+            max,
+        } => {
+            let allowed = match (min, max) {
+                (f64::MIN_POSITIVE, f64::INFINITY) => "more than 0".to_owned(),
+                (min, f64::INFINITY) => format!("at least {min}"),
+                (min, max) => format!("{min} to {max}"),
+            };
+            bad_input(&format!("{name} {}", index + 1), found, &allowed)
+        }
+        Invalid::OutOfReach { distance, min, max } => bad_input(
+            "handle",
+            format!("{distance} m from the robot's base"),
+            &format!("{min} m to {max} m"),
+        ),
+        other => bad_input("argument", other, "a known name"),
+    }
+}
