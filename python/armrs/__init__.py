@@ -1,0 +1,55 @@
+"""armrs: what is an arm made of, when a robot leads it.
+
+Everything is loaded on first use, so that `import armrs` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ._armrs import Arm as Arm
+    from ._armrs import __version__ as __version__
+    from .conversion import convert as convert
+    from .dataset import Dataset as Dataset
+    from .dataset import load_dataset as load_dataset
+    from .dataset import write_dataset as write_dataset
+    from .errors import ArmrsError as ArmrsError
+    from .errors import BadInput as BadInput
+    from .errors import IdentificationError as IdentificationError
+    from .errors import SimulationError as SimulationError
+    from .model import Contact as Contact
+    from .model import Effect as Effect
+    from .model import Joint as Joint
+    from .model import Model as Model
+    from .model import Robot as Robot
+    from .model import Segment as Segment
+    from .model import load_model as load_model
+    from .trial import Trial as Trial
+
+# A module is never named like a public function: importing it would put the module in the place of the function.
+_HOMES = {
+    "_armrs": ("Arm", "__version__", "build_profile"),
+    "conversion": ("convert",),
+    "dataset": ("Dataset", "load_dataset", "write_dataset"),
+    "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
+    "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
+    "trial": ("Trial",),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = sorted(_HOME_OF)
+
+
+def __getattr__(name: str) -> Any:
+    module = _HOME_OF.get(name)
+    if module is None:
+        raise AttributeError(f"module 'armrs' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{module}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

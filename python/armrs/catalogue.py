@@ -1,0 +1,70 @@
+"""The catalogue of effects, as the compiled core states it.
+
+The core owns the list: nothing here knows the name of an effect. Where the compiled module is absent, `catalogue()` is empty and
+effects are only checked for their form.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Attributes
+    ----------
+    name, unit : str
+        Name and SI unit.
+    min, max : float
+        Bounds, both included; infinite where there is none.
+    default : float
+        Value when it is left out.
+    linear : bool
+        Whether the effect is linear in it; a fit takes such parameters as unknowns.
+    """
+
+    name: str
+    unit: str
+    min: float
+    max: float
+    default: float
+    linear: bool = True
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of effect: name, where it acts, what it does, its formula and its source."""
+
+    kind: str
+    where: str
+    summary: str
+    formula: str
+    reference: str
+    parameters: tuple[Parameter, ...]
+    address: str | None = None
+    """What else an effect of this kind must say: "joint", "channel" or nothing (None)."""
+
+
+@functools.cache
+def catalogue() -> Mapping[str, Kind]:
+    """Return every kind of effect by name, in the order of the core; empty without the compiled module."""
+    try:
+        from . import _armrs
+
+        entries = _armrs.effects()
+    except (ImportError, AttributeError):
+        return MappingProxyType({})
+    return MappingProxyType({entry["kind"]: _kind(entry) for entry in entries})
+
+
+def _kind(entry: Mapping[str, Any]) -> Kind:
+    own = {f.name for f in fields(Parameter)}
+    parameters = tuple(Parameter(**{k: v for k, v in p.items() if k in own}) for p in entry["parameters"])
+    plain = {f.name: entry[f.name] for f in fields(Kind) if f.name in entry}
+    return Kind(**{**plain, "parameters": parameters})

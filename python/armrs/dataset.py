@@ -1,0 +1,385 @@
+"""A data set: a folder with `dataset.toml`, a model and trials."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import checks, files, tomlfile
+from .errors import BadInput, Text
+from .model import Model, load_model
+from .samples import SUFFIXES, write_samples
+from .trial import FEWEST_SAMPLES, Trial, read_trial
+
+FILE = "dataset.toml"
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Whose arm it is; used for the literature values.
+
+    Attributes
+    ----------
+    body_mass : float, optional
+        [kg]
+    height : float, optional
+        [m]
+    sex : {"male", "female"}, optional
+    """
+
+    body_mass: float | None = None
+    height: float | None = None
+    sex: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.body_mass is not None:
+            mass = checks.number("body_mass", self.body_mass, least=1.0, most=500.0, unit="kg")
+            object.__setattr__(self, "body_mass", mass)
+        if self.height is not None:
+            height = checks.number("height", self.height, least=0.3, most=3.0, unit="m", hint="centimetres?")
+            object.__setattr__(self, "height", height)
+        if self.sex is not None:
+            checks.choice("sex", self.sex, ("male", "female"))
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """What the calibration promises. Smaller deviations are absorbed and reported, larger ones are named.
+
+    Attributes
+    ----------
+    angle_offset_deg : float
+        [deg]; `angle_offset` is the same in radians.
+    force_bias_N : float
+        [N]
+    force_gain : float
+        Relative.
+    time_delay_s : float
+        Force against angles [s].
+    handle_placement_m : float
+        [m]
+    """
+
+    angle_offset_deg: float = 0.3
+    force_bias_N: float = 0.2
+    force_gain: float = 0.01
+    time_delay_s: float = 0.005
+    handle_placement_m: float = 0.001
+
+    def __post_init__(self) -> None:
+        for f in dataclasses.fields(self):
+            object.__setattr__(self, f.name, checks.number(f.name, getattr(self, f.name), least=0.0))
+
+    @property
+    def angle_offset(self) -> float:
+        """Offset of an angle sensor [rad]."""
+        return math.radians(self.angle_offset_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """A model and the trials that challenge it.
+
+    Attributes
+    ----------
+    name : str
+    model : Model
+    trials : tuple of Trial
+        In the order of the file, those without a single sample left out.
+    force_on : {"robot", "arm"} or None
+        What the forces in the files act on. In the trials they are forces on the arm, whatever this says.
+    sample_rate : float or None
+        As stated [Hz].
+    subject : Subject
+    tolerance : Tolerance
+    folder : Path or None
+        Where it was read.
+    model_path : Path or None
+        Where the model was read.
+    warnings : tuple of str
+        What the user should know, one line each.
+    """
+
+    name: str
+    model: Model
+    trials: tuple[Trial, ...]
+    force_on: str | None = None
+    sample_rate: float | None = None
+    subject: Subject = Subject()
+    tolerance: Tolerance = Tolerance()
+    folder: Path | None = None
+    model_path: Path | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def fit_trials(self) -> tuple[Trial, ...]:
+        """Trials on which things may be chosen and fitted."""
+        return tuple(trial for trial in self.trials if trial.role == "fit")
+
+    @property
+    def test_trials(self) -> tuple[Trial, ...]:
+        """Trials on which nothing is chosen or fitted."""
+        return tuple(trial for trial in self.trials if trial.role == "test")
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.fit_trials)} fit and {len(self.test_trials)} test trials"
+        return f"Dataset({self.name!r}, {self.model.n_joints} joints, {counts}, {len(self.warnings)} warnings)"
+
+    def replace(self, **changes: Any) -> Dataset:
+        """Return a data set with some attributes changed."""
+        return dataclasses.replace(self, **changes)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What `dataset.toml` says of one trial."""
+
+    file: str
+    configuration: str
+    role: str
+    repeat: int = 1
+
+
+@dataclass(frozen=True)
+class Description:
+    """The content of `dataset.toml`, before any trial is read."""
+
+    path: Path
+    name: str
+    model: str
+    entries: tuple[Entry, ...]
+    force_on: str | None
+    sample_rate: float | None
+    subject: Subject
+    tolerance: Tolerance
+
+    @property
+    def model_path(self) -> Path:
+        """Where the model is."""
+        return self.path.parent / self.model
+
+    def trial_path(self, entry: Entry) -> Path:
+        """Where a trial is."""
+        return self.path.parent / entry.file
+
+
+def load_dataset(source: str | os.PathLike[str]) -> Dataset:
+    """Read a data set: check it, bring it to SI units, to forces on the arm, and to uniform time.
+
+    Parameters
+    ----------
+    source : path
+        The folder, or its `dataset.toml`.
+
+    Returns
+    -------
+    Dataset
+
+    Raises
+    ------
+    BadInput
+        Names the file, the place, the value found and the value allowed.
+
+    Notes
+    -----
+    Uneven time stamps are resampled at the median rate, see `armrs.resample`; the samples as read stay in `Trial.original`.
+    Missing samples are bridged over at most 0.25 s; longer gaps stay NaN and are reported in `warnings`.
+    """
+    description = describe(source)
+    model_path = description.model_path
+    model = load_model(model_path)
+    trials: list[Trial] = []
+    warnings: list[str] = []
+    for entry in description.entries:
+        path = description.trial_path(entry)
+        try:
+            reading = read_trial(
+                path,
+                n_joints=model.n_joints,
+                force_on=description.force_on,
+                sample_rate=description.sample_rate,
+                **dataclasses.asdict(entry),
+            )
+            if reading is None:
+                refusal = BadInput("file", Text("no samples below the header"), f"at least {FEWEST_SAMPLES} samples")
+                if entry.role == "fit":
+                    raise refusal
+                warnings.append(f"{refusal.within(file=entry.file)}: this test trial is left out")
+                continue
+        except BadInput as error:
+            raise error.within(file=path) from None
+        trials.append(reading.trial)
+        warnings += [f"{entry.file}: {line}" for line in reading.warnings]
+    return Dataset(
+        name=description.name,
+        model=model,
+        trials=tuple(trials),
+        force_on=description.force_on,
+        sample_rate=description.sample_rate,
+        subject=description.subject,
+        tolerance=description.tolerance,
+        folder=description.path.parent,
+        model_path=model_path,
+        warnings=tuple(warnings),
+    )
+
+
+def describe(source: str | os.PathLike[str]) -> Description:
+    """Read `dataset.toml` alone."""
+    path = Path(source)
+    path = path / FILE if path.is_dir() else path
+    document = tomlfile.read(path)
+    try:
+        return _description(path, document)
+    except BadInput as error:
+        raise error.within(file=path) from None
+
+
+def _description(path: Path, document: dict[str, Any]) -> Description:
+    optional = ["name", "force_on", "sample_rate", "subject", "tolerance"]
+    checks.keys("", document, required=["model", "trial"], optional=optional)
+    tables = checks.tables("trial", document["trial"])
+    entries = tuple(_entry(f"[[trial]] {k}", table) for k, table in enumerate(tables, 1))
+    _check_entries(entries)
+    rate = document.get("sample_rate")
+    force_on = document.get("force_on")
+    return Description(
+        path=path,
+        name=checks.text("name", document.get("name", path.resolve().parent.name or "data set")),
+        model=checks.text("model", document["model"]),
+        entries=entries,
+        force_on=None if force_on is None else checks.choice("force_on", force_on, ("robot", "arm")),
+        sample_rate=None if rate is None else checks.number("sample_rate", rate, above=0.0, most=1e6, unit="Hz"),
+        subject=_part(Subject, "[subject]", document.get("subject", {})),
+        tolerance=_part(Tolerance, "[tolerance]", document.get("tolerance", {})),
+    )
+
+
+def _part(kind: Any, place: str, value: object) -> Any:
+    table = checks.table(place, value)
+    checks.keys(place, table, optional=[f.name for f in dataclasses.fields(kind)])
+    try:
+        return kind(**table)
+    except BadInput as error:
+        raise error.within(place=place) from None
+
+
+def _entry(place: str, table: dict[str, Any]) -> Entry:
+    checks.keys(place, table, required=["file", "configuration", "role"], optional=["repeat"])
+    try:
+        return Entry(
+            file=checks.text("file", table["file"]),
+            configuration=checks.text("configuration", table["configuration"]),
+            repeat=checks.whole("repeat", table.get("repeat", 1), least=1),
+            role=checks.choice("role", table["role"], ("fit", "test")),
+        )
+    except BadInput as error:
+        raise error.within(place=place) from None
+
+
+def _check_entries(entries: tuple[Entry, ...]) -> None:
+    by_file: dict[str, int] = {}
+    by_repeat: dict[tuple[str, int], int] = {}
+    for number, entry in enumerate(entries, start=1):
+        first = by_file.setdefault(os.path.normpath(entry.file), number)
+        if first != number:
+            raise BadInput(f"[[trial]] {number}, file", entry.file, f"each file once: [[trial]] {first} has it already")
+        first = by_repeat.setdefault((entry.configuration, entry.repeat), number)
+        if first != number:
+            found = Text(f'repeat {entry.repeat} of "{entry.configuration}"')
+            raise BadInput(f"[[trial]] {number}, repeat", found, f"each repeat once: [[trial]] {first} has it already")
+    if not any(entry.role == "fit" for entry in entries):
+        raise BadInput("[[trial]]", Text('no trial with role = "fit"'), "at least one")
+
+
+def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: str | None = None) -> Path:
+    """Write a data set: `dataset.toml`, `model.toml` and the trials, in SI units and with the signs of `force_on`.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    folder : path
+        Made when it does not exist. Nothing is written outside of it.
+    suffix : {".csv", ".parquet"}, optional
+        Format of all trials. Without it each keeps its own.
+
+    Returns
+    -------
+    Path
+        The `dataset.toml` written; it is written last, so that it never names a trial that is not there.
+
+    Notes
+    -----
+    Samples that were missing are written as empty cells, not as measured.
+    """
+    out = files.output_folder(folder)
+    if suffix is not None:
+        checks.choice("suffix", suffix, SUFFIXES)
+    if dataset.force_on is None and any(trial.force_on_arm is not None for trial in dataset.trials):
+        dataset = dataset.replace(force_on="arm")
+    names = output_names([trial.file for trial in dataset.trials], suffix)
+    inputs = [] if dataset.folder is None else [dataset.folder / FILE, *(dataset.folder / t.file for t in dataset.trials)]
+    inputs += [dataset.model_path] if dataset.model_path else []
+    files.not_an_input([out / FILE, out / "model.toml", *(out / name for name in names)], inputs)
+    for trial, name in zip(dataset.trials, names, strict=True):
+        table = trial_columns(trial, dataset.force_on)
+        write_samples(out / name, list(table), list(table.values()))
+    dataset.model.write(out / "model.toml")
+    entries = [Entry(name, t.configuration, t.role, t.repeat) for t, name in zip(dataset.trials, names, strict=True)]
+    content = description_text(dataset, "model.toml", entries)
+    files.write_text(out / FILE, content, kind=".toml")
+    return out / FILE
+
+
+def output_names(names: list[str], suffix: str | None) -> list[str]:
+    """Return where below an output folder trials go: under their own names when these stay inside, else in `trials/`."""
+    result: list[str] = []
+    for name in names:
+        path = Path(name)
+        inside = not path.is_absolute() and ".." not in path.parts
+        path = path if inside else Path("trials") / path.name
+        path = path.with_suffix(suffix) if suffix else path
+        if path.as_posix() in result:
+            raise BadInput("output", path.as_posix(), "names that differ by more than suffix and folder")
+        result.append(path.as_posix())
+    return result
+
+
+def trial_columns(trial: Trial, force_on: str | None) -> dict[str, np.ndarray]:
+    """Return the columns of a trial as they stand in a file, by name; NaN where a sample was missing."""
+    sign = 1.0 if force_on == "arm" else -1.0
+    table: dict[str, np.ndarray] = {"t_s": trial.t}
+
+    def add(form: str, values: np.ndarray | None) -> None:
+        if values is not None:
+            table.update({form.format(j + 1): values[:, j] for j in range(values.shape[1])})
+
+    add("q{}_rad", trial.q)
+    add("dq{}_rad_s", trial.dq)
+    if trial.force_on_arm is not None:
+        table["Fy_N"], table["Fz_N"] = sign * trial.force_on_arm.T
+    if trial.moment_on_arm is not None:
+        table["Mx_Nm"] = sign * trial.moment_on_arm
+    add("qr{}_rad", trial.robot_q)
+    add("tau{}_Nm", trial.tau)
+    table.update(trial.emg)
+    return {name: np.where(trial.filled_columns[name], np.nan, v) if name in trial.filled_columns else v for name, v in table.items()}
+
+
+def description_text(source: Dataset | Description, model: str, entries: list[Entry]) -> str:
+    """Return the text of `dataset.toml`."""
+    head = {"name": source.name, "model": model, "force_on": source.force_on, "sample_rate": source.sample_rate}
+    blocks = [tomlfile.lines(head)]
+    subject = tomlfile.lines(dataclasses.asdict(source.subject))
+    if subject:
+        blocks.append(["[subject]", *subject])
+    if source.tolerance != Tolerance():
+        blocks.append(["[tolerance]", *tomlfile.lines(dataclasses.asdict(source.tolerance))])
+    blocks += [["[[trial]]", *tomlfile.lines(dataclasses.asdict(entry))] for entry in entries]
+    return "\n\n".join("\n".join(block) for block in blocks) + "\n"

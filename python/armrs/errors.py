@@ -1,0 +1,104 @@
+"""The errors of armrs: one tree, and one line of text for each."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable
+
+
+class ArmrsError(Exception):
+    """Anything armrs refuses or cannot finish. The command line ends with status 1."""
+
+
+class BadInput(ArmrsError, ValueError):
+    """An input that cannot be used as it is. The command line ends with status 2 and writes nothing.
+
+    Parameters
+    ----------
+    place : str
+        Where in the file (key, row and column) or which argument.
+    found : object
+        The value found.
+    allowed : str
+        What is allowed there, with its unit.
+    file : path, optional
+        The file, as the caller named it.
+    hint : str, optional
+        What was probably meant.
+    """
+
+    def __init__(
+        self,
+        place: str,
+        found: object,
+        allowed: str,
+        *,
+        file: str | os.PathLike[str] | None = None,
+        hint: str | None = None,
+    ) -> None:
+        super().__init__(place, found, allowed)
+        self.place = place
+        self.found = found
+        self.allowed = allowed
+        self.file = None if file is None else os.fspath(file)
+        self.hint = hint
+
+    def within(self, *, file: str | os.PathLike[str] | None = None, place: str | None = None) -> BadInput:
+        """Return this error seen from further outside: with the file, or with the table that holds the place."""
+        outer = ", ".join(part for part in (place, self.place) if part)
+        return BadInput(
+            outer,
+            self.found,
+            self.allowed,
+            file=self.file if file is None else file,
+            hint=self.hint,
+        )
+
+    def __str__(self) -> str:
+        where = ": ".join(one_line(part) for part in (self.file, self.place) if part)
+        found = self.found if isinstance(self.found, Text) else show(self.found)
+        text = f"{where}: found {found}, allowed {one_line(self.allowed)}"
+        return f"{text} ({one_line(self.hint)})" if self.hint else text
+
+
+class IdentificationError(ArmrsError):
+    """The data cannot answer what the identification asks."""
+
+
+class SimulationError(ArmrsError):
+    """A simulation that stopped: it names the step and the joint."""
+
+
+class Text(str):
+    """A description of what was found, printed as it is and not as a quoted value."""
+
+
+def show(value: object) -> str:
+    """Write a value on one line of bounded length, as it would stand in a file."""
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return one_line(text if len(text) <= 80 else text[:77] + "...")
+
+
+def one_line(text: object) -> str:
+    """Replace line ends and other control characters, so that a message stays one line."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in str(text))
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that looks most like `name`, or None when nothing is known."""
+    known = sorted(known)
+    lower = {k.lower(): k for k in reversed(known)}
+    match = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.0)
+    return lower[match[0]] if match else None
+
+
+def unknown_name(place: str, name: str, known: Iterable[str], *, what: str = "key") -> BadInput:
+    """Build the refusal of a name that is not known; it says the nearest known one."""
+    known = sorted(known)
+    return BadInput(
+        place,
+        Text(f"unknown {what} {show(name)}"),
+        ", ".join(known) if known else f"no {what}",
+        hint=f"nearest known: {nearest(name, known)}" if known else None,
+    )

@@ -1,0 +1,132 @@
+"""Writing files: whole or not at all, and never over something of another kind."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from .errors import BadInput, Text
+
+PathLike = str | os.PathLike[str]
+
+
+@contextmanager
+def replacing(path: PathLike) -> Iterator[Path]:
+    """Give a temporary path in the same folder; on success it takes the place of `path` at once, on failure nothing remains.
+
+    The folder is made when it does not exist. The content is on the disk before the name changes, so that after a crash the file is
+    either the old or the new one.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise BadInput("file", Text("a folder"), "the name of a file", file=path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from None
+    temporary = Path(name)
+    try:
+        os.fchmod(handle, _mode(target))
+        os.close(handle)
+        yield temporary
+        with temporary.open("rb+") as written:
+            os.fsync(written.fileno())
+        temporary.replace(target)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: PathLike, content: str, *, kind: str) -> None:
+    """Write UTF-8 text, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        The file. A device or a pipe is written to directly.
+    content : str
+        The text.
+    kind : str
+        Suffix of the kind of file, such as ".json". A file that exists under another suffix is not replaced.
+    """
+    target = Path(path)
+    may_replace(target, kind)
+    raw = content.encode("utf-8")
+    if target.exists() and not target.is_file() and not target.is_dir():
+        try:
+            target.write_bytes(raw)
+        except OSError as error:
+            raise _unwritable(path, error) from None
+        return
+    with replacing(target) as temporary:
+        temporary.write_bytes(raw)
+
+
+def write_json(path: PathLike, data: Any) -> None:
+    """Write JSON, whole or not at all. NumPy values become plain ones; numbers that are not finite become null."""
+    write_text(path, json_text(data), kind=".json")
+
+
+def json_text(data: Any) -> str:
+    """Return JSON text that ends with a line end."""
+    return json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def may_replace(path: PathLike, kind: str) -> None:
+    """Refuse to replace a file whose suffix says that it is of another kind than `kind`."""
+    target = Path(path)
+    if target.is_file() and target.stat().st_size > 0 and target.suffix.lower() != kind:
+        raise BadInput(
+            "file", Text(f"an existing file with suffix {target.suffix!r}"), f"a new file, or a {kind} file to replace", file=path
+        )
+
+
+def output_folder(path: PathLike) -> Path:
+    """Return a folder to write below; it need not exist yet, but it must not be a file."""
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise BadInput("-o", Text("a file"), "a folder", file=path)
+    return folder
+
+
+def not_an_input(outputs: list[Path], inputs: list[Path]) -> None:
+    """Refuse to write over what was read."""
+    read = {path.resolve() for path in inputs}
+    for output in outputs:
+        if output.resolve() in read:
+            raise BadInput("output", Text("an input of this command"), "another folder or name", file=output)
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {str(key): _plain(item) for key, item in data.items()}
+    if hasattr(data, "tolist"):
+        data = data.tolist()
+    if isinstance(data, (list, tuple)):
+        return [_plain(item) for item in data]
+    if isinstance(data, float) and (data != data or data in (float("inf"), float("-inf"))):
+        return None
+    if isinstance(data, os.PathLike):
+        return os.fspath(data)
+    return data
+
+
+def _mode(target: Path) -> int:
+    try:
+        return target.stat().st_mode & 0o777
+    except OSError:
+        umask = os.umask(0)
+        os.umask(umask)
+        return 0o666 & ~umask
+
+
+def _unwritable(path: PathLike, error: Exception) -> BadInput:
+    reason = getattr(error, "strerror", None) or "a name no file can have"
+    return BadInput("file", Text(reason), "a place that can be written", file=path)

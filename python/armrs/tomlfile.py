@@ -1,0 +1,81 @@
+"""Reading and writing TOML: what armrs needs of it, with refusals on one line."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .errors import BadInput, Text
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_LIMIT = 16 * 1024 * 1024
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def read(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the tables of a TOML file, or raise `BadInput` naming file, line and column."""
+    content = read_text(path, "a TOML file")
+    try:
+        return tomllib.loads(content)
+    except tomllib.TOMLDecodeError as error:
+        message, _, position = str(error).partition(" (at ")
+        place = position.rstrip(")") or "TOML"
+        raise BadInput(place, Text(message), "TOML", file=path) from None
+
+
+def read_text(path: str | os.PathLike[str], what: str) -> str:
+    """Return the text of a UTF-8 file, or raise `BadInput`."""
+    file = Path(path)
+    try:
+        if file.is_dir():
+            raise BadInput("file", Text("a folder"), what, file=path)
+        if file.stat().st_size > _LIMIT:
+            raise BadInput("file", Text(f"{file.stat().st_size} bytes"), f"{what} of at most {_LIMIT} bytes", file=path)
+        raw = file.read_bytes()
+    except OSError as error:
+        raise BadInput("file", Text(error.strerror or "unreadable"), f"{what} that can be read", file=path) from None
+    except ValueError:  # a path with a null character
+        raise BadInput("file", Text("a name no file can have"), what, file=path) from None
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise BadInput(f"line {line}", Text(f"byte 0x{raw[error.start]:02x}"), "UTF-8 text", file=path) from None
+
+
+def value(item: object) -> str:
+    """Write one value; a float is written with all the digits that reading it back needs."""
+    if isinstance(item, bool):
+        return "true" if item else "false"
+    if isinstance(item, (int, float)):
+        return repr(item)
+    if isinstance(item, str):
+        return '"' + "".join(_escape(c) for c in item) + '"'
+    if isinstance(item, (list, tuple)):
+        return "[" + ", ".join(value(part) for part in item) + "]"
+    raise TypeError(f"no TOML form for {type(item).__name__}")
+
+
+def lines(table: Mapping[str, object]) -> list[str]:
+    """Write the plain keys of one table, leaving out those that are None."""
+    return [f"{_key(key)} = {value(item)}" for key, item in table.items() if item is not None]
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else value(key)
+
+
+def _escape(character: str) -> str:
+    if character in '"\\':
+        return "\\" + character
+    if character < " " or character == "\x7f":
+        return f"\\u{ord(character):04x}"
+    return character
