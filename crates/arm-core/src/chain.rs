@@ -2,6 +2,7 @@
 
 use core::array::from_fn;
 
+use crate::check::{at_least_zero, finite, positive};
 use crate::{Invalid, Plane, Scalar};
 
 /// One rigid segment.
@@ -129,44 +130,4 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
     pub fn second_moments(&self) -> &[T; N] {
         &self.j
     }
-}
-
-fn finite<T: Scalar>(name: &'static str, index: usize, value: T) -> Result<(), Invalid> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(Invalid::NotFinite { name, index })
-    }
-}
-
-fn at_least<T: Scalar>(
-    name: &'static str,
-    index: usize,
-    value: T,
-    min: f64,
-) -> Result<(), Invalid> {
-    finite(name, index, value)?;
-    if value.every(|v| v >= min) {
-        return Ok(());
-    }
-    let found = core::cell::Cell::new(min);
-    value.every(|v| {
-        found.set(v);
-        v >= min
-    });
-    Err(Invalid::OutOfRange {
-        name,
-        index,
-        found: found.get(),
-        min,
-        max: f64::INFINITY,
-    })
-}
-
-fn at_least_zero<T: Scalar>(name: &'static str, index: usize, value: T) -> Result<(), Invalid> {
-    at_least(name, index, value, 0.0)
-}
-
-fn positive<T: Scalar>(name: &'static str, index: usize, value: T) -> Result<(), Invalid> {
-    at_least(name, index, value, f64::MIN_POSITIVE)
 }

@@ -98,4 +98,8 @@ impl<const L: usize> Scalar for Lanes<L> {
     fn tanh(self) -> Self {
         self.map(libm::tanh)
     }
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        self.zip(x, libm::atan2)
+    }
 }

@@ -18,6 +18,7 @@
 
 mod body;
 mod chain;
+mod check;
 mod contact;
 mod contribution;
 mod coriolis;
@@ -31,8 +32,10 @@ mod kinematics;
 mod lanes;
 pub mod models;
 mod regressor;
+mod robot;
 mod scalar;
 mod setup;
+mod trajectory;
 
 pub use body::Body;
 pub use chain::{Chain, Segment};
@@ -47,8 +50,10 @@ pub use inertia::{inertia, link_inertia};
 pub use kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};
 pub use lanes::Lanes;
 pub use regressor::{Regressor, regressor};
+pub use robot::{Elbow, Robot};
 pub use scalar::Scalar;
 pub use setup::{Reading, Setup};
+pub use trajectory::{Limits, Path, Profile, Sample, Shape};
 
 /// A value for each joint or link: angles, speeds, torques.
 pub type Joints<T, const N: usize> = nalgebra::SVector<T, N>;

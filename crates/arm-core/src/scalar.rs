@@ -39,6 +39,8 @@ pub trait Scalar:
     fn exp(self) -> Self;
     /// Hyperbolic tangent.
     fn tanh(self) -> Self;
+    /// Angle of the vector `[x, self]` from the first axis, in ±π \[rad\].
+    fn atan2(self, x: Self) -> Self;
 
     /// Absolute value.
     #[inline]
@@ -212,6 +214,10 @@ impl Scalar for f64 {
     fn tanh(self) -> Self {
         libm::tanh(self)
     }
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        libm::atan2(self, x)
+    }
 }
 
 impl Scalar for f32 {
@@ -253,5 +259,9 @@ impl Scalar for f32 {
     #[inline]
     fn tanh(self) -> Self {
         libm::tanhf(self)
+    }
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        libm::atan2f(self, x)
     }
 }

@@ -2,3 +2,5 @@
 
 mod common;
 mod identities;
+mod robot;
+mod trajectory;

@@ -1,0 +1,51 @@
+//! Checks of values handed to the core.
+
+use crate::{Invalid, Scalar};
+
+pub(crate) fn finite<T: Scalar>(name: &'static str, index: usize, value: T) -> Result<(), Invalid> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(Invalid::NotFinite { name, index })
+    }
+}
+
+fn at_least<T: Scalar>(
+    name: &'static str,
+    index: usize,
+    value: T,
+    min: f64,
+) -> Result<(), Invalid> {
+    finite(name, index, value)?;
+    if value.every(|v| v >= min) {
+        return Ok(());
+    }
+    let found = core::cell::Cell::new(min);
+    value.every(|v| {
+        found.set(v);
+        v >= min
+    });
+    Err(Invalid::OutOfRange {
+        name,
+        index,
+        found: found.get(),
+        min,
+        max: f64::INFINITY,
+    })
+}
+
+pub(crate) fn at_least_zero<T: Scalar>(
+    name: &'static str,
+    index: usize,
+    value: T,
+) -> Result<(), Invalid> {
+    at_least(name, index, value, 0.0)
+}
+
+pub(crate) fn positive<T: Scalar>(
+    name: &'static str,
+    index: usize,
+    value: T,
+) -> Result<(), Invalid> {
+    at_least(name, index, value, f64::MIN_POSITIVE)
+}
