@@ -1,5 +1,6 @@
 //! Random arms and states from written seeds.
 
+use arm_core::effect::{Effect, Kind, Motion};
 use arm_core::{Chain, Joints, Segment};
 
 /// SplitMix64 (Steele, Lea, Flood 2014): small, portable and good enough for test states.
@@ -35,5 +36,25 @@ impl Random {
         Chain::new(segments, base, gravity)
             .and_then(|c| c.with_rotor_inertia(core::array::from_fn(|_| self.uniform(0.0, 0.01))))
             .expect("random arms are within the allowed ranges")
+    }
+}
+
+impl Random {
+    /// Values for the parameters of a kind: within its bounds, of order one, away from both ends.
+    pub fn effect(&mut self, kind: Kind, index: usize) -> Effect<f64> {
+        let mut effect = Effect::new(kind, index);
+        for (value, p) in effect.parameters.iter_mut().zip(kind.info().parameters) {
+            let (low, high) = (p.min.max(-2.0), p.max.min(2.0));
+            *value = low + (high - low) * self.uniform(0.2, 0.8);
+        }
+        effect
+    }
+
+    /// A motion of an arm, with forces through its joints.
+    pub fn motion<const N: usize>(&mut self) -> Motion<f64, N> {
+        let mut motion = Motion::new(self.uniform(0.0, 2.0), self.joints(2.0), self.joints(2.0));
+        motion.qdd = self.joints(5.0);
+        motion.joint_force = core::array::from_fn(|_| self.uniform(0.0, 30.0));
+        motion
     }
 }

@@ -1,6 +1,8 @@
 //! Tests of arm-core: identities between two independent ways, limits, arithmetic in the head, refused inputs.
 
+mod catalogue;
 mod common;
+mod effects;
 mod identities;
 mod robot;
 mod trajectory;

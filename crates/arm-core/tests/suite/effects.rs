@@ -1,0 +1,415 @@
+//! Each effect by arithmetic in the head, and what each must mean physically.
+
+use arm_core::effect::{Effect, Kind, Local, Motion, resisting_torque};
+use arm_core::{
+    Chain, Contact, Joints, Load, Pose, Reading, Segment, Setup, forward_dynamics, gravity,
+    inverse_dynamics, models,
+};
+
+use crate::common::Random;
+
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-14
+}
+
+fn of(name: &str, values: &[f64]) -> Effect<f64> {
+    let kind = Kind::named(name).expect("a kind of the catalogue");
+    let effect = Effect::new(kind, 0).with(values);
+    if name != "biarticular" {
+        effect.validate(1).expect("values within bounds");
+    }
+    effect
+}
+
+/// A joint at rest at angle zero.
+const REST: Local<f64> = Local {
+    time: 0.0,
+    q: 0.0,
+    qd: 0.0,
+    qdd: 0.0,
+    proximal_q: 0.0,
+    joint_force: 0.0,
+    memory: 0.0,
+};
+const fn moving(qd: f64) -> Local<f64> {
+    Local { qd, ..REST }
+}
+const fn at(q: f64) -> Local<f64> {
+    Local { q, ..REST }
+}
+const fn when(time: f64) -> Local<f64> {
+    Local { time, ..REST }
+}
+
+#[test]
+fn torques_in_the_head() {
+    let half_life = core::f64::consts::LN_2;
+    let loaded = Local {
+        joint_force: 100.0,
+        ..moving(1.0)
+    };
+    let remembering = Local {
+        q: 1.0,
+        memory: 0.5,
+        ..moving(1.0)
+    };
+    let crossed = Local {
+        proximal_q: 2.0,
+        ..at(1.0)
+    };
+    for (name, values, local, expected) in [
+        ("viscous", &[2.0][..], moving(3.0), 6.0),
+        ("viscous", &[2.0], at(3.0), 0.0),
+        ("coulomb", &[0.5], moving(1.0), 0.5),
+        ("coulomb", &[0.5], moving(-1.0), -0.5),
+        ("coulomb", &[0.5], REST, 0.0),
+        ("stribeck", &[2.0, 1.0], moving(half_life), 1.0),
+        ("stribeck", &[2.0, 0.1], moving(-9.0), 0.0),
+        ("load_friction", &[0.01], loaded, 1.0),
+        ("load_friction", &[0.01], moving(1.0), 0.0),
+        ("quadratic_drag", &[0.5], moving(-2.0), -2.0),
+        ("elastic", &[2.0, 0.5], at(1.5), 2.0),
+        ("elastic", &[2.0, 0.5], at(-0.5), -2.0),
+        ("cubic_elastic", &[2.0, 1.0], at(3.0), 16.0),
+        (
+            "relaxation",
+            &[3.0, 4.0],
+            Local {
+                memory: 2.0,
+                ..REST
+            },
+            6.0,
+        ),
+        ("thixotropy", &[1.0, 2.0, 0.0, 0.5, 4.0], remembering, 1.5),
+        ("constant_moment", &[1.5], REST, 1.5),
+        ("end_range", &[3.0, 2.0, 50.0, 1.0, -1.0], at(1.0), 3.0),
+        ("end_range", &[3.0, 2.0, 50.0, 1.0, -1.0], at(-1.0), -2.0),
+        ("end_range", &[3.0, 2.0, 50.0, 1.0, -1.0], REST, 0.0),
+        ("biarticular", &[2.0, 0.5, 1.0], crossed, 2.0),
+        ("stretch_reflex", &[2.0, 0.5, 1.0], moving(1.5), 2.0),
+        ("stretch_reflex", &[2.0, 0.5, 1.0], moving(-1.5), 0.0),
+        ("stretch_reflex", &[2.0, 0.5, -1.0], moving(-1.5), -2.0),
+        ("stretch_reflex", &[2.0, 0.5, -1.0], moving(1.5), 0.0),
+        ("stretch_reflex", &[2.0, 0.5, 0.0], moving(1.5), 2.0),
+        ("stretch_reflex", &[2.0, 0.5, 0.0], moving(-1.5), -2.0),
+        ("stretch_reflex", &[2.0, 0.5, 0.0], moving(0.5), 0.0),
+        ("tremor", &[2.0, 1.0, 0.0], when(0.25), -2.0),
+        ("tremor", &[2.0, 1.0, 0.0], when(0.75), 2.0),
+        ("voluntary", &[4.0, 1.0, 2.0], when(2.0), -4.0),
+        ("voluntary", &[4.0, 1.0, 2.0], when(1.5), -4.0 * 27.0 / 64.0),
+        ("voluntary", &[4.0, 1.0, 2.0], when(0.5), 0.0),
+        ("voluntary", &[4.0, 1.0, 2.0], when(3.5), 0.0),
+        ("motor_inertia", &[4.0], Local { qdd: 2.0, ..REST }, 0.0),
+    ] {
+        let torque = of(name, values).torque(&local);
+        assert!(
+            close(torque, expected),
+            "{name} {values:?}: {torque} instead of {expected}"
+        );
+    }
+}
+
+#[test]
+fn memory_in_the_head() {
+    // 1 rad/s stretches, 2 rad of stretch fade over 4 s.
+    let stretched = Local {
+        memory: 2.0,
+        ..moving(1.0)
+    };
+    assert_eq!(of("relaxation", &[3.0, 4.0]).memory_rate(&stretched), 0.5);
+    // Half broken: 0.5·|−1|/0.5 breaks, 0.5/4 builds.
+    let half = Local {
+        memory: 0.5,
+        ..moving(-1.0)
+    };
+    let effect = of("thixotropy", &[1.0, 2.0, 0.0, 0.5, 4.0]);
+    assert_eq!(effect.memory_rate(&half), 0.875);
+}
+
+/// Torques over a motion, with the state advanced by small steps.
+fn torques(effect: &Effect<f64>, duration: f64, motion: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
+    let step = 1e-3;
+    let mut memory = 0.0;
+    (0..(duration / step) as u32)
+        .map(|i| {
+            let [q, qd] = motion(f64::from(i) * step);
+            let local = Local {
+                q,
+                qd,
+                memory,
+                ..REST
+            };
+            memory += step * effect.memory_rate(&local);
+            effect.torque(&local)
+        })
+        .collect()
+}
+
+#[test]
+fn relaxation_fades_at_rest() {
+    // Stretched by 1 rad in 0.1 s, then held for two time constants of 1 s.
+    let r = torques(&of("relaxation", &[2.0, 1.0]), 2.1, |t| {
+        if t < 0.1 {
+            [10.0 * t, 10.0]
+        } else {
+            [1.0, 0.0]
+        }
+    });
+    let peak = r[100];
+    assert!((1.8..2.0).contains(&peak), "{peak}");
+    let left = r[2099] / peak;
+    assert!((left - libm::exp(-2.0)).abs() < 2e-3, "{left}");
+}
+
+#[test]
+fn thixotropy_breaks_down_in_motion_and_recovers_at_rest() {
+    let effect = of("thixotropy", &[1.0, 0.0, 0.0, 0.1, 3.0]);
+    let r = torques(&effect, 12.0, |t| {
+        let speed = if (1.0..11.0).contains(&t) { 0.0 } else { 1.0 };
+        [0.0, speed]
+    });
+    assert!(close(r[0], 1.0), "whole after a long rest");
+    // Steady: (1−b)·1/0.1 = b/3, so 1−b = 1/31.
+    assert!((r[999] - 1.0 / 31.0).abs() < 1e-3, "{}", r[999]);
+    // 10 s of rest: the broken part fades by exp(−10/3).
+    let recovered = 1.0 - 30.0 / 31.0 * libm::exp(-10.0 / 3.0);
+    assert!(
+        (r[11_001] - recovered).abs() < 0.02,
+        "{} {recovered}",
+        r[11_001]
+    );
+}
+
+#[test]
+fn friction_takes_energy_at_every_speed() {
+    let mut random = Random(41);
+    for name in [
+        "viscous",
+        "coulomb",
+        "stribeck",
+        "load_friction",
+        "quadratic_drag",
+        "stretch_reflex",
+        "thixotropy",
+    ] {
+        let kind = Kind::named(name).expect("a kind");
+        for _ in 0..1000 {
+            let mut effect = random.effect(kind, 0);
+            if name == "thixotropy" {
+                effect.parameters[1] = 0.0;
+            }
+            let local = Local {
+                joint_force: 10.0,
+                ..moving(random.uniform(-3.0, 3.0))
+            };
+            assert!(effect.torque(&local) * local.qd >= 0.0, "{name}");
+        }
+    }
+}
+
+#[test]
+fn springs_return_their_energy() {
+    // Work over a closed loop in both angles is zero.
+    let step = 1e-3;
+    let tau = core::f64::consts::TAU;
+    for name in [
+        "elastic",
+        "cubic_elastic",
+        "end_range",
+        "constant_moment",
+        "biarticular",
+    ] {
+        let mut effect = Random(42).effect(Kind::named(name).expect("a kind"), 1);
+        if name == "end_range" {
+            effect = effect.with(&[1.0, 2.0, 2.0, 0.5, -0.5]);
+        }
+        let mut work = 0.0;
+        let mut largest = 0.0_f64;
+        for i in 0..1000 {
+            let t = step * f64::from(i);
+            let angle = |phase: f64| arm_core::Scalar::sin_cos(tau * t + phase);
+            let ((s1, c1), (s2, c2)) = (angle(0.0), angle(1.0));
+            let qd = Joints::<f64, 2>::new(tau * c1, tau * c2);
+            let motion = Motion::new(t, Joints::<f64, 2>::new(s1, s2), qd);
+            let r = resisting_torque(&[effect], &motion, &[]);
+            work += step * r.dot(&qd);
+            largest = largest.max(r.dot(&qd).abs());
+        }
+        assert!(work.abs() < 1e-10 * largest, "{name}: {work}");
+    }
+}
+
+#[test]
+fn a_positive_muscle_torque_lifts_the_arm() {
+    let arm = models::mechanical_arm();
+    let pose = Pose::new(&Joints::zeros());
+    for effect in [
+        of("voluntary", &[3.0, 0.0, 2.0]),
+        of("tremor", &[3.0, 0.25, 0.0]),
+    ] {
+        let motion = Motion::<f64, 2>::new(1.0, Joints::zeros(), Joints::zeros());
+        let r = resisting_torque(&[effect], &motion, &[]);
+        assert!(close(r[0], -3.0));
+        let load = Load {
+            torque: gravity(&arm, &pose) - r,
+            ..Load::none()
+        };
+        let qdd = forward_dynamics(&arm, &pose, &motion.qd, &load);
+        assert!(qdd[0] > 1.0, "{qdd}");
+    }
+}
+
+#[test]
+fn rotor_inertia_is_counted_once() {
+    let arm = models::mechanical_arm();
+    let effect = Effect {
+        index: 1,
+        ..of("motor_inertia", &[0.5])
+    };
+    let mut rig = Setup::new(&arm, Contact::new([1.0; 2], [1.0; 2]));
+    effect.alter(&mut rig);
+    let with = rig.chain().expect("a possible arm");
+    let (q, qd) = (
+        Joints::<f64, 2>::new(0.3, 0.4),
+        Joints::<f64, 2>::new(1.0, -1.0),
+    );
+    let mut motion = Motion::new(0.0, q, qd);
+    motion.qdd = Joints::<f64, 2>::new(7.0, 2.0);
+    let pose = Pose::new(&q);
+    let needed = |chain: &Chain<f64, 2>| inverse_dynamics(chain, &pose, &qd, &motion.qdd);
+    let gained = needed(&with) - needed(&arm) + resisting_torque(&[effect], &motion, &[]);
+    // 0.5 kg m² at 2 rad/s²: 1 N m in its joint, nothing in the other.
+    assert!(close(gained[0], 0.0) && close(gained[1], 1.0), "{gained}");
+}
+
+/// Three segments of 1 m and 1 kg with the mass at half length, and no inertia of their own.
+fn rig() -> Setup<f64, 3> {
+    let segment = Segment {
+        length: 1.0,
+        mass: 1.0,
+        com: [0.5, 0.0],
+        inertia: 0.0,
+    };
+    let chain = Chain::new([segment; 3], [0.0; 2], [0.0, -10.0]).expect("valid");
+    Setup::new(&chain, Contact::new([10_000.0, 20_000.0], [25.0, 50.0]))
+}
+
+fn altered(name: &str, index: usize, values: &[f64]) -> Setup<f64, 3> {
+    let mut rig = rig();
+    Effect {
+        index,
+        ..of(name, values)
+    }
+    .alter(&mut rig);
+    rig
+}
+
+#[test]
+fn segments_in_the_head() {
+    let base = rig().chain().expect("valid");
+    // 1 kg in the hand adds a_j to every X and a_j² to every J.
+    let loaded = altered("added_mass", 0, &[1.0]).chain().expect("valid");
+    for j in 0..3 {
+        assert!(close(
+            loaded.first_moments()[j],
+            base.first_moments()[j] + 1.0
+        ));
+        assert!(close(
+            loaded.second_moments()[j],
+            base.second_moments()[j] + 1.0
+        ));
+    }
+    // The hand carries 2 kg now, at 0.75 m.
+    assert_eq!(loaded.segments()[2].mass, 2.0);
+    assert_eq!(loaded.segments()[2].com, [0.75, 0.0]);
+
+    let moved = altered("gravity_moment", 1, &[0.25])
+        .chain()
+        .expect("valid");
+    assert_eq!(moved.segments()[1].com, [0.75, 0.0]);
+    assert_eq!(
+        (moved.segments()[1].mass, moved.segments()[1].inertia),
+        (1.0, 0.0)
+    );
+    assert!(close(
+        moved.first_moments()[1] - base.first_moments()[1],
+        0.25
+    ));
+    assert_eq!(moved.first_moments()[0], base.first_moments()[0]);
+
+    let heavier = altered("inertia", 1, &[0.5]).chain().expect("valid");
+    assert_eq!(heavier.second_moments()[1] - base.second_moments()[1], 0.5);
+    let longer = altered("segment_length", 1, &[0.25]);
+    assert_eq!(
+        (longer.segments[1].length, longer.segments[1].com),
+        (1.25, [0.5, 0.0])
+    );
+}
+
+#[test]
+fn frame_in_the_head() {
+    // A turn of π/6 shows half the weight forward.
+    let tilted = altered("gravity_tilt", 0, &[core::f64::consts::FRAC_PI_6 * 0.5]);
+    let [y, z] = tilted.gravity;
+    assert!(y > 0.0 && z < 0.0);
+    assert!(close(y * y + z * z - 100.0, 0.0) || (y * y + z * z - 100.0).abs() < 1e-12);
+    assert!(close(2.0 * y * -z / 100.0, 0.5), "sine of twice the angle");
+    let moving = altered("shoulder_motion", 0, &[0.01, -0.02, 0.5]);
+    assert_eq!((moving.base_motion, moving.base_rest), ([0.01, -0.02], 0.5));
+}
+
+#[test]
+fn contact_in_the_head() {
+    // In series with its own compliance of 1e-4 m/N: half as stiff. The second axis: a third.
+    let softer = altered("contact_compliance", 0, &[1e-4, 1e-4]).contact;
+    assert!((softer.stiffness[0] - 5_000.0).abs() < 1e-9);
+    assert!((softer.stiffness[1] - 20_000.0 / 3.0).abs() < 1e-9);
+    // However negative: a hundred times as stiff at most.
+    let stiffer = altered("contact_compliance", 0, &[-1e-3, 0.0]).contact;
+    assert_eq!(stiffer.stiffness, [1e6, 20_000.0]);
+    assert_eq!(
+        altered("contact_damping", 0, &[5.0, -60.0]).contact.damping,
+        [30.0, 0.0]
+    );
+    let loose = altered("backlash", 0, &[0.001, 0.002]).contact;
+    assert_eq!(loose.play, [0.001, 0.002]);
+    assert_eq!(loose.force_on_arm([0.0005, 0.003], [0.0; 2])[0], 0.0);
+    assert!((loose.force_on_arm([0.0005, 0.003], [0.0; 2])[1] - 20.0).abs() < 1e-12);
+    let rippled = altered("robot_ripple", 0, &[0.001, 0.002, 3.0, 0.5]);
+    assert_eq!(rippled.ripple, [0.001, 0.002]);
+    assert_eq!((rippled.ripple_frequency, rippled.ripple_phase), (3.0, 0.5));
+    assert_eq!(altered("time_delay", 0, &[0.05]).force_delay, 0.05);
+}
+
+#[test]
+fn sensors_in_the_head() {
+    let before = Reading {
+        time: 2.0,
+        q: Joints::<f64, 2>::new(0.1, 0.2),
+        force_on_arm: [3.0, 4.0],
+        moment_on_arm: 1.0,
+    };
+    let read = |name: &str, index, values: &[f64]| {
+        let mut reading = before;
+        Effect {
+            index,
+            ..of(name, values)
+        }
+        .distort(&mut reading);
+        reading
+    };
+    assert_eq!(read("force_bias", 0, &[0.5]).force_on_arm, [3.5, 4.0]);
+    assert_eq!(read("force_bias", 1, &[0.5]).force_on_arm, [3.0, 4.5]);
+    assert_eq!(read("force_bias", 2, &[0.5]).moment_on_arm, 1.5);
+    assert_eq!(read("force_drift", 1, &[0.5]).force_on_arm, [3.0, 5.0]);
+    assert_eq!(read("force_gain", 0, &[0.5]).force_on_arm, [4.5, 4.0]);
+    assert_eq!(
+        read("angle_offset", 1, &[0.5]).q,
+        Joints::<f64, 2>::new(0.1, 0.7)
+    );
+    let [y, z] = read("force_misalignment", 0, &[core::f64::consts::FRAC_PI_2]).force_on_arm;
+    assert!(
+        close(y, -4.0) && close(z, 3.0),
+        "a quarter turn: y → z → −y"
+    );
+}
