@@ -1,1 +1,36 @@
-//! Stub, replaced below.
+//! The closed-chain experiment of thesis section 3.6: a robot leads the hand of a planar arm, or motors move its joints.
+//!
+//! An [`Experiment`] says what is simulated; [`simulate`] gives a [`Recording`] with every kinematic and dynamic quantity.
+//! The step is fixed, transcendental functions come from the core, and nothing depends on threads or lanes: the same
+//! experiment has the same [`digest`] everywhere.
+//!
+//! Conventions are those of [`arm_core`]: y forward, z up, counter-clockwise positive, SI units and radians, forces named
+//! by what they act on, `R` the torque with which a joint resists.
+
+mod digest;
+mod error;
+mod experiment;
+mod model;
+mod movement;
+mod native;
+mod path;
+mod prepare;
+mod record;
+mod recorder;
+mod series;
+mod stability;
+mod start;
+mod step;
+mod terms;
+
+pub use digest::digest;
+pub use error::SimulationError;
+pub use experiment::{
+    Coupling, Drive, Engine, Experiment, Integrator, Partial, Start, simulate, simulate_partial,
+    simulate_with,
+};
+pub use movement::{JointMotion, Movement};
+pub use path::{Handle, HandlePath};
+pub use record::{EnergyColumns, Recording, TorqueColumns, WorkColumns};
+pub use series::{Interpolation, Jet, Series};
+pub use stability::Vibration;

@@ -1,0 +1,115 @@
+//! What can be wrong with an experiment, and how a run can fail.
+
+use arm_core::Invalid;
+
+/// Why a simulation was refused or stopped.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// A value of the rig or of an effect that was refused.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    /// A setting outside what is allowed.
+    #[error("{name} is {found}, allowed is {allowed}")]
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// The value found, SI units.
+        found: f64,
+        /// The values allowed, in words.
+        allowed: &'static str,
+    },
+    /// A table of samples that cannot be a function of time.
+    #[error("{name}, sample {sample}: {problem}")]
+    Samples {
+        /// What the table holds.
+        name: &'static str,
+        /// One-based sample.
+        sample: usize,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// A drive that is not known for the whole run.
+    #[error("{name} is known from {from} s to {to} s, the run needs 0 s to {needed} s")]
+    TooShort {
+        /// What ends too early.
+        name: &'static str,
+        /// First time known \[s\].
+        from: f64,
+        /// Last time known \[s\].
+        to: f64,
+        /// Last time needed \[s\].
+        needed: f64,
+    },
+    /// A rigidly held tip takes two freedoms; an arm of one joint has only one.
+    #[error(
+        "a rigid coupling holds the tip in y and z and needs at least 2 joints, the arm has {joints}"
+    )]
+    RigidCoupling {
+        /// Joints of the arm.
+        joints: usize,
+    },
+    /// A handle position that the robot cannot reach.
+    #[error(
+        "at {time} s the handle is {distance} m from the robot's base, its reach is {min} m to {max} m"
+    )]
+    Unreachable {
+        /// First time out of reach \[s\].
+        time: f64,
+        /// Distance of the handle from the robot's base \[m\].
+        distance: f64,
+        /// Shortest reach \[m\].
+        min: f64,
+        /// Longest reach \[m\].
+        max: f64,
+    },
+    /// No static equilibrium was found from the angles given.
+    #[error(
+        "no static equilibrium near the given angles: {residual} N m are left after {iterations} iterations"
+    )]
+    NoEquilibrium {
+        /// Largest torque left \[N m\], or gap left \[m\].
+        residual: f64,
+        /// Newton iterations made.
+        iterations: usize,
+    },
+    /// The tip cannot be brought to the handle.
+    #[error("the tip of the arm is {gap} m from the handle that holds it rigidly")]
+    Gap {
+        /// Distance left \[m\].
+        gap: f64,
+    },
+    /// A contact too stiff for the step.
+    #[error(
+        "the contact vibrates at {frequency} rad/s with damping rate {damping} 1/s; \
+         this integrator is stable for steps up to {largest} s, the step is {dt} s"
+    )]
+    TooStiff {
+        /// Largest eigenfrequency \[rad/s\].
+        frequency: f64,
+        /// Largest damping rate \[1/s\].
+        damping: f64,
+        /// Largest stable step \[s\].
+        largest: f64,
+        /// The step asked for \[s\].
+        dt: f64,
+    },
+    /// The state ceased to be finite.
+    #[error("the state is not finite after step {step} at {time} s, first in joint {}", joint + 1)]
+    Diverged {
+        /// Steps made.
+        step: usize,
+        /// Time \[s\].
+        time: f64,
+        /// Zero-based joint.
+        joint: usize,
+    },
+    /// Something that an engine cannot do.
+    #[error("the {engine} engine cannot simulate {what}")]
+    Unsupported {
+        /// Name of the engine.
+        engine: &'static str,
+        /// What was asked of it.
+        what: &'static str,
+    },
+}

@@ -1,0 +1,289 @@
+//! The closed chain at one instant: from state and drive to accelerations, forces and powers.
+
+use arm_core::effect::{Effect, Local, Motion};
+use arm_core::{
+    Chain, Contact, Invalid, Joints, Load, Plane, Pose, Scalar, Setup, forward_dynamics,
+    joint_force, tip, tip_velocity,
+};
+
+use crate::Handle;
+use crate::terms::{MovingBase, Terms};
+
+/// How the tip is held.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Link<T> {
+    Free,
+    Compliant(Contact<T>),
+    Rigid,
+}
+
+/// Everything of a rig that the dynamics need; constant during a run.
+#[derive(Clone, Debug)]
+pub(crate) struct Model<T, const N: usize> {
+    pub chain: Chain<T, N>,
+    pub base: Option<MovingBase<T, N>>,
+    pub link: Link<T>,
+    /// The joint effects that are switched on.
+    pub effects: Vec<Effect<T>>,
+    /// Whether an effect depends on the force through its joint.
+    feels_joint_force: bool,
+    /// Whether an effect has a state of its own.
+    pub has_memory: bool,
+}
+
+/// What drives the arm at one instant.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Input<T, const N: usize> {
+    pub time: T,
+    pub handle: Handle<T>,
+    /// Torques of motors \[N m\].
+    pub torque: Joints<T, N>,
+}
+
+/// Angles, speeds and the work done so far.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State<T, const N: usize> {
+    pub q: Joints<T, N>,
+    pub qd: Joints<T, N>,
+    /// By handle and drive, against resistance and damping \[J\].
+    pub work: [T; 4],
+}
+
+/// What follows from state and input.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outcome<T, const N: usize> {
+    pub qdd: Joints<T, N>,
+    pub force_on_arm: Plane<T>,
+    /// Time derivative of [`State::work`] \[W\].
+    pub power: [T; 4],
+    /// Force through each joint where an effect needs it, else zero \[N\].
+    pub joint_force: [T; N],
+}
+
+impl<T: Scalar, const N: usize> Model<T, N> {
+    /// * `setup` - the rig, effects applied
+    /// * `effects` - joint effects only
+    pub fn new(
+        setup: &Setup<T, N>,
+        link: Link<T>,
+        effects: Vec<Effect<T>>,
+    ) -> Result<Self, Invalid> {
+        Ok(Self {
+            chain: setup.chain()?,
+            base: MovingBase::of(setup)?,
+            link,
+            feels_joint_force: effects.iter().any(feels_joint_force),
+            has_memory: effects.iter().any(|e| e.kind.info().memory),
+            effects,
+        })
+    }
+
+    /// Position of the tip \[m\].
+    #[inline]
+    pub fn tip(&self, q: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
+        let mut point = tip(&self.chain, pose);
+        if let Some(base) = &self.base {
+            let shift = base.displacement(q);
+            point = [point[0] + shift[0], point[1] + shift[1]];
+        }
+        point
+    }
+
+    #[inline]
+    fn tip_velocity(&self, qd: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
+        let mut velocity = tip_velocity(&self.chain, pose, qd);
+        if let Some(base) = &self.base {
+            let v = base.velocity(qd);
+            velocity = [velocity[0] + v[0], velocity[1] + v[1]];
+        }
+        velocity
+    }
+
+    /// Sum of what all effects resist with \[N m\].
+    #[inline]
+    pub fn resisting(&self, motion: &Motion<T, N>, memory: &[T]) -> Joints<T, N> {
+        let mut total = Joints::<T, N>::repeat(T::ZERO);
+        for (effect, &memory) in self.effects.iter().zip(memory) {
+            let torque = effect.torque(&motion.local(effect.index, memory));
+            total[effect.index] += torque;
+            if effect.index > 0 {
+                total[effect.index - 1] += effect.proximal_share() * torque;
+            }
+        }
+        total
+    }
+
+    /// Time derivatives of the effects' own states.
+    pub fn memory_rates(&self, motion: &Motion<T, N>, memory: &[T], rates: &mut [T]) {
+        for ((effect, &memory), rate) in self.effects.iter().zip(memory).zip(rates) {
+            *rate = effect.memory_rate(&motion.local(effect.index, memory));
+        }
+    }
+
+    /// Accelerations, contact force and powers at a state.
+    ///
+    /// Friction that depends on the force through its joint is evaluated at the joint forces of the motion without it:
+    /// one pass of a fixed-point iteration, whose error is of the second order in that friction.
+    #[inline]
+    pub fn evaluate(
+        &self,
+        input: &Input<T, N>,
+        q: &Joints<T, N>,
+        qd: &Joints<T, N>,
+        memory: &[T],
+    ) -> Outcome<T, N> {
+        let pose = Pose::new(q);
+        let mut motion = Motion::new(input.time, *q, *qd);
+        let mut resisting = self.resisting(&motion, memory);
+        let contact = self.contact(input, q, qd, &pose);
+        let terms = if self.base.is_some() || matches!(self.link, Link::Rigid) {
+            Some(Terms::new(&self.chain, self.base.as_ref(), &pose, qd))
+        } else {
+            None
+        };
+        let solve = |resisting: &Joints<T, N>| {
+            let torque = difference(&input.torque, resisting);
+            self.accelerations(input, (qd, &pose), (torque, contact.0), terms.as_ref())
+        };
+        let (mut qdd, mut force) = solve(&resisting);
+        if self.feels_joint_force {
+            let mut through = joint_force(&self.chain, &pose, (qd, &qdd), force);
+            if let Some(base) = &self.base {
+                base.add_joint_force(&self.chain, &qdd, &mut through);
+            }
+            motion = motion.with_joint_force(&through);
+            resisting = self.resisting(&motion, memory);
+            (qdd, force) = solve(&resisting);
+        }
+        let v = input.handle.velocity;
+        let (mut drive, mut resisted) = (T::ZERO, T::ZERO);
+        for i in 0..N {
+            drive += input.torque[i] * qd[i];
+            resisted += resisting[i] * qd[i];
+        }
+        Outcome {
+            qdd,
+            force_on_arm: force,
+            power: [
+                force[0] * v[0] + force[1] * v[1],
+                drive,
+                resisted,
+                contact.1,
+            ],
+            joint_force: motion.joint_force,
+        }
+    }
+
+    /// Force of a compliant contact on the arm, and the power lost in its damping.
+    #[inline]
+    fn contact(
+        &self,
+        input: &Input<T, N>,
+        q: &Joints<T, N>,
+        qd: &Joints<T, N>,
+        pose: &Pose<T, N>,
+    ) -> (Plane<T>, T) {
+        let Link::Compliant(contact) = &self.link else {
+            return ([T::ZERO; 2], T::ZERO);
+        };
+        let (at, v) = (self.tip(q, pose), self.tip_velocity(qd, pose));
+        let handle = &input.handle;
+        let gap = [handle.position[0] - at[0], handle.position[1] - at[1]];
+        let rate = [handle.velocity[0] - v[0], handle.velocity[1] - v[1]];
+        let force = contact.force_on_arm(gap, rate);
+        let spring = contact.force_on_arm(gap, [T::ZERO; 2]);
+        let lost = (force[0] - spring[0]) * rate[0] + (force[1] - spring[1]) * rate[1];
+        (force, lost)
+    }
+
+    /// Accelerations and the force on the arm, which for a rigid coupling follows from the constraint.
+    #[inline]
+    fn accelerations(
+        &self,
+        input: &Input<T, N>,
+        (qd, pose): (&Joints<T, N>, &Pose<T, N>),
+        (torque, force): (Joints<T, N>, Plane<T>),
+        terms: Option<&Terms<T, N>>,
+    ) -> (Joints<T, N>, Plane<T>) {
+        let Some(terms) = terms else {
+            let load = Load {
+                torque,
+                force_on_arm: force,
+                moment_on_arm: T::ZERO,
+            };
+            return (forward_dynamics(&self.chain, pose, qd, &load), force);
+        };
+        let net = sum(&difference(&torque, &terms.bias), &terms.tip_torque(force));
+        let free = terms.accelerate(&net);
+        if !matches!(self.link, Link::Rigid) {
+            return (free, force);
+        }
+        let (a, rate, wanted) = (
+            terms.tip_rate(&free),
+            terms.jacobian_rate,
+            input.handle.acceleration,
+        );
+        let constraint = terms.constraint();
+        let force = constraint.force([wanted[0] - rate[0] - a[0], wanted[1] - rate[1] - a[1]]);
+        (sum(&free, &constraint.response(force)), force)
+    }
+
+    /// Brings a rigidly held tip back to position and velocity of the handle, with the least energy of motion.
+    ///
+    /// The position by `iterations` Newton steps, so that lanes and single runs take the same ones; the velocity exactly.
+    pub fn project(&self, input: &Input<T, N>, state: &mut State<T, N>, iterations: usize) {
+        for _ in 0..iterations {
+            let (pose, terms) = self.terms(state);
+            let at = self.tip(&state.q, &pose);
+            let wanted = input.handle.position;
+            let constraint = terms.constraint();
+            let force = constraint.force([wanted[0] - at[0], wanted[1] - at[1]]);
+            state.q = sum(&state.q, &constraint.response(force));
+        }
+        let (_, terms) = self.terms(state);
+        let (v, wanted) = (terms.tip_rate(&state.qd), input.handle.velocity);
+        let constraint = terms.constraint();
+        let force = constraint.force([wanted[0] - v[0], wanted[1] - v[1]]);
+        state.qd = sum(&state.qd, &constraint.response(force));
+    }
+
+    fn terms(&self, state: &State<T, N>) -> (Pose<T, N>, Terms<T, N>) {
+        let pose = Pose::new(&state.q);
+        let terms = Terms::new(&self.chain, self.base.as_ref(), &pose, &state.qd);
+        (pose, terms)
+    }
+}
+
+/// Tries whether the force through the joint changes an effect's torque; no kind is named here.
+fn feels_joint_force<T: Scalar>(effect: &Effect<T>) -> bool {
+    let mut at = Local {
+        time: T::ZERO,
+        q: T::of(0.1),
+        qd: T::ONE,
+        qdd: T::ZERO,
+        proximal_q: T::ZERO,
+        joint_force: T::ZERO,
+        memory: T::ZERO,
+    };
+    let without = effect.torque(&at);
+    at.joint_force = T::ONE;
+    !(effect.torque(&at) - without).every(|d| d == 0.0)
+}
+
+#[inline]
+pub(crate) fn sum<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>) -> Joints<T, N> {
+    let mut c = *a;
+    for i in 0..N {
+        c[i] += b[i];
+    }
+    c
+}
+
+#[inline]
+fn difference<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>) -> Joints<T, N> {
+    let mut c = *a;
+    for i in 0..N {
+        c[i] -= b[i];
+    }
+    c
+}

@@ -1,0 +1,66 @@
+//! The native engine: minimal coordinates, one run at a time.
+
+use crate::model::State;
+use crate::prepare::Prepared;
+use crate::recorder::Recorder;
+use crate::step::{Inputs, Memory, step};
+use crate::{Experiment, Integrator, Partial, SimulationError};
+
+/// Runs an experiment; the loop does not allocate.
+pub(crate) fn run<const N: usize>(
+    experiment: &Experiment<N>,
+) -> Result<Partial<N>, SimulationError> {
+    let prepared = Prepared::new(experiment)?;
+    let schedule = prepared.schedule;
+    let mut recorder = Recorder::new(&prepared);
+    let mut memory = Memory::new(prepared.model.effects.len());
+    let mut state = State {
+        q: prepared.start.0,
+        qd: prepared.start.1,
+        work: [0.0; 4],
+    };
+    recorder.push(0, &state, &memory.state);
+    let now = prepared.input(0.0);
+    let mut inputs = Inputs {
+        start: now,
+        middle: now,
+        end: now,
+    };
+    let mut stopped = None;
+    for done in 1..=schedule.steps {
+        inputs.start = inputs.end;
+        if prepared.integrator() == Integrator::Rk4 {
+            inputs.middle = prepared.input((done as f64 - 0.5) * schedule.dt);
+        }
+        inputs.end = prepared.input(schedule.time(done));
+        let at = (&mut state, &mut memory);
+        step(
+            &prepared.model,
+            prepared.integrator(),
+            schedule.dt,
+            &inputs,
+            at,
+        );
+        if let Some(joint) = diverged(&state) {
+            stopped = Some(SimulationError::Diverged {
+                step: done,
+                time: schedule.time(done),
+                joint,
+            });
+            break;
+        }
+        if done % schedule.every == 0 {
+            recorder.push(done, &state, &memory.state);
+        }
+    }
+    Ok(Partial {
+        recording: recorder.finish(),
+        stopped,
+    })
+}
+
+/// The first joint whose angle or speed is not finite.
+#[inline]
+pub(crate) fn diverged<const N: usize>(state: &State<f64, N>) -> Option<usize> {
+    (0..N).find(|&i| !(state.q[i].is_finite() && state.qd[i].is_finite()))
+}

@@ -1,0 +1,183 @@
+//! Where the robot's handle is at any time.
+
+use arm_core::{Chain, Joints, Plane, Pose, Robot, jacobian, jacobian_rate, tip};
+
+use crate::{Interpolation, Jet, JointMotion, Movement, Series, SimulationError};
+
+/// Motion of the handle at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Handle<T> {
+    /// Position, y and z \[m\].
+    pub position: Plane<T>,
+    /// Velocity \[m/s\].
+    pub velocity: Plane<T>,
+    /// Acceleration \[m/s²\].
+    pub acceleration: Plane<T>,
+}
+
+/// The commanded path of the robot's handle as a function of time.
+///
+/// The ripple of the rig ([`Setup::ripple`](arm_core::Setup)) comes on top of it when the experiment runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandlePath<const N: usize> {
+    source: Source<N>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Source<const N: usize> {
+    Fixed(Plane<f64>),
+    Points(Series<2>),
+    Arm(Chain<f64, N>, Movement<N>),
+    Robot(Robot<f64>, Series<2>),
+}
+
+impl<const N: usize> HandlePath<N> {
+    /// A handle that stays at a point \[m\].
+    ///
+    /// # Errors
+    /// [`SimulationError::Setting`] for a coordinate that is not finite.
+    pub fn fixed(point: Plane<f64>) -> Result<Self, SimulationError> {
+        for found in point {
+            if !found.is_finite() {
+                return Err(SimulationError::Setting {
+                    name: "handle position",
+                    found,
+                    allowed: "a finite number of metres",
+                });
+            }
+        }
+        Ok(Self {
+            source: Source::Fixed(point),
+        })
+    }
+
+    /// A path through sampled handle positions \[s, m\], joined by a cubic spline.
+    ///
+    /// # Errors
+    /// As [`Series::new`].
+    pub fn through_points(times: &[f64], points: &[Plane<f64>]) -> Result<Self, SimulationError> {
+        let series = Series::new("handle positions", times, points, Interpolation::Cubic)?;
+        Ok(Self {
+            source: Source::Points(series),
+        })
+    }
+
+    /// The path on which the tip of the nominal arm goes in a desired movement: `T_A(q_d)` of thesis figure 3.13.
+    ///
+    /// * `nominal` - the arm for which the robot was programmed; the arm that is simulated may differ
+    pub fn of_arm(nominal: Chain<f64, N>, movement: Movement<N>) -> Self {
+        Self {
+            source: Source::Arm(nominal, movement),
+        }
+    }
+
+    /// The path of a robot's handle at sampled joint angles \[s, rad\], which are joined by a cubic spline.
+    ///
+    /// # Errors
+    /// As [`Series::new`].
+    pub fn of_robot(
+        robot: Robot<f64>,
+        times: &[f64],
+        angles: &[[f64; 2]],
+    ) -> Result<Self, SimulationError> {
+        let series = Series::new("robot angles", times, angles, Interpolation::Cubic)?;
+        Ok(Self {
+            source: Source::Robot(robot, series),
+        })
+    }
+
+    /// First and last time for which the path is known \[s\].
+    pub fn span(&self) -> (f64, f64) {
+        match &self.source {
+            Source::Fixed(_) | Source::Arm(..) => (f64::NEG_INFINITY, f64::INFINITY),
+            Source::Points(series) | Source::Robot(_, series) => (series.start(), series.end()),
+        }
+    }
+
+    /// The commanded motion of the handle at a time \[s\].
+    #[inline]
+    pub fn at(&self, time: f64) -> Handle<f64> {
+        match &self.source {
+            Source::Fixed(position) => Handle {
+                position: *position,
+                velocity: [0.0; 2],
+                acceleration: [0.0; 2],
+            },
+            Source::Points(series) => {
+                let jet = series.at(time);
+                Handle {
+                    position: jet.value,
+                    velocity: jet.rate,
+                    acceleration: jet.curvature,
+                }
+            }
+            Source::Arm(arm, movement) => tip_motion(arm, &movement.at(time)),
+            Source::Robot(robot, series) => {
+                let JointMotion { q, qd, qdd } = joints(series.at(time));
+                Handle {
+                    position: robot.handle(&q),
+                    velocity: robot.handle_velocity(&q, &qd),
+                    acceleration: robot.handle_acceleration(&q, &qd, &qdd),
+                }
+            }
+        }
+    }
+
+    /// Joint motion of the robot at a time: what it was given, or by inverse kinematics of `robot`.
+    ///
+    /// # Errors
+    /// [`SimulationError::Unreachable`] with time and distance.
+    pub fn robot_motion(
+        &self,
+        robot: &Robot<f64>,
+        time: f64,
+    ) -> Result<JointMotion<2>, SimulationError> {
+        if let Source::Robot(own, series) = &self.source
+            && own == robot
+        {
+            return Ok(joints(series.at(time)));
+        }
+        let handle = self.at(time);
+        let q = robot.angles(handle.position).map_err(|e| match e {
+            arm_core::Invalid::OutOfReach { distance, min, max } => SimulationError::Unreachable {
+                time,
+                distance,
+                min,
+                max,
+            },
+            other => other.into(),
+        })?;
+        let qd = robot.speeds(&q, handle.velocity);
+        let qdd = robot.accelerations(&q, &qd, handle.acceleration);
+        Ok(JointMotion { q, qd, qdd })
+    }
+}
+
+fn joints(jet: Jet<2>) -> JointMotion<2> {
+    JointMotion {
+        q: jet.value.into(),
+        qd: jet.rate.into(),
+        qdd: jet.curvature.into(),
+    }
+}
+
+/// Position, velocity and acceleration of an arm's tip.
+#[inline]
+fn tip_motion<const N: usize>(arm: &Chain<f64, N>, motion: &JointMotion<N>) -> Handle<f64> {
+    let pose = Pose::new(&motion.q);
+    let (j, rate) = (jacobian(arm, &pose), jacobian_rate(arm, &pose, &motion.qd));
+    let along = |m: &nalgebra::SMatrix<f64, 2, N>, v: &Joints<f64, N>| {
+        let mut sum = [0.0; 2];
+        for k in 0..N {
+            sum[0] += m[(0, k)] * v[k];
+            sum[1] += m[(1, k)] * v[k];
+        }
+        sum
+    };
+    let (turning, inward) = (along(&j, &motion.qdd), along(&rate, &motion.qd));
+    Handle {
+        position: tip(arm, &pose),
+        velocity: along(&j, &motion.qd),
+        acceleration: [turning[0] + inward[0], turning[1] + inward[1]],
+    }
+}

@@ -1,0 +1,274 @@
+//! From an experiment to what a run needs: checks, effects applied, schedule, robot angles.
+
+use arm_core::effect::{Effect, Place};
+use arm_core::{Joints, Scalar, Setup};
+
+use crate::model::{Input, Link, Model};
+use crate::{
+    Coupling, Drive, Experiment, Handle, Integrator, JointMotion, SimulationError, Start,
+    stability, start,
+};
+
+/// When steps are made and samples taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Schedule {
+    /// Step \[s\].
+    pub dt: f64,
+    /// Number of steps.
+    pub steps: usize,
+    /// Steps from one sample to the next.
+    pub every: usize,
+}
+
+impl Schedule {
+    /// Samples of a complete run, the start included.
+    pub fn samples(&self) -> usize {
+        self.steps / self.every + 1
+    }
+
+    /// Time after a number of steps \[s\]; a product, so that it does not drift.
+    #[inline]
+    pub fn time(&self, steps: usize) -> f64 {
+        steps as f64 * self.dt
+    }
+
+    fn of<const N: usize>(experiment: &Experiment<N>) -> Result<Self, SimulationError> {
+        let dt = experiment.dt;
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(SimulationError::Setting {
+                name: "step",
+                found: dt,
+                allowed: "a positive number of seconds",
+            });
+        }
+        let whole = |name, found: f64, allowed| {
+            let steps = found / dt;
+            let rounded = (steps + 0.5).floor();
+            // The quotient of two decimal numbers is whole up to their rounding.
+            let is_whole = (steps - rounded).abs() <= 1e-9 * rounded;
+            if is_whole && (1.0..1e12).contains(&rounded) {
+                Ok(rounded as usize)
+            } else {
+                Err(SimulationError::Setting {
+                    name,
+                    found,
+                    allowed,
+                })
+            }
+        };
+        let allowed = "a whole number of steps";
+        let steps = whole("duration", experiment.duration, allowed)?;
+        let every = match experiment.output_interval {
+            Some(interval) => whole("output interval", interval, allowed)?,
+            None => 1,
+        };
+        if every > steps {
+            return Err(SimulationError::Setting {
+                name: "output interval",
+                found: experiment.output_interval.unwrap_or(dt),
+                allowed: "up to the duration",
+            });
+        }
+        Ok(Self { dt, steps, every })
+    }
+}
+
+/// An experiment that passed all checks.
+#[derive(Clone, Debug)]
+pub(crate) struct Prepared<'a, const N: usize> {
+    pub experiment: &'a Experiment<N>,
+    /// The rig with all effects applied.
+    pub setup: Setup<f64, N>,
+    pub model: Model<f64, N>,
+    pub schedule: Schedule,
+    /// Angles and speeds at the start.
+    pub start: (Joints<f64, N>, Joints<f64, N>),
+    /// Commanded robot motion at each sample; empty without a robot.
+    pub robot: Vec<JointMotion<2>>,
+}
+
+impl<'a, const N: usize> Prepared<'a, N> {
+    pub fn new(experiment: &'a Experiment<N>) -> Result<Self, SimulationError> {
+        let schedule = Schedule::of(experiment)?;
+        let mut setup = experiment.setup;
+        for effect in &experiment.effects {
+            effect.validate(N)?;
+            effect.alter(&mut setup);
+        }
+        check(&setup)?;
+        let in_joints = |e: &&Effect<f64>| e.on && e.kind.info().place == Place::Joint;
+        let effects = experiment.effects.iter().filter(in_joints).copied();
+        let model = Model::new(&setup, link(experiment, &setup)?, effects.collect())?;
+        known(experiment, &schedule)?;
+        let robot = robot_motion(experiment, &schedule)?;
+        let mut prepared = Self {
+            experiment,
+            setup,
+            model,
+            schedule,
+            start: (Joints::zeros(), Joints::zeros()),
+            robot,
+        };
+        prepared.start = match &experiment.start {
+            Start::Given { q, qd } => start::given(&prepared, q, qd)?,
+            Start::Equilibrium { near } => (start::equilibrium(&prepared, near)?, Joints::zeros()),
+        };
+        stability::check(&prepared)?;
+        Ok(prepared)
+    }
+
+    /// Handle, ripple included, and torques at a time \[s\].
+    #[inline]
+    pub fn input(&self, time: f64) -> Input<f64, N> {
+        with_ripple(command(&self.experiment.drive, time), &self.setup)
+    }
+
+    pub fn integrator(&self) -> Integrator {
+        self.experiment.integrator
+    }
+
+    pub fn has_handle(&self) -> bool {
+        !matches!(self.model.link, Link::Free)
+    }
+}
+
+/// What the drive commands at a time, without ripple.
+#[inline]
+pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64, N> {
+    let still = Handle {
+        position: [0.0; 2],
+        velocity: [0.0; 2],
+        acceleration: [0.0; 2],
+    };
+    let (handle, torque) = match drive {
+        Drive::Handle { path, .. } => (path.at(time), Joints::zeros()),
+        Drive::Torque(Some(series)) => (still, Joints::from(series.at(time).value)),
+        Drive::Torque(None) => (still, Joints::zeros()),
+    };
+    Input {
+        time,
+        handle,
+        torque,
+    }
+}
+
+/// The periodic error of the robot's position on top of the commanded handle: `amplitude · sin(2π f t + phase)`.
+#[inline]
+pub(crate) fn with_ripple<T: Scalar, const N: usize>(
+    mut input: Input<T, N>,
+    setup: &Setup<T, N>,
+) -> Input<T, N> {
+    if setup.ripple.iter().all(|a| a.every(|a| a == 0.0)) {
+        return input;
+    }
+    let omega = T::of(core::f64::consts::TAU) * setup.ripple_frequency;
+    let (sin, cos) = (omega * input.time + setup.ripple_phase).sin_cos();
+    for axis in 0..2 {
+        let amplitude = setup.ripple[axis];
+        input.handle.position[axis] += amplitude * sin;
+        input.handle.velocity[axis] += amplitude * omega * cos;
+        input.handle.acceleration[axis] -= amplitude * omega.squared() * sin;
+    }
+    input
+}
+
+/// What the chain does not check.
+fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
+    let contact = &setup.contact;
+    let at_least_zero = [
+        ("contact stiffness", contact.stiffness),
+        ("contact damping", contact.damping),
+        ("play of the contact", contact.play),
+    ];
+    for (name, values) in at_least_zero {
+        for found in values {
+            if !(found >= 0.0 && found.is_finite()) {
+                let allowed = "zero or more";
+                return Err(SimulationError::Setting {
+                    name,
+                    found,
+                    allowed,
+                });
+            }
+        }
+    }
+    let finite = [
+        ("base motion", setup.base_motion[0]),
+        ("base motion", setup.base_motion[1]),
+        ("rest angle of the base", setup.base_rest),
+        ("ripple", setup.ripple[0]),
+        ("ripple", setup.ripple[1]),
+        ("ripple frequency", setup.ripple_frequency),
+        ("ripple phase", setup.ripple_phase),
+        ("force delay", setup.force_delay),
+    ];
+    for (name, found) in finite {
+        if !found.is_finite() {
+            let allowed = "a finite number";
+            return Err(SimulationError::Setting {
+                name,
+                found,
+                allowed,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn link<const N: usize>(
+    experiment: &Experiment<N>,
+    setup: &Setup<f64, N>,
+) -> Result<Link<f64>, SimulationError> {
+    match &experiment.drive {
+        Drive::Torque(_) => Ok(Link::Free),
+        Drive::Handle {
+            coupling: Coupling::Compliant,
+            ..
+        } => Ok(Link::Compliant(setup.contact)),
+        Drive::Handle {
+            coupling: Coupling::Rigid,
+            ..
+        } if N < 2 => Err(SimulationError::RigidCoupling { joints: N }),
+        Drive::Handle {
+            coupling: Coupling::Rigid,
+            ..
+        } => Ok(Link::Rigid),
+    }
+}
+
+/// Whether the drive is known for the whole run.
+fn known<const N: usize>(
+    experiment: &Experiment<N>,
+    schedule: &Schedule,
+) -> Result<(), SimulationError> {
+    let (name, (from, to)) = match &experiment.drive {
+        Drive::Handle { path, .. } => ("the handle's path", path.span()),
+        Drive::Torque(Some(series)) => ("the joint torque", (series.start(), series.end())),
+        Drive::Torque(None) => return Ok(()),
+    };
+    let needed = schedule.time(schedule.steps);
+    // The last sample may miss the end by rounding.
+    let slack = 1e-6 * schedule.dt;
+    if from <= slack && needed <= to + slack {
+        Ok(())
+    } else {
+        Err(SimulationError::TooShort {
+            name,
+            from,
+            to,
+            needed,
+        })
+    }
+}
+
+fn robot_motion<const N: usize>(
+    experiment: &Experiment<N>,
+    schedule: &Schedule,
+) -> Result<Vec<JointMotion<2>>, SimulationError> {
+    let (Some(robot), Drive::Handle { path, .. }) = (&experiment.robot, &experiment.drive) else {
+        return Ok(Vec::new());
+    };
+    (0..schedule.samples())
+        .map(|sample| path.robot_motion(robot, schedule.time(sample * schedule.every)))
+        .collect()
+}

@@ -1,0 +1,149 @@
+//! What is recorded of a run.
+
+use arm_core::effect::Kind;
+
+/// A run as columns, each with one row a sample (row-major); names and signs as in the equation of motion
+/// `B q̈ + C q̇ + G + frame + R = τ + Jᵀ F_on_arm`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recording<const N: usize> {
+    /// Time since the start \[s\], `(n)`.
+    pub time: Vec<f64>,
+    /// Joint angles \[rad\], `(n, N)`.
+    pub q: Vec<f64>,
+    /// Joint speeds \[rad/s\], `(n, N)`.
+    pub qd: Vec<f64>,
+    /// Joint accelerations \[rad/s²\], `(n, N)`.
+    pub qdd: Vec<f64>,
+    /// Position of the arm's tip, y and z \[m\], `(n, 2)`.
+    pub tip: Vec<f64>,
+    /// Position of the robot's handle, ripple included \[m\], `(n, 2)`; empty without a handle.
+    pub handle: Vec<f64>,
+    /// Commanded joint angles of the robot \[rad\], `(n, 2)`; empty without a robot. Its encoders read these: a ripple of
+    /// its position is behind them.
+    pub robot_q: Vec<f64>,
+    /// Joint speeds of the robot \[rad/s\].
+    pub robot_qd: Vec<f64>,
+    /// Joint accelerations of the robot \[rad/s²\].
+    pub robot_qdd: Vec<f64>,
+    /// Force on the arm at its tip, y and z \[N\], `(n, 2)`.
+    pub force_on_arm: Vec<f64>,
+    /// Moment on the arm at its tip \[N m\], `(n)`; zero, because the contact is a point.
+    pub moment_on_arm: Vec<f64>,
+    /// Every torque by itself.
+    pub torque: TorqueColumns,
+    /// Which effect each column of [`Recording::resisting`] belongs to: kind and zero-based joint.
+    pub effects: Vec<(Kind, usize)>,
+    /// Torque with which each joint effect resists in its joint \[N m\], `(n, effects)`.
+    pub resisting: Vec<f64>,
+    /// State of each joint effect, `(n, effects)`; zero for those without.
+    pub memory: Vec<f64>,
+    /// What is stored.
+    pub energy: EnergyColumns,
+    /// What was exchanged since the start.
+    pub work: WorkColumns,
+}
+
+/// Joint torques \[N m\], each `(n, N)`. Left-hand side less right-hand side is zero.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TorqueColumns {
+    /// `B q̈`, left.
+    pub inertial: Vec<f64>,
+    /// The part of `C q̇` with squared speeds, left.
+    pub centrifugal: Vec<f64>,
+    /// The part of `C q̇` with products of two speeds, left.
+    pub coriolis: Vec<f64>,
+    /// `G`, left.
+    pub gravity: Vec<f64>,
+    /// What a moving base adds on the left: its inertia and weight, less the work of the contact force on it. Zero when it rests.
+    pub frame: Vec<f64>,
+    /// Sum of all resisting torques `R`, left.
+    pub resisting: Vec<f64>,
+    /// Torques of motors `τ`, right.
+    pub drive: Vec<f64>,
+    /// `Jᵀ F_on_arm`, right.
+    pub contact: Vec<f64>,
+}
+
+/// Stored energy \[J\], each `(n)`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EnergyColumns {
+    /// Energy of motion.
+    pub kinetic: Vec<f64>,
+    /// Energy of weight, relative to the base at rest.
+    pub potential: Vec<f64>,
+    /// Energy in the springs of the contact.
+    pub contact: Vec<f64>,
+}
+
+/// Work since the start \[J\], each `(n)`, integrated with the order of the integrator.
+///
+/// `kinetic + potential + contact` grows by `handle + drive − resisted − damped`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WorkColumns {
+    /// Done by the robot's handle on contact and arm: `∫ F_on_arm · v_handle dt`.
+    pub handle: Vec<f64>,
+    /// Done by motors: `∫ τ · q̇ dt`.
+    pub drive: Vec<f64>,
+    /// Done against all resisting torques, stored by elastic ones and lost in the others: `∫ R · q̇ dt`.
+    pub resisted: Vec<f64>,
+    /// Lost in the damping of the contact.
+    pub damped: Vec<f64>,
+}
+
+impl<const N: usize> Recording<N> {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether nothing was recorded.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// Change of stored energy less the work that explains it, for each sample \[J\]; zero but for the integration error.
+    pub fn energy_error(&self) -> Vec<f64> {
+        let (e, w) = (&self.energy, &self.work);
+        let balance = |i: usize| {
+            e.kinetic[i] + e.potential[i] + e.contact[i] - w.handle[i] - w.drive[i]
+                + w.resisted[i]
+                + w.damped[i]
+        };
+        (0..self.len()).map(|i| balance(i) - balance(0)).collect()
+    }
+
+    /// Every column with its name and number of entries a sample, in a fixed order.
+    pub fn columns(&self) -> [(&'static str, usize, &[f64]); 28] {
+        let (t, e, w, effects) = (&self.torque, &self.energy, &self.work, self.effects.len());
+        [
+            ("time", 1, &self.time),
+            ("q", N, &self.q),
+            ("qd", N, &self.qd),
+            ("qdd", N, &self.qdd),
+            ("tip", 2, &self.tip),
+            ("handle", 2, &self.handle),
+            ("robot_q", 2, &self.robot_q),
+            ("robot_qd", 2, &self.robot_qd),
+            ("robot_qdd", 2, &self.robot_qdd),
+            ("force_on_arm", 2, &self.force_on_arm),
+            ("moment_on_arm", 1, &self.moment_on_arm),
+            ("torque.inertial", N, &t.inertial),
+            ("torque.centrifugal", N, &t.centrifugal),
+            ("torque.coriolis", N, &t.coriolis),
+            ("torque.gravity", N, &t.gravity),
+            ("torque.frame", N, &t.frame),
+            ("torque.resisting", N, &t.resisting),
+            ("torque.drive", N, &t.drive),
+            ("torque.contact", N, &t.contact),
+            ("resisting", effects, &self.resisting),
+            ("memory", effects, &self.memory),
+            ("energy.kinetic", 1, &e.kinetic),
+            ("energy.potential", 1, &e.potential),
+            ("energy.contact", 1, &e.contact),
+            ("work.handle", 1, &w.handle),
+            ("work.drive", 1, &w.drive),
+            ("work.resisted", 1, &w.resisted),
+            ("work.damped", 1, &w.damped),
+        ]
+    }
+}

@@ -1,0 +1,89 @@
+//! How long a step may be before the vibration of the contact grows.
+
+use arm_core::{Contact, Joints, Pose};
+
+use crate::model::Link;
+use crate::prepare::Prepared;
+use crate::terms::{MovingBase, Terms};
+use crate::{Integrator, SimulationError};
+
+/// The fastest vibration of an arm on the springs and dampers of its contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vibration {
+    /// Largest eigenfrequency ω of `B⁻¹ Jᵀ S J` \[rad/s\].
+    pub frequency: f64,
+    /// Largest eigenvalue c of `B⁻¹ Jᵀ D J` \[1/s\].
+    pub damping: f64,
+}
+
+impl Vibration {
+    /// Largest step for which the vibration does not grow \[s\].
+    ///
+    /// Both limits hold for the mode `ẍ + c ẋ + ω² x = 0` with the largest c and the largest ω together, which is exact
+    /// where damping and stiffness share their directions, and safe elsewhere:
+    /// semi-implicit Euler `ω²h² + 2ch < 4`; Rk4 `|λ| h < 2.61`, the radius of its region of stability in the left half-plane.
+    pub fn largest_step(&self, integrator: Integrator) -> f64 {
+        let (w, c) = (self.frequency, self.damping);
+        match integrator {
+            Integrator::SemiImplicitEuler => 4.0 / (c + (c * c + 4.0 * w * w).sqrt()),
+            Integrator::Rk4 => {
+                let overdamped = (c * c - 4.0 * w * w).max(0.0).sqrt();
+                RK4_RADIUS / w.max(0.5 * (c + overdamped))
+            }
+        }
+    }
+
+    /// The vibration at a pose.
+    pub(crate) fn at<const N: usize>(
+        contact: &Contact<f64>,
+        chain: &arm_core::Chain<f64, N>,
+        base: Option<&MovingBase<f64, N>>,
+        q: &Joints<f64, N>,
+    ) -> Self {
+        let terms = Terms::new(chain, base, &Pose::new(q), &Joints::zeros());
+        // B⁻¹ Jᵀ S J has the eigenvalues of the 2×2 matrix J B⁻¹ Jᵀ S.
+        let columns = [[1.0, 0.0], [0.0, 1.0]]
+            .map(|f| terms.tip_rate(&terms.accelerate(&terms.tip_torque(f))));
+        let largest = |s: [f64; 2]| {
+            let (a, d) = (columns[0][0] * s[0], columns[1][1] * s[1]);
+            let bc = columns[0][1] * columns[1][0] * s[0] * s[1];
+            let (mean, half) = (0.5 * (a + d), 0.5 * (a - d));
+            mean + (half * half + bc).max(0.0).sqrt()
+        };
+        Self {
+            frequency: largest(contact.stiffness).sqrt(),
+            damping: largest(contact.damping),
+        }
+    }
+}
+
+const RK4_RADIUS: f64 = 2.61;
+
+/// Refuses a contact that is too stiff for the step, judged at the start.
+///
+/// Dry friction of joints is stiffer still near rest, but bounded, so that it cannot grow without limit; it is not judged.
+pub(crate) fn check<const N: usize>(prepared: &Prepared<N>) -> Result<(), SimulationError> {
+    let Link::Compliant(contact) = &prepared.model.link else {
+        return Ok(());
+    };
+    let model = &prepared.model;
+    let vibration = Vibration::at(
+        contact,
+        &model.chain,
+        model.base.as_ref(),
+        &prepared.start.0,
+    );
+    let (dt, largest) = (
+        prepared.schedule.dt,
+        vibration.largest_step(prepared.integrator()),
+    );
+    if dt <= largest {
+        return Ok(());
+    }
+    Err(SimulationError::TooStiff {
+        frequency: vibration.frequency,
+        damping: vibration.damping,
+        largest,
+        dt,
+    })
+}

@@ -1,0 +1,171 @@
+//! One step of each integrator, the same source for single runs and lanes.
+
+use arm_core::effect::Motion;
+use arm_core::{Joints, Scalar};
+
+use crate::Integrator;
+use crate::model::{Input, Link, Model, Outcome, State};
+
+/// Newton steps that bring a rigidly held tip back to its handle: after a step it is off by the error of the integrator
+/// in one step, and each squares it.
+const PROJECTIONS: usize = 2;
+
+/// What drives the arm in a step: at its start, its middle and its end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inputs<T, const N: usize> {
+    pub start: Input<T, N>,
+    pub middle: Input<T, N>,
+    pub end: Input<T, N>,
+}
+
+/// States of the effects, and room for those of the stages.
+#[derive(Clone, Debug)]
+pub(crate) struct Memory<T> {
+    pub state: Vec<T>,
+    stage: Vec<T>,
+    rate: Vec<T>,
+    sum: Vec<T>,
+}
+
+impl<T: Scalar> Memory<T> {
+    pub fn new(effects: usize) -> Self {
+        let zeros = vec![T::ZERO; effects];
+        Self {
+            state: zeros.clone(),
+            stage: zeros.clone(),
+            rate: zeros.clone(),
+            sum: zeros,
+        }
+    }
+}
+
+/// Advances a state by one step of length `h`.
+#[inline]
+pub(crate) fn step<T: Scalar, const N: usize>(
+    model: &Model<T, N>,
+    integrator: Integrator,
+    h: f64,
+    inputs: &Inputs<T, N>,
+    (state, memory): (&mut State<T, N>, &mut Memory<T>),
+) {
+    match integrator {
+        Integrator::SemiImplicitEuler => semi_implicit_euler(model, h, inputs, state, memory),
+        Integrator::Rk4 => rk4(model, h, inputs, state, memory),
+    }
+    if matches!(model.link, Link::Rigid) {
+        model.project(&inputs.end, state, PROJECTIONS);
+    }
+}
+
+#[inline]
+fn semi_implicit_euler<T: Scalar, const N: usize>(
+    model: &Model<T, N>,
+    h: f64,
+    inputs: &Inputs<T, N>,
+    state: &mut State<T, N>,
+    memory: &mut Memory<T>,
+) {
+    let h = T::of(h);
+    let now = model.evaluate(&inputs.start, &state.q, &state.qd, &memory.state);
+    if model.has_memory {
+        let motion = motion(&inputs.start, &state.q, &state.qd, &now);
+        model.memory_rates(&motion, &memory.state, &mut memory.rate);
+        for (m, rate) in memory.state.iter_mut().zip(&memory.rate) {
+            *m += h * *rate;
+        }
+    }
+    add(&mut state.qd, h, &now.qdd);
+    let qd = state.qd;
+    add(&mut state.q, h, &qd);
+    for (work, power) in state.work.iter_mut().zip(&now.power) {
+        *work += h * *power;
+    }
+}
+
+#[inline]
+fn rk4<T: Scalar, const N: usize>(
+    model: &Model<T, N>,
+    h: f64,
+    inputs: &Inputs<T, N>,
+    state: &mut State<T, N>,
+    memory: &mut Memory<T>,
+) {
+    let stages = [
+        (&inputs.start, 0.0, 1.0),
+        (&inputs.middle, 0.5 * h, 2.0),
+        (&inputs.middle, 0.5 * h, 2.0),
+        (&inputs.end, h, 1.0),
+    ];
+    let zero = Joints::<T, N>::repeat(T::ZERO);
+    // Slopes of the stage before, and the weighted sums of all.
+    let (mut speed, mut acceleration) = (zero, zero);
+    let (mut speeds, mut accelerations, mut powers) = (zero, zero, [T::ZERO; 4]);
+    for (stage, (input, ahead, weight)) in stages.into_iter().enumerate() {
+        let (ahead, weight) = (T::of(ahead), T::of(weight));
+        let (mut q, mut qd) = (state.q, state.qd);
+        if stage > 0 {
+            add(&mut q, ahead, &speed);
+            add(&mut qd, ahead, &acceleration);
+        }
+        if model.has_memory {
+            for (i, at) in memory.stage.iter_mut().enumerate() {
+                let start = memory.state[i];
+                *at = if stage > 0 {
+                    start + ahead * memory.rate[i]
+                } else {
+                    start
+                };
+            }
+        }
+        let now = model.evaluate(input, &q, &qd, &memory.stage);
+        if model.has_memory {
+            model.memory_rates(
+                &motion(input, &q, &qd, &now),
+                &memory.stage,
+                &mut memory.rate,
+            );
+            for (i, sum) in memory.sum.iter_mut().enumerate() {
+                let before = if stage > 0 { *sum } else { T::ZERO };
+                *sum = before + weight * memory.rate[i];
+            }
+        }
+        (speed, acceleration) = (qd, now.qdd);
+        add(&mut speeds, weight, &speed);
+        add(&mut accelerations, weight, &acceleration);
+        for (sum, power) in powers.iter_mut().zip(&now.power) {
+            *sum += weight * *power;
+        }
+    }
+    let sixth = T::of(h / 6.0);
+    add(&mut state.q, sixth, &speeds);
+    add(&mut state.qd, sixth, &accelerations);
+    for (work, power) in state.work.iter_mut().zip(&powers) {
+        *work += sixth * *power;
+    }
+    if model.has_memory {
+        for (m, sum) in memory.state.iter_mut().zip(&memory.sum) {
+            *m += sixth * *sum;
+        }
+    }
+}
+
+#[inline]
+fn motion<T: Scalar, const N: usize>(
+    input: &Input<T, N>,
+    q: &Joints<T, N>,
+    qd: &Joints<T, N>,
+    now: &Outcome<T, N>,
+) -> Motion<T, N> {
+    let mut motion = Motion::new(input.time, *q, *qd);
+    motion.qdd = now.qdd;
+    motion.joint_force = now.joint_force;
+    motion
+}
+
+/// `a += s b`.
+#[inline]
+fn add<T: Scalar, const N: usize>(a: &mut Joints<T, N>, s: T, b: &Joints<T, N>) {
+    for i in 0..N {
+        a[i] += s * b[i];
+    }
+}

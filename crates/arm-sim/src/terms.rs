@@ -1,0 +1,263 @@
+//! The equation of motion in joint coordinates, for rigs beyond the link-form solver of the core: an arm whose first
+//! joint moves, and an arm whose tip is held rigidly.
+
+use core::array::from_fn;
+
+use arm_core::{
+    Chain, Invalid, JointMatrix, Joints, Plane, Pose, Scalar, Setup, gravity, inertia,
+    inverse_dynamics, jacobian, jacobian_rate, joint_force,
+};
+
+/// A first joint that moves with its own angle: `base + u (q_1 − rest)`.
+///
+/// It is an ideal guide: it does no work and has no mass. Lagrange's equations with the velocity `u q̇_1` of the whole arm,
+/// P the derivative of the first moment `Σ m r` to the joint angles and f₀ the force through the first joint without
+/// acceleration give
+///
+/// ```text
+/// B' = B + e₁ (uᵀP) + (uᵀP)ᵀ e₁ᵀ + e₁ M|u|² e₁ᵀ     bias' = C q̇ + G + e₁ uᵀf₀     J' = J + u e₁ᵀ
+/// ```
+///
+/// so that inertia, weight and contact force all act on it and energy is conserved.
+#[derive(Clone, Debug)]
+pub(crate) struct MovingBase<T, const N: usize> {
+    per_angle: Plane<T>,
+    rest: T,
+    mass: T,
+    /// The arm under unit gravity against y and z: its gravity torques are the rows of P.
+    unit_weight: [Chain<T, N>; 2],
+}
+
+impl<T: Scalar, const N: usize> MovingBase<T, N> {
+    /// The moving base of a rig, or nothing where it rests.
+    pub fn of(setup: &Setup<T, N>) -> Result<Option<Self>, Invalid> {
+        let u = setup.base_motion;
+        if u.iter().all(|u| u.every(|u| u == 0.0)) {
+            return Ok(None);
+        }
+        let against = |y, z| Chain::new(setup.segments, setup.base, [T::of(y), T::of(z)]);
+        Ok(Some(Self {
+            per_angle: u,
+            rest: setup.base_rest,
+            mass: setup.segments.iter().fold(T::ZERO, |m, s| m + s.mass),
+            unit_weight: [against(-1.0, 0.0)?, against(0.0, -1.0)?],
+        }))
+    }
+
+    /// How far the base stands from its place at rest \[m\].
+    #[inline]
+    pub fn displacement(&self, q: &Joints<T, N>) -> Plane<T> {
+        let angle = q[0] - self.rest;
+        self.per_angle.map(|u| u * angle)
+    }
+
+    /// Its velocity \[m/s\], and with accelerations its acceleration \[m/s²\].
+    #[inline]
+    pub fn velocity(&self, qd: &Joints<T, N>) -> Plane<T> {
+        self.per_angle.map(|u| u * qd[0])
+    }
+
+    /// Derivative of the first moment to the joint angles, rows y and z \[kg m/rad\].
+    fn first_moment_rows(&self, pose: &Pose<T, N>) -> [Joints<T, N>; 2] {
+        [0, 1].map(|axis| gravity(&self.unit_weight[axis], pose))
+    }
+
+    /// Joint torques on the left-hand side because the base moves; the contact's share is subtracted \[N m\].
+    pub fn torque(
+        &self,
+        chain: &Chain<T, N>,
+        pose: &Pose<T, N>,
+        (qd, qdd): (&Joints<T, N>, &Joints<T, N>),
+        force_on_arm: Plane<T>,
+    ) -> Joints<T, N> {
+        // Newton for the whole arm as if its base stood still, less the contact force.
+        let [fy, fz] = joint_force(chain, pose, (qd, qdd), force_on_arm)[0];
+        let rows = self.first_moment_rows(pose);
+        let [uy, uz] = self.per_angle;
+        let mut torque = Joints::<T, N>::repeat(T::ZERO);
+        for k in 0..N {
+            torque[k] = (uy * rows[0][k] + uz * rows[1][k]) * qdd[0];
+        }
+        torque[0] += uy * fy + uz * fz + self.mass * (uy.squared() + uz.squared()) * qdd[0];
+        torque
+    }
+
+    /// Adds to the forces through the joints what accelerates everything beyond them with the base \[N\].
+    pub fn add_joint_force(
+        &self,
+        chain: &Chain<T, N>,
+        qdd: &Joints<T, N>,
+        force: &mut [Plane<T>; N],
+    ) {
+        let acceleration = self.velocity(qdd);
+        let mut beyond = T::ZERO;
+        for (segment, force) in chain.segments().iter().zip(force.iter_mut()).rev() {
+            beyond += segment.mass;
+            for axis in 0..2 {
+                force[axis] += beyond * acceleration[axis];
+            }
+        }
+    }
+
+    /// Kinetic and potential energy beyond those of the arm on a base at rest \[J\].
+    pub fn energy(
+        &self,
+        chain: &Chain<T, N>,
+        pose: &Pose<T, N>,
+        q: &Joints<T, N>,
+        qd: &Joints<T, N>,
+    ) -> [T; 2] {
+        let v = self.velocity(qd);
+        let rows = self.first_moment_rows(pose);
+        let mut kinetic = T::of(0.5) * self.mass * (v[0].squared() + v[1].squared());
+        for k in 0..N {
+            kinetic += (v[0] * rows[0][k] + v[1] * rows[1][k]) * qd[k];
+        }
+        let [y, z] = self.displacement(q);
+        let [gy, gz] = chain.gravity();
+        [kinetic, -(self.mass * (gy * y + gz * z))]
+    }
+}
+
+/// `B`, `C q̇ + G` and the Jacobian of the tip at one state, with a moving base where there is one.
+pub(crate) struct Terms<T, const N: usize> {
+    inertia: JointMatrix<T, N>,
+    /// `C q̇ + G` \[N m\].
+    pub bias: Joints<T, N>,
+    /// Rows y and z \[m/rad\].
+    pub jacobian: [[T; N]; 2],
+    /// `J̇ q̇` \[m/s²\].
+    pub jacobian_rate: Plane<T>,
+}
+
+impl<T: Scalar, const N: usize> Terms<T, N> {
+    pub fn new(
+        chain: &Chain<T, N>,
+        base: Option<&MovingBase<T, N>>,
+        pose: &Pose<T, N>,
+        qd: &Joints<T, N>,
+    ) -> Self {
+        let still = Joints::<T, N>::repeat(T::ZERO);
+        let (j, rate) = (jacobian(chain, pose), jacobian_rate(chain, pose, qd));
+        let mut terms = Self {
+            inertia: inertia(chain, pose),
+            bias: inverse_dynamics(chain, pose, qd, &still),
+            jacobian: [0, 1].map(|row| from_fn(|k| j[(row, k)])),
+            jacobian_rate: [0, 1].map(|row| {
+                let mut sum = T::ZERO;
+                for k in 0..N {
+                    sum += rate[(row, k)] * qd[k];
+                }
+                sum
+            }),
+        };
+        if let Some(base) = base {
+            let [uy, uz] = base.per_angle;
+            let rows = base.first_moment_rows(pose);
+            for k in 0..N {
+                let coupling = uy * rows[0][k] + uz * rows[1][k];
+                terms.inertia[(0, k)] += coupling;
+                terms.inertia[(k, 0)] += coupling;
+            }
+            terms.inertia[(0, 0)] += base.mass * (uy.squared() + uz.squared());
+            let [fy, fz] = joint_force(chain, pose, (qd, &still), [T::ZERO; 2])[0];
+            terms.bias[0] += uy * fy + uz * fz;
+            terms.jacobian[0][0] += uy;
+            terms.jacobian[1][0] += uz;
+        }
+        terms
+    }
+
+    /// `J v` \[m/s for speeds\].
+    pub fn tip_rate(&self, v: &Joints<T, N>) -> Plane<T> {
+        self.jacobian.map(|row| {
+            let mut sum = T::ZERO;
+            for k in 0..N {
+                sum += row[k] * v[k];
+            }
+            sum
+        })
+    }
+
+    /// `Jᵀ F` \[N m\].
+    pub fn tip_torque(&self, force: Plane<T>) -> Joints<T, N> {
+        let mut torque = Joints::<T, N>::repeat(T::ZERO);
+        for k in 0..N {
+            torque[k] = self.jacobian[0][k] * force[0] + self.jacobian[1][k] * force[1];
+        }
+        torque
+    }
+
+    /// `B⁻¹ τ` \[rad/s²\], by a square-root-free Cholesky factorisation.
+    pub fn accelerate(&self, torque: &Joints<T, N>) -> Joints<T, N> {
+        let mut columns = [*torque];
+        self.solve(&mut columns);
+        columns[0]
+    }
+
+    /// `B⁻¹` applied to several columns at once.
+    fn solve<const K: usize>(&self, columns: &mut [Joints<T, N>; K]) {
+        let mut m = self.inertia;
+        for k in 0..N {
+            let reciprocal = T::ONE / m[(k, k)];
+            for i in k + 1..N {
+                let factor = m[(i, k)] * reciprocal;
+                for c in i..N {
+                    m[(c, i)] = m[(c, i)] - factor * m[(c, k)];
+                }
+                for b in columns.iter_mut() {
+                    b[i] = b[i] - factor * b[k];
+                }
+            }
+        }
+        for b in columns.iter_mut() {
+            for i in (0..N).rev() {
+                for k in i + 1..N {
+                    b[i] = b[i] - m[(k, i)] * b[k];
+                }
+                b[i] = b[i] / m[(i, i)];
+            }
+        }
+    }
+
+    /// `B⁻¹ Jᵀ (J B⁻¹ Jᵀ)⁻¹`: how the joints follow the tip with the least energy of motion, and the force for it.
+    pub fn constraint(&self) -> Constraint<T, N> {
+        let mut follow = self.jacobian.map(Joints::<T, N>::from);
+        self.solve(&mut follow);
+        let entry = |row: usize, column: usize| self.tip_rate(&follow[column])[row];
+        let (a, b, d) = (entry(0, 0), entry(0, 1), entry(1, 1));
+        let reciprocal = T::ONE / (a * d - b * b);
+        Constraint {
+            follow,
+            apparent_mass: [
+                [d * reciprocal, -(b * reciprocal)],
+                [-(b * reciprocal), a * reciprocal],
+            ],
+        }
+    }
+}
+
+/// A tip that is held in y and z.
+pub(crate) struct Constraint<T, const N: usize> {
+    /// Columns of `B⁻¹ Jᵀ`.
+    follow: [Joints<T, N>; 2],
+    /// `(J B⁻¹ Jᵀ)⁻¹` \[kg\].
+    apparent_mass: [[T; 2]; 2],
+}
+
+impl<T: Scalar, const N: usize> Constraint<T, N> {
+    /// Force at the tip that changes its acceleration (or with impulse and velocity, its velocity) by `change`.
+    pub fn force(&self, change: Plane<T>) -> Plane<T> {
+        self.apparent_mass
+            .map(|[y, z]| y * change[0] + z * change[1])
+    }
+
+    /// What a force at the tip does to the joints: `B⁻¹ Jᵀ F`.
+    pub fn response(&self, force: Plane<T>) -> Joints<T, N> {
+        let mut v = Joints::<T, N>::repeat(T::ZERO);
+        for k in 0..N {
+            v[k] = self.follow[0][k] * force[0] + self.follow[1][k] * force[1];
+        }
+        v
+    }
+}
