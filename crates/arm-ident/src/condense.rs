@@ -81,13 +81,10 @@ impl Condenser {
     /// [`IdentError::Length`]; [`IdentError::NotFinite`] for NaN, infinity or a magnitude above [`LARGEST`]. A refused row changes nothing.
     #[inline]
     pub fn push(&mut self, row: &[f64], rhs: f64) -> Result<(), IdentError> {
-        let acceptable = row
-            .iter()
-            .fold(rhs.abs() < LARGEST, |ok, v| ok & (v.abs() < LARGEST));
-        if row.len() != self.p || !acceptable {
+        if row.len() != self.p || !(acceptable(row) & acceptable(&[rhs])) {
             return Err(self.refusal(row, rhs));
         }
-        let at = self.waiting % BLOCK;
+        let at = self.waiting;
         for (column, &value) in self.panel.iter_mut().zip(row.iter().chain([&rhs])) {
             column[at] = value;
         }
@@ -111,9 +108,20 @@ impl Condenser {
         if self.p == 0 {
             return rhs.iter().try_for_each(|&b| self.push(&[], b));
         }
-        rows.chunks_exact(self.p)
-            .zip(rhs)
-            .try_for_each(|(row, &b)| self.push(row, b))
+        let (mut rows, mut rhs) = (rows, rhs);
+        while !rhs.is_empty() {
+            let take = rhs.len().min(BLOCK - self.waiting);
+            let (now, later) = rows.split_at(take * self.p);
+            let (b, rest) = rhs.split_at(take);
+            if !(acceptable(now) & acceptable(b)) {
+                // Row by row up to the bad one, which is then named.
+                let mut pairs = now.chunks_exact(self.p).zip(b);
+                return pairs.try_for_each(|(row, &b)| self.push(row, b));
+            }
+            self.take_block(now, b);
+            (rows, rhs) = (later, rest);
+        }
+        Ok(())
     }
 
     /// Adds all rows of another condenser, after those pushed here. The result depends on the order of merging in its last bits: merge in a fixed order.
@@ -187,6 +195,27 @@ impl Condenser {
         }
     }
 
+    /// Copies acceptable rows, at most as many as there is room for.
+    fn take_block(&mut self, rows: &[f64], rhs: &[f64]) {
+        let places = self.waiting..self.waiting + rhs.len();
+        for (j, column) in self.panel.iter_mut().enumerate() {
+            let column = &mut column[places.clone()];
+            if j == self.p {
+                column.copy_from_slice(rhs);
+            } else {
+                let values = rows[j..].iter().step_by(self.p);
+                for (place, value) in column.iter_mut().zip(values) {
+                    *place = *value;
+                }
+            }
+        }
+        self.waiting = places.end;
+        self.rows += rhs.len();
+        if self.waiting == BLOCK {
+            self.fold();
+        }
+    }
+
     fn push_with(&mut self, value: impl Fn(usize) -> f64) {
         for (j, column) in self.panel.iter_mut().enumerate() {
             column[self.waiting] = value(j);
@@ -255,6 +284,12 @@ impl Condenser {
             },
         }
     }
+}
+
+/// Whether all numbers are finite and small enough; false for NaN.
+#[inline(always)]
+fn acceptable(values: &[f64]) -> bool {
+    values.iter().fold(true, |ok, v| ok & (v.abs() < LARGEST))
 }
 
 #[inline(always)]

@@ -27,6 +27,7 @@ pub mod svd;
 
 mod equality;
 mod orthogonal;
+mod outcome;
 mod polish;
 mod scaled;
 

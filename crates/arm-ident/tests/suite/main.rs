@@ -1,3 +1,14 @@
-//! One module per source file.
+//! One module per source file; `noise` is the seeded source of random numbers that they share.
 
+mod coloured;
 mod condense;
+mod covariance;
+mod derivative;
+mod factor;
+mod filter;
+mod long_run;
+mod noise;
+mod program;
+mod rank;
+mod student;
+mod svd;
