@@ -142,8 +142,8 @@ class Entry:
 
     file: str
     configuration: str
+    repeat: int
     role: str
-    repeat: int = 1
 
 
 @dataclass(frozen=True)
@@ -331,7 +331,7 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
         table = trial_columns(trial, dataset.force_on)
         write_samples(out / name, list(table), list(table.values()))
     dataset.model.write(out / "model.toml")
-    entries = [Entry(name, t.configuration, t.role, t.repeat) for t, name in zip(dataset.trials, names, strict=True)]
+    entries = [Entry(name, t.configuration, t.repeat, t.role) for t, name in zip(dataset.trials, names, strict=True)]
     content = description_text(dataset, "model.toml", entries)
     files.write_text(out / FILE, content, kind=".toml")
     return out / FILE

@@ -10,6 +10,7 @@ import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .errors import BadInput, Text
 from .files import may_replace, replacing
 
 SUFFIXES = (".csv", ".parquet")
+NUMBER = "a finite number, or an empty cell where the sample is missing"
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def read_samples(path: Path) -> Samples:
         bad = np.flatnonzero(np.isinf(column))
         if bad.size:
             place = f"{samples.place_of(int(bad[0]))}, column {name}"
-            raise BadInput(place, float(column[bad[0]]), "a finite number, or an empty cell where the sample is missing")
+            raise BadInput(place, float(column[bad[0]]), NUMBER)
     return samples
 
 
@@ -121,29 +123,31 @@ def _read_csv(path: Path) -> Samples:
         )
     except pa.ArrowInvalid as error:
         if "Empty CSV" in str(error):
-            return Samples(names, [np.empty(0) for _ in names], _csv_place(path))
-        _explain_csv(path, names)
+            return Samples(names, [np.empty(0) for _ in names], csv_place(path))
+        explain_csv(path, names)
         raise BadInput("file", Text(str(error).splitlines()[0]), "CSV with one number a cell") from None
-    samples = Samples(names, [_numbers(table.column(name)) for name in names], _csv_place(path))
+    samples = Samples(names, [_numbers(table.column(name)) for name in names], csv_place(path))
     if any(_has_nan_text(table.column(name)) for name in names):
-        _explain_csv(path, names)
+        explain_csv(path, names)
     return samples
 
 
-def _numbers(column: object) -> np.ndarray:
+def _numbers(column: Any) -> np.ndarray:
     """Return an Arrow column as float64 with NaN where it is null."""
-    return np.ascontiguousarray(column.to_numpy(), dtype=np.float64)  # type: ignore[attr-defined]
+    return np.ascontiguousarray(column.to_numpy(), dtype=np.float64)
 
 
-def _has_nan_text(column: object) -> bool:
+def _has_nan_text(column: Any) -> bool:
     """Tell whether a NaN was written out, rather than left empty."""
     values = _numbers(column)
-    return int(np.isnan(values).sum()) > column.null_count  # type: ignore[attr-defined]
+    return int(np.isnan(values).sum()) > column.null_count
 
 
-def _explain_csv(path: Path, names: list[str]) -> None:
-    """Go through the file cell by cell and refuse the first that is not a number."""
-    allowed = "a finite number, or an empty cell where the sample is missing"
+def explain_csv(path: Path, names: list[str], *, numbers: bool = True) -> None:
+    """Go through a CSV file cell by cell and refuse the first line that has not one cell a column.
+
+    With `numbers`, also refuse the first cell that is not a finite number.
+    """
     with path.open("rb") as stream:
         for line, raw in enumerate(stream, start=1):
             try:
@@ -161,8 +165,8 @@ def _explain_csv(path: Path, names: list[str]) -> None:
             if len(cells) != len(names):
                 raise BadInput(f"line {line}", Text(f"{len(cells)} cells"), f"{len(names)} cells, one a column")
             for name, cell in zip(names, cells, strict=True):
-                if cell and not _is_number(cell):
-                    raise BadInput(f"line {line}, column {name}", cell, allowed)
+                if numbers and cell and not _is_number(cell):
+                    raise BadInput(f"line {line}, column {name}", cell, NUMBER)
 
 
 def _is_number(cell: str) -> bool:
@@ -172,7 +176,9 @@ def _is_number(cell: str) -> bool:
         return False
 
 
-def _csv_place(path: Path) -> Callable[[int], str]:
+def csv_place(path: Path) -> Callable[[int], str]:
+    """Return what turns the index of a row of a CSV file into words for a message."""
+
     def place(index: int) -> str:
         """Count the lines as an editor does, blank ones included."""
         rows = -1
@@ -189,24 +195,33 @@ def _csv_place(path: Path) -> Callable[[int], str]:
 
 def _read_parquet(path: Path) -> Samples:
     import pyarrow as pa
-    from pyarrow import parquet
 
-    with path.open("rb") as stream:
-        if stream.read(4) != b"PAR1":
-            raise BadInput("file", Text("no Parquet mark at its start"), "a Parquet file")
-    try:
-        table = parquet.read_table(io.BytesIO(path.read_bytes()))
-    except (pa.ArrowException, OSError) as error:
-        raise BadInput("file", Text(str(error).splitlines()[0]), "a whole Parquet file") from None
+    table = parquet_table(path)
     names = table.column_names
     for name in names:
-        if names.count(name) > 1:
-            raise BadInput("header", Text(f"column {name} twice"), "each column once")
         kind = table.schema.field(name).type
         if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
             raise BadInput(f"column {name}", Text(f"type {kind}"), "numbers")
     values = [_numbers(table.column(name).cast(pa.float64())) for name in names]
     return Samples(names, values, lambda index: f"row {index + 1}")
+
+
+def parquet_table(path: Path) -> Any:
+    """Return the Arrow table of a Parquet file, each column once."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    content = path.read_bytes()
+    if content[:4] != b"PAR1":
+        raise BadInput("file", Text("no Parquet mark at its start"), "a Parquet file")
+    try:
+        table = parquet.read_table(io.BytesIO(content))
+    except (pa.ArrowException, OSError) as error:
+        raise BadInput("file", Text(str(error).splitlines()[0]), "a whole Parquet file") from None
+    for name in table.column_names:
+        if table.column_names.count(name) > 1:
+            raise BadInput("header", Text(f"column {name} twice"), "each column once")
+    return table
 
 
 def write_samples(path: Path, names: list[str], values: list[np.ndarray]) -> None:
@@ -217,8 +232,8 @@ def write_samples(path: Path, names: list[str], values: list[np.ndarray]) -> Non
     write_table(path, pa.table(arrays, names=names))
 
 
-def write_table(path: Path, table: object) -> None:
-    """Write an Arrow table as CSV or Parquet, by the suffix."""
+def write_table(path: Path, table: Any, verify: Callable[[Path], None] | None = None) -> None:
+    """Write an Arrow table as CSV or Parquet, by the suffix. `verify` may refuse what was written before it takes its place."""
     from pyarrow import csv as arrow_csv
     from pyarrow import parquet
 
@@ -226,9 +241,11 @@ def write_table(path: Path, table: object) -> None:
     with replacing(path) as temporary:
         if path.suffix.lower() == ".parquet":
             parquet.write_table(table, temporary)
-            return
-        with temporary.open("wb") as stream:
+        else:
             header = io.StringIO()
-            csv.writer(header, lineterminator="\n").writerow(table.column_names)  # type: ignore[attr-defined]
-            stream.write(header.getvalue().encode("utf-8"))
-            arrow_csv.write_csv(table, stream, arrow_csv.WriteOptions(include_header=False))
+            csv.writer(header, lineterminator="\n").writerow(table.column_names)
+            with temporary.open("wb") as stream:
+                stream.write(header.getvalue().encode("utf-8"))
+                arrow_csv.write_csv(table, stream, arrow_csv.WriteOptions(include_header=False))
+        if verify is not None:
+            verify(temporary)

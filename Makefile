@@ -1,0 +1,75 @@
+# Needs Rust and Python 3.10 or newer. Everything else goes into .venv.
+#
+#   make demo    build, run the main job on built-in data, print where the report is
+#   make test    every check: formatting, lints, Rust and Python tests, types, examples
+#   make bench   speed
+#   make clean   remove what make has made
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMPS := $(VENV)/stamps
+
+RUST    := $(shell find crates -type f \( -name '*.rs' -o -name Cargo.toml \)) Cargo.toml Cargo.lock clippy.toml
+PACKAGE := $(RUST) $(shell find python -type f -name '*.pyi') pyproject.toml README.md
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+
+.PHONY: demo test bench clean build format rust python
+.DELETE_ON_ERROR:
+
+demo: build
+	$(BIN)/armrs demo -o out/demo
+	@echo "Report: out/demo/report.html"
+
+test: rust python
+	@echo "make test: everything passed"
+
+build: $(STAMPS)/build
+
+# ---- the environment; a stamp is renewed when what it depends on is newer
+$(STAMPS)/venv:
+	$(PYTHON) scripts/check_python.py
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet "maturin>=1.9,<2"
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/build: $(PACKAGE) | $(STAMPS)/venv
+	$(BIN)/maturin develop --release
+	@touch $@
+
+$(STAMPS)/dev: pyproject.toml | $(STAMPS)/build
+	$(BIN)/maturin develop --release --quiet --extras dev,files
+	@touch $@
+
+# ---- Rust
+rust: $(STAMPS)/rust
+
+$(STAMPS)/rust: $(RUST) scripts/check_no_std.sh | $(STAMPS)/venv
+	cargo fmt --all --check
+	scripts/check_no_std.sh
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	cargo test --quiet
+	@touch $@
+
+# ---- Python
+python: $(STAMPS)/build $(STAMPS)/dev
+	$(BIN)/ruff format --check --quiet python tests scripts
+	$(BIN)/ruff check --quiet python tests scripts
+	$(BIN)/mypy --no-error-summary
+	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
+	$(BIN)/python -m pytest --quiet
+
+format: $(STAMPS)/dev
+	cargo fmt --all
+	$(BIN)/ruff format python tests scripts
+	$(BIN)/ruff check --fix python tests scripts
+
+bench: build
+	cargo bench --quiet
+	$(BIN)/python scripts/bench_import.py
+
+clean:
+	rm -rf $(VENV) out
+	cargo clean

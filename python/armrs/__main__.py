@@ -1,0 +1,5 @@
+"""`python -m armrs` is the command `armrs`."""
+
+from .cli import run
+
+run()

@@ -1,0 +1,299 @@
+"""Identification of body segment and joint parameters from a data set."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _armrs
+from .catalogue import catalogue
+from .dataset import Dataset, load_dataset
+from .errors import BadInput, Text, unknown_name
+from .model import Effect, Joint, Model, Segment
+from .rig import all_effects, rig
+from .trial import Trial
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One estimated quantity.
+
+    Attributes
+    ----------
+    name : str
+        Parameter of a segment (`m2`, `m2*l2`, `l2`, `I2`) or of an effect (`torque`), or a combination of parameters.
+    joint : int or None
+        Joint or segment, from 1.
+    kind : str
+        "segment", "combination", "calibration", or the kind of effect.
+    value, std : float
+        Estimate and standard deviation, in `unit`.
+    unit : str
+    interval : (float, float)
+    decided_by : {"data", "prior", "bound"}
+        What the value rests on. A prior's value is an assumption that the data left open, not a measurement.
+    """
+
+    name: str
+    joint: int | None
+    kind: str
+    value: float
+    std: float
+    unit: str
+    interval: tuple[float, float]
+    decided_by: str
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """How a fitted model explains one trial, after the common low-pass.
+
+    Attributes
+    ----------
+    trial : Trial
+    t : ndarray, shape (m,)
+        Times of the samples that were used [s].
+    measured, fitted : ndarray, shape (m, n_joints)
+        Joint torques that the measurement asks for, and those of the fitted model [N m].
+    """
+
+    trial: Trial
+    t: np.ndarray
+    measured: np.ndarray
+    fitted: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """The result of an identification.
+
+    Attributes
+    ----------
+    method : {"joint", "cascade"}
+    status : str
+        How the solver ended: "solved", "almostsolved".
+    rank, unknowns : int
+        How many combinations of the unknowns the data determine.
+    parameters : tuple of Estimate
+    combinations : tuple of Estimate
+        The base parameters: what a planar chain can show at all.
+    calibration : tuple of Estimate
+        Small imperfections of the measurement that were refitted within the declared tolerance.
+    trades : tuple of str
+        Which unknowns the movements cannot tell apart, in words.
+    scale_free : bool
+        No torque acted: all parameters are known up to one common factor, which was taken from the model.
+    cutoff : float
+        Cutoff of the zero-phase low-pass that motion and torque share, -3 dB of both passes [Hz].
+    residual_rms : dict
+        Role -> channel -> root mean square of the torque residual after the low-pass [N m].
+    explained : tuple of Explained
+    model : Model
+        The model with the estimates.
+    """
+
+    method: str
+    status: str
+    rank: int
+    unknowns: int
+    parameters: tuple[Estimate, ...]
+    combinations: tuple[Estimate, ...]
+    calibration: tuple[Estimate, ...]
+    trades: tuple[str, ...]
+    scale_free: bool
+    cutoff: float
+    residual_rms: dict[str, dict[str, float]]
+    explained: tuple[Explained, ...]
+    model: Model
+    dataset: Dataset
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as it is written to JSON; the model stands in a file of its own."""
+        return {
+            "method": self.method,
+            "status": self.status,
+            "rank": self.rank,
+            "unknowns": self.unknowns,
+            "parameters": [dataclasses.asdict(e) for e in self.parameters],
+            "combinations": [dataclasses.asdict(e) for e in self.combinations],
+            "calibration": [dataclasses.asdict(e) for e in self.calibration],
+            "not_separable": list(self.trades),
+            "scale_free": self.scale_free,
+            "cutoff_Hz": self.cutoff,
+            "residual_rms": self.residual_rms,
+            "model": "identified.toml",
+        }
+
+
+def identify(
+    dataset: Dataset | str | os.PathLike[str],
+    *,
+    method: str = "joint",
+    with_effects: Sequence[str] = (),
+    cutoff: float | None = None,
+    motion: str = "auto",
+    level: float = 0.95,
+) -> Identified:
+    """Identify segment and joint parameters on the fit trials of a data set.
+
+    Parameters
+    ----------
+    dataset : Dataset or path
+    method : {"joint", "cascade"}
+        All joints at once with physical constraints, or the thesis' order wrist, elbow, shoulder.
+    with_effects : sequence of str
+        Kinds of joint effects that are fitted at every joint besides those of the model.
+    cutoff : float, optional
+        Cutoff of the common low-pass [Hz]; chosen from the data when absent.
+    motion : {"auto", "measured", "simulated"}
+        Where the speeds and accelerations come from: simulated along the robot's path where it is known.
+    level : float
+        Probability of the intervals.
+
+    Raises
+    ------
+    BadInput
+        For an unknown effect or method, and data that cannot be used.
+    IdentificationError
+        When no solution exists.
+    """
+    if not isinstance(dataset, Dataset):
+        dataset = load_dataset(dataset)
+    if method not in ("joint", "cascade"):
+        raise BadInput("method", method, "joint or cascade")
+    if not 0.5 <= level < 1.0:
+        raise BadInput("level", level, "0.5 to 1")
+    if cutoff is not None and not cutoff > 0:
+        raise BadInput("cutoff", cutoff, "a frequency above 0 Hz")
+    model = dataset.model
+    effects = [*all_effects(model), *_added(model, with_effects)]
+    fitted = [e.kind in _joint_kinds() for e in effects]
+    tolerance = dataset.tolerance
+    settings = {
+        "fitted": fitted,
+        "segment_uncertainty": model.segment_uncertainty,
+        "angle_offset": np.radians(tolerance.angle_offset_deg),
+        "force_bias": tolerance.force_bias_N,
+        "force_gain": tolerance.force_gain,
+        "time_delay": tolerance.time_delay_s,
+        "handle_placement": tolerance.handle_placement_m,
+        "cutoff": cutoff,
+        "motion": motion,
+        "level": level,
+    }
+    for trial in dataset.trials:
+        if trial.force_on_arm is None and trial.tau is None:
+            raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
+    columns = [_columns(trial) for trial in dataset.trials]
+    raw = _armrs.identify(rig(model, effects), columns, settings)
+    explained = tuple(
+        Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
+        for trial, e in zip(dataset.trials, raw["explained"], strict=True)
+    )
+    return Identified(
+        method=method,
+        status=raw["status"],
+        rank=raw["rank"],
+        unknowns=raw["unknowns"],
+        parameters=_estimates(raw["parameters"]),
+        combinations=_estimates(raw["combinations"]),
+        calibration=_estimates(raw["calibration"]),
+        trades=tuple(raw["trades"]),
+        scale_free=raw["scale_free"],
+        cutoff=raw["cutoff"],
+        residual_rms=_residuals(explained),
+        explained=explained,
+        model=_identified_model(model, raw, effects),
+        dataset=dataset,
+    )
+
+
+def _joint_kinds() -> dict[str, Any]:
+    return {name: kind for name, kind in catalogue().items() if kind.where == "joint"}
+
+
+def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
+    """Return an effect of every wanted kind at every joint where the model has none yet."""
+    known = _joint_kinds()
+    present = {(e.kind, e.joint) for e in all_effects(model)}
+    added = []
+    for kind in dict.fromkeys(kinds):
+        if kind not in known:
+            raise unknown_name("--with", kind, known, what="joint effect")
+        added += [Effect(kind, j) for j in range(1, model.n_joints + 1) if (kind, j) not in present]
+    return added
+
+
+def _columns(trial: Trial) -> dict[str, Any]:
+    """Return a trial for the core; gaps are bridged by straight lines and masked by `valid`."""
+
+    def whole(values: np.ndarray | None) -> np.ndarray | None:
+        if values is None:
+            return None
+        table = np.array(values, dtype=float).reshape(len(trial), -1)
+        for column in table.T:
+            bad = ~np.isfinite(column)
+            if bad.any():
+                column[bad] = np.interp(trial.t[bad], trial.t[~bad], column[~bad])
+        return table.reshape(values.shape)
+
+    return {
+        "role": trial.role,
+        "rate": trial.rate,
+        "q": whole(trial.q),
+        "force_on_arm": whole(trial.force_on_arm),
+        "moment_on_arm": whole(trial.moment_on_arm),
+        "tau": whole(trial.tau),
+        "robot_q": whole(trial.robot_q),
+        "valid": np.array(trial.valid),
+    }
+
+
+def _estimates(items: list[dict[str, Any]]) -> tuple[Estimate, ...]:
+    return tuple(Estimate(**{**item, "interval": tuple(item["interval"])}) for item in items)
+
+
+def _residuals(explained: tuple[Explained, ...]) -> dict[str, dict[str, float]]:
+    result: dict[str, dict[str, float]] = {}
+    for role in ("fit", "test"):
+        rows = [e.measured - e.fitted for e in explained if e.trial.role == role]
+        if rows:
+            rms = np.sqrt(np.mean(np.square(np.concatenate(rows)), axis=0))
+            result[role] = {f"tau{j}_Nm": float(v) for j, v in enumerate(rms, start=1)}
+    return result
+
+
+def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) -> Model:
+    """Return the model with estimates; effects that its joints state stay there, the others become effects."""
+    segments = tuple(
+        Segment(old.name, length, mass, min(max(com, 0.0), length), inertia, com_normal=normal)
+        for old, (length, mass, com, normal, inertia) in zip(model.segments, raw["segments"], strict=True)
+    )
+    joints = [dataclasses.asdict(j) | {"stiffness": 0.0, "rest": 0.0, "viscosity": 0.0, "coulomb": 0.0} for j in model.joints]
+    listed = []
+    fitted = [Effect(kind, index + 1, parameters=_named(kind, values)) for kind, index, values in raw["effects"]]
+    held = [e for e in effects if e.kind not in _joint_kinds()]
+    for effect in fitted:
+        joint, values = joints[(effect.joint or 1) - 1], effect.parameters
+        if effect.kind == "elastic" and not joint["stiffness"]:
+            joint.update(stiffness=values["stiffness"], rest=values["rest"])
+        elif effect.kind == "viscous" and not joint["viscosity"]:
+            joint["viscosity"] = values["viscosity"]
+        elif effect.kind == "coulomb" and not joint["coulomb"] and "smoothing" not in _changed(effect):
+            joint["coulomb"] = values["torque"]
+        else:
+            listed.append(effect)
+    return model.replace(segments=segments, joints=tuple(Joint(**j) for j in joints), effects=(*listed, *held))
+
+
+def _named(kind: str, values: Sequence[float]) -> dict[str, float]:
+    return {p.name: v for p, v in zip(catalogue()[kind].parameters, values, strict=True)}
+
+
+def _changed(effect: Effect) -> set[str]:
+    return {p.name for p in catalogue()[effect.kind].parameters if effect.parameters.get(p.name, p.default) != p.default}

@@ -1,0 +1,58 @@
+"""A model as the compiled core computes with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from . import _armrs
+from .catalogue import catalogue
+from .model import Effect, Model
+
+_CHANNELS = {"Fy": 0, "Fz": 1, "Mx": 2}
+_NO_CONTACT = ((10_000.0, 10_000.0), (25.0, 25.0))
+"""Stiffness [N/m] and damping [N s/m] of the thesis' contact, where a model says nothing."""
+
+
+def joint_effects(model: Model) -> list[Effect]:
+    """Return what the joints of a model say of themselves as effects, joint by joint; zero means that there is none."""
+    effects = []
+    for number, joint in enumerate(model.joints, start=1):
+        if joint.stiffness:
+            effects.append(Effect("elastic", number, parameters={"stiffness": joint.stiffness, "rest": joint.rest}))
+        if joint.viscosity:
+            effects.append(Effect("viscous", number, parameters={"viscosity": joint.viscosity}))
+        if joint.coulomb:
+            effects.append(Effect("coulomb", number, parameters={"torque": joint.coulomb}))
+    return effects
+
+
+def all_effects(model: Model) -> list[Effect]:
+    """Return every effect of a model, those of its joints first."""
+    return [*joint_effects(model), *model.effects]
+
+
+def arm(model: Model) -> _armrs.Arm:
+    """Return the rigid arm of a model."""
+    segments = model.segments
+    return _armrs.Arm(
+        [s.length for s in segments],
+        [s.mass for s in segments],
+        [s.com for s in segments],
+        [s.inertia for s in segments],
+        com_normals=[s.com_normal for s in segments],
+        gravity=model.gravity,
+        base=model.base,
+    )
+
+
+def rig(model: Model, effects: Iterable[Effect] | None = None) -> _armrs.Rig:
+    """Return a model with all its effects, or with the effects given, ready for the core."""
+    listed = all_effects(model) if effects is None else list(effects)
+    contact = _NO_CONTACT if model.contact is None else (model.contact.stiffness, model.contact.damping)
+    robot = None if model.robot is None else (model.robot.lengths, model.robot.base, model.robot.elbow)
+    return _armrs.Rig(arm(model), [_entry(e) for e in listed], contact, robot)
+
+
+def _entry(effect: Effect) -> tuple[str, int, list[float]]:
+    index = _CHANNELS[effect.channel] if effect.channel is not None else (effect.joint or 1) - 1
+    return effect.kind, index, [effect.parameters.get(p.name, p.default) for p in catalogue()[effect.kind].parameters]
