@@ -63,3 +63,33 @@ impl<T: Scalar> Body<T> {
         }
     }
 }
+
+/// An elbow orthosis: one part strapped to the upper arm, the other to the forearm.
+///
+/// Both centres of mass are measured from the elbow, as the thesis does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orthosis<T> {
+    /// Mass of the part on the upper arm \[kg\].
+    pub upper_mass: T,
+    /// Its centre of mass, proximal of the elbow \[m\].
+    pub upper_from_elbow: T,
+    /// Mass of the part on the forearm \[kg\].
+    pub lower_mass: T,
+    /// Its centre of mass, distal of the elbow \[m\].
+    pub lower_from_elbow: T,
+}
+
+impl<T: Scalar> Orthosis<T> {
+    /// Upper arm and forearm with the orthosis on (thesis 3.20, corrected).
+    ///
+    /// The printed `l_1 = a_1 − (l_ua m_ua + l_uo m_uo)/m_1` holds only when both are measured from the elbow; the
+    /// upper arm's own centre of mass is given from the shoulder, so that here `l_1 = (l_ua m_ua + (a_1 − l_uo) m_uo)/m_1`.
+    pub fn on(&self, upper_arm: &Segment<T>, forearm: &Segment<T>) -> [Segment<T>; 2] {
+        let upper = Body::point(self.upper_mass, upper_arm.length - self.upper_from_elbow);
+        let lower = Body::point(self.lower_mass, self.lower_from_elbow);
+        [
+            Body::of(upper_arm).with(&upper).segment(upper_arm.length),
+            Body::of(forearm).with(&lower).segment(forearm.length),
+        ]
+    }
+}

@@ -73,6 +73,26 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
         Ok(Self { rotor, ..self })
     }
 
+    /// The same arm in another number: single precision, or the same in every lane.
+    pub fn cast<S: Scalar>(&self) -> Chain<S, N>
+    where
+        T: Into<f64>,
+    {
+        let of = |value: T| S::of(value.into());
+        let segments = self.segments.map(|s| Segment {
+            length: of(s.length),
+            mass: of(s.mass),
+            com: s.com.map(of),
+            inertia: of(s.inertia),
+        });
+        Chain::assembled(
+            segments,
+            self.base.map(of),
+            self.gravity.map(of),
+            self.rotor.map(of),
+        )
+    }
+
     pub(crate) fn assembled(
         segments: [Segment<T>; N],
         base: Plane<T>,

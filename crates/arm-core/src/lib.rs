@@ -16,6 +16,7 @@
 //! ```
 #![no_std]
 
+pub mod anthropometry;
 mod body;
 mod chain;
 mod check;
@@ -37,7 +38,7 @@ mod scalar;
 mod setup;
 mod trajectory;
 
-pub use body::Body;
+pub use body::{Body, Orthosis};
 pub use chain::{Chain, Segment};
 pub use contact::Contact;
 pub use contribution::{Contributions, contributions};

@@ -1,6 +1,6 @@
 //! Documented sample arms for tests, benchmarks and examples.
 
-use crate::{Chain, Segment};
+use crate::{Chain, Orthosis, Segment};
 
 const GRAVITY: [f64; 2] = [0.0, -9.81];
 
@@ -32,4 +32,14 @@ pub fn human_arm() -> Chain<f64, 3> {
         segment(0.264, 0.121, 1.264, 0.001),
         segment(0.093, 0.081, 0.753, 0.006),
     ])
+}
+
+/// The elbow orthosis of the thesis (section 3.4.1).
+pub const fn orthosis() -> Orthosis<f64> {
+    Orthosis {
+        upper_mass: 0.200,
+        upper_from_elbow: 0.091,
+        lower_mass: 0.191,
+        lower_from_elbow: 0.066,
+    }
 }

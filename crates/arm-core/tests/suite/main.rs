@@ -1,5 +1,7 @@
 //! Tests of arm-core: identities between two independent ways, limits, arithmetic in the head, refused inputs.
 
+mod anthropometry;
+mod body;
 mod catalogue;
 mod common;
 mod effects;
