@@ -43,17 +43,16 @@ def number(
         bounds.append(f">= {least:g}")
     elif most is not None:
         bounds.append(f"<= {most:g}")
-    allowed = " ".join(part for part in ("a number", " and ".join(bounds), unit) if part)
+    allowed = " ".join(part for part in ("a finite number", " and ".join(bounds), unit) if part)
     if isinstance(value, bool) or not hasattr(type(value), "__float__"):
         raise BadInput(place, value, allowed)
     try:
         result = float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError):
         raise BadInput(place, value, allowed) from None
-    if not math.isfinite(result):
-        raise BadInput(place, result, f"a finite number{' ' + unit if unit else ''}")
     outside = (
-        (above is not None and not result > above)
+        not math.isfinite(result)
+        or (above is not None and not result > above)
         or (least is not None and not result >= least)
         or (most is not None and not result <= most)
     )

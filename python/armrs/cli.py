@@ -130,8 +130,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = typer.main.get_command(app)
     try:
-        result = command.main(args=given or ["--help"], prog_name="armrs", standalone_mode=False)
+        # Not `command.main`, which turns some errors into exits of its own.
+        with command.make_context("armrs", given or ["--help"]) as context:
+            result = command.invoke(context)
         sys.stdout.flush()
+    except typer.Exit as end:
+        return end.exit_code
     except BadInput as error:
         return _refuse(str(error))
     except ArmrsError as error:

@@ -35,15 +35,16 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
     """Return the text of a UTF-8 file, or raise `BadInput`."""
     file = Path(path)
     try:
-        if file.is_dir():
-            raise BadInput("file", Text("a folder"), what, file=path)
-        if file.stat().st_size > _LIMIT:
-            raise BadInput("file", Text(f"{file.stat().st_size} bytes"), f"{what} of at most {_LIMIT} bytes", file=path)
-        raw = file.read_bytes()
+        is_folder, size = file.is_dir(), file.stat().st_size
+        raw = b"" if is_folder or size > _LIMIT else file.read_bytes()
     except OSError as error:
         raise BadInput("file", Text(error.strerror or "unreadable"), f"{what} that can be read", file=path) from None
     except ValueError:  # a path with a null character
         raise BadInput("file", Text("a name no file can have"), what, file=path) from None
+    if is_folder:
+        raise BadInput("file", Text("a folder"), what, file=path)
+    if size > _LIMIT:
+        raise BadInput("file", Text(f"{size} bytes"), f"{what} of at most {_LIMIT} bytes", file=path)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

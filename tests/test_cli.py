@@ -1,0 +1,157 @@
+"""The command line as a user meets it: exit status, one line on standard error, nothing written."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import armrs
+from armrs import catalogue, cli
+from armrs.errors import ArmrsError
+from conftest import Session
+
+
+def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run `armrs` as a process of its own."""
+    command = [sys.executable, "-m", "armrs", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, timeout=120)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Run in this process, expect status 2, nothing on standard output and one line on standard error."""
+    assert cli.main([str(a) for a in arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.startswith("armrs: ")
+    return err.removeprefix("armrs: ").rstrip("\n")
+
+
+def test_version() -> None:
+    done = run("--version")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"armrs {armrs.__version__}\n", "")
+
+
+def test_help_without_arguments() -> None:
+    done = run()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "effects" in done.stdout
+    assert "convert" in done.stdout
+
+
+def test_effects_prints_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["effects"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    for kind in catalogue.catalogue().values():
+        assert f"{kind.kind} ({kind.where}" in out
+        assert kind.formula in out
+    assert "torque: 0 to 100 N m, default 0" in out
+
+
+def test_effects_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert cli.main(["effects", "coulomb", "--json", "-"]) == 0
+    (effect,) = json.loads(capsys.readouterr().out)["effects"]
+    assert (effect["kind"], effect["where"], effect["address"]) == ("coulomb", "joint", "joint")
+    assert effect["parameters"][0]["unit"] == "N m"
+    assert cli.main(["effects", "--json", str(tmp_path / "effects.json")]) == 0
+    assert len(json.loads((tmp_path / "effects.json").read_text(encoding="utf-8"))["effects"]) == len(catalogue.catalogue())
+    assert "coulomb" in capsys.readouterr().out
+
+
+def test_convert(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["convert", str(session.folder), "-o", str(tmp_path / "out"), "--json", "-"]) == 0
+    files = json.loads(capsys.readouterr().out)["files"]
+    assert [Path(f).exists() for f in files] == [True] * 4
+    assert cli.main(["convert", files[0], "--to", "csv", "-o", str(tmp_path / "back")]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'back' / 'slow_1.csv'}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["effekts"], "No such command 'effekts'"),
+        (["effects", "--jason", "x"], "--jason"),
+        (["convert"], "Missing"),
+        (["convert", "x", "--to", "c3d", "-o", "out"], "c3d"),
+        (["effects", "coulom"], "KIND: found unknown kind of effect 'coulom', allowed"),
+        (["convert", "nothing", "-o", "out"], "nothing: file: found No such file or directory, allowed a TOML file that can be read"),
+        (["convert", "nothing.csv", "-o", "out"], "nothing.csv: file: found No such file or directory"),
+        (["convert", "nul\0l.csv", "-o", "out"], "null byte"),
+    ],
+)
+def test_refuses(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert message in refused(capsys, *arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_input_is_one_line_and_status_2_and_nothing_is_written(session: Session, tmp_path: Path) -> None:
+    session.set_cell(7, "q2_rad", "abc")
+    (session.folder / "trials/slow_2.csv").write_text("t_s\n1,2\n", encoding="utf-8")
+    before = session.files()
+    done = run("convert", "session", "-o", "out", "--json", "out.json", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "armrs: session/trials/slow_2.csv: line 2: found 2 cells, allowed 1 cells, one a column\n"
+    assert session.files() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["session"]
+
+
+def test_json_does_not_replace_a_model(session: Session, capsys: pytest.CaptureFixture[str]) -> None:
+    before = session.files()
+    text = refused(capsys, "effects", "--json", session.folder / "model.toml")
+    assert text.endswith("file: found an existing file with suffix '.toml', allowed a new file, or a .json file to replace")
+    assert session.files() == before
+
+
+def test_json_to_a_device_leaves_the_device() -> None:
+    done = run("effects", "--json", os.devnull)
+    assert done.returncode == 0
+    assert not Path(os.devnull).is_file()
+
+
+def test_a_folder_that_cannot_be_made_is_refused(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("x", encoding="utf-8")
+    text = refused(capsys, "convert", session.folder, "-o", tmp_path / "file" / "out")
+    assert text.endswith("file: found Not a directory, allowed a place that can be written")
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (ArmrsError("the data\ncannot say"), 1, "armrs: the data\\ncannot say\n"),
+        (armrs.IdentificationError("no excitation"), 1, "armrs: no excitation\n"),
+        (armrs.BadInput("q", "x", "y", file="f.csv"), 2, "armrs: f.csv: q: found 'x', allowed y\n"),
+        (KeyboardInterrupt(), 130, "armrs: interrupted\n"),
+    ],
+)
+def test_errors_become_a_line_and_a_status(
+    error: BaseException, status: int, line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail() -> None:
+        raise error
+
+    monkeypatch.setattr(catalogue, "catalogue", fail)
+    assert cli.main(["effects"]) == status
+    assert capsys.readouterr().err == line
+
+
+def test_a_reader_that_leaves_early_is_no_error() -> None:
+    done = subprocess.run(
+        f'"{sys.executable}" -m armrs effects | head -n 1', shell=True, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.stderr == ""
+    assert done.stdout.count("\n") == 1
+
+
+def test_without_the_compiled_module_the_line_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(catalogue, "catalogue", dict)
+    assert cli.main(["effects"]) == 1
+    assert "the compiled module armrs._armrs is missing" in capsys.readouterr().err
