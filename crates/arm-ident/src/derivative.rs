@@ -10,10 +10,10 @@ use crate::orthogonal::{Qr, solve_upper_transposed};
 ///
 /// White noise of standard deviation σ comes out as `σ/(√2 Δ)`.
 ///
-/// * `step` - Δ, time between samples [s]
+/// * `step` - Δ, time between samples \[s\]
 ///
 /// # Errors
-/// [`IdentError::TooFew`] below 3 samples, [`IdentError::NotFinite`], [`IdentError::OutOfRange`] for a step that is not positive.
+/// [`IdentError::TooFew`] below 3 samples, [`IdentError::NotFinite`], [`IdentError::OutOfRange`] unless the step is 1e-20…1e20.
 pub fn first(column: &[f64], step: f64) -> Result<Vec<f64>, IdentError> {
     check(column, step, 3)?;
     let n = column.len();
@@ -34,7 +34,7 @@ pub fn first(column: &[f64], step: f64) -> Result<Vec<f64>, IdentError> {
 /// White noise of standard deviation σ comes out as `√6 σ/Δ²`.
 ///
 /// # Errors
-/// [`IdentError::TooFew`] below 4 samples, [`IdentError::NotFinite`], [`IdentError::OutOfRange`] for a step that is not positive.
+/// [`IdentError::TooFew`] below 4 samples, [`IdentError::NotFinite`], [`IdentError::OutOfRange`] unless the step is 1e-20…1e20.
 pub fn second(column: &[f64], step: f64) -> Result<Vec<f64>, IdentError> {
     check(column, step, 4)?;
     let n = column.len();
@@ -80,7 +80,7 @@ impl SavitzkyGolay {
     /// Weights from a QR factor of the polynomial basis on `[−1, 1]`.
     ///
     /// # Errors
-    /// [`IdentError::OutOfRange`] unless `1 ≤ m ≤ 500`, `derivative ≤ degree ≤ min(2m, 12)` and the step is positive.
+    /// [`IdentError::OutOfRange`] unless `1 ≤ m ≤ 500`, `derivative ≤ degree ≤ min(2m, 12)` and the step is 1e-20…1e20.
     pub fn new(options: SavitzkyGolayOptions) -> Result<Self, IdentError> {
         let SavitzkyGolayOptions {
             half_width,
@@ -95,7 +95,7 @@ impl SavitzkyGolay {
             [0.0, (2 * half_width).min(12) as f64],
         )?;
         check_range("derivative", derivative as f64, [0.0, degree as f64])?;
-        check_range("step", step, [f64::MIN_POSITIVE, f64::MAX])?;
+        check_range("step", step, [1e-20, 1e20])?;
         let n = 2 * half_width + 1;
         let place = |i: usize| (i as f64 - half_width as f64) / half_width as f64;
         let qr = Qr::new(Matrix::from_fn(n, degree + 1, |i, k| power(place(i), k)));
@@ -144,7 +144,7 @@ impl SavitzkyGolay {
 fn check(column: &[f64], step: f64, least: usize) -> Result<(), IdentError> {
     check_least("samples of column", column.len(), least)?;
     check_finite("column", column)?;
-    check_range("step", step, [f64::MIN_POSITIVE, f64::MAX])
+    check_range("step", step, [1e-20, 1e20])
 }
 
 /// `x^k` by repeated multiplication: the same bits everywhere.

@@ -96,12 +96,12 @@ impl Butterworth {
         }
     }
 
-    /// Frequency of −3.01 dB in a single pass [Hz].
+    /// Frequency of −3.01 dB in a single pass \[Hz\].
     pub fn cutoff_hz(&self) -> f64 {
         libm::atan(self.warped) * self.rate_hz / PI
     }
 
-    /// Frequency of −3.01 dB after both passes [Hz]; at [`Butterworth::cutoff_hz`] it is −6.02 dB.
+    /// Frequency of −3.01 dB after both passes \[Hz\]; at [`Butterworth::cutoff_hz`] it is −6.02 dB.
     pub fn half_power_both_ways_hz(&self) -> f64 {
         libm::atan(self.warped * two_pass_factor(self.order)) * self.rate_hz / PI
     }

@@ -10,8 +10,11 @@ use crate::scaled::{Scaled, sides};
 /// Newton steps on binding cones.
 const NEWTON_STEPS: usize = 25;
 
-/// A step this short (relative to 1 and x̃) ends Newton's method.
+/// Newton's method ends when a step changes the prediction `R x̃` by less than this part of `z`, or by its rounding …
 const CONVERGED: f64 = 1e-12;
+
+/// … and x̃ by less than this part of 1 and x̃: what a cone curves away over such a step is its square.
+const SHORT: f64 = 1e-6;
 
 /// Violation (relative to 1 and the value) that is accepted as rounding.
 const FEASIBLE: f64 = 1e-10;
@@ -29,8 +32,9 @@ pub(crate) struct Active {
 /// Refines `start`. `None` if no set of binding constraints near the guess gives a feasible point with multipliers of the right sign.
 pub(crate) fn polish(scaled: &Scaled, start: &[f64], guess: &Active) -> Option<(Vec<f64>, Active)> {
     let mut active = guess.clone();
-    let largest = norm(scaled.r.as_slice()) * norm(&scaled.z);
-    let least = -ZERO_MULTIPLIER * largest;
+    let largest = norm(scaled.r.as_slice());
+    let rounding = 16.0 * f64::EPSILON * largest * largest * norm(start);
+    let least = -ZERO_MULTIPLIER * largest * norm(&scaled.z) - rounding;
     // Every round drops or adds one constraint; a cycle ends with the count.
     for _ in 0..4 * (active.rows.len() + active.cones.len()) + 4 {
         let solved = newton(scaled, start, &active)?;
@@ -81,7 +85,9 @@ fn newton(scaled: &Scaled, start: &[f64], active: &Active) -> Option<Solved> {
         let mut moved = solved.x.clone();
         add_scaled(&mut moved, -1.0, &x);
         x.clone_from(&solved.x);
-        if max_abs(&moved) <= CONVERGED * (1.0 + max_abs(&x)) {
+        let rounding = 4.0 * f64::EPSILON * norm(scaled.r.as_slice()) * norm(&x);
+        let seen = norm(&scaled.r.times(&moved)) <= CONVERGED * norm(&scaled.z) + rounding;
+        if seen && max_abs(&moved) <= SHORT * (1.0 + max_abs(&x)) {
             solved.multipliers = in_order(scaled, active, &solved.multipliers);
             return Some(solved);
         }

@@ -1,5 +1,6 @@
 //! One module per source file; `noise` is the seeded source of random numbers that they share.
 
+mod bits;
 mod coloured;
 mod condense;
 mod covariance;

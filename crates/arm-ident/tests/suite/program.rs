@@ -345,6 +345,19 @@ fn repeated_solves_have_equal_bits() {
 }
 
 #[test]
+fn nothing_to_estimate_is_no_problem() {
+    let outcome = solve(Program::new(Matrix::zeros(0, 0), Vec::new()));
+    assert_eq!((outcome.status, outcome.rank), (Status::Solved, 0));
+    let only_noise = solve(Program::new(Matrix::zeros(2, 0), vec![3.0, 4.0]));
+    assert!((only_noise.objective - 25.0).abs() < EXACT);
+    // A column of zeros stays at zero, or at the bound nearest to it.
+    let dead = Program::new(Matrix::diagonal(&[1.0, 0.0]), vec![1.0, 0.0]);
+    let held = solve(dead.and_then(|p| p.bounds(&[-FREE, 2.0], &[FREE; 2])));
+    assert_eq!((held.status, held.rank), (Status::Solved, 1));
+    assert!((held.x[0] - 1.0).abs() < EXACT && held.x[1] >= 2.0);
+}
+
+#[test]
 fn refuses_bad_input_by_name() {
     let good = identity(&[1.0, 2.0]);
     let name = |result: Result<Program, IdentError>| match result {
