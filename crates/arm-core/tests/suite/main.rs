@@ -2,9 +2,17 @@
 
 mod anthropometry;
 mod body;
+mod calculus;
 mod catalogue;
+mod chain;
 mod common;
+mod dual;
 mod effects;
 mod identities;
+mod lanes;
+mod newton_euler;
+mod pendulum;
 mod robot;
+mod scalar;
+mod thesis;
 mod trajectory;
