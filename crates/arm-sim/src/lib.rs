@@ -7,10 +7,12 @@
 //! Conventions are those of [`arm_core`]: y forward, z up, counter-clockwise positive, SI units and radians, forces named
 //! by what they act on, `R` the torque with which a joint resists.
 
+mod batch;
 mod digest;
 mod error;
 mod experiment;
 mod model;
+pub mod models;
 mod movement;
 mod native;
 mod path;
@@ -23,6 +25,7 @@ mod start;
 mod step;
 mod terms;
 
+pub use batch::simulate_batch;
 pub use digest::digest;
 pub use error::SimulationError;
 pub use experiment::{

@@ -1,6 +1,6 @@
 //! Where the robot's handle is at any time.
 
-use arm_core::{Chain, Joints, Plane, Pose, Robot, jacobian, jacobian_rate, tip};
+use arm_core::{Chain, Lanes, Plane, Robot, Scalar};
 
 use crate::{Interpolation, Jet, JointMotion, Movement, Series, SimulationError};
 
@@ -161,23 +161,33 @@ fn joints(jet: Jet<2>) -> JointMotion<2> {
     }
 }
 
-/// Position, velocity and acceleration of an arm's tip.
+/// Position, velocity and acceleration of an arm's tip: the sums over its links, with all sines and cosines at once.
 #[inline]
 fn tip_motion<const N: usize>(arm: &Chain<f64, N>, motion: &JointMotion<N>) -> Handle<f64> {
-    let pose = Pose::new(&motion.q);
-    let (j, rate) = (jacobian(arm, &pose), jacobian_rate(arm, &pose, &motion.qd));
-    let along = |m: &nalgebra::SMatrix<f64, 2, N>, v: &Joints<f64, N>| {
-        let mut sum = [0.0; 2];
-        for k in 0..N {
-            sum[0] += m[(0, k)] * v[k];
-            sum[1] += m[(1, k)] * v[k];
-        }
-        sum
-    };
-    let (turning, inward) = (along(&j, &motion.qdd), along(&rate, &motion.qd));
-    Handle {
-        position: tip(arm, &pose),
-        velocity: along(&j, &motion.qd),
-        acceleration: [turning[0] + inward[0], turning[1] + inward[1]],
+    let mut angles = [0.0; N];
+    let mut sum = 0.0;
+    for (angle, q) in angles.iter_mut().zip(motion.q.iter()) {
+        sum += q;
+        *angle = sum;
     }
+    let (sin, cos) = Lanes(angles).sin_cos();
+    let mut handle = Handle {
+        position: arm.base(),
+        velocity: [0.0; 2],
+        acceleration: [0.0; 2],
+    };
+    let (mut speed, mut acceleration) = (0.0, 0.0);
+    for (i, segment) in arm.segments().iter().enumerate() {
+        speed += motion.qd[i];
+        acceleration += motion.qdd[i];
+        let [y, z] = [segment.length * cos.0[i], segment.length * sin.0[i]];
+        let inward = speed * speed;
+        handle.position[0] += y;
+        handle.position[1] += z;
+        handle.velocity[0] -= speed * z;
+        handle.velocity[1] += speed * y;
+        handle.acceleration[0] -= acceleration * z + inward * y;
+        handle.acceleration[1] += acceleration * y - inward * z;
+    }
+    handle
 }

@@ -111,9 +111,13 @@ impl<'a, const N: usize> Prepared<'a, N> {
         };
         prepared.start = match &experiment.start {
             Start::Given { q, qd } => start::given(&prepared, q, qd)?,
-            Start::Equilibrium { near } => (start::equilibrium(&prepared, near)?, Joints::zeros()),
+            Start::Equilibrium { near } => {
+                // First near it: no equilibrium need be found of a contact that is refused anyhow.
+                stability::check(&prepared, near)?;
+                (start::equilibrium(&prepared, near)?, Joints::zeros())
+            }
         };
-        stability::check(&prepared)?;
+        stability::check(&prepared, &prepared.start.0)?;
         Ok(prepared)
     }
 

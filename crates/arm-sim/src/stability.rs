@@ -59,20 +59,18 @@ impl Vibration {
 
 const RK4_RADIUS: f64 = 2.61;
 
-/// Refuses a contact that is too stiff for the step, judged at the start.
+/// Refuses a contact that is too stiff for the step, judged at one pose.
 ///
 /// Dry friction of joints is stiffer still near rest, but bounded, so that it cannot grow without limit; it is not judged.
-pub(crate) fn check<const N: usize>(prepared: &Prepared<N>) -> Result<(), SimulationError> {
+pub(crate) fn check<const N: usize>(
+    prepared: &Prepared<N>,
+    q: &Joints<f64, N>,
+) -> Result<(), SimulationError> {
     let Link::Compliant(contact) = &prepared.model.link else {
         return Ok(());
     };
     let model = &prepared.model;
-    let vibration = Vibration::at(
-        contact,
-        &model.chain,
-        model.base.as_ref(),
-        &prepared.start.0,
-    );
+    let vibration = Vibration::at(contact, &model.chain, model.base.as_ref(), q);
     let (dt, largest) = (
         prepared.schedule.dt,
         vibration.largest_step(prepared.integrator()),

@@ -8,7 +8,7 @@ use crate::model::{Input, Link, State};
 use crate::prepare::Prepared;
 use crate::terms::Terms;
 
-/// Largest torque left in an equilibrium, and largest gap of a rigid coupling \[N m, m\]: rounding of forces in a stiff contact.
+/// Largest torque left in an equilibrium, and largest gap of a rigid coupling \[N m, m\].
 const BALANCED: f64 = 1e-9;
 /// Newton steps after which a search is given up.
 const ITERATIONS: usize = 100;
@@ -62,6 +62,12 @@ pub(crate) fn equilibrium<const N: usize>(
     if rigid {
         x.extend([0.0; 2]);
     }
+    let stiffest = match &prepared.model.link {
+        Link::Compliant(contact) => contact.stiffness[0].max(contact.stiffness[1]),
+        Link::Free | Link::Rigid => 0.0,
+    };
+    // A stiff contact turns the rounding of a position into a force.
+    let balanced = BALANCED + 1e-15 * stiffest;
     let residual = |x: &[f64]| imbalance(prepared, &input, x);
     let size = |r: &[f64]| {
         r.iter()
@@ -69,7 +75,7 @@ pub(crate) fn equilibrium<const N: usize>(
     };
     let mut r = residual(&x);
     for iteration in 0..ITERATIONS {
-        if size(&r) < BALANCED {
+        if size(&r) < balanced {
             return Ok(Joints::from_fn(|i, _| x[i]));
         }
         let failed = SimulationError::NoEquilibrium {

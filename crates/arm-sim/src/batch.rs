@@ -1,0 +1,249 @@
+//! Many runs side by side: eight in the lanes of one, groups of eight over threads.
+
+use std::mem::discriminant;
+
+use arm_core::effect::Effect;
+use arm_core::{Contact, Joints, Lanes, Plane, Scalar, Segment, Setup};
+
+use crate::model::{Input, Link, Model, State};
+use crate::native::diverged;
+use crate::prepare::{Prepared, command, with_ripple};
+use crate::recorder::Recorder;
+use crate::step::{Inputs, Memory, step};
+use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
+
+/// Runs in one group.
+const LANES: usize = 8;
+
+type Wide = Lanes<LANES>;
+type Outcomes<const N: usize> = Vec<Result<Recording<N>, SimulationError>>;
+
+/// Simulates many experiments; each has the bits of [`simulate`], whatever its neighbours and the number of threads.
+///
+/// Neighbours that differ only in values (not in kinds of effects, steps, or the kind of drive) run eight at a time in
+/// one pass; order similar experiments together.
+pub fn simulate_batch<const N: usize>(
+    experiments: &[Experiment<N>],
+    threads: usize,
+) -> Outcomes<N> {
+    let groups: Vec<&[Experiment<N>]> = experiments.chunks(LANES).collect();
+    let threads = threads.clamp(1, groups.len().max(1));
+    let mut done: Vec<Outcomes<N>> = Vec::new();
+    if threads == 1 {
+        done.extend(groups.into_iter().map(group));
+    } else {
+        // Every thread takes each `threads`-th group: fixed, and even for runs of slowly changing cost.
+        let share = &|first: usize| -> Vec<Outcomes<N>> {
+            let mine = groups.iter().skip(first).step_by(threads);
+            mine.map(|experiments| group(experiments)).collect()
+        };
+        let mut shares: Vec<_> = std::thread::scope(|scope| {
+            let workers: Vec<_> = (0..threads)
+                .map(|first| scope.spawn(move || share(first)))
+                .collect();
+            let joined = workers.into_iter().map(|worker| worker.join());
+            joined
+                .map(|share| share.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .map(Vec::into_iter)
+                .collect()
+        });
+        for index in 0..groups.len() {
+            done.extend(shares[index % threads].next());
+        }
+    }
+    done.into_iter().flatten().collect()
+}
+
+/// Up to eight runs: in lanes where they are alike, else one by one.
+fn group<const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
+    let prepared: Result<Vec<_>, _> = experiments.iter().map(Prepared::new).collect();
+    match prepared {
+        Ok(prepared) if prepared.len() > 1 && prepared.iter().all(|p| alike(p, &prepared[0])) => {
+            match side_by_side(&prepared) {
+                Ok(outcomes) => outcomes,
+                Err(error) => vec![Err(error); prepared.len()],
+            }
+        }
+        _ => experiments.iter().map(simulate).collect(),
+    }
+}
+
+/// Whether two runs take the same steps.
+fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
+    let kinds =
+        |p: &Prepared<N>| -> Vec<_> { p.model.effects.iter().map(|e| (e.kind, e.index)).collect() };
+    let has_ripple = |p: &Prepared<N>| p.setup.ripple.iter().any(|a| *a != 0.0);
+    a.schedule == b.schedule
+        && a.integrator() == b.integrator()
+        && discriminant(&a.model.link) == discriminant(&b.model.link)
+        && a.model.base.is_some() == b.model.base.is_some()
+        && has_ripple(a) == has_ripple(b)
+        && kinds(a) == kinds(b)
+}
+
+/// The runs in the lanes of one. A group of fewer than eight repeats its last run in the lanes left over.
+fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>, SimulationError> {
+    let lane = |i: usize| &prepared[i.min(prepared.len() - 1)];
+    let first = &prepared[0];
+    let (schedule, integrator) = (first.schedule, first.integrator());
+    let setup = pack_setup(lane);
+    let link = match first.model.link {
+        Link::Compliant(_) => Link::Compliant(setup.contact),
+        Link::Free => Link::Free,
+        Link::Rigid => Link::Rigid,
+    };
+    let effects =
+        (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
+    let model = Model::new(&setup, link, effects.collect())?;
+    let same_drive = prepared
+        .iter()
+        .all(|p| p.experiment.drive == first.experiment.drive);
+    let input = |time: f64| {
+        let commanded = if same_drive {
+            let one = command(&first.experiment.drive, time);
+            pack_input(|_| one)
+        } else {
+            pack_input(|i| command(&lane(i).experiment.drive, time))
+        };
+        with_ripple(commanded, &setup)
+    };
+
+    let mut memory = Memory::<Wide>::new(model.effects.len());
+    let mut lane_memory = vec![0.0; model.effects.len()];
+    let mut state = State {
+        q: Joints::from_fn(|j, _| pack(|i| lane(i).start.0[j])),
+        qd: Joints::from_fn(|j, _| pack(|i| lane(i).start.1[j])),
+        work: [Wide::ZERO; 4],
+    };
+    let mut recorders: Vec<_> = prepared.iter().map(Recorder::new).collect();
+    let mut stopped: Vec<Option<SimulationError>> = vec![None; prepared.len()];
+    let mut sample =
+        |steps: usize, state: &State<Wide, N>, memory: &[Wide], stopped: &[Option<_>]| {
+            for (i, recorder) in recorders.iter_mut().enumerate() {
+                if stopped[i].is_none() {
+                    for (one, all) in lane_memory.iter_mut().zip(memory) {
+                        *one = all.0[i];
+                    }
+                    recorder.push(steps, &lane_state(state, i), &lane_memory);
+                }
+            }
+        };
+    sample(0, &state, &memory.state, &stopped);
+    let now = input(0.0);
+    let mut inputs = Inputs {
+        start: now,
+        middle: now,
+        end: now,
+    };
+    for done in 1..=schedule.steps {
+        inputs.start = inputs.end;
+        if integrator == Integrator::Rk4 {
+            inputs.middle = input((done as f64 - 0.5) * schedule.dt);
+        }
+        inputs.end = input(schedule.time(done));
+        step(
+            &model,
+            integrator,
+            schedule.dt,
+            &inputs,
+            (&mut state, &mut memory),
+        );
+        if !finite(&state) {
+            for (i, stop) in stopped.iter_mut().enumerate() {
+                if let (None, Some(joint)) = (&stop, diverged(&lane_state(&state, i))) {
+                    *stop = Some(SimulationError::Diverged {
+                        step: done,
+                        time: schedule.time(done),
+                        joint,
+                    });
+                }
+            }
+            if stopped.iter().all(Option::is_some) {
+                break;
+            }
+        }
+        if done % schedule.every == 0 {
+            sample(done, &state, &memory.state, &stopped);
+        }
+    }
+    let recordings = recorders.into_iter().map(Recorder::finish);
+    Ok(recordings
+        .zip(stopped)
+        .map(|(recording, stopped)| stopped.map_or(Ok(recording), Err))
+        .collect())
+}
+
+/// Whether every angle and speed of every lane is finite: zero times anything else is not zero.
+#[inline]
+fn finite<const N: usize>(state: &State<Wide, N>) -> bool {
+    let mut sum = Wide::ZERO;
+    for i in 0..N {
+        sum += Wide::ZERO * state.q[i] + Wide::ZERO * state.qd[i];
+    }
+    sum.every(|s| s == 0.0)
+}
+
+fn pack(value: impl Fn(usize) -> f64) -> Wide {
+    Lanes(core::array::from_fn(value))
+}
+
+fn pack_plane(value: impl Fn(usize) -> Plane<f64>) -> Plane<Wide> {
+    [0, 1].map(|axis| pack(|i| value(i)[axis]))
+}
+
+fn pack_effect<'a>(effect: impl Fn(usize) -> &'a Effect<f64>) -> Effect<Wide> {
+    let first = effect(0);
+    Effect {
+        kind: first.kind,
+        index: first.index,
+        parameters: core::array::from_fn(|p| pack(|i| effect(i).parameters[p])),
+        on: first.on,
+    }
+}
+
+fn pack_input<const N: usize>(input: impl Fn(usize) -> Input<f64, N>) -> Input<Wide, N> {
+    let inputs: [Input<f64, N>; LANES] = core::array::from_fn(input);
+    Input {
+        time: pack(|i| inputs[i].time),
+        handle: Handle {
+            position: pack_plane(|i| inputs[i].handle.position),
+            velocity: pack_plane(|i| inputs[i].handle.velocity),
+            acceleration: pack_plane(|i| inputs[i].handle.acceleration),
+        },
+        torque: Joints::from_fn(|j, _| pack(|i| inputs[i].torque[j])),
+    }
+}
+
+fn pack_setup<'a, const N: usize>(lane: impl Fn(usize) -> &'a Prepared<'a, N>) -> Setup<Wide, N> {
+    let setup = |i: usize| &lane(i).setup;
+    Setup {
+        segments: core::array::from_fn(|s| Segment {
+            length: pack(|i| setup(i).segments[s].length),
+            mass: pack(|i| setup(i).segments[s].mass),
+            com: pack_plane(|i| setup(i).segments[s].com),
+            inertia: pack(|i| setup(i).segments[s].inertia),
+        }),
+        rotor: core::array::from_fn(|s| pack(|i| setup(i).rotor[s])),
+        base: pack_plane(|i| setup(i).base),
+        gravity: pack_plane(|i| setup(i).gravity),
+        contact: Contact {
+            stiffness: pack_plane(|i| setup(i).contact.stiffness),
+            damping: pack_plane(|i| setup(i).contact.damping),
+            play: pack_plane(|i| setup(i).contact.play),
+        },
+        base_motion: pack_plane(|i| setup(i).base_motion),
+        base_rest: pack(|i| setup(i).base_rest),
+        ripple: pack_plane(|i| setup(i).ripple),
+        ripple_frequency: pack(|i| setup(i).ripple_frequency),
+        ripple_phase: pack(|i| setup(i).ripple_phase),
+        force_delay: pack(|i| setup(i).force_delay),
+    }
+}
+
+fn lane_state<const N: usize>(state: &State<Wide, N>, i: usize) -> State<f64, N> {
+    State {
+        q: Joints::from_fn(|j, _| state.q[j].0[i]),
+        qd: Joints::from_fn(|j, _| state.qd[j].0[i]),
+        work: state.work.map(|w| w.0[i]),
+    }
+}

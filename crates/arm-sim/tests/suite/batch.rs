@@ -1,0 +1,104 @@
+//! Lanes and threads have the bits of single runs.
+
+use arm_core::effect::{Effect, Kind};
+use arm_sim::{
+    Coupling, Drive, Experiment, Integrator, SimulationError, Start, digest, simulate,
+    simulate_batch,
+};
+
+use crate::common::{several_effects, smooth};
+
+/// The experiment with values that differ from run to run.
+fn perturbed(base: &Experiment<3>, runs: usize) -> Vec<Experiment<3>> {
+    (0..runs)
+        .map(|i| {
+            let mut e = base.clone();
+            let scale = 1.0 + 0.01 * i as f64;
+            for segment in &mut e.setup.segments {
+                segment.mass *= scale;
+                segment.inertia *= scale;
+            }
+            if let Some(effect) = e.effects.first_mut() {
+                effect.parameters[0] *= scale;
+            }
+            e.setup.contact.stiffness[1] *= scale;
+            e
+        })
+        .collect()
+}
+
+fn same_bits(experiments: &[Experiment<3>], threads: usize) {
+    let batch = simulate_batch(experiments, threads);
+    assert_eq!(batch.len(), experiments.len());
+    for (i, (many, one)) in batch
+        .iter()
+        .zip(experiments.iter().map(simulate))
+        .enumerate()
+    {
+        match (many, one) {
+            (Ok(many), Ok(one)) => {
+                assert_eq!(digest(many), digest(&one), "run {i} of {threads} threads");
+                assert_eq!(many, &one);
+            }
+            (many, one) => assert_eq!(many.as_ref().err(), one.as_ref().err(), "run {i}"),
+        }
+    }
+}
+
+#[test]
+fn lanes_have_the_bits_of_single_runs() {
+    for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4] {
+        let mut base = smooth(0.25);
+        base.integrator = integrator;
+        same_bits(&perturbed(&base, 8), 1);
+        base.effects = several_effects();
+        same_bits(&perturbed(&base, 11), 1);
+    }
+}
+
+#[test]
+fn lanes_have_the_bits_of_single_runs_with_a_rigid_coupling() {
+    let mut base = smooth(0.25);
+    if let Drive::Handle { coupling, .. } = &mut base.drive {
+        *coupling = Coupling::Rigid;
+    }
+    base.start = Start::Given {
+        q: [-68f64, 40.0, 0.0].map(f64::to_radians).into(),
+        qd: [0.0; 3].into(),
+    };
+    let mut experiments = perturbed(&base, 5);
+    same_bits(&experiments, 1);
+    for e in &mut experiments {
+        e.effects = several_effects();
+    }
+    same_bits(&experiments, 1);
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads() {
+    let mut experiments = perturbed(&smooth(0.1), 37);
+    experiments[3]
+        .effects
+        .push(Effect::new(Kind::Tremor, 1).with(&[0.2]));
+    experiments[20].dt = -1.0;
+    for threads in [1, 2, 3, 64] {
+        same_bits(&experiments, threads);
+    }
+    assert!(simulate_batch::<3>(&[], 4).is_empty());
+}
+
+/// A lane that overflows stops with its own step and joint and leaves its neighbours alone.
+#[test]
+fn a_lane_that_diverges_does_not_touch_the_others() {
+    let mut experiments = perturbed(&smooth(0.05), 8);
+    experiments[5].start = Start::Given {
+        q: [0.0; 3].into(),
+        qd: [1e200, 0.0, 0.0].into(),
+    };
+    let batch = simulate_batch(&experiments, 1);
+    assert!(matches!(
+        batch[5],
+        Err(SimulationError::Diverged { step: 1, .. })
+    ));
+    same_bits(&experiments, 1);
+}

@@ -1,0 +1,49 @@
+//! Experiments and comparisons that several tests use.
+
+use arm_core::effect::{Effect, Kind};
+use arm_core::{Shape, models};
+use arm_sim::{Experiment, Recording, simulate};
+
+/// The human arm led by a handle whose path is smooth enough for a fourth-order method.
+pub fn smooth(duration: f64) -> Experiment<3> {
+    let (from, to) = ([-68.0, 40.0, 0.0], [-56.0, 80.0, 5.0]);
+    let mut experiment = arm_sim::models::led(
+        models::human_arm(),
+        Shape::Smooth,
+        (from, to),
+        duration,
+        [0.0; 3],
+    )
+    .expect("a sample experiment");
+    experiment.setup.contact.damping = [25.0; 2];
+    experiment
+}
+
+/// Effects of every kind of place that a run of three joints can have.
+pub fn several_effects() -> Vec<Effect<f64>> {
+    vec![
+        Effect::new(Kind::Viscous, 0).with(&[0.2]),
+        Effect::new(Kind::Elastic, 1).with(&[0.5, 0.8]),
+        Effect::new(Kind::Viscous, 2).with(&[0.1]),
+        Effect::new(Kind::Coulomb, 1).with(&[0.161, 0.05]),
+        Effect::new(Kind::Relaxation, 0).with(&[2.0, 0.5]),
+        Effect::new(Kind::LoadFriction, 1).with(&[0.002, 0.05]),
+        Effect::new(Kind::Biarticular, 2),
+        Effect::new(Kind::AddedMass, 0).with(&[0.3]),
+        Effect::new(Kind::RobotRipple, 0).with(&[0.0005, 0.0003, 2.0, 0.4]),
+        Effect::new(Kind::ShoulderMotion, 0).with(&[0.01, 0.02, -1.1]),
+    ]
+}
+
+pub fn run<const N: usize>(experiment: &Experiment<N>) -> Recording<N> {
+    simulate(experiment).expect("the experiment runs")
+}
+
+/// Largest difference of two columns.
+pub fn largest(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |m, d| if d <= m { m } else { d })
+}

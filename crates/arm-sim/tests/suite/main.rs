@@ -1,0 +1,12 @@
+//! Tests of arm-sim: order and energy of the integrators, long runs, limits, lanes against single runs, refused inputs.
+
+mod accuracy;
+mod batch;
+mod common;
+mod energy;
+mod long;
+mod pendulum;
+mod refused;
+mod rigid;
+mod series;
+mod switch;
