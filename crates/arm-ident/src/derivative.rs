@@ -72,7 +72,7 @@ pub struct SavitzkyGolayOptions {
     pub degree: usize,
     /// Which derivative: 0 smooths.
     pub derivative: usize,
-    /// Time between samples [s].
+    /// Time between samples \[s\].
     pub step: f64,
 }
 
