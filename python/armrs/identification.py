@@ -189,7 +189,8 @@ def identify(
     for trial in dataset.trials:
         if trial.force_on_arm is None and trial.tau is None:
             raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
-    columns = [_columns(trial) for trial in dataset.trials]
+    configurations = sorted({t.configuration for t in dataset.trials})
+    columns = [_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     raw = _armrs.identify(rig(model, effects), columns, settings)
     explained = tuple(
         Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])

@@ -66,6 +66,30 @@ pub enum IdentError {
         /// The rank that is needed.
         expected: usize,
     },
+    /// The constrained problem has no usable solution.
+    #[error("the fit has no solution: {status:?}")]
+    NoSolution {
+        /// How the solver ended.
+        status: crate::outcome::Status,
+    },
+    /// The simulated arm moves elsewhere than the measured one.
+    #[error(
+        "the simulated arm differs from the measured one by {found} rad in joint {joint}, expected at most {allowed} rad: do the robot's base, lengths and elbow fit?"
+    )]
+    OtherMovement {
+        /// One-based joint.
+        joint: usize,
+        /// Root mean square difference [rad].
+        found: f64,
+        /// Largest difference allowed [rad].
+        allowed: f64,
+    },
+    /// The simulation that gives the motion was refused or stopped.
+    #[error("simulated motion: {0}")]
+    Simulation(#[from] arm_sim::SimulationError),
+    /// The estimates do not make an arm.
+    #[error("the estimates do not make an arm: {0}")]
+    Model(arm_core::Invalid),
 }
 
 /// Refuses a slice of the wrong length.

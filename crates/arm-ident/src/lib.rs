@@ -8,10 +8,25 @@
 //! - [`filter`], [`derivative`]: zero-phase low-pass, differentiation
 //! - [`coloured`], [`long_run`], [`covariance`], [`student`]: residuals that are not white, and intervals that know it
 //!
+//! The upper half is the arm: [`trial`] and [`unknown`] say what is known, [`motion`] and [`simulated`] give the movement, [`equation`] the rows,
+//! [`condition`] filters and whitens them, [`constraint`] says what is physical, [`joint`] solves, [`estimate`] is the result.
+//!
 //! Everything is `f64`, has a fixed order of operations and takes its transcendental functions from `libm`: the same input gives the same bits on
 //! every platform.
 
 pub mod coloured;
+pub mod condition;
+pub mod constraint;
+pub mod equation;
+pub mod estimate;
+pub mod joint;
+pub mod motion;
+pub mod simulated;
+pub mod trial;
+pub mod unknown;
+
+mod summary;
+
 pub mod condense;
 pub mod covariance;
 pub mod derivative;

@@ -35,6 +35,8 @@ macro_rules! each_length {
     };
 }
 
+pub(crate) use each_length;
+
 impl AnyChain {
     fn new(
         segments: &[Segment<f64>],
@@ -94,7 +96,7 @@ type Array<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
 ///     Inertia of a drive's rotor as seen at each joint [kg m²]. Default 0.
 #[pyclass(frozen, module = "armrs")]
 pub struct Arm {
-    chain: AnyChain,
+    pub chain: AnyChain,
 }
 
 #[pymethods]
@@ -148,7 +150,7 @@ impl Arm {
 
     /// Number of joints.
     #[getter]
-    fn n_joints(&self) -> usize {
+    pub fn n_joints(&self) -> usize {
         each_length!(&self.chain, c => c.segments().len())
     }
 

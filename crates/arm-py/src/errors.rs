@@ -1,6 +1,7 @@
 //! The one place that turns errors of the core into Python's.
 
 use arm_core::Invalid;
+use arm_ident::IdentError;
 use pyo3::prelude::*;
 
 /// `armrs.errors.BadInput` for an argument.
@@ -46,4 +47,35 @@ pub fn invalid(error: Invalid) -> PyErr {
         ),
         other => bad_input("argument", other, "a known name"),
     }
+}
+
+/// A refusal or failure of an identification: bad data are `BadInput`, the rest is `IdentificationError`.
+pub fn identification(error: IdentError) -> PyErr {
+    match error {
+        IdentError::TooFew {
+            name,
+            found,
+            expected,
+        } => bad_input(name, found, &format!("at least {expected}")),
+        IdentError::OutOfRange {
+            name,
+            found,
+            min,
+            max,
+        } => bad_input(name, found, &format!("{min} to {max}")),
+        other => in_python("IdentificationError", &other.to_string()),
+    }
+}
+
+/// An error of the tree in `armrs.errors` with a text.
+fn in_python(class: &str, text: &str) -> PyErr {
+    Python::attach(|py| {
+        match py
+            .import("armrs.errors")
+            .and_then(|e| e.getattr(class)?.call1((text,)))
+        {
+            Ok(error) => PyErr::from_value(error),
+            Err(error) => error,
+        }
+    })
 }

@@ -4,6 +4,8 @@ mod arm;
 mod catalogue;
 mod convert;
 mod errors;
+mod ident;
+mod rig;
 
 use pyo3::prelude::*;
 
@@ -19,6 +21,8 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
         },
     )?;
     m.add_class::<arm::Arm>()?;
+    m.add_class::<rig::Rig>()?;
+    m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
     Ok(())
 }

@@ -1,0 +1,238 @@
+//! The equation of motion of every sample as rows of a linear regression.
+//!
+//! One row a joint: `Y π + R(ρ) + C c = τ + Jᵀ F − R_held − rotor`, with inertial parameters π, linear parameters ρ of the
+//! fitted effects and small imperfections c of the measurement, each through its first-order influence on the row.
+
+use arm_core::effect::{Effect, Motion, resisting_torque};
+use arm_core::{
+    Chain, Joints, Plane, Pose, inverse_dynamics, joint_force, regressor, static_torque,
+};
+
+use crate::trial::{Model, Trial};
+use crate::unknown::{Imperfection, Moment, Source, Unknown};
+
+/// Joint motion at the samples of a trial.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kinematics<const N: usize> {
+    /// Angles \[rad\].
+    pub q: Vec<Joints<f64, N>>,
+    /// Speeds \[rad/s\].
+    pub qd: Vec<Joints<f64, N>>,
+    /// Accelerations \[rad/s²\].
+    pub qdd: Vec<Joints<f64, N>>,
+}
+
+/// Rows of a regression over a whole trial, column by column.
+///
+/// `columns[u][i * N + j]` belongs to unknown `u`, sample `i`, joint `j`; the right-hand side `rhs` is laid out alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rows {
+    /// One column for each unknown.
+    pub columns: Vec<Vec<f64>>,
+    /// Measured torque that the columns explain \[N m\].
+    pub rhs: Vec<f64>,
+    /// Index in the trial of each sample.
+    pub samples: Vec<usize>,
+}
+
+/// Builds the rows of a trial for given unknowns.
+///
+/// The measured forces act through the Jacobian of `motion`, so that the same filter reaches both sides later.
+pub fn rows<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    trial: &Trial<N>,
+    motion: &Kinematics<N>,
+) -> Rows {
+    let samples = trial.len();
+    let mut columns = vec![vec![0.0; samples * N]; unknowns.len()];
+    let mut rhs = vec![0.0; samples * N];
+    let mut memory = Memory::new(model);
+    for i in 0..samples {
+        let at = Sample::new(model, trial, motion, i);
+        memory.advance(&at.motion, 1.0 / trial.rate);
+        let measured = at.measured - resisting_torque(&model.held, &at.motion, &memory.held);
+        rhs[i * N..(i + 1) * N].copy_from_slice(measured.as_slice());
+        let y = regressor(&model.chain, &at.pose, &at.motion.qd, &at.motion.qdd);
+        let fixed = inverse_dynamics(&model.chain, &at.pose, &at.motion.qd, &at.motion.qdd);
+        let inertial: [[Joints<f64, N>; 4]; N] =
+            core::array::from_fn(|k| y.segment_columns(&model.chain, k));
+        let mut explained = Joints::<f64, N>::zeros();
+        for (u, unknown) in unknowns.iter().enumerate() {
+            let column = match unknown.source {
+                Source::Segment(k, moment) => inertial[k][position(moment)],
+                Source::Effect(e, p) => gradient(&model.fitted[e], p, &at.motion, memory.fitted[e]),
+                Source::Calibration(what) => at.influence(model, trial, what, i),
+            };
+            if let Source::Segment(k, moment) = unknown.source {
+                explained += column * value_of(&model.chain, k, moment);
+            }
+            columns[u][i * N..(i + 1) * N].copy_from_slice(column.as_slice());
+        }
+        // What the rigid arm does besides the unknown moments: rotors, held normal moments, held segments.
+        for j in 0..N {
+            rhs[i * N + j] -= fixed[j] - explained[j];
+        }
+    }
+    Rows {
+        columns,
+        rhs,
+        samples: (0..samples).collect(),
+    }
+}
+
+fn position(moment: Moment) -> usize {
+    match moment {
+        Moment::Mass => 0,
+        Moment::Along => 1,
+        Moment::Normal => 2,
+        Moment::Inertia => 3,
+    }
+}
+
+/// The model's own value of an inertial parameter.
+pub fn value_of<const N: usize>(chain: &Chain<f64, N>, segment: usize, moment: Moment) -> f64 {
+    let s = &chain.segments()[segment];
+    match moment {
+        Moment::Mass => s.mass,
+        Moment::Along => s.mass * s.com[0],
+        Moment::Normal => s.mass * s.com[1],
+        Moment::Inertia => s.inertia + s.mass * (s.com[0] * s.com[0] + s.com[1] * s.com[1]),
+    }
+}
+
+/// Derivative of the resisting torques to one parameter of one effect.
+fn gradient<const N: usize>(
+    effect: &Effect<f64>,
+    p: usize,
+    motion: &Motion<f64, N>,
+    memory: f64,
+) -> Joints<f64, N> {
+    let mut column = Joints::zeros();
+    if effect.index < N {
+        let value = effect.gradient(&motion.local(effect.index, memory))[p];
+        column[effect.index] = value;
+        if effect.index > 0 {
+            column[effect.index - 1] = effect.proximal_share() * value;
+        }
+    }
+    column
+}
+
+/// The states of effects that have one, carried along the motion.
+struct Memory {
+    fitted: Vec<f64>,
+    held: Vec<f64>,
+    effects: (Vec<Effect<f64>>, Vec<Effect<f64>>),
+}
+
+impl Memory {
+    fn new<const N: usize>(model: &Model<N>) -> Self {
+        Self {
+            fitted: vec![0.0; model.fitted.len()],
+            held: vec![0.0; model.held.len()],
+            effects: (model.fitted.clone(), model.held.clone()),
+        }
+    }
+
+    /// One sampling interval in ten steps, the motion taken as constant in it.
+    fn advance<const N: usize>(&mut self, motion: &Motion<f64, N>, interval: f64) {
+        const STEPS: usize = 10;
+        let lists = [
+            (&self.effects.0, &mut self.fitted),
+            (&self.effects.1, &mut self.held),
+        ];
+        for (effects, states) in lists {
+            for (effect, state) in effects.iter().zip(states.iter_mut()) {
+                if effect.kind.info().memory {
+                    for _ in 0..STEPS {
+                        let local = motion.local(effect.index, *state);
+                        *state += effect.memory_rate(&local) * interval / STEPS as f64;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// One sample: what moves and what was measured.
+struct Sample<const N: usize> {
+    pose: Pose<f64, N>,
+    motion: Motion<f64, N>,
+    force: Plane<f64>,
+    moment: f64,
+    measured: Joints<f64, N>,
+}
+
+impl<const N: usize> Sample<N> {
+    fn new(model: &Model<N>, trial: &Trial<N>, motion: &Kinematics<N>, i: usize) -> Self {
+        let pose = Pose::new(&motion.q[i]);
+        let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
+        let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
+        let torque = trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i]);
+        let joint = joint_force(&model.chain, &pose, (&motion.qd[i], &motion.qdd[i]), force);
+        let mut seen =
+            Motion::new(i as f64 / trial.rate, motion.q[i], motion.qd[i]).with_joint_force(&joint);
+        seen.qdd = motion.qdd[i];
+        Self {
+            pose,
+            motion: seen,
+            force,
+            moment,
+            measured: torque + static_torque(&model.chain, &pose, force, moment),
+        }
+    }
+
+    /// Influence of a small imperfection on the row: what it adds to the left-hand side.
+    fn influence(
+        &self,
+        model: &Model<N>,
+        trial: &Trial<N>,
+        what: Imperfection,
+        i: usize,
+    ) -> Joints<f64, N> {
+        match what {
+            Imperfection::AngleOffset(joint) => self.angle_offset(model, joint),
+            Imperfection::ForceBias(channel) => {
+                let mut unit = [0.0; 2];
+                unit[channel] = 1.0;
+                static_torque(&model.chain, &self.pose, unit, 0.0)
+            }
+            Imperfection::ForceGain(channel) => {
+                let mut share = [0.0; 2];
+                share[channel] = self.force[channel];
+                static_torque(&model.chain, &self.pose, share, 0.0)
+            }
+            Imperfection::TimeDelay => {
+                let Some(force) = &trial.force_on_arm else {
+                    return Joints::zeros();
+                };
+                let (before, after) = (i.saturating_sub(1), (i + 1).min(force.len() - 1));
+                let span = (after - before).max(1) as f64 / trial.rate;
+                let rate = [0, 1].map(|c| (force[after][c] - force[before][c]) / span);
+                -static_torque(&model.chain, &self.pose, rate, 0.0)
+            }
+            Imperfection::HandlePlacement(axis) => {
+                // A displaced handle lengthens the lever of the last segment; every joint feels the same moment.
+                let angle = self.motion.q.iter().fold(0.0, |sum, q| sum + q);
+                let (s, c) = arm_core::Scalar::sin_cos(angle);
+                let direction = if axis == 0 { [c, s] } else { [-s, c] };
+                let moment = direction[0] * self.force[1] - direction[1] * self.force[0];
+                Joints::repeat(-moment)
+            }
+        }
+    }
+
+    /// The measured angle is the true one plus the offset: the row moves against the offset.
+    fn angle_offset(&self, model: &Model<N>, joint: usize) -> Joints<f64, N> {
+        const STEP: f64 = 1e-5;
+        let row = |shift: f64| {
+            let mut q = self.motion.q;
+            q[joint] += shift;
+            let pose = Pose::new(&q);
+            inverse_dynamics(&model.chain, &pose, &self.motion.qd, &self.motion.qdd)
+                - static_torque(&model.chain, &pose, self.force, self.moment)
+        };
+        (row(-STEP) - row(STEP)) / (2.0 * STEP)
+    }
+}

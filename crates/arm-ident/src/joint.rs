@@ -1,0 +1,461 @@
+//! The joint method: all joints at once, all linear effects, physical consistency, honest intervals.
+
+use arm_core::Chain;
+use arm_core::effect::Effect;
+
+use crate::condition::{Noise, Pieces, filtered, repeat_deviations, residual};
+use crate::constraint::{binding_gradients, program};
+use crate::covariance::blocks;
+use crate::equation::{Kinematics, Rows, rows};
+use crate::error::IdentError;
+use crate::estimate::{Explained, Identified};
+use crate::motion::{candidates, measured, speed_noise};
+use crate::outcome::Outcome;
+use crate::simulated::simulated;
+use crate::summary::{Fit, summarise};
+use crate::trial::{Model, Role, Tolerance, Trial};
+use crate::unknown::{Moment, Source, Unknown, unknowns};
+use crate::{Condenser, Factor, Matrix};
+
+/// Rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
+const ROUNDS: usize = 3;
+/// From this number of trials on, a trial is a cluster; below, trials are cut into blocks.
+const ENOUGH_TRIALS: usize = 5;
+/// Fewest clusters aimed at when trials are cut into blocks.
+const BLOCKS: usize = 12;
+/// Shortest block, in decimated samples.
+const SHORTEST_BLOCK: usize = 20;
+/// Dry friction is smoothed over this many standard deviations of the speed's noise.
+const DEAD_BAND: f64 = 3.0;
+/// Residual, relative to the torques, assumed before the first fit.
+const FIRST_GUESS: f64 = 0.05;
+/// A lower cutoff is preferred while its relative residual is within this factor of the best.
+const NEARLY_BEST: f64 = 1.1;
+
+/// Where the motion in the regressors comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotionSource {
+    /// Simulated where the handle's path is known in every trial, else measured.
+    Auto,
+    /// Filtered and differentiated angles.
+    Measured,
+    /// Simulation of the closed chain along the measured path of the handle.
+    Simulated,
+}
+
+/// Choices of an identification.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Cutoff of the common low-pass \[Hz\]; chosen from the data when absent.
+    pub cutoff: Option<f64>,
+    /// Where the motion comes from.
+    pub motion: MotionSource,
+    /// What the calibration promises.
+    pub tolerance: Tolerance,
+    /// Probability of the intervals.
+    pub level: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            cutoff: None,
+            motion: MotionSource::Auto,
+            tolerance: Tolerance::default(),
+            level: 0.95,
+        }
+    }
+}
+
+/// Identifies a model on the trials whose role is [`Role::Fit`]; the others are only explained.
+///
+/// # Errors
+/// [`IdentError`] when there is nothing to fit on or with, a trial is too short for the filter, or no solution exists.
+pub fn identify<const N: usize>(
+    model: &Model<N>,
+    trials: &[Trial<N>],
+    options: &Options,
+) -> Result<Identified<N>, IdentError> {
+    let fit: Vec<&Trial<N>> = trials.iter().filter(|t| t.role == Role::Fit).collect();
+    if fit.is_empty() {
+        return Err(IdentError::TooFew {
+            name: "trials with role fit",
+            found: 0,
+            expected: 1,
+        });
+    }
+    let scale_free = fit.iter().all(|t| t.is_unloaded());
+    let simulate = match options.motion {
+        MotionSource::Auto => trials.iter().all(|t| t.handle.is_some()),
+        MotionSource::Measured => false,
+        MotionSource::Simulated => true,
+    };
+    let unknowns = unknowns(model, &options.tolerance, trials);
+    if unknowns
+        .iter()
+        .all(|u| matches!(u.source, Source::Calibration(_)))
+    {
+        return Err(IdentError::TooFew {
+            name: "unknowns",
+            found: 0,
+            expected: 1,
+        });
+    }
+    let cutoff = match options.cutoff {
+        Some(cutoff) => cutoff,
+        // Simulated motion is not bent by the filter: the lowest cutoff keeps out most noise.
+        None if simulate => candidates(&fit)[0],
+        None => best_cutoff(model, &unknowns, &fit)?,
+    };
+    let mut current = model.clone();
+    let mut last = None;
+    for _ in 0..ROUNDS {
+        let prepared = prepare(&current, &unknowns, trials, (cutoff, simulate))?;
+        let fitted: Vec<&Pieces> = prepared
+            .iter()
+            .zip(trials)
+            .filter(|(_, t)| t.role == Role::Fit)
+            .map(|(p, _)| p)
+            .collect();
+        let deviations = deviations(&fit, &fitted);
+        let solved = weighted(&current, &unknowns, &fitted, (&deviations, scale_free))?;
+        current = updated(&current, &unknowns, &solved.outcome.x)?;
+        last = Some((solved, prepared));
+    }
+    let Some((solved, prepared)) = last else {
+        unreachable!("ROUNDS is not zero")
+    };
+    let explained = prepared
+        .iter()
+        .map(|pieces| explain(pieces, &solved.outcome.x))
+        .collect();
+    let fit = Fit {
+        solved: &solved,
+        unknowns: &unknowns,
+        model: &current,
+        scale_free,
+        level: options.level,
+    };
+    summarise(&fit, cutoff, explained)
+}
+
+/// The lowest cutoff with which the fit trials are explained nearly as well as with the best one.
+///
+/// Judged by the residual relative to the size of the terms that have to cancel.
+fn best_cutoff<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    fit: &[&Trial<N>],
+) -> Result<f64, IdentError> {
+    let trials: Vec<Trial<N>> = fit.iter().map(|&t| t.clone()).collect();
+    let scale_free = fit.iter().all(|t| t.is_unloaded());
+    let mut scored = Vec::new();
+    for cutoff in candidates(fit) {
+        let prepared = prepare(model, unknowns, &trials, (cutoff, false))?;
+        let pieces: Vec<&Pieces> = prepared.iter().collect();
+        let solved = first_solution(model, unknowns, &pieces, scale_free)?.0;
+        let rows = || prepared.iter().flatten();
+        let rest: Vec<f64> = rows()
+            .flat_map(|r| residual(r, &solved.outcome.x))
+            .collect();
+        let terms = rows().flat_map(|r| r.columns.iter().zip(&solved.outcome.x));
+        let terms: Vec<f64> = terms
+            .flat_map(|(c, &x)| c.iter().map(move |v| v * x))
+            .collect();
+        scored.push((
+            cutoff,
+            root_mean_square(rest.iter()) / root_mean_square(terms.iter()),
+        ));
+    }
+    let best = scored.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
+    Ok(scored
+        .iter()
+        .find(|s| s.1 <= NEARLY_BEST * best)
+        .map_or(scored[0].0, |s| s.0))
+}
+
+/// Filtered rows of every trial.
+fn prepare<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    trials: &[Trial<N>],
+    (cutoff, simulate): (f64, bool),
+) -> Result<Vec<Pieces>, IdentError> {
+    let motions = trials
+        .iter()
+        .map(|t| {
+            let seen = measured(t, cutoff)?;
+            if simulate {
+                simulated(model, t, seen, cutoff)
+            } else {
+                Ok(seen)
+            }
+        })
+        .collect::<Result<Vec<Kinematics<N>>, _>>()?;
+    let mut model = model.clone();
+    if !simulate {
+        for trial in trials.iter().filter(|t| t.role == Role::Fit) {
+            let noise = speed_noise(trial, cutoff);
+            for effect in model.fitted.iter_mut().chain(&mut model.held) {
+                widen(
+                    effect,
+                    DEAD_BAND * noise.get(effect.index).copied().unwrap_or(0.0),
+                );
+            }
+        }
+    }
+    trials
+        .iter()
+        .zip(&motions)
+        .map(|(trial, motion)| filtered(&rows(&model, unknowns, trial, motion), trial, cutoff))
+        .collect()
+}
+
+/// Raises the smoothing speed of an effect that has one, within its bounds.
+fn widen(effect: &mut Effect<f64>, least: f64) {
+    for (value, parameter) in effect
+        .parameters
+        .iter_mut()
+        .zip(effect.kind.info().parameters)
+    {
+        if parameter.name == "smoothing" {
+            *value = value.max(least).min(parameter.max);
+        }
+    }
+}
+
+/// Scatter between the repeats of every movement; empty where too few movements were repeated.
+fn deviations<const N: usize>(fit: &[&Trial<N>], pieces: &[&Pieces]) -> Vec<Vec<f64>> {
+    let mut configurations: Vec<usize> = fit.iter().map(|t| t.configuration).collect();
+    configurations.sort_unstable();
+    configurations.dedup();
+    let mut all = Vec::new();
+    for configuration in configurations {
+        let repeats: Vec<&Pieces> = fit
+            .iter()
+            .zip(pieces)
+            .filter(|(t, _)| t.configuration == configuration)
+            .map(|(_, &p)| p)
+            .collect();
+        match repeat_deviations(&repeats) {
+            Some(found) => all.extend(found),
+            None => return Vec::new(),
+        }
+    }
+    all
+}
+
+/// A solved weighted problem and what is needed to say how certain it is.
+pub(crate) struct Solved {
+    /// The solution.
+    pub outcome: Outcome,
+    /// Factor of the weighed data, without prior.
+    pub data: Factor,
+    /// The same with the prior.
+    pub posterior: Factor,
+    /// Factors of the independent clusters.
+    pub clusters: Vec<Factor>,
+    /// Gradients of the constraints that bind, bounds excepted.
+    pub binding: Vec<Vec<f64>>,
+}
+
+/// Iteratively weighted least squares: the weights of the joints and the estimate in turn.
+fn weighted<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    fit: &[&Pieces],
+    (deviations, scale_free): (&[Vec<f64>], bool),
+) -> Result<Solved, IdentError> {
+    let (mut solved, level) = first_solution::<N>(model, unknowns, fit, scale_free)?;
+    for _ in 0..2 {
+        let residuals: Vec<Vec<f64>> = fit
+            .iter()
+            .flat_map(|p| p.iter())
+            .map(|r| residual(r, &solved.outcome.x))
+            .collect();
+        // Data without any noise (a check on exact values) would make infinite weights.
+        if root_mean_square(residuals.iter().flatten()) <= 1e-9 * level {
+            break;
+        }
+        let noise = if deviations.is_empty() {
+            Noise::<N>::of_residuals(&residuals)?
+        } else {
+            Noise::of_repeats(deviations)?
+        };
+        solved = solve(model, unknowns, fit, &noise, scale_free)?;
+    }
+    Ok(solved)
+}
+
+/// The estimate under a first guess of white noise, and the size of the torques.
+fn first_solution<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    fit: &[&Pieces],
+    scale_free: bool,
+) -> Result<(Solved, f64), IdentError> {
+    let torque = root_mean_square(fit.iter().flat_map(|p| p.iter()).flat_map(|r| r.rhs.iter()));
+    // Without a load the torques of the known model tell what is large.
+    let x0: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
+    let rest: Vec<Vec<f64>> = fit
+        .iter()
+        .flat_map(|p| p.iter())
+        .map(|r| residual(r, &x0))
+        .collect();
+    let level = torque.max(root_mean_square(rest.iter().flatten()));
+    let noise = Noise::<N>::even((FIRST_GUESS * level).max(f64::MIN_POSITIVE.sqrt()));
+    Ok((solve(model, unknowns, fit, &noise, scale_free)?, level))
+}
+
+fn root_mean_square<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    if count > 0.0 {
+        libm::sqrt(sum / count)
+    } else {
+        0.0
+    }
+}
+
+fn solve<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    fit: &[&Pieces],
+    noise: &Noise<N>,
+    scale_free: bool,
+) -> Result<Solved, IdentError> {
+    let p = unknowns.len();
+    let mut clusters = Vec::new();
+    let samples: usize = fit
+        .iter()
+        .flat_map(|f| f.iter())
+        .map(|r| r.samples.len())
+        .sum();
+    let block = (samples / BLOCKS).max(SHORTEST_BLOCK);
+    for pieces in fit {
+        let mut trial = Condenser::new(p);
+        for piece in pieces.iter() {
+            let mut weighed = piece.clone();
+            noise.weigh(&mut weighed);
+            if fit.len() >= ENOUGH_TRIALS {
+                push(&mut trial, &weighed, 0..piece.samples.len() * N)?;
+            } else {
+                for range in blocks(piece.samples.len(), block.min(piece.samples.len()))? {
+                    let mut part = Condenser::new(p);
+                    push(&mut part, &weighed, range.start * N..range.end * N)?;
+                    clusters.push(part.finish());
+                }
+            }
+        }
+        if fit.len() >= ENOUGH_TRIALS {
+            clusters.push(trial.finish());
+        }
+    }
+    if clusters.len() < 2 {
+        return Err(IdentError::TooFew {
+            name: "usable stretches of data",
+            found: clusters.len(),
+            expected: 2,
+        });
+    }
+    let mut all = Condenser::new(p);
+    for cluster in &clusters {
+        all.merge_factor(cluster)?;
+    }
+    let data = all.finish();
+    let mean: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
+    let sd: Vec<f64> = unknowns.iter().map(|u| u.sd).collect();
+    let posterior = data.with_prior(&mean, &sd)?;
+    let outcome = program(&posterior, unknowns, model, scale_free)?.solve()?;
+    if outcome.x.iter().any(|v| !v.is_finite()) {
+        return Err(IdentError::NoSolution {
+            status: outcome.status,
+        });
+    }
+    let binding = binding_gradients(&outcome, unknowns, model, scale_free);
+    Ok(Solved {
+        outcome,
+        data,
+        posterior,
+        clusters,
+        binding,
+    })
+}
+
+fn push(
+    condenser: &mut Condenser,
+    rows: &Rows,
+    range: core::ops::Range<usize>,
+) -> Result<(), IdentError> {
+    let mut row = vec![0.0; rows.columns.len()];
+    for i in range {
+        for (value, column) in row.iter_mut().zip(&rows.columns) {
+            *value = column[i];
+        }
+        condenser.push(&row, rows.rhs[i])?;
+    }
+    Ok(())
+}
+
+/// The model with estimates in place of its own values.
+fn updated<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    x: &[f64],
+) -> Result<Model<N>, IdentError> {
+    let mut next = model.clone();
+    let mut segments = *model.chain.segments();
+    for (k, segment) in segments.iter_mut().enumerate() {
+        let value = |moment| {
+            unknowns
+                .iter()
+                .position(|u| u.source == Source::Segment(k, moment))
+                .map(|u| x[u])
+        };
+        let (Some(mass), Some(along), Some(inertia)) = (
+            value(Moment::Mass),
+            value(Moment::Along),
+            value(Moment::Inertia),
+        ) else {
+            continue;
+        };
+        let normal = value(Moment::Normal).unwrap_or(mass * segment.com[1]);
+        segment.mass = mass;
+        segment.com = [along / mass, normal / mass];
+        segment.inertia = (inertia - (along * along + normal * normal) / mass).max(0.0);
+    }
+    for (u, unknown) in unknowns.iter().enumerate() {
+        if let Source::Effect(e, p) = unknown.source {
+            next.fitted[e].parameters[p] = x[u];
+        }
+    }
+    next.chain = Chain::new(segments, model.chain.base(), model.chain.gravity())
+        .and_then(|c| c.with_rotor_inertia(*model.chain.rotor_inertia()))
+        .map_err(IdentError::Model)?;
+    Ok(next)
+}
+
+fn explain<const N: usize>(pieces: &Pieces, x: &[f64]) -> Explained<N> {
+    let mut out = Explained {
+        samples: Vec::new(),
+        measured: Vec::new(),
+        fitted: Vec::new(),
+    };
+    for piece in pieces {
+        out.samples.extend(&piece.samples);
+        let rest = residual(piece, x);
+        for (m, r) in piece.rhs.chunks_exact(N).zip(rest.chunks_exact(N)) {
+            out.measured.push(arm_core::Joints::from_column_slice(m));
+            out.fitted
+                .push(arm_core::Joints::from_fn(|j, _| m[j] - r[j]));
+        }
+    }
+    out
+}
+
+/// The design matrix that the weighed data leave, without the calibration columns.
+pub(crate) fn physical_columns(data: &Factor, unknowns: &[Unknown]) -> Matrix {
+    let keep: Vec<usize> = (0..unknowns.len())
+        .filter(|&u| !matches!(unknowns[u].source, Source::Calibration(_)))
+        .collect();
+    data.r.select_columns(&keep)
+}

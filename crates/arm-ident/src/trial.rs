@@ -1,0 +1,102 @@
+//! What a trial brings: uniformly sampled channels, already in SI units and with the force named by what it acts on.
+
+use arm_core::effect::Effect;
+use arm_core::{Chain, Contact, Joints, Plane};
+
+/// Whether anything may be fitted on a trial.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Used for fitting.
+    Fit,
+    /// Kept apart: only residuals are computed on it.
+    Test,
+}
+
+/// One trial, sampled uniformly.
+#[derive(Clone, Debug)]
+pub struct Trial<const N: usize> {
+    /// What it is used for.
+    pub role: Role,
+    /// Number of its movement; repeats of one movement carry the same.
+    pub configuration: usize,
+    /// Sampling rate \[Hz\].
+    pub rate: f64,
+    /// Joint angles \[rad\].
+    pub q: Vec<Joints<f64, N>>,
+    /// Contact force on the arm \[N\], where measured.
+    pub force_on_arm: Option<Vec<Plane<f64>>>,
+    /// Contact moment on the arm \[N m\], where measured; else the handle turns freely and it is zero.
+    pub moment_on_arm: Option<Vec<f64>>,
+    /// Joint torques of motors or brakes on the distal segment \[N m\], where measured.
+    pub torque: Option<Vec<Joints<f64, N>>>,
+    /// Position of the robot's handle \[m\], where the robot's angles are known.
+    pub handle: Option<Vec<Plane<f64>>>,
+    /// False where a sample was missing and filled in.
+    pub valid: Vec<bool>,
+}
+
+impl<const N: usize> Trial<N> {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.q.len()
+    }
+
+    /// Whether the trial has no sample.
+    pub fn is_empty(&self) -> bool {
+        self.q.is_empty()
+    }
+
+    /// Whether no torque and no force acts on the arm during the whole trial.
+    pub fn is_unloaded(&self) -> bool {
+        let force = self.force_on_arm.iter().flatten().all(|f| *f == [0.0, 0.0]);
+        let moment = self.moment_on_arm.iter().flatten().all(|&m| m == 0.0);
+        let torque = self
+            .torque
+            .iter()
+            .flatten()
+            .all(|t| t.iter().all(|&v| v == 0.0));
+        force && moment && torque
+    }
+}
+
+/// What the calibration of the sensors promises, as standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Offset of a joint angle \[rad\].
+    pub angle_offset: f64,
+    /// Bias of a force channel \[N\].
+    pub force_bias: f64,
+    /// Relative error of a force channel's gain.
+    pub force_gain: f64,
+    /// Delay between forces and angles \[s\].
+    pub time_delay: f64,
+    /// Displacement of the handle in the hand \[m\].
+    pub handle_placement: f64,
+}
+
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self {
+            angle_offset: 0.3_f64.to_radians(),
+            force_bias: 0.2,
+            force_gain: 0.01,
+            time_delay: 0.005,
+            handle_placement: 0.001,
+        }
+    }
+}
+
+/// The model that the data challenge.
+#[derive(Clone, Debug)]
+pub struct Model<const N: usize> {
+    /// The rigid arm.
+    pub chain: Chain<f64, N>,
+    /// Relative standard deviation of masses, centres of mass and inertias; 0 holds them.
+    pub segment_uncertainty: f64,
+    /// Effects whose linear parameters are fitted.
+    pub fitted: Vec<Effect<f64>>,
+    /// Effects that are held at their values.
+    pub held: Vec<Effect<f64>>,
+    /// The contact, needed for the simulated motion.
+    pub contact: Contact<f64>,
+}
