@@ -93,6 +93,7 @@ def test_a_fault_in_the_last_trial_writes_nothing(session: Session, tmp_path: Pa
         ({"x": [[1.0], [2.0]]}, "column x: found type list"),
         ({"x": [True, False]}, "column x: found type bool, allowed numbers or text"),
         ({"x": np.array(["2026-01-01", "2026-01-02"], dtype="datetime64[s]")}, "column x: found type timestamp"),
+        ({" x": [1.0]}, "header, column 1: found ' x', allowed a name without line ends and blanks around it"),
         ({"x": ["007", "008"]}, ""),
     ],
 )

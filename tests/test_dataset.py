@@ -237,6 +237,8 @@ BROKEN_TRIAL: dict[str, tuple[Callable[[Session], None], str, str]] = {
     "time missing": (cell(8, "t_s", ""), "line 8, time: found an empty cell, allowed a time stamp in every row", ""),
     "time repeated": (cell(8, "t_s", "0.1"), "line 8, time: found 0.1 s twice, allowed time stamps that increase strictly", ""),
     "time backwards": (cell(8, "t_s", "0.05"), "line 8, time: found 0.05 s after 0.1 s, allowed time stamps that increase strictly", ""),
+    "clock set during the recording": (cell(101, "t_s", "1e6"), "line 101, time: found 1000000.0 s after 1.96 s, allowed a recording of which", ""),
+    "activity beyond reason": (cell(30, "emg_biceps", "1e300"), "line 30, column emg_biceps: found 1e+300, allowed -1e+12 to 1e+12", ""),
     "time in ms": (lines_changed(lambda lines: [lines[0], *(str(20 * k) + x[x.index(",") :] for k, x in enumerate(lines[1:]))]),
                    "time: found 20 s between samples, allowed at least one sample a second", "(milliseconds?)"),
     "degrees": (cell(30, "q1_rad", "145.0"), "line 30, column q1_rad: found 145.0, allowed -100 to 100 rad", "(looks like degrees)"),
@@ -435,6 +437,15 @@ def test_whole_turns_are_taken_out(session: Session) -> None:
     data = armrs.load_dataset(session.folder)
     np.testing.assert_allclose(data.trials[0].q[:, 0], smooth, atol=1e-11)
     assert data.warnings == ("trials/slow_1.csv: column q1_rad jumps by whole turns 1 times: they were taken out",)
+
+
+def test_seconds_since_1970_are_welcome(session: Session) -> None:
+    values = rows(200)
+    values[:, 0] += 1.7e9
+    write_rows(session, values)
+    trial = armrs.load_dataset(session.folder).trials[0]
+    assert not trial.resampled
+    assert trial.rate == pytest.approx(50.0)
 
 
 # ---- writing

@@ -38,11 +38,12 @@ class Quantity:
     hint: str
 
 
-TIME = Quantity(_TIME, 1e7, "milliseconds?")
+TIME = Quantity(_TIME, 1e11, "milliseconds?")  # seconds since 1970 are welcome
 ANGLE = Quantity(_ANGLE, 100.0, "looks like degrees")
 SPEED = Quantity(_SPEED, 1e4, "looks like degrees per second")
 FORCE = Quantity(_FORCE, 1e4, "looks like millinewtons")
 MOMENT = Quantity(_MOMENT, 1e4, "looks like newton millimetres")
+ACTIVITY = Quantity({"": 1.0}, 1e12, "a number that no amplifier gives")
 
 _QUANTITIES = {
     "t": TIME, "q": ANGLE, "qr": ANGLE, "dq": SPEED, "tau": MOMENT, "Fy": FORCE, "Fz": FORCE, "Mx": MOMENT,
@@ -61,19 +62,19 @@ class Column:
         What it measures, without the unit: `t`, `q1`, `Fy`, `emg_biceps`.
     factor : float
         From the unit of the file to SI.
-    quantity : Quantity or None
-        None for muscle activity, which is carried along as it is.
+    quantity : Quantity
+        What it measures, with the bounds of what can be meant.
     """
 
     name: str
     symbol: str
     factor: float
-    quantity: Quantity | None
+    quantity: Quantity
 
     @property
     def si_name(self) -> str:
         """Name of the same column in SI units."""
-        return self.name if self.quantity is None else f"{self.symbol}_{next(iter(self.quantity.units))}"
+        return self.name if self.quantity is ACTIVITY else f"{self.symbol}_{next(iter(self.quantity.units))}"
 
 
 def parse(names: Sequence[str], n_joints: int) -> list[Column]:
@@ -105,7 +106,7 @@ def parse(names: Sequence[str], n_joints: int) -> list[Column]:
 
 def _parse_one(name: str, n_joints: int) -> Column:
     if name.startswith("emg_") and len(name) > len("emg_"):
-        return Column(name, name, 1.0, None)
+        return Column(name, name, 1.0, ACTIVITY)
     symbol, _, unit = name.partition("_")
     numbered = _NUMBERED.fullmatch(symbol)
     quantity = _QUANTITIES.get(numbered[1] if numbered else symbol)

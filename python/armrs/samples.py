@@ -100,12 +100,19 @@ def header_of(path: Path) -> list[str]:
         for separator, word in ((";", "semicolons"), ("\t", "tabs")):
             if separator in text:
                 raise BadInput("line 1", Text(word), "commas between the cells, and a point as decimal mark")
-    for position, name in enumerate(names, start=1):
-        if not name:
-            raise BadInput(f"line 1, column {position}", Text("no name"), "a name for each column")
-        if name in names[: position - 1]:
-            raise BadInput("line 1", Text(f"column {name} twice"), "each column once")
+    _check_names("line 1", names)
     return names
+
+
+def _check_names(place: str, names: list[str]) -> None:
+    """Refuse column names that are absent, stand twice, or would not come back from a file."""
+    for position, name in enumerate(names, start=1):
+        if not name.strip():
+            raise BadInput(f"{place}, column {position}", Text("no name"), "a name for each column")
+        if name != name.strip() or not name.isprintable():
+            raise BadInput(f"{place}, column {position}", name, "a name without line ends and blanks around it")
+        if name in names[: position - 1]:
+            raise BadInput(place, Text(f"column {name} twice"), "each column once")
 
 
 def _read_csv(path: Path) -> Samples:
@@ -216,11 +223,10 @@ def parquet_table(path: Path) -> Any:
         raise BadInput("file", Text("no Parquet mark at its start"), "a Parquet file")
     try:
         table = parquet.read_table(io.BytesIO(content))
-    except (pa.ArrowException, OSError) as error:
+        names = table.column_names
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise BadInput("file", Text(str(error).splitlines()[0]), "a whole Parquet file") from None
-    for name in table.column_names:
-        if table.column_names.count(name) > 1:
-            raise BadInput("header", Text(f"column {name} twice"), "each column once")
+    _check_names("header", names)
     return table
 
 

@@ -229,8 +229,6 @@ def _check_size(column: columns.Column, values: np.ndarray, samples: Samples) ->
         raise BadInput(f"column {column.name}", Text("no sample at all"), "samples, or no such column")
     if column.symbol != "t" and count < FEWEST_SAMPLES:
         raise BadInput(f"column {column.name}", Text(f"{count} samples"), f"at least {FEWEST_SAMPLES} samples")
-    if column.quantity is None:
-        return
     large = np.flatnonzero(np.abs(np.where(there, values, 0.0)) > column.quantity.most)
     if large.size:
         row = int(large[0])
@@ -238,7 +236,7 @@ def _check_size(column: columns.Column, values: np.ndarray, samples: Samples) ->
         raise BadInput(
             f"{samples.place_of(row)}, column {column.name}",
             float(values[row] / column.factor),
-            f"{-most:g} to {most:g} {column.name.partition('_')[2]}",
+            f"{-most:g} to {most:g}" + (f" {column.name.partition('_')[2]}" if column.quantity is not columns.ACTIVITY else ""),
             hint=column.quantity.hint if column.factor == 1.0 else None,
         )
 
@@ -256,6 +254,10 @@ def _check_time(t: np.ndarray, samples: Samples) -> None:
     step = resample.usual_step(t)
     if step > 1.0:
         raise BadInput("time", Text(f"{step:g} s between samples"), "at least one sample a second", hint=columns.TIME.hint)
+    if t[-1] - t[0] > 10.0 * step * len(t):
+        row = int(np.argmax(np.diff(t)))
+        found = Text(f"{float(t[row + 1])!r} s after {float(t[row])!r} s")
+        raise BadInput(f"{samples.place_of(row + 1)}, time", found, "a recording of which at least a tenth is there")
 
 
 def _grid(t: np.ndarray, sample_rate: float | None, warnings: list[str]) -> tuple[np.ndarray, bool]:
