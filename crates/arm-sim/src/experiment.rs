@@ -51,6 +51,19 @@ impl<const N: usize> Experiment<N> {
             output_interval: None,
         }
     }
+
+    /// The rig with all effects applied that alter it.
+    ///
+    /// # Errors
+    /// [`SimulationError::Invalid`] for an effect with a value or a place outside what its kind allows.
+    pub fn altered(&self) -> Result<Setup<f64, N>, SimulationError> {
+        let mut setup = self.setup;
+        for effect in &self.effects {
+            effect.validate(N)?;
+            effect.alter(&mut setup);
+        }
+        Ok(setup)
+    }
 }
 
 /// How the arm is driven.

@@ -83,3 +83,31 @@ pub fn led<const N: usize>(
     }
     Ok(experiment)
 }
+
+/// The run whose digest stands for the bits of the simulator: two seconds of the human arm with a robot, damped contact and
+/// effects of every kind that a run computes differently (friction with the hyperbolic tangent, exponential end stops,
+/// states of their own, joint forces, a moving base, ripple).
+///
+/// # Errors
+/// None for these values.
+pub fn reference() -> Result<Experiment<3>, SimulationError> {
+    let mut experiment = human_experiment(2.0, [-1.1, 0.9, 0.05])?;
+    experiment.setup.contact.damping = [25.0; 2];
+    experiment.robot = Some(robot()?);
+    experiment.output_interval = Some(0.02);
+    experiment.effects.extend([
+        Effect::new(Kind::Coulomb, 1).with(&[0.161, 0.01]),
+        Effect::new(Kind::Stribeck, 0).with(&[0.1]),
+        Effect::new(Kind::LoadFriction, 2).with(&[0.001, 0.05]),
+        Effect::new(Kind::Relaxation, 0).with(&[2.0, 0.5]),
+        Effect::new(Kind::Thixotropy, 1).with(&[0.05, 0.3]),
+        Effect::new(Kind::EndRange, 1).with(&[1.0, 1.0, 8.0, 1.6, 0.2]),
+        Effect::new(Kind::Biarticular, 2).with(&[0.4]),
+        Effect::new(Kind::Tremor, 2).with(&[0.02, 6.0]),
+        Effect::new(Kind::AddedMass, 0).with(&[0.277]),
+        Effect::new(Kind::ShoulderMotion, 0).with(&[0.02, 0.01, -1.1]),
+        Effect::new(Kind::RobotRipple, 0).with(&[2e-4, 1e-4, 3.0, 0.2]),
+        Effect::new(Kind::Backlash, 0).with(&[2e-5, 1e-5]),
+    ]);
+    Ok(experiment)
+}

@@ -90,11 +90,7 @@ pub(crate) struct Prepared<'a, const N: usize> {
 impl<'a, const N: usize> Prepared<'a, N> {
     pub fn new(experiment: &'a Experiment<N>) -> Result<Self, SimulationError> {
         let schedule = Schedule::of(experiment)?;
-        let mut setup = experiment.setup;
-        for effect in &experiment.effects {
-            effect.validate(N)?;
-            effect.alter(&mut setup);
-        }
+        let setup = experiment.altered()?;
         check(&setup)?;
         let in_joints = |e: &&Effect<f64>| e.on && e.kind.info().place == Place::Joint;
         let effects = experiment.effects.iter().filter(in_joints).copied();

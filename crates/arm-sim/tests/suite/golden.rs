@@ -1,0 +1,20 @@
+//! One run, to the last bit.
+
+use arm_sim::{digest, models};
+
+use crate::common::run;
+
+/// Digest of [`models::reference`]; the same on every platform, in debug and release, whatever the target's features.
+const GOLDEN: u64 = 0x43ec406e25c3cefa;
+
+#[test]
+fn the_reference_run_has_the_same_bits_everywhere() {
+    let found = digest(&run(&models::reference().expect("a sample"))).expect("numbers");
+    assert_eq!(
+        found, GOLDEN,
+        "\nthe reference run has digest {found:#018x}, expected {GOLDEN:#018x}.\n\
+         On one platform only: some arithmetic there is not that of IEEE 754 or came from its own mathematics library; find it.\n\
+         On all platforms: a formula, an order of operations or what is recorded has changed. If that was meant, put the new\n\
+         number here in a commit of its own that says why.\n"
+    );
+}
