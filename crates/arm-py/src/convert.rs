@@ -4,7 +4,10 @@ use std::borrow::Cow;
 
 use arm_core::Joints;
 use numpy::ndarray::{ArrayD, IxDyn};
-use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyUntypedArrayMethods};
+use numpy::{
+    AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyReadonlyArray2,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::errors::bad_input;
@@ -106,4 +109,24 @@ pub fn over_rows<'py, const K: usize>(
     let array =
         ArrayD::from_shape_vec(IxDyn(&shape), out).expect("the buffer was made for this shape");
     Ok(array.into_pyarray(py))
+}
+
+/// A table of samples, `(n, M)`.
+pub fn rows<const M: usize>(
+    name: &str,
+    array: &PyReadonlyArray2<'_, f64>,
+) -> PyResult<Vec<[f64; M]>> {
+    if array.shape()[1] != M {
+        return Err(bad_input(
+            name,
+            format!("{} columns", array.shape()[1]),
+            &format!("{M} columns"),
+        ));
+    }
+    let view = array.as_array();
+    Ok(view
+        .rows()
+        .into_iter()
+        .map(|r| std::array::from_fn(|k| r[k]))
+        .collect())
 }

@@ -2,6 +2,7 @@
 
 use arm_core::Invalid;
 use arm_ident::IdentError;
+use arm_sim::SimulationError;
 use pyo3::prelude::*;
 
 /// `armrs.errors.BadInput` for an argument.
@@ -78,4 +79,36 @@ fn in_python(class: &str, text: &str) -> PyErr {
             Err(error) => error,
         }
     })
+}
+
+/// A refusal or failure of a simulation: what was asked wrongly is `BadInput`, a run that stopped is `SimulationError`.
+pub fn simulation(error: SimulationError) -> PyErr {
+    match error {
+        SimulationError::Invalid(error) => invalid(error),
+        SimulationError::Setting {
+            name,
+            found,
+            allowed,
+        } => bad_input(name, found, allowed),
+        SimulationError::Samples {
+            name,
+            sample,
+            problem,
+        } => bad_input(
+            &format!("{name}, sample {sample}"),
+            problem,
+            "finite samples at increasing times",
+        ),
+        SimulationError::Unreachable {
+            time,
+            distance,
+            min,
+            max,
+        } => bad_input(
+            &format!("handle at {time} s"),
+            format!("{distance} m from the robot's base"),
+            &format!("{min} m to {max} m"),
+        ),
+        other => in_python("SimulationError", &other.to_string()),
+    }
 }

@@ -6,11 +6,12 @@ use arm_ident::estimate::{Estimate, Explained, Identified};
 use arm_ident::joint::{MotionSource, Options};
 use arm_ident::trial::{Model, Role, Tolerance, Trial};
 use arm_ident::unknown::Source;
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arm::{AnyChain, each_length};
+use crate::convert::rows;
 use crate::errors::{bad_input, identification, invalid};
 use crate::rig::Rig;
 
@@ -43,22 +44,6 @@ pub struct Settings {
     cutoff: Option<f64>,
     motion: String,
     level: f64,
-}
-
-fn rows<const M: usize>(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; M]>> {
-    if array.shape()[1] != M {
-        return Err(bad_input(
-            name,
-            format!("{} columns", array.shape()[1]),
-            &format!("{M} columns"),
-        ));
-    }
-    let view = array.as_array();
-    Ok(view
-        .rows()
-        .into_iter()
-        .map(|r| std::array::from_fn(|k| r[k]))
-        .collect())
 }
 
 pub fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {

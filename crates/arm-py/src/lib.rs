@@ -6,6 +6,7 @@ mod convert;
 mod errors;
 mod ident;
 mod rig;
+mod sim;
 
 use pyo3::prelude::*;
 
@@ -23,6 +24,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<arm::Arm>()?;
     m.add_class::<rig::Rig>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
+    m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
     Ok(())
 }

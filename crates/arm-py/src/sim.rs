@@ -1,0 +1,352 @@
+//! Simulation: a rig and how it is driven in, every column of the recording out, and what sensors read of it.
+
+use arm_core::{Chain, Joints, Limits, Shape};
+use arm_sim::{
+    Channel, Coupling, Drive, Engine, Experiment, HandlePath, Integrator, Interpolation, Movement,
+    Recording, Sensors, Series, Start,
+};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::arm::{AnyChain, each_length};
+use crate::convert::rows;
+use crate::errors::{bad_input, simulation};
+use crate::rig::Rig;
+
+/// How the arm is driven; what belongs to another kind of drive is `None`.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Driven<'py> {
+    /// "movement", "robot", "handle", "torque" or "free".
+    kind: String,
+    /// Waypoints of a movement [rad]; samples of the robot's angles [rad], the handle [m] or joint torques [N m].
+    values: Option<PyReadonlyArray2<'py, f64>>,
+    /// Times of the samples [s].
+    times: Option<PyReadonlyArray1<'py, f64>>,
+    shape: String,
+    speed: f64,
+    acceleration: f64,
+    pause: f64,
+    rigid: bool,
+}
+
+/// Numerical settings.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Settings {
+    engine: String,
+    integrator: String,
+    dt: f64,
+    duration: Option<f64>,
+    output_interval: Option<f64>,
+    /// Where it starts; the static equilibrium near it when a handle leads and no speed is given.
+    q: Option<Vec<f64>>,
+    qd: Option<Vec<f64>>,
+}
+
+/// Noise and limits of the sensors: (deviation, correlation time, range, bits) for each kind of channel.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Sensing {
+    rate: f64,
+    seeds: Vec<u64>,
+    angle: (f64, f64, f64, Option<u32>),
+    force: (f64, f64, f64, Option<u32>),
+    moment: (f64, f64, f64, Option<u32>),
+    robot: (f64, f64, f64, Option<u32>),
+    torque: (f64, f64, f64, Option<u32>),
+}
+
+impl Sensing {
+    fn sensors<const N: usize>(&self, seed: u64) -> Sensors<N> {
+        let channel = |(deviation, correlation_time, range, bits)| Channel {
+            deviation,
+            correlation_time,
+            range,
+            bits,
+        };
+        Sensors {
+            rate: self.rate,
+            seed,
+            angle: [channel(self.angle); N],
+            force: [channel(self.force); 2],
+            moment: channel(self.moment),
+            robot: [channel(self.robot); 2],
+            torque: [channel(self.torque); N],
+        }
+    }
+}
+
+/// Simulates an experiment; see `armrs.simulate`.
+#[pyfunction]
+#[pyo3(signature = (rig, drive, settings, sensing=None))]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    drive: Driven<'py>,
+    settings: Settings,
+    sensing: Option<Sensing>,
+) -> PyResult<Bound<'py, PyDict>> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (drive, settings, sensing): (&Driven<'py>, &Settings, Option<&Sensing>),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let experiment = experiment(chain, rig, drive, settings)?;
+        let engine = match settings.engine.as_str() {
+            "native" => Engine::Native,
+            other => return Err(bad_input("engine", other, "native")),
+        };
+        let recording = py
+            .detach(|| arm_sim::simulate_with(engine, &experiment))
+            .map_err(simulation)?;
+        let out = columns(py, &recording)?;
+        if let Some(sensing) = sensing {
+            let readings = sensing
+                .seeds
+                .iter()
+                .map(|&seed| readings::<N>(py, &sensing.sensors(seed), &experiment, &recording))
+                .collect::<PyResult<Vec<_>>>()?;
+            out.set_item("readings", PyList::new(py, readings)?)?;
+        }
+        Ok(out)
+    }
+    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
+}
+
+fn experiment<const N: usize>(
+    chain: &Chain<f64, N>,
+    rig: &Rig,
+    drive: &Driven<'_>,
+    settings: &Settings,
+) -> PyResult<Experiment<N>> {
+    let (drive, first, natural) = driven(chain, rig, drive)?;
+    // A whole number of recorded samples: not beyond the last sample of a drive, and up to the end of a movement.
+    let whole = |d: f64| {
+        settings
+            .output_interval
+            .map_or(d, |i| (d / i + 1e-9).floor() * i)
+    };
+    let natural = match natural {
+        Some(Natural::Samples(d)) => Some(whole(d)),
+        Some(Natural::Movement(d)) => Some(whole(
+            d + settings.output_interval.unwrap_or(0.0) * (1.0 - 2e-9),
+        )),
+        None => None,
+    };
+    let duration = settings.duration.or(natural);
+    let Some(duration) = duration else {
+        return Err(bad_input(
+            "duration",
+            "none",
+            "a time in seconds for an arm that swings freely",
+        ));
+    };
+    let mut experiment = Experiment::new(rig.setup(chain), drive, duration);
+    experiment.effects = rig.effects.clone();
+    experiment.robot = rig.robot;
+    experiment.dt = settings.dt;
+    experiment.output_interval = settings.output_interval;
+    experiment.integrator = match settings.integrator.as_str() {
+        "rk4" => Integrator::Rk4,
+        "euler" => Integrator::SemiImplicitEuler,
+        other => return Err(bad_input("integrator", other, "rk4 or euler")),
+    };
+    let given = |name: &str, values: &Option<Vec<f64>>| match values {
+        Some(v) if v.len() == N => Ok(Some(Joints::<f64, N>::from_column_slice(v))),
+        Some(v) => Err(bad_input(
+            name,
+            format!("{} values", v.len()),
+            &format!("{N}, one a joint"),
+        )),
+        None => Ok(None),
+    };
+    let (q, qd) = (
+        given("start angles", &settings.q)?,
+        given("start speeds", &settings.qd)?,
+    );
+    let led = matches!(experiment.drive, Drive::Handle { .. });
+    experiment.start = match (q.or(first), qd) {
+        (Some(near), None) if led => Start::Equilibrium { near },
+        (q, qd) => Start::Given {
+            q: q.unwrap_or_else(Joints::zeros),
+            qd: qd.unwrap_or_else(Joints::zeros),
+        },
+    };
+    Ok(experiment)
+}
+
+/// How long a drive lasts of itself [s].
+enum Natural {
+    Movement(f64),
+    Samples(f64),
+}
+
+type Begun<const N: usize> = (Drive<N>, Option<Joints<f64, N>>, Option<Natural>);
+
+/// The drive, the angles it starts from where it says so, and how long it lasts.
+fn driven<const N: usize>(
+    chain: &Chain<f64, N>,
+    rig: &Rig,
+    drive: &Driven<'_>,
+) -> PyResult<Begun<N>> {
+    let coupling = if drive.rigid {
+        Coupling::Rigid
+    } else {
+        Coupling::Compliant
+    };
+    let Some(values) = &drive.values else {
+        return match drive.kind.as_str() {
+            "free" => Ok((Drive::Torque(None), None, None)),
+            _ => Err(bad_input("drive", "no values", "samples or waypoints")),
+        };
+    };
+    let times = drive
+        .times
+        .as_ref()
+        .map(|t| t.as_array().to_vec())
+        .unwrap_or_default();
+    let last = times.last().copied().map(Natural::Samples);
+    match drive.kind.as_str() {
+        "movement" => {
+            let waypoints: Vec<Joints<f64, N>> = rows("waypoints", values)?
+                .into_iter()
+                .map(Joints::from)
+                .collect();
+            let shape = match drive.shape.as_str() {
+                "trapezoid" => Shape::Trapezoid,
+                "smooth" => Shape::Smooth,
+                other => return Err(bad_input("shape", other, "trapezoid or smooth")),
+            };
+            let limits = Limits {
+                speed: drive.speed,
+                acceleration: drive.acceleration,
+            };
+            let movement = Movement::within(shape, &waypoints, &[limits; N], drive.pause)
+                .map_err(simulation)?;
+            let (first, duration) = (waypoints.first().copied(), movement.duration());
+            Ok((
+                Drive::Handle {
+                    path: HandlePath::of_arm(*chain, movement),
+                    coupling,
+                },
+                first,
+                Some(Natural::Movement(duration)),
+            ))
+        }
+        "robot" => {
+            let Some(robot) = rig.robot else {
+                return Err(bad_input(
+                    "[robot]",
+                    "none in the model",
+                    "a robot with lengths, base and elbow",
+                ));
+            };
+            let path = HandlePath::of_robot(robot, &times, &rows("robot angles", values)?)
+                .map_err(simulation)?;
+            Ok((Drive::Handle { path, coupling }, None, last))
+        }
+        "handle" => {
+            let path = HandlePath::through_points(&times, &rows("handle positions", values)?)
+                .map_err(simulation)?;
+            Ok((Drive::Handle { path, coupling }, None, last))
+        }
+        "torque" => {
+            let samples = rows::<N>("joint torques", values)?;
+            let series = Series::new("joint torques", &times, &samples, Interpolation::Linear)
+                .map_err(simulation)?;
+            Ok((Drive::Torque(Some(series)), None, last))
+        }
+        other => Err(bad_input(
+            "drive",
+            other,
+            "movement, robot, handle, torque or free",
+        )),
+    }
+}
+
+fn columns<'py, const N: usize>(
+    py: Python<'py>,
+    recording: &Recording<N>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    for (name, width, values) in recording.columns() {
+        // Energies, works, time and the moment are numbers; everything else belongs to joints, axes or effects.
+        let scalar = name == "time"
+            || name == "moment_on_arm"
+            || name.starts_with("energy")
+            || name.starts_with("work");
+        let shape = if scalar {
+            Shaped::Vector
+        } else {
+            Shaped::Table(width)
+        };
+        put(py, &out, name, (shape, values))?;
+    }
+    let effects: Vec<_> = recording
+        .effects
+        .iter()
+        .map(|(kind, index)| (kind.info().kind, *index))
+        .collect();
+    out.set_item("effects", effects)?;
+    out.set_item("energy_error", recording.energy_error().to_pyarray(py))?;
+    out.set_item(
+        "digest",
+        format!("{:016x}", arm_sim::digest(recording).map_err(simulation)?),
+    )?;
+    Ok(out)
+}
+
+/// How a column is shaped in Python.
+enum Shaped {
+    /// One number a sample, `(n,)`.
+    Vector,
+    /// Several numbers a sample, `(n, width)`, also where the width is one.
+    Table(usize),
+}
+
+/// Sets a column; an empty one is `None`.
+fn put(
+    py: Python<'_>,
+    out: &Bound<'_, PyDict>,
+    name: &str,
+    (shape, values): (Shaped, &[f64]),
+) -> PyResult<()> {
+    let array = values.to_pyarray(py);
+    match shape {
+        _ if values.is_empty() => out.set_item(name, py.None()),
+        Shaped::Vector => out.set_item(name, array),
+        Shaped::Table(width) => {
+            out.set_item(name, array.call_method1("reshape", (-1, width as isize))?)
+        }
+    }
+}
+
+fn readings<'py, const N: usize>(
+    py: Python<'py>,
+    sensors: &Sensors<N>,
+    experiment: &Experiment<N>,
+    recording: &Recording<N>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let read = sensors.read(experiment, recording).map_err(simulation)?;
+    let out = PyDict::new(py);
+    put(py, &out, "time", (Shaped::Vector, &read.time))?;
+    put(py, &out, "q", (Shaped::Table(N), &read.q))?;
+    put(
+        py,
+        &out,
+        "force_on_arm",
+        (Shaped::Table(2), &read.force_on_arm),
+    )?;
+    put(
+        py,
+        &out,
+        "moment_on_arm",
+        (Shaped::Vector, &read.moment_on_arm),
+    )?;
+    put(py, &out, "robot_q", (Shaped::Table(2), &read.robot_q))?;
+    put(py, &out, "tau", (Shaped::Table(N), &read.torque))?;
+    Ok(out)
+}

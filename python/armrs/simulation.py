@@ -1,0 +1,287 @@
+"""The closed-chain experiment: a robot leads the arm, and every quantity is recorded."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import _armrs, tomlfile
+from .errors import BadInput
+from .model import Model, load_model
+from .rig import rig
+from .trial import Trial
+
+DEFAULT_DT = 0.25e-3
+"""Step of the simulation [s]."""
+DEFAULT_RATE = 50.0
+"""Samples a second of a recording [Hz]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """A desired movement of the arm's joints: straight lines through waypoints, at rest in each.
+
+    Attributes
+    ----------
+    waypoints : ndarray, shape (k, n_joints)
+        Joint angles [rad].
+    speed : float
+        Largest joint speed [rad/s].
+    acceleration : float
+        Largest joint acceleration [rad/s²].
+    pause : float
+        Rest in every waypoint on the way [s].
+    shape : {"trapezoid", "smooth"}
+        Velocity profile: straight ramps as in the thesis, or ramps with continuous acceleration.
+    """
+
+    waypoints: np.ndarray
+    speed: float = 0.2
+    acceleration: float = 0.6
+    pause: float = 0.0
+    shape: str = "trapezoid"
+
+    def __post_init__(self) -> None:
+        points = np.array(self.waypoints, dtype=float)
+        if points.ndim != 2 or len(points) < 2:
+            raise BadInput("waypoints", f"an array of shape {points.shape}", "two or more rows of joint angles")
+        points.flags.writeable = False
+        object.__setattr__(self, "waypoints", points)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Noise and limits of one kind of sensor channel.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the noise, in the unit of the channel.
+    correlation_time : float
+        Time in which its correlation falls to 1/e [s]; 0 for white noise.
+    range : float
+        Largest magnitude that is read.
+    bits : int, optional
+        Bits over the whole range.
+    """
+
+    deviation: float = 0.0
+    correlation_time: float = 0.0
+    range: float = np.inf
+    bits: int | None = None
+
+    def _entry(self) -> tuple[float, float, float, int | None]:
+        return self.deviation, self.correlation_time, self.range, self.bits
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the sensors of a rig do to the truth; the defaults are ideal ones at 50 Hz."""
+
+    rate: float = DEFAULT_RATE
+    angle: Channel = Channel()
+    force: Channel = Channel()
+    moment: Channel = Channel()
+    robot: Channel = Channel()
+    torque: Channel = Channel()
+
+    @classmethod
+    def realistic(cls) -> Sensors:
+        """Sensors of the thesis: cameras of 0.1°, a force sensor of ±110 N and 12 bit with 0.2 N of noise, robot encoders."""
+        return cls(
+            angle=Channel(np.radians(0.1)),
+            force=Channel(0.2, range=110.0, bits=12),
+            robot=Channel(range=2 * np.pi, bits=20),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A recorded run; rows are samples.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+    q, qd, qdd : ndarray, shape (n, n_joints)
+        Joint angles, speeds and accelerations [rad, rad/s, rad/s²].
+    force_on_arm : ndarray, shape (n, 2)
+        Contact force [N].
+    columns : dict of str to ndarray
+        Everything that was recorded: tip, handle, robot angles, every torque by itself, energies and works.
+    digest : str
+        Digest of the recorded bits; the same on every machine.
+    readings : tuple of dict
+        What the sensors read, one for each seed asked for.
+    model : Model
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    force_on_arm: np.ndarray
+    columns: dict[str, Any] = field(repr=False)
+    digest: str
+    readings: tuple[dict[str, Any], ...] = field(repr=False)
+    model: Model = field(repr=False)
+
+
+def simulate(
+    model: Model | str | os.PathLike[str],
+    drive: Movement | Trial | None = None,
+    *,
+    engine: str = "native",
+    integrator: str = "rk4",
+    dt: float = DEFAULT_DT,
+    rate: float = DEFAULT_RATE,
+    duration: float | None = None,
+    coupling: str = "compliant",
+    start: np.ndarray | None = None,
+    start_speed: np.ndarray | None = None,
+    sensors: Sensors | None = None,
+    seeds: Sequence[int] = (),
+) -> Simulated:
+    """Simulate an arm that a robot leads, that motors move, or that swings freely.
+
+    Parameters
+    ----------
+    model : Model or path
+    drive : Movement, Trial or None
+        The desired movement; a measured trial, whose robot angles (or else joint torques) drive the arm; or nothing, and it swings.
+    engine : {"native", "rapier"}
+        Minimal coordinates, or rigid bodies and joints in maximal coordinates.
+    integrator : {"rk4", "euler"}
+        Fourth order, or semi-implicit first order (native engine).
+    dt : float
+        Step [s].
+    rate : float
+        Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps.
+    duration : float, optional
+        Length of the run [s]; that of the movement or trial when absent.
+    coupling : {"compliant", "rigid"}
+        How the handle holds the tip.
+    start, start_speed : ndarray, shape (n_joints,), optional
+        Angles [rad] and speeds [rad/s] at the start. Where a handle leads: the static equilibrium near these angles.
+    sensors, seeds
+        What sensors read of the run, once for every seed.
+
+    Raises
+    ------
+    BadInput
+        For settings that cannot be used.
+    SimulationError
+        When the run stops early.
+    """
+    if not isinstance(model, Model):
+        model = load_model(model)
+    if coupling not in ("compliant", "rigid"):
+        raise BadInput("coupling", coupling, "compliant or rigid")
+    for name, value in (("dt", dt), ("rate", rate)):
+        if not (np.isfinite(value) and value > 0):
+            raise BadInput(name, value, "a number above 0")
+    driven = _driven(drive, coupling)
+    if isinstance(drive, Trial) and start is None:
+        start = drive.q[0]
+        if driven["kind"] != "robot" and start_speed is None and drive.dq is not None:
+            start_speed = drive.dq[0]
+    settings = {
+        "engine": engine,
+        "integrator": integrator,
+        "dt": dt,
+        "duration": duration,
+        "output_interval": 1.0 / rate,
+        "q": None if start is None else [float(v) for v in start],
+        "qd": None if start_speed is None else [float(v) for v in start_speed],
+    }
+    sensing = None if sensors is None else _sensing(sensors, seeds)
+    raw = _armrs.simulate(rig(model), driven, settings, sensing)
+    return Simulated(
+        t=raw["time"],
+        q=raw["q"],
+        qd=raw["qd"],
+        qdd=raw["qdd"],
+        force_on_arm=raw["force_on_arm"],
+        columns={k: v for k, v in raw.items() if k not in ("digest", "readings")},
+        digest=raw["digest"],
+        readings=tuple(raw.get("readings", ())),
+        model=model,
+    )
+
+
+def _driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
+    driven: dict[str, Any] = {
+        "kind": "free",
+        "values": None,
+        "times": None,
+        "shape": "trapezoid",
+        "speed": 0.0,
+        "acceleration": 0.0,
+        "pause": 0.0,
+        "rigid": coupling == "rigid",
+    }
+    if isinstance(drive, Movement):
+        shared = ("shape", "speed", "acceleration", "pause")
+        driven |= {"kind": "movement", "values": np.array(drive.waypoints)} | {name: getattr(drive, name) for name in shared}
+    elif drive is not None:
+        kind, values = ("robot", drive.robot_q) if drive.robot_q is not None else ("torque", drive.tau)
+        if values is None:
+            raise BadInput("columns", "neither robot angles nor joint torques", "qr1_rad and qr2_rad, or tau1_Nm …", file=drive.file)
+        keep = np.isfinite(values).all(axis=1)
+        driven |= {"kind": kind, "values": np.array(values[keep]), "times": np.array(drive.t[keep] - drive.t[0])}
+    return driven
+
+
+def _sensing(sensors: Sensors, seeds: Sequence[int]) -> dict[str, Any]:
+    kinds = ("angle", "force", "moment", "robot", "torque")
+    return {"rate": sensors.rate, "seeds": list(seeds)} | {kind: getattr(sensors, kind)._entry() for kind in kinds}
+
+
+def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
+    """Read a movement file: a TOML table `[movement]` with `waypoints_deg` (or `_rad`), speed, acceleration, pause, shape."""
+    document = tomlfile.read(Path(path))
+    try:
+        return _movement(document, n_joints)
+    except BadInput as error:
+        raise error.within(file=path) from None
+
+
+def _movement(document: dict[str, Any], n_joints: int) -> Movement:
+    from . import checks
+
+    checks.keys("", document, required=["movement"])
+    table = document["movement"]
+    known = [
+        "waypoints_deg", "waypoints_rad", "speed_rad_s", "speed_deg_s", "acceleration_rad_s2", "acceleration_deg_s2", "pause_s", "shape",
+    ]  # fmt: skip
+    checks.keys("movement", table, optional=known)
+    fields: dict[str, Any] = {}
+    for name in known:
+        if name not in table:
+            continue
+        value = table[name]
+        key, _, unit = name.partition("_")
+        if key == "shape":
+            if value not in ("trapezoid", "smooth"):
+                raise BadInput("movement.shape", value, "trapezoid or smooth")
+            fields[key] = value
+            continue
+        try:
+            numbers = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise BadInput(f"movement.{name}", value, "numbers") from None
+        if not np.isfinite(numbers).all():
+            raise BadInput(f"movement.{name}", value, "finite numbers")
+        if key in fields:
+            raise BadInput(f"movement.{name}", "a second unit", f"{key} once, in degrees or radians")
+        numbers = np.radians(numbers) if unit.startswith("deg") else numbers
+        fields[key] = numbers if key == "waypoints" else float(numbers)
+    if "waypoints" not in fields:
+        raise BadInput("movement", "no waypoints", "waypoints_deg or waypoints_rad")
+    if fields["waypoints"].ndim != 2 or fields["waypoints"].shape[1] != n_joints:
+        raise BadInput("movement.waypoints", f"an array of shape {fields['waypoints'].shape}", f"rows of {n_joints} angles")
+    return Movement(**fields)
