@@ -10,7 +10,7 @@ BIN    := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 
 RUST    := $(shell find crates -type f \( -name '*.rs' -o -name Cargo.toml \)) Cargo.toml Cargo.lock clippy.toml
-PACKAGE := $(RUST) $(shell find python -type f -name '*.pyi') pyproject.toml README.md
+PACKAGE := $(RUST) $(shell find python -type f -name "*.pyi") pyproject.toml
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
