@@ -2,7 +2,8 @@
 
 use crate::kinematics::{to_joint_torque, to_links};
 use crate::{
-    Chain, Joints, Load, Pose, Scalar, centrifugal, coriolis, gravity, link_inertia, static_torque,
+    Chain, Joints, Load, Pose, Scalar, centrifugal, coriolis, gravity, joints, link_inertia,
+    static_torque,
 };
 
 /// The terms of `B q̈ + C q̇ + G = τ + Jᵀ F`, each shoulder first \[N m\].
@@ -25,7 +26,7 @@ pub struct Contributions<T, const N: usize> {
 impl<T: Scalar, const N: usize> Contributions<T, N> {
     /// Left-hand side less right-hand side; zero when the motion obeys the equation of motion \[N m\].
     pub fn imbalance(&self) -> Joints<T, N> {
-        let mut sum = Joints::<T, N>::repeat(T::ZERO);
+        let mut sum = joints([T::ZERO; N]);
         for i in 0..N {
             sum[i] = self.inertial[i] + self.centrifugal[i] + self.coriolis[i] + self.gravity[i]
                 - self.joint[i]

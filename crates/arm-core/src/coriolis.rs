@@ -1,8 +1,8 @@
 //! Coriolis and centrifugal torques.
 
-use crate::inertia::to_joint_matrix;
+use crate::inertia::{link_motion, to_joint_matrix};
 use crate::kinematics::{to_joint_torque, to_links};
-use crate::{Chain, JointMatrix, Joints, Pose, Scalar};
+use crate::{Chain, JointMatrix, Joints, Pose, Scalar, joints};
 
 /// Derivative of `M_ik` to θ_i; to θ_k it is the opposite.
 #[inline]
@@ -18,31 +18,13 @@ fn slope<T: Scalar, const N: usize>(
     if i < k { value } else { -value }
 }
 
-/// Centrifugal part of each link's row, from link speeds.
-#[inline]
-pub(crate) fn link_coriolis<T: Scalar, const N: usize>(
-    chain: &Chain<T, N>,
-    pose: &Pose<T, N>,
-    speed: &[T; N],
-) -> [T; N] {
-    let mut rows = [T::ZERO; N];
-    for i in 0..N {
-        for k in i + 1..N {
-            let s = slope(chain, pose, i, k);
-            rows[i] -= s * speed[k].squared();
-            rows[k] += s * speed[i].squared();
-        }
-    }
-    rows
-}
-
 /// Torques `C(q,q̇) q̇` at joint speeds `qd` \[N m\] (thesis 3.7; 3.6 corrected as its appendix D has it).
 pub fn coriolis<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
     qd: &Joints<T, N>,
 ) -> Joints<T, N> {
-    to_joint_torque(&link_coriolis(chain, pose, &to_links(qd)))
+    to_joint_torque(&link_motion(chain, pose, &to_links(qd)).1)
 }
 
 /// The matrix `C(q,q̇)` of Christoffel symbols, for which `Ḃ − 2C` is skew-symmetric \[N m s/rad\].
@@ -72,9 +54,9 @@ pub fn centrifugal<T: Scalar, const N: usize>(
     pose: &Pose<T, N>,
     qd: &Joints<T, N>,
 ) -> Joints<T, N> {
-    let mut total = Joints::<T, N>::repeat(T::ZERO);
+    let mut total = joints([T::ZERO; N]);
     for k in 0..N {
-        let mut alone = Joints::<T, N>::repeat(T::ZERO);
+        let mut alone = joints([T::ZERO; N]);
         alone[k] = qd[k];
         let torque = coriolis(chain, pose, &alone);
         for i in 0..N {

@@ -2,10 +2,10 @@
 
 use core::array::from_fn;
 
-use crate::coriolis::link_coriolis;
-use crate::gravity::link_gravity;
+use crate::gravity::{link_gravity, weight_moments};
+use crate::inertia::link_motion;
 use crate::kinematics::{to_joint_torque, to_links};
-use crate::{Chain, JointMatrix, Joints, Plane, Pose, Scalar, link_inertia};
+use crate::{Chain, Joints, Plane, Pose, Scalar, joints};
 
 /// What acts on the arm from outside and in its joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,7 @@ impl<T: Scalar, const N: usize> Load<T, N> {
     /// Nothing acts.
     pub fn none() -> Self {
         Self {
-            torque: Joints::repeat(T::ZERO),
+            torque: joints([T::ZERO; N]),
             force_on_arm: [T::ZERO; 2],
             moment_on_arm: T::ZERO,
         }
@@ -63,13 +63,13 @@ pub fn inverse_dynamics<T: Scalar, const N: usize>(
     qdd: &Joints<T, N>,
 ) -> Joints<T, N> {
     let acceleration = to_links(qdd);
-    let m = link_inertia(chain, pose);
-    let mut rows = link_coriolis(chain, pose, &to_links(qd));
+    let (m, mut rows) = link_motion(chain, pose, &to_links(qd));
     let weight = link_gravity(chain, pose);
     for i in 0..N {
-        rows[i] += weight[i];
-        for k in 0..N {
-            rows[i] += m[(i, k)] * acceleration[k];
+        rows[i] += weight[i] + m[i][i] * acceleration[i];
+        for k in 0..i {
+            rows[i] += m[i][k] * acceleration[k];
+            rows[k] += m[i][k] * acceleration[i];
         }
     }
     to_joint_torque(&rows)
@@ -86,46 +86,47 @@ pub fn forward_dynamics<T: Scalar, const N: usize>(
     qd: &Joints<T, N>,
     load: &Load<T, N>,
 ) -> Joints<T, N> {
-    let force = link_force(chain, pose, load.force_on_arm);
-    let weight = link_gravity(chain, pose);
-    let turning = link_coriolis(chain, pose, &to_links(qd));
+    let (m, turning) = link_motion(chain, pose, &to_links(qd));
+    let [fy, fz] = load.force_on_arm;
     let mut rows: [T; N] = from_fn(|i| {
         let beyond = if i + 1 < N {
             load.torque[i + 1]
         } else {
             -load.moment_on_arm
         };
-        load.torque[i] - beyond + force[i] - weight[i] - turning[i]
+        // Weight and force at the tip turn the link with the same two lever arms.
+        let [level, upright] = weight_moments(chain, i);
+        let a = chain.segments[i].length;
+        let pushed = (a * fz + level) * pose.cos[i] - (a * fy + upright) * pose.sin[i];
+        load.torque[i] - beyond + pushed - turning[i]
     });
-    solve(link_inertia(chain, pose), &mut rows);
-    let mut qdd = Joints::<T, N>::repeat(T::ZERO);
-    for i in 0..N {
-        qdd[i] = if i == 0 {
+    solve(m, &mut rows);
+    joints(from_fn(|i| {
+        if i == 0 {
             rows[0]
         } else {
             rows[i] - rows[i - 1]
-        };
-    }
-    qdd
+        }
+    }))
 }
 
-/// Solves `M x = b` in place for symmetric positive definite M by `L D Lᵀ`.
+/// Solves `M x = b` in place for symmetric positive definite M, given by its rows up to the diagonal, by `L D Lᵀ`.
 #[inline]
-fn solve<T: Scalar, const N: usize>(mut m: JointMatrix<T, N>, b: &mut [T; N]) {
+fn solve<T: Scalar, const N: usize>(mut m: [[T; N]; N], b: &mut [T; N]) {
     let mut reciprocal = [T::ONE; N];
     for k in 0..N {
-        reciprocal[k] = T::ONE / m[(k, k)];
+        reciprocal[k] = T::ONE / m[k][k];
         for i in k + 1..N {
-            let factor = m[(i, k)] * reciprocal[k];
+            let factor = m[i][k] * reciprocal[k];
             for c in i..N {
-                m[(c, i)] = m[(c, i)] - factor * m[(c, k)];
+                m[c][i] -= factor * m[c][k];
             }
             b[i] -= factor * b[k];
         }
     }
     for i in (0..N).rev() {
         for k in i + 1..N {
-            b[i] -= m[(k, i)] * b[k];
+            b[i] -= m[k][i] * b[k];
         }
         b[i] = b[i] * reciprocal[i];
     }

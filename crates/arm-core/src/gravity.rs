@@ -11,11 +11,18 @@ pub(crate) fn link_gravity<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
 ) -> [T; N] {
-    let [gy, gz] = chain.gravity;
     from_fn(|i| {
-        let (x, h) = (chain.x[i], chain.h[i]);
-        gy * (x * pose.sin[i] + h * pose.cos[i]) - gz * (x * pose.cos[i] - h * pose.sin[i])
+        let [level, upright] = weight_moments(chain, i);
+        upright * pose.sin[i] - level * pose.cos[i]
     })
+}
+
+/// Moments of the weight of a link and of all beyond it about its joint, with the link level and upright \[N m\].
+#[inline]
+pub(crate) fn weight_moments<T: Scalar, const N: usize>(chain: &Chain<T, N>, i: usize) -> [T; 2] {
+    let [gy, gz] = chain.gravity;
+    let (x, h) = (chain.x[i], chain.h[i]);
+    [gz * x - gy * h, gy * x + gz * h]
 }
 
 /// Gravity torques `G(q)` on the left-hand side of the equation of motion, shoulder first \[N m\] (thesis 3.8).

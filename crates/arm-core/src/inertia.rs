@@ -10,25 +10,40 @@ pub fn link_inertia<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
 ) -> JointMatrix<T, N> {
-    let mut m = JointMatrix::<T, N>::repeat(T::ZERO);
-    for i in 0..N {
-        for k in i + 1..N {
+    let rows = link_motion(chain, pose, &[T::ZERO; N]).0;
+    JointMatrix::from_fn(|i, k| if i < k { rows[k][i] } else { rows[i][k] })
+}
+
+/// The inertia matrix in link angles, rows up to the diagonal, and the centrifugal part of each link's row.
+///
+/// One pass over the pairs i < k of links, with their angle θ_i − θ_k: `M_ik = a_i (X_k cos + H_k sin)`, and its slope
+/// `a_i (H_k cos − X_k sin)` to θ_i takes the squared speed of k from row i and gives that of i to row k. Products of
+/// parameters come first: they do not change during a run.
+#[inline]
+pub(crate) fn link_motion<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    speed: &[T; N],
+) -> ([[T; N]; N], [T; N]) {
+    let (mut m, mut turning) = ([[T::ZERO; N]; N], [T::ZERO; N]);
+    for k in 0..N {
+        for i in 0..k {
             let (c, s) = pose.difference(i, k);
-            let value = chain.segments[i].length * (chain.x[k] * c + chain.h[k] * s);
-            m[(i, k)] = value;
-            m[(k, i)] = value;
+            let a = chain.segments[i].length;
+            let (along, normal) = (a * chain.x[k], a * chain.h[k]);
+            let slope = normal * c - along * s;
+            m[k][i] = along * c + normal * s;
+            turning[i] -= slope * speed[k].squared();
+            turning[k] += slope * speed[i].squared();
         }
-        m[(i, i)] = chain.j[i];
-    }
-    for i in 0..N {
-        m[(i, i)] += chain.rotor[i];
-        if i > 0 {
-            m[(i - 1, i - 1)] += chain.rotor[i];
-            m[(i, i - 1)] -= chain.rotor[i];
-            m[(i - 1, i)] -= chain.rotor[i];
+        // A rotor turns with the angle between two links.
+        m[k][k] = chain.j[k] + chain.rotor[k];
+        if k > 0 {
+            m[k - 1][k - 1] += chain.rotor[k];
+            m[k][k - 1] -= chain.rotor[k];
         }
     }
-    m
+    (m, turning)
 }
 
 /// Inertia matrix in joint angles, `B(q)` of thesis 3.4 with `l_3²` in place of the misprinted `l_2²` \[kg m²\].

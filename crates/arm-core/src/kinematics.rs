@@ -4,7 +4,7 @@ use core::array::from_fn;
 
 use nalgebra::SMatrix;
 
-use crate::{Chain, Joints, Plane, Scalar};
+use crate::{Chain, Joints, Plane, Scalar, joints};
 
 /// Direction of every link: sine and cosine of θ_j = q_1 + … + q_j.
 ///
@@ -40,10 +40,10 @@ impl<T: Scalar, const N: usize> Pose<T, N> {
 
 /// Sums from the proximal end: joint speeds to link speeds, joint angles to link angles.
 #[inline]
-pub(crate) fn to_links<T: Scalar, const N: usize>(joints: &Joints<T, N>) -> [T; N] {
+pub(crate) fn to_links<T: Scalar, const N: usize>(values: &Joints<T, N>) -> [T; N] {
     let mut sum = T::ZERO;
     from_fn(|i| {
-        sum += joints[i];
+        sum += values[i];
         sum
     })
 }
@@ -51,13 +51,11 @@ pub(crate) fn to_links<T: Scalar, const N: usize>(joints: &Joints<T, N>) -> [T; 
 /// Sums from the distal end: what acts on each link to what acts at each joint.
 #[inline]
 pub(crate) fn to_joint_torque<T: Scalar, const N: usize>(links: &[T; N]) -> Joints<T, N> {
-    let mut torque = Joints::<T, N>::repeat(T::ZERO);
-    let mut sum = T::ZERO;
-    for i in (0..N).rev() {
-        sum += links[i];
-        torque[i] = sum;
+    let mut torque = *links;
+    for i in (0..N.saturating_sub(1)).rev() {
+        torque[i] += torque[i + 1];
     }
-    torque
+    joints(torque)
 }
 
 /// Position of joint `joint` (0 is the base, `N` the tip) \[m\].

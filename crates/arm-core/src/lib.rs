@@ -62,3 +62,9 @@ pub type Joints<T, const N: usize> = nalgebra::SVector<T, N>;
 pub type JointMatrix<T, const N: usize> = nalgebra::SMatrix<T, N, N>;
 /// A vector of the plane, `[y, z]`.
 pub type Plane<T> = [T; 2];
+
+/// Joint values from an array, without the copies that filling a vector costs in lanes.
+#[inline]
+pub(crate) const fn joints<T, const N: usize>(values: [T; N]) -> Joints<T, N> {
+    Joints::from_array_storage(nalgebra::ArrayStorage([values]))
+}

@@ -21,6 +21,7 @@ impl Law for Biarticular {
         ],
         memory: false,
     };
+    const CROSSES: bool = true;
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

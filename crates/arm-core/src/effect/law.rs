@@ -147,6 +147,8 @@ pub struct Local<T> {
 pub trait Law {
     /// Name, parameters, formula and reference.
     const INFO: Info;
+    /// Whether it acts in the joint before as well, by [`Law::proximal_share`].
+    const CROSSES: bool = false;
 
     /// Torque with which the joint resists \[N m\].
     fn torque<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {

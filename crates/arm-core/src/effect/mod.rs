@@ -10,7 +10,7 @@ mod law;
 
 pub use law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
 
-use crate::{Invalid, Joints, Plane, Reading, Scalar, Setup};
+use crate::{Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
 
 /// Declares the kinds: their modules, the enum, and the dispatch to each [`Law`].
 macro_rules! catalogue {
@@ -58,6 +58,18 @@ macro_rules! catalogue {
             pub fn memory_rate(&self, at: &Local<T>) -> T {
                 if !self.on { return T::ZERO; }
                 match self.kind { $(Kind::$law => $module::$law::memory_rate(&self.parameters, at)),* }
+            }
+            /// Adds the torque with which the joints of a moving arm resist; nothing for an index beyond the arm.
+            #[inline]
+            fn resist<const N: usize>(&self, motion: &Motion<T, N>, memory: T, total: &mut Joints<T, N>) {
+                // The view of the joint is made within each arm, so that a kind pays only for what it looks at.
+                match self.kind { $(Kind::$law => {
+                    let torque = $module::$law::torque(&self.parameters, &motion.local(self.index, memory));
+                    total[self.index] += torque;
+                    if $module::$law::CROSSES && self.index > 0 {
+                        total[self.index - 1] += $module::$law::proximal_share(&self.parameters) * torque;
+                    }
+                }),* }
             }
             /// Changes the rig before a run.
             pub fn alter<const N: usize>(&self, setup: &mut Setup<T, N>) {
@@ -229,7 +241,7 @@ impl<T: Scalar, const N: usize> Motion<T, N> {
             time,
             q,
             qd,
-            qdd: Joints::repeat(T::ZERO),
+            qdd: joints([T::ZERO; N]),
             joint_force: [T::ZERO; N],
         }
     }
@@ -269,17 +281,11 @@ pub fn resisting_torque<T: Scalar, const N: usize>(
     motion: &Motion<T, N>,
     memory: &[T],
 ) -> Joints<T, N> {
-    let mut total = Joints::<T, N>::repeat(T::ZERO);
+    let mut total = joints([T::ZERO; N]);
     for (i, effect) in effects.iter().enumerate() {
-        let here = effect.on && effect.index < N && effect.kind.info().place == Place::Joint;
-        if !here {
-            continue;
-        }
-        let state = memory.get(i).copied().unwrap_or(T::ZERO);
-        let torque = effect.torque(&motion.local(effect.index, state));
-        total[effect.index] += torque;
-        if effect.index > 0 {
-            total[effect.index - 1] += effect.proximal_share() * torque;
+        if effect.on && effect.index < N {
+            let state = memory.get(i).copied().unwrap_or(T::ZERO);
+            effect.resist(motion, state, &mut total);
         }
     }
     total
