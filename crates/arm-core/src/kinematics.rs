@@ -28,6 +28,18 @@ impl<T: Scalar, const N: usize> Pose<T, N> {
         Self { sin, cos }
     }
 
+    /// Sines of the link angles.
+    #[inline]
+    pub fn sin(&self) -> &[T; N] {
+        &self.sin
+    }
+
+    /// Cosines of the link angles.
+    #[inline]
+    pub fn cos(&self) -> &[T; N] {
+        &self.cos
+    }
+
     /// Cosine and sine of θ_i − θ_k.
     #[inline]
     pub(crate) fn difference(&self, i: usize, k: usize) -> (T, T) {
