@@ -13,6 +13,7 @@ RUST    := $(shell find crates -type f \( -name '*.rs' -o -name Cargo.toml \)) C
 PACKAGE := $(RUST) $(shell find python -type f -name "*.pyi") pyproject.toml
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_QUIET := 1
 # The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
@@ -32,7 +33,7 @@ build: $(STAMPS)/build
 $(STAMPS)/venv:
 	$(PYTHON) scripts/check_python.py
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet "maturin>=1.9,<2"
+	$(BIN)/python -m pip install "maturin>=1.9,<2"
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/build: $(PACKAGE) | $(STAMPS)/venv
