@@ -5,7 +5,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Arm", "Rig", "__version__", "build_profile", "effects", "identify"]
+__all__ = ["Arm", "Rig", "__version__", "build_profile", "effects", "identify", "simulate"]
 
 __version__: str
 build_profile: str
@@ -46,3 +46,9 @@ class Rig:
 
 def effects() -> list[dict[str, Any]]: ...
 def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...
+def simulate(
+    rig: Rig,
+    drive: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    sensing: Mapping[str, Any] | None = None,
+) -> dict[str, Any]: ...
