@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from .errors import BadInput as BadInput
     from .errors import IdentificationError as IdentificationError
     from .errors import SimulationError as SimulationError
+    from .identification import Estimate as Estimate
+    from .identification import Identified as Identified
+    from .identification import identify as identify
     from .model import Contact as Contact
     from .model import Effect as Effect
     from .model import Joint as Joint
@@ -26,6 +29,16 @@ if TYPE_CHECKING:
     from .model import Robot as Robot
     from .model import Segment as Segment
     from .model import load_model as load_model
+    from .moments import PassiveCurve as PassiveCurve
+    from .moments import PassiveMoments as PassiveMoments
+    from .moments import passive_moments as passive_moments
+    from .report import write_report as write_report
+    from .simulation import Channel as Channel
+    from .simulation import Movement as Movement
+    from .simulation import Sensors as Sensors
+    from .simulation import Simulated as Simulated
+    from .simulation import load_movement as load_movement
+    from .simulation import simulate as simulate
     from .trial import Trial as Trial
 
 # A module is never named like a public function: importing it would put the module in the place of the function.
@@ -34,7 +47,11 @@ _HOMES = {
     "conversion": ("convert",),
     "dataset": ("Dataset", "load_dataset", "write_dataset"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
+    "identification": ("Estimate", "Identified", "identify"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
+    "moments": ("PassiveCurve", "PassiveMoments", "passive_moments"),
+    "report": ("write_report",),
+    "simulation": ("Channel", "Movement", "Sensors", "Simulated", "load_movement", "simulate"),
     "trial": ("Trial",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

@@ -5,7 +5,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Arm", "Rig", "__version__", "build_profile", "effects", "identify", "simulate"]
+__all__ = ["Arm", "Rig", "__version__", "build_profile", "effects", "identify", "simulate", "smooth"]
 
 __version__: str
 build_profile: str
@@ -52,3 +52,6 @@ def simulate(
     settings: Mapping[str, Any],
     sensing: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]: ...
+def smooth(
+    values: NDArray[np.float64], rate: float, cutoff: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...

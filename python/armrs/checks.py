@@ -82,6 +82,13 @@ def whole(place: str, value: object, *, least: int, most: int | None = None) -> 
     return int(result)
 
 
+def flag(place: str, value: object) -> bool:
+    """Return true or false."""
+    if not isinstance(value, bool):
+        raise BadInput(place, value, "true or false")
+    return value
+
+
 def text(place: str, value: object) -> str:
     """Return a text of at least one visible character, on one line."""
     if not isinstance(value, str) or not value.strip() or not value.isprintable():

@@ -11,20 +11,27 @@ from __future__ import annotations
 import enum
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import files
-from .errors import ArmrsError, BadInput, one_line, unknown_name
+from . import console, files
+from .errors import ArmrsError, BadInput, Text, one_line, unknown_name
+
+if TYPE_CHECKING:
+    from .trial import Trial
 
 app = typer.Typer(name="armrs", add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
 
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is standard output.")]
 OutFolder = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write below; made when it does not exist.")]
+MaybeFolder = Annotated[
+    Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder to write files and report below; made when it does not exist.")
+]
 Source = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with dataset.toml, or that file.")]
 
 _STDOUT = Path("-")
@@ -37,6 +44,42 @@ class Format(str, enum.Enum):
 
     csv = "csv"
     parquet = "parquet"
+
+
+class Method(str, enum.Enum):
+    """Methods of identification."""
+
+    joint = "joint"
+    cascade = "cascade"
+
+
+class Engine(str, enum.Enum):
+    """Engines of simulation."""
+
+    native = "native"
+    rapier = "rapier"
+
+
+class Integrator(str, enum.Enum):
+    """Integrators of the native engine."""
+
+    rk4 = "rk4"
+    euler = "euler"
+
+
+class Coupling(str, enum.Enum):
+    """How the handle holds the tip."""
+
+    compliant = "compliant"
+    rigid = "rigid"
+
+
+class Motion(str, enum.Enum):
+    """Sources of speeds and accelerations."""
+
+    auto = "auto"
+    measured = "measured"
+    simulated = "simulated"
 
 
 def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None]) -> None:
@@ -125,13 +168,154 @@ def convert(
     present(lambda: {"files": written}, json, lambda: print("\n".join(os.fspath(path) for path in written)))
 
 
+@app.command()
+def identify(
+    context: typer.Context,
+    dataset: Source,
+    out: MaybeFolder = None,
+    method: Annotated[Method, typer.Option(help="All joints at once with physical constraints, or one after the other.")] = Method.joint,
+    with_: Annotated[
+        str, typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects to fit at every joint besides those of the model.")
+    ] = "",
+    cutoff_hz: Annotated[float | None, typer.Option(help="Cutoff of the common low-pass [Hz]; chosen from the data when absent.")] = None,
+    motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
+    level: Annotated[float, typer.Option(help="Probability of the intervals, 0.5 to 1.")] = 0.95,
+    json: JsonFile = None,
+) -> None:
+    """Identify body segment and joint parameters, each with an interval and what decided it."""
+    from . import results, words
+    from .dataset import load_dataset
+    from .identification import identify as run_identification
+
+    folder = _folder(out)
+    data = load_dataset(dataset)
+    kinds = [kind.strip() for kind in with_.split(",") if kind.strip()]
+    with console.progress("identifying"):
+        result = run_identification(data, method=method.value, with_effects=kinds, cutoff=cutoff_hz, motion=motion.value, level=level)
+    plain = results.identified_data(result, _command(context))
+    written = results.write_identified(result, plain, folder) if folder else []
+    console.warn(data.warnings)
+    present(lambda: plain, json, lambda: words.identified(plain, written))
+
+
+@app.command()
+def simulate(
+    context: typer.Context,
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
+    movement: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="TOML file with a table [movement]: waypoints_deg, speed_rad_s, …")
+    ] = None,
+    trial: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
+    ] = None,
+    out: MaybeFolder = None,
+    engine: Annotated[Engine, typer.Option(help="Minimal coordinates, or rigid bodies and joints.")] = Engine.native,
+    dt: Annotated[float, typer.Option(help="Step [s].")] = 0.25e-3,
+    rate_hz: Annotated[float, typer.Option(help="Samples a second that are recorded [Hz].")] = 50.0,
+    integrator: Annotated[Integrator, typer.Option(help="Fourth order, or semi-implicit first order.")] = Integrator.rk4,
+    coupling: Annotated[Coupling, typer.Option(help="How the handle holds the tip.")] = Coupling.compliant,
+    duration_s: Annotated[float | None, typer.Option(help="Length of the run [s]; that of the movement when absent.")] = None,
+    to: Annotated[Format, typer.Option("--to", help="Format of the samples written.")] = Format.csv,
+    json: JsonFile = None,
+) -> None:
+    """Simulate the closed-chain experiment: a robot leads the arm."""
+    from . import results, words
+    from .model import load_model
+    from .simulation import load_movement
+    from .simulation import simulate as run_simulation
+
+    if (movement is None) == (trial is None):
+        found = Text("neither" if movement is None else "both")
+        raise BadInput("--movement, --trial", found, "one of them")
+    folder = _folder(out)
+    arm = load_model(model)
+    measured = None if trial is None else _single_trial(trial, arm.n_joints)
+    drive = measured if movement is None else load_movement(movement, arm.n_joints)
+    with console.progress("simulating"):
+        result = run_simulation(
+            arm,
+            drive,
+            engine=engine.value,
+            integrator=integrator.value,
+            dt=dt,
+            rate=rate_hz,
+            duration=duration_s,
+            coupling=coupling.value,
+        )
+    plain = results.simulated_data(result, os.fspath(movement or trial or ""), _command(context))
+    written = results.write_simulated(result, plain, folder, suffix=f".{to.value}", trial=measured) if folder else []
+    present(lambda: plain, json, lambda: words.simulated(plain, written))
+
+
+@app.command()
+def passive(
+    context: typer.Context,
+    dataset: Source,
+    out: MaybeFolder = None,
+    cutoff_hz: Annotated[float, typer.Option(help="Cutoff of the low-pass of angles and forces [Hz].")] = 1.0,
+    bins: Annotated[int, typer.Option(help="Angle bins over the range of a joint.")] = 24,
+    json: JsonFile = None,
+) -> None:
+    """Passive joint moments of slow movements: elastic mean and hysteresis against the angle."""
+    from . import results, words
+    from .dataset import load_dataset
+    from .moments import passive_moments
+
+    folder = _folder(out)
+    data = load_dataset(dataset)
+    with console.progress("passive moments"):
+        result = passive_moments(data, cutoff=cutoff_hz, bins=bins)
+    plain = results.passive_data(result, _command(context))
+    written = results.write_passive(result, plain, folder) if folder else []
+    console.warn([*data.warnings, *result.warnings])
+    present(lambda: plain, json, lambda: words.passive(plain, written))
+
+
+@app.command()
+def report(
+    sources: Annotated[list[Path], typer.Argument(metavar="RESULT.json…", help="Results that other verbs wrote.")],
+    out: OutFolder = Path(),
+) -> None:
+    """Make one self-contained HTML report, report.html, of any results."""
+    from .report import write_report
+
+    folder = files.output_folder(out)
+    print(write_report(sources, folder / "report.html"))
+
+
+def _single_trial(path: Path, n_joints: int) -> Trial:
+    """Read a trial that stands alone. Its forces are not used, so that it does not matter what they act on."""
+    from .trial import read_trial
+
+    try:
+        reading = read_trial(
+            path, n_joints=n_joints, force_on="arm", sample_rate=None, file=path.name, configuration=path.stem, repeat=1, role="test"
+        )
+    except BadInput as error:
+        raise error.within(file=path) from None
+    if reading is None:
+        raise BadInput("file", Text("no samples below the header"), "samples", file=path)
+    console.warn(reading.warnings)
+    return reading.trial
+
+
+def _folder(out: Path | None) -> Path | None:
+    """Refuse an output folder that cannot be one before any work is done."""
+    return None if out is None else files.output_folder(out)
+
+
+def _command(context: typer.Context) -> str:
+    return shlex.join(["armrs", *(context.find_root().obj or [])])
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = typer.main.get_command(app)
     try:
         # Not `command.main`, which turns some errors into exits of its own.
-        with command.make_context("armrs", given or ["--help"]) as context:
+        with command.make_context("armrs", given or ["--help"], obj=tuple(given)) as context:
             result = command.invoke(context)
         sys.stdout.flush()
     except typer.Exit as end:

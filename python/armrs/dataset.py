@@ -104,6 +104,8 @@ class Dataset:
         Where the model was read.
     warnings : tuple of str
         What the user should know, one line each.
+    synthetic : bool
+        Whether the trials were simulated; reports say so.
     """
 
     name: str
@@ -116,6 +118,7 @@ class Dataset:
     folder: Path | None = None
     model_path: Path | None = None
     warnings: tuple[str, ...] = ()
+    synthetic: bool = False
 
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
@@ -158,6 +161,7 @@ class Description:
     sample_rate: float | None
     subject: Subject
     tolerance: Tolerance
+    synthetic: bool
 
     @property
     def model_path(self) -> Path:
@@ -227,6 +231,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         folder=description.path.parent,
         model_path=model_path,
         warnings=tuple(warnings),
+        synthetic=description.synthetic,
     )
 
 
@@ -242,7 +247,7 @@ def describe(source: str | os.PathLike[str]) -> Description:
 
 
 def _description(path: Path, document: dict[str, Any]) -> Description:
-    optional = ["name", "force_on", "sample_rate", "subject", "tolerance"]
+    optional = ["name", "force_on", "sample_rate", "synthetic", "subject", "tolerance"]
     checks.keys("", document, required=["model", "trial"], optional=optional)
     tables = checks.tables("trial", document["trial"])
     entries = tuple(_entry(f"[[trial]] {k}", table) for k, table in enumerate(tables, 1))
@@ -258,6 +263,7 @@ def _description(path: Path, document: dict[str, Any]) -> Description:
         sample_rate=None if rate is None else checks.number("sample_rate", rate, above=0.0, most=1e6, unit="Hz"),
         subject=_part(Subject, "[subject]", document.get("subject", {})),
         tolerance=_part(Tolerance, "[tolerance]", document.get("tolerance", {})),
+        synthetic=checks.flag("synthetic", document.get("synthetic", False)),
     )
 
 
@@ -374,7 +380,9 @@ def trial_columns(trial: Trial, force_on: str | None) -> dict[str, np.ndarray]:
 
 def description_text(source: Dataset | Description, model: str, entries: list[Entry]) -> str:
     """Return the text of `dataset.toml`."""
-    head = {"name": source.name, "model": model, "force_on": source.force_on, "sample_rate": source.sample_rate}
+    head: dict[str, object] = {"name": source.name, "model": model, "force_on": source.force_on, "sample_rate": source.sample_rate}
+    if source.synthetic:
+        head["synthetic"] = True
     blocks = [tomlfile.lines(head)]
     subject = tomlfile.lines(dataclasses.asdict(source.subject))
     if subject:

@@ -48,6 +48,9 @@ class Estimate:
     interval: tuple[float, float]
     decided_by: str
 
+    def __str__(self) -> str:
+        return f"{self.name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
+
 
 @dataclass(frozen=True, eq=False)
 class Explained:
@@ -88,6 +91,8 @@ class Identified:
         Which unknowns the movements cannot tell apart, in words.
     scale_free : bool
         No torque acted: all parameters are known up to one common factor, which was taken from the model.
+    level : float
+        Probability of the intervals.
     cutoff : float
         Cutoff of the zero-phase low-pass that motion and torque share, -3 dB of both passes [Hz].
     residual_rms : dict
@@ -106,11 +111,16 @@ class Identified:
     calibration: tuple[Estimate, ...]
     trades: tuple[str, ...]
     scale_free: bool
+    level: float
     cutoff: float
     residual_rms: dict[str, dict[str, float]]
     explained: tuple[Explained, ...]
     model: Model
     dataset: Dataset
+
+    def __repr__(self) -> str:
+        known = f"{self.rank} of {self.unknowns} unknowns determined"
+        return f"Identified({self.dataset.name!r}, {self.method} method, {self.status}: {known}; {'; '.join(map(str, self.combinations))})"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as it is written to JSON; the model stands in a file of its own."""
@@ -124,6 +134,7 @@ class Identified:
             "calibration": [dataclasses.asdict(e) for e in self.calibration],
             "not_separable": list(self.trades),
             "scale_free": self.scale_free,
+            "level": self.level,
             "cutoff_Hz": self.cutoff,
             "residual_rms": self.residual_rms,
             "model": "identified.toml",
@@ -206,6 +217,7 @@ def identify(
         calibration=_estimates(raw["calibration"]),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
+        level=level,
         cutoff=raw["cutoff"],
         residual_rms=_residuals(explained),
         explained=explained,

@@ -118,6 +118,8 @@ class Simulated:
     readings : tuple of dict
         What the sensors read, one for each seed asked for.
     model : Model
+    settings : dict
+        Engine, integrator, step and rate that made it.
     """
 
     t: np.ndarray
@@ -129,6 +131,12 @@ class Simulated:
     digest: str
     readings: tuple[dict[str, Any], ...] = field(repr=False)
     model: Model = field(repr=False)
+    settings: dict[str, Any] = field(repr=False)
+
+    def __repr__(self) -> str:
+        most = np.max(np.hypot(*self.force_on_arm.T))
+        size = f"{len(self.t)} samples, {self.t[-1]:.6g} s, {self.q.shape[1]} joints"
+        return f"Simulated({size}; force on the arm up to {most:.4g} N; digest {self.digest})"
 
 
 def simulate(
@@ -210,6 +218,7 @@ def simulate(
         digest=raw["digest"],
         readings=tuple(raw.get("readings", ())),
         model=model,
+        settings={"engine": engine, "integrator": integrator, "dt_s": dt, "rate_Hz": rate, "coupling": coupling},
     )
 
 

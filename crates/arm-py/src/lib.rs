@@ -6,6 +6,7 @@ mod convert;
 mod errors;
 mod ident;
 mod rig;
+mod signal;
 mod sim;
 
 use pyo3::prelude::*;
@@ -25,6 +26,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<rig::Rig>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
+    m.add_function(wrap_pyfunction!(signal::smooth, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
     Ok(())
 }

@@ -1,0 +1,41 @@
+//! The common low-pass and the derivatives behind it, for time series.
+
+use arm_ident::derivative;
+use arm_ident::motion::low_pass;
+use numpy::ndarray::{Array1, Array2};
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::errors::{bad_input, identification};
+
+type Table<'py> = Bound<'py, PyArray2<f64>>;
+
+/// Zero-phase low-pass of uniform time series, and the first and second derivatives of what passed, each `(n, k)`.
+///
+/// `cutoff` is −3 dB of both passes together [Hz].
+#[pyfunction]
+pub fn smooth<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray2<'py, f64>,
+    rate: f64,
+    cutoff: f64,
+) -> PyResult<(Table<'py>, Table<'py>, Table<'py>)> {
+    if !(0.0 < cutoff && cutoff < 0.5 * rate) {
+        let allowed = format!("above 0 and below {} Hz, half the sample rate", 0.5 * rate);
+        return Err(bad_input("cutoff", cutoff, &allowed));
+    }
+    let filter = low_pass(cutoff, rate).map_err(identification)?;
+    let (n, k) = (values.shape()[0], values.shape()[1]);
+    let mut out = [(); 3].map(|()| Array2::zeros((n, k)));
+    for c in 0..k {
+        let column = values.as_array().column(c).to_vec();
+        let passed = filter.both_ways(&column).map_err(identification)?;
+        let first = derivative::first(&passed, 1.0 / rate).map_err(identification)?;
+        let second = derivative::second(&passed, 1.0 / rate).map_err(identification)?;
+        for (table, series) in out.iter_mut().zip([passed, first, second]) {
+            table.column_mut(c).assign(&Array1::from(series));
+        }
+    }
+    let [passed, first, second] = out.map(|table| table.into_pyarray(py));
+    Ok((passed, first, second))
+}

@@ -1,0 +1,176 @@
+"""Whole figures of results: which plots stand together, and the words below them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import plotting, tables
+from .identification import Identified
+from .moments import PassiveMoments
+from .simulation import Simulated
+from .trial import Trial
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_CONFIGURATIONS = 8
+"""So many movements are drawn; with more, a report would be too long to read."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure with the name of its file, its title and what it shows in words."""
+
+    name: str
+    title: str
+    text: str
+    figure: Figure
+
+
+def identified(result: Identified, data: Mapping[str, Any]) -> list[Drawn]:
+    """Draw an identification: parameters with intervals, and torques measured and fitted for every movement."""
+    joints = data["data"]["joints"]
+    with plotting.style():
+        return [parameters([*data["parameters"], *data["combinations"]], joints, data["level"]), *_torques(result, joints)]
+
+
+def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level: float) -> Drawn:
+    """Draw estimates with intervals, one panel a unit."""
+    unique = list({(tables.label(item), item.get("joint")): item for item in reversed(items)}.values())[::-1]
+    units = list(dict.fromkeys(item["unit"] for item in unique))
+    panels = [[item for item in unique if item["unit"] == unit] for unit in units]
+    sizes = [len(panel) + 1.1 for panel in panels]
+    columns = 2 if len(panels) > 1 else 1
+    split = _balanced(sizes, columns)
+    height = max(sum(sizes[k] for k in column) for column in split)
+    figure = plotting.figure(5.4 * columns, 0.36 * height + 0.9)
+    for place, column in zip(figure.subfigures(1, columns, squeeze=False)[0], split, strict=True):
+        spare = height - sum(sizes[k] for k in column)
+        ratios = [sizes[k] for k in column] + ([spare] if spare > 0.5 else [])
+        axes = place.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0]
+        for ax, k in zip(axes, column, strict=False):
+            plotting.intervals(panels[k], [_named(item, joints) for item in panels[k]], ax)
+        for ax in axes[len(column) :]:
+            ax.set_axis_off()
+    plotting.interval_legend(figure, unique)
+    text = (
+        f"Bars are {100 * level:g} % intervals. A full marker rests on the measurement. A hollow one does not: where the movements leave a "
+        "value open it is that of the model as given, moved only as far as the combinations that are measured ask for."
+    )
+    return Drawn("parameters", "Parameters with intervals", text, figure)
+
+
+def _named(item: Mapping[str, Any], joints: Sequence[str]) -> str:
+    if item["kind"] in ("segment", "combination"):
+        return plotting.symbol(item["name"])
+    return f"{tables.label(item)} {tables.where(item, joints)}".strip()
+
+
+def _balanced(sizes: Sequence[float], columns: int) -> list[list[int]]:
+    """Share panels among columns so that these become about equally high; the order stays within each."""
+    split: list[list[int]] = [[] for _ in range(columns)]
+    for k in sorted(range(len(sizes)), key=lambda k: -sizes[k]):
+        min(split, key=lambda column: sum(sizes[i] for i in column)).append(k)
+    return sorted(sorted(column) for column in split)
+
+
+def _torques(result: Identified, joints: Sequence[str]) -> list[Drawn]:
+    drawn = []
+    names = list(dict.fromkeys(e.trial.configuration for e in result.explained))
+    for configuration in names[:MOST_CONFIGURATIONS]:
+        own = [e for e in result.explained if e.trial.configuration == configuration]
+        shown = next((e for e in own if e.trial.role == "test"), own[0])
+        n = len(joints)
+        figure = plotting.figure(5.0 * max(n, 1) + 0.4, 4.6)
+        axes = figure.subplots(2, n, squeeze=False, sharex=True, height_ratios=(2.0, 1.0))
+        for j, name in enumerate(joints):
+            plotting.torque(shown.t, shown.measured[:, j], shown.fitted[:, j], axes[0, j], title=name)
+            plotting.residual([(e.t, e.measured[:, j] - e.fitted[:, j], e.trial.role) for e in own], axes[1, j])
+            axes[0, j].set_xlabel("")
+        text = (
+            f"Above, joint torques of {shown.trial.file} ({shown.trial.role} trial): what the measured forces and motion ask for, and what "
+            f"the fitted model gives. Below, what is left in all {len(own)} repeats."
+        )
+        drawn.append(Drawn(f"torques-{slug(configuration)}", f"Torques of the movement {configuration}", text, figure))
+    return drawn
+
+
+_TORQUES = {
+    "inertial": "inertia",
+    "centrifugal": "centrifugal",
+    "coriolis": "Coriolis",
+    "gravity": "gravity",
+    "frame": "moving base",
+    "resisting": "resisting",
+    "drive": "motor",
+    "contact": "contact",
+}
+"""Torque columns of a recording, and how a legend names them."""
+_VISIBLE = 1e-3
+"""A torque below this part of the largest would be a line on the axis."""
+
+
+def simulated(result: Simulated, trial: Trial | None = None) -> list[Drawn]:
+    """Draw a run: angles, force and every torque of each joint. A trial that drove it is drawn behind the angles."""
+    names = [joint.name for joint in result.model.joints]
+    n = len(names)
+    columns = max(n, 2)
+    with plotting.style():
+        figure = plotting.figure(4.6 * columns, 6.4)
+        grid = figure.add_gridspec(2, 2 * columns)
+        top = [figure.add_subplot(grid[0, k * columns : (k + 1) * columns]) for k in range(2)]
+        measured = None if trial is None else np.column_stack([np.interp(result.t, trial.t - trial.t[0], q) for q in trial.q.T])
+        plotting.angles(result.t, result.q, names, top[0], measured=measured)
+        plotting.force(result.t, result.force_on_arm, top[1])
+        for j, name in enumerate(names):
+            share = 2 * columns // n
+            ax = figure.add_subplot(grid[1, j * share : (j + 1) * share])
+            torques = {label: result.columns[f"torque.{key}"][:, j] for key, label in _TORQUES.items()}
+            largest = max(np.abs(values).max() for values in torques.values())
+            shown = {label: values for label, values in torques.items() if np.abs(values).max() > _VISIBLE * largest}
+            plotting.contributions(result.t, shown, ax, title=f"Torques: {name}")
+    text = (
+        "Inertial, centrifugal, Coriolis, gravity and resisting torques stand on the left of the equation of motion, those of motors and "
+        "contact on the right. Torques below a thousandth of the largest are left out."
+    )
+    if trial is not None:
+        text += f" The broad lines are the angles measured in {trial.file}."
+    return [Drawn("simulated", "Angles, force and torques", text, figure)]
+
+
+def passive(result: PassiveMoments) -> list[Drawn]:
+    """Draw passive moments: for each configuration the samples by direction of motion, elastic mean and half width."""
+    names = [joint.name for joint in result.dataset.model.joints]
+    drawn = []
+    with plotting.style():
+        for configuration in list(dict.fromkeys(c.configuration for c in result.curves))[:MOST_CONFIGURATIONS]:
+            curves = [c for c in result.curves if c.configuration == configuration]
+            own = [m for m in result.trials if m.trial.configuration == configuration]
+            figure = plotting.figure(4.9 * len(curves) + 0.4, 5.6)
+            axes = figure.subplots(2, len(curves), squeeze=False, sharex="col", height_ratios=(1.7, 1.0))
+            for (above, below), curve in zip(axes.T, curves, strict=True):
+                j = curve.joint - 1
+                rising, falling = ([(m.q[d, j], m.moment[d, j]) for m in own for d in [m.direction[:, j] == sign]] for sign in (1, -1))
+                plotting.hysteresis(rising, falling, above, title=names[j])
+                plotting.mean_and_spread(curve.angle, curve.elastic, curve.elastic_std, above, label="elastic mean")
+                plotting.mean_and_spread(
+                    curve.angle, curve.half_width, curve.half_width_std, below, label="half width (dissipative)", colour=plotting.PURPLE
+                )
+                above.set(ylabel="passive moment [N m]", xlabel="")
+                below.set_ylim(bottom=min(0.0, below.get_ylim()[0]))
+            text = (
+                f"Above, samples of {len(own)} repeats by direction of motion and the mean of both directions. Below, half the difference "
+                "of both directions. Bands are one standard deviation over the repeats."
+            )
+            drawn.append(Drawn(f"passive-{slug(configuration)}", f"Passive moments of the movement {configuration}", text, figure))
+    return drawn
+
+
+def slug(name: str) -> str:
+    """Turn a name into one that every file system takes."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.") or "figure"

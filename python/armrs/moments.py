@@ -1,0 +1,278 @@
+"""Passive joint moments of slow movements: elastic mean and hysteresis (section 3.4 of the thesis)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import _armrs
+from .dataset import Dataset, load_dataset
+from .errors import BadInput, Text
+from .rig import arm
+from .trial import FEWEST_SAMPLES, Trial
+
+DEFAULT_CUTOFF = 1.0
+"""Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
+DEFAULT_BINS = 24
+"""Angle bins over the range of a joint in one configuration."""
+LEAST_RANGE = np.radians(2.0)
+"""A joint that moves less than this counts as held [rad]."""
+MOVING = 0.25
+"""A joint moves when its speed is above this part of its usual speed in the trial."""
+MARGIN = 0.35
+"""The low-pass mixes what lies within this time, in periods of its cutoff."""
+FEWEST_IN_BIN = 3
+"""Samples that a repeat needs in a bin to count there."""
+SLOW = 0.1
+"""Largest share of inertial torques at which a movement counts as slow."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrialMoments:
+    """Passive moments of one trial; rows are samples, NaN where nothing was measured.
+
+    Attributes
+    ----------
+    trial : Trial
+    q, qd : ndarray, shape (n, n_joints)
+        Low-passed angles and speeds [rad, rad/s].
+    moment : ndarray, shape (n, n_joints)
+        Torque with which each joint resists [N m].
+    inertial : ndarray, shape (n, n_joints)
+        What the neglected inertial torques would be [N m].
+    direction : ndarray of int, shape (n, n_joints)
+        1 where the angle grows, -1 where it shrinks, 0 at rest.
+    """
+
+    trial: Trial
+    q: np.ndarray
+    qd: np.ndarray
+    moment: np.ndarray
+    inertial: np.ndarray
+    direction: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveCurve:
+    """Passive moment of one joint against its angle, over the repeats of one configuration; shapes (k,), NaN where there are no samples.
+
+    Attributes
+    ----------
+    configuration : str
+    joint : int
+        From 1.
+    repeats : int
+    angle : ndarray
+        Centres of the bins [rad].
+    rising, falling : ndarray
+        Mean moment while the angle grows and shrinks [N m].
+    elastic, elastic_std : ndarray
+        Mean of both directions, and its standard deviation over repeats [N m]; the deviation is NaN for a single repeat.
+    half_width, half_width_std : ndarray
+        Half the difference of both directions: the dissipative part [N m].
+    inertial_share : float
+        Root mean square of the neglected inertial torque, relative to that of the moment.
+    """
+
+    configuration: str
+    joint: int
+    repeats: int
+    angle: np.ndarray
+    rising: np.ndarray
+    falling: np.ndarray
+    elastic: np.ndarray
+    elastic_std: np.ndarray
+    half_width: np.ndarray
+    half_width_std: np.ndarray
+    inertial_share: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data with units in the names."""
+        there = np.isfinite(self.half_width)
+        return {
+            "configuration": self.configuration,
+            "joint": self.joint,
+            "repeats": self.repeats,
+            "inertial_share": self.inertial_share,
+            "half_width_mean_Nm": float(np.mean(self.half_width[there])),
+            "elastic_mean_Nm": float(np.mean(self.elastic[there])),
+            "angle_deg": np.degrees(self.angle),
+            **{f"{n}_Nm": getattr(self, n) for n in ("rising", "falling", "elastic", "elastic_std", "half_width", "half_width_std")},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveMoments:
+    """Passive joint moments of a data set.
+
+    Attributes
+    ----------
+    trials : tuple of TrialMoments
+    curves : tuple of PassiveCurve
+        One for every configuration and joint that moved in both directions.
+    cutoff : float
+        Cutoff of the low-pass [Hz].
+    warnings : tuple of str
+    dataset : Dataset
+    """
+
+    trials: tuple[TrialMoments, ...]
+    curves: tuple[PassiveCurve, ...]
+    cutoff: float
+    warnings: tuple[str, ...]
+    dataset: Dataset = field(repr=False)
+
+    def __repr__(self) -> str:
+        parts = [f"joint {c.joint} in {c.configuration!r}: ±{np.nanmean(c.half_width):.3g} N m" for c in self.curves]
+        return f"PassiveMoments({self.dataset.name!r}; {'; '.join(parts) or 'no joint moved in both directions'})"
+
+
+def passive_moments(
+    dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEFAULT_CUTOFF, bins: int = DEFAULT_BINS
+) -> PassiveMoments:
+    """Compute the passive moment of every joint in slow movements, and its elastic and dissipative parts.
+
+    `tau_p = J(q)^T F_on_arm - G(q)`, plus joint torques where they were measured: equation 3.18 of the thesis with the force on the arm.
+    Inertial torques are neglected; a warning says where that is not right. Only the rigid arm of the model counts, none of its effects.
+
+    Parameters
+    ----------
+    dataset : Dataset or path
+    cutoff : float
+        Cutoff of the zero-phase low-pass of angles and forces, -3 dB of both passes [Hz].
+    bins : int
+        Angle bins over the range of each joint in each configuration.
+
+    Returns
+    -------
+    PassiveMoments
+
+    Raises
+    ------
+    BadInput
+        For settings out of range, and a trial with neither forces nor joint torques.
+    """
+    if not isinstance(dataset, Dataset):
+        dataset = load_dataset(dataset)
+    if isinstance(bins, bool) or not 2 <= bins <= 1000:
+        raise BadInput("bins", bins, "2 to 1000")
+    trials = tuple(_of_trial(dataset, trial, cutoff) for trial in dataset.trials)
+    curves = []
+    for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
+        repeats = [m for m in trials if m.trial.configuration == configuration]
+        for joint in range(dataset.model.n_joints):
+            curve = _curve(repeats, joint, int(bins))
+            if curve is not None:
+                curves.append(curve)
+    return PassiveMoments(trials, tuple(curves), cutoff, _warnings(curves), dataset)
+
+
+def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
+    if trial.force_on_arm is None and trial.tau is None:
+        raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
+    chain, n = arm(dataset.model), dataset.model.n_joints
+    q, qd, moment, inertial = (np.full((len(trial), n), np.nan) for _ in range(4))
+    for piece in trial.pieces():
+        if piece.stop - piece.start < FEWEST_SAMPLES:
+            continue
+        angle, speed, acceleration = _armrs.smooth(np.ascontiguousarray(trial.q[piece]), trial.rate, cutoff)
+        gravity = chain.gravity(angle)
+        torque = -gravity
+        if trial.force_on_arm is not None:
+            force = _armrs.smooth(np.ascontiguousarray(trial.force_on_arm[piece]), trial.rate, cutoff)[0]
+            torque = torque + chain.static_torque(angle, force)
+        if trial.moment_on_arm is not None:  # it turns every joint alike
+            torque = torque + _armrs.smooth(np.ascontiguousarray(trial.moment_on_arm[piece, None]), trial.rate, cutoff)[0]
+        if trial.tau is not None:
+            torque = torque + _armrs.smooth(np.ascontiguousarray(trial.tau[piece]), trial.rate, cutoff)[0]
+        q[piece], qd[piece], moment[piece] = angle, speed, torque
+        inertial[piece] = chain.inverse_dynamics(angle, speed, acceleration) - gravity
+    return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)))
+
+
+def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
+    """Tell in which direction each joint moves; one that is held rests, whatever its noise.
+
+    `margin` samples beside every reversal count as rest: there the low-pass mixes both directions.
+    """
+    result = np.zeros(q.shape, dtype=int)
+    for j in range(q.shape[1]):
+        there = np.isfinite(qd[:, j])
+        if not there.any() or np.ptp(q[there, j]) < LEAST_RANGE:
+            continue
+        least = MOVING * np.percentile(np.abs(qd[there, j]), 90.0)
+        signs = np.where(there & (np.abs(qd[:, j]) > least), np.sign(qd[:, j]), 0.0)
+        for sign in (-1, 1):
+            result[_deep_inside(signs == sign, margin), j] = sign
+    return result
+
+
+def _deep_inside(own: np.ndarray, margin: int) -> np.ndarray:
+    """Return the samples that have `margin` of their like on both sides."""
+    window = 2 * margin + 1
+    return np.convolve(own, np.ones(window), mode="same") > window - 0.5 if window <= len(own) else np.zeros(len(own), dtype=bool)
+
+
+def _curve(repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCurve | None:
+    moving = [m.direction[:, joint] != 0 for m in repeats]
+    samples = [m.q[keep, joint] for m, keep in zip(repeats, moving, strict=True)]
+    angles = np.concatenate(samples)
+    if angles.size == 0:
+        return None
+    edges = np.linspace(angles.min(), angles.max(), bins + 1)
+    rising, falling = (np.array([_binned(m, joint, sign, edges) for m in repeats]) for sign in (1, -1))
+    elastic, half_width = 0.5 * (rising + falling), 0.5 * (rising - falling)
+    if not np.isfinite(elastic).any():
+        return None
+    kept = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
+    inertial, moment = (np.concatenate(part) for part in zip(*kept, strict=True))
+    return PassiveCurve(
+        configuration=repeats[0].trial.configuration,
+        joint=joint + 1,
+        repeats=len(repeats),
+        angle=0.5 * (edges[1:] + edges[:-1]),
+        rising=_mean(rising),
+        falling=_mean(falling),
+        elastic=_mean(elastic),
+        elastic_std=_deviation(elastic),
+        half_width=_mean(half_width),
+        half_width_std=_deviation(half_width),
+        inertial_share=float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2))),
+    )
+
+
+def _binned(moments: TrialMoments, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
+    """Return the mean moment in each bin of one direction; NaN where there are too few samples."""
+    own = moments.direction[:, joint] == sign
+    place = np.clip(np.searchsorted(edges, moments.q[own, joint], side="right") - 1, 0, len(edges) - 2)
+    count = np.bincount(place, minlength=len(edges) - 1)
+    total = np.bincount(place, weights=moments.moment[own, joint], minlength=len(edges) - 1)
+    return np.where(count >= FEWEST_IN_BIN, total / np.maximum(count, 1), np.nan)
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    """Return the mean over repeats of those that have samples."""
+    there = np.isfinite(values)
+    count = there.sum(axis=0)
+    return np.where(count > 0, np.where(there, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+
+
+def _deviation(values: np.ndarray) -> np.ndarray:
+    """Return the standard deviation over repeats; NaN where fewer than two have samples."""
+    there = np.isfinite(values)
+    count = there.sum(axis=0)
+    square = np.where(there, values - _mean(values), 0.0) ** 2
+    return np.where(count > 1, np.sqrt(square.sum(axis=0) / np.maximum(count - 1, 1)), np.nan)
+
+
+def _warnings(curves: Sequence[PassiveCurve]) -> tuple[str, ...]:
+    return tuple(
+        f"{c.configuration}: not slow for joint {c.joint}: inertial torques are {100 * c.inertial_share:.0f} % of the passive moment, "
+        f"more than {100 * SLOW:.0f} %"
+        for c in curves
+        if c.inertial_share > SLOW
+    )

@@ -1,0 +1,325 @@
+"""Plots. Each function draws data that are given to it into `ax` (a new one when absent) and returns the Axes; nothing is computed here.
+
+Angles come in radians and are shown in degrees. Colours tell quantities apart also for colour-blind eyes, and lines and markers differ too.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import tables
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#A6548B", "#56B4E9", "#C9B500"
+"""The palette of Okabe and Ito, the two faintest darkened for thin lines."""
+INK, GREY, FAINT = "#222222", "#767676", "#D9D9D9"
+CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, INK)
+
+MARKERS = {"data": (BLUE, "full"), "prior": (GREY, "none"), "bound": (RED, "none")}
+"""What decided a value -> colour and fill of its marker."""
+_SHAPES = {"data": "o", "prior": "o", "bound": "D"}
+_MEANING = {"data": "decided by the measurement", "prior": "taken from the model, not measured", "bound": "at a physical limit"}
+
+_STYLE: dict[str, Any] = {
+    "font.size": 10.0,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 10.0,
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#EAEAEA",
+    "grid.linewidth": 0.8,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "lines.linewidth": 1.5,
+    "figure.facecolor": "white",
+    "axes.facecolor": "white",
+    "savefig.facecolor": "white",
+}
+
+
+def style() -> AbstractContextManager[None]:
+    """Return a context in which plots have the common look."""
+    import matplotlib
+    from cycler import cycler
+
+    look: Any = {**_STYLE, "axes.prop_cycle": cycler(color=CYCLE)}
+    return matplotlib.rc_context(look)
+
+
+def figure(width: float, height: float) -> Figure:
+    """Return an empty figure that no window and no global state knows [inches]."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    made = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(made)
+    return made
+
+
+def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:
+    """Plot the torque of one joint that the measurement asks for, and that of the fitted model.
+
+    Parameters
+    ----------
+    t, measured, fitted : ndarray, shape (n,)
+        [s], [N m].
+    """
+    ax = _axes(ax)
+    ax.plot(*_broken(t, measured), color=INK, lw=2.4, alpha=0.35, label="measured")
+    ax.plot(*_broken(t, fitted), color=RED, lw=1.3, label="fitted")
+    ax.set(title=title, ylabel="torque [N m]", xlabel="time [s]")
+    _legend(ax)
+    return ax
+
+
+def residual(trials: Sequence[tuple[np.ndarray, np.ndarray, str]], ax: Axes | None = None, *, title: str = "") -> Axes:
+    """Plot residual torques of one joint over all repeats.
+
+    Parameters
+    ----------
+    trials : sequence of (t, residual, role)
+        Times [s], residuals [N m], and "fit" or "test".
+    """
+    ax = _axes(ax)
+    looks: dict[str, dict[str, Any]] = {
+        "fit": {"color": BLUE, "lw": 0.7, "alpha": 0.55},
+        "test": {"color": ORANGE, "lw": 1.0, "alpha": 0.9},
+    }
+    for role, look in looks.items():
+        for k, (t, values, _) in enumerate(item for item in trials if item[2] == role):
+            ax.plot(*_broken(t, values), label=f"{role} trials" if k == 0 else None, **look)
+    ax.axhline(0.0, color=INK, lw=0.8)
+    ax.set(title=title, ylabel="residual [N m]", xlabel="time [s]")
+    _legend(ax)
+    return ax
+
+
+def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axes | None = None) -> Axes:
+    """Plot estimates with intervals, one line each; what was not measured has a hollow marker.
+
+    Parameters
+    ----------
+    items : sequence of mappings
+        `value`, `interval`, `decided_by`, `unit`, and where there are such `given` (the model's own value) and `reference` (a known one).
+    labels : sequence of str
+        What stands at each line.
+    """
+    ax = _axes(ax)
+    for row, item in enumerate(items):
+        colour, fill = MARKERS[item["decided_by"]]
+        ax.hlines(row, *item["interval"], color=colour, lw=2.2, alpha=0.9)
+        ax.plot(
+            item["value"],
+            row,
+            marker=_SHAPES[item["decided_by"]],
+            ms=7,
+            mew=1.7,
+            color=colour,
+            mfc=colour if fill == "full" else "white",
+            ls="",
+        )
+        if item.get("given") is not None:
+            ax.plot(item["given"], row, marker="x", ms=7, mew=1.5, color=INK, ls="", alpha=0.75)
+        if item.get("reference") is not None:
+            ax.plot(item["reference"], row, marker="|", ms=17, mew=2.4, color=GREEN, ls="")
+    ax.set_yticks(range(len(items)), labels)
+    ax.set_ylim(len(items) - 0.4, -0.6)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel(f"[{tables.unit(items[0]['unit']) or 'relative'}]" if items else "")
+    return ax
+
+
+def symbol(name: str) -> str:
+    """Set a quantity such as `I1 + m1*l1^2` as mathematics, so that I and l look different."""
+    text = re.sub(r"([mlaIn])([0-9]+)", r"\1_{\2}", name).replace("*", r"\,")
+    return f"${text}$"
+
+
+def interval_legend(figure: Figure, items: Sequence[Mapping[str, Any]]) -> None:
+    """Explain the markers of `intervals` above a figure, those that occur."""
+    from matplotlib.lines import Line2D
+
+    handles = []
+    for key in ("data", "prior", "bound"):
+        if any(item["decided_by"] == key for item in items):
+            colour, fill = MARKERS[key]
+            face = colour if fill == "full" else "white"
+            handles.append(Line2D([], [], color=colour, marker=_SHAPES[key], mfc=face, mew=1.7, ms=7, lw=2.2, label=_MEANING[key]))
+    if any(item.get("given") is not None for item in items):
+        handles.append(Line2D([], [], color=INK, marker="x", ls="", mew=1.5, ms=7, label="model as given"))
+    if any(item.get("reference") is not None for item in items):
+        handles.append(Line2D([], [], color=GREEN, marker="|", ls="", mew=2.4, ms=14, label="known value"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=3, fontsize=9)
+
+
+def angles(t: np.ndarray, q: np.ndarray, names: Sequence[str], ax: Axes | None = None, *, measured: np.ndarray | None = None) -> Axes:
+    """Plot joint angles, simulated and where they are given measured ones.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        [s]
+    q, measured : ndarray, shape (n, n_joints)
+        [rad]
+    names : sequence of str
+        Names of the joints.
+    """
+    ax = _axes(ax)
+    for j, name in enumerate(names):
+        if measured is not None:
+            ax.plot(*_broken(t, np.degrees(measured[:, j])), color=INK, lw=3.0, alpha=0.25, label="measured" if j == 0 else None)
+        ax.plot(t, np.degrees(q[:, j]), color=CYCLE[j % len(CYCLE)], ls=_DASHES[j % len(_DASHES)], label=name)
+    ax.set(title="Joint angles", ylabel="angle [°]", xlabel="time [s]")
+    _legend(ax)
+    return ax
+
+
+def force(t: np.ndarray, force_on_arm: np.ndarray, ax: Axes | None = None) -> Axes:
+    """Plot the contact force on the arm, shape (n, 2) [N]."""
+    ax = _axes(ax)
+    for k, name in enumerate(("forward (y)", "up (z)")):
+        ax.plot(t, force_on_arm[:, k], color=CYCLE[k], ls=_DASHES[k], label=name)
+    ax.axhline(0.0, color=INK, lw=0.8)
+    ax.set(title="Contact force on the arm", ylabel="force [N]", xlabel="time [s]")
+    _legend(ax)
+    return ax
+
+
+def contributions(t: np.ndarray, torques: Mapping[str, np.ndarray], ax: Axes | None = None, *, title: str = "") -> Axes:
+    """Plot every torque of one joint by itself, with the sign it has in the equation of motion.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        [s]
+    torques : mapping of str to ndarray, shape (n,)
+        Names and torques [N m].
+    """
+    ax = _axes(ax)
+    for k, (name, values) in enumerate(torques.items()):
+        ax.plot(t, values, color=CYCLE[k % len(CYCLE)], ls=_DASHES[(k // 2) % len(_DASHES)], label=name)
+    ax.axhline(0.0, color=INK, lw=0.8)
+    ax.set(title=title, ylabel="torque [N m]", xlabel="time [s]")
+    _legend(ax)
+    return ax
+
+
+def hysteresis(
+    rising: Sequence[tuple[np.ndarray, np.ndarray]],
+    falling: Sequence[tuple[np.ndarray, np.ndarray]],
+    ax: Axes | None = None,
+    *,
+    title: str = "",
+) -> Axes:
+    """Plot the passive moment of one joint against its angle, by direction of motion.
+
+    Parameters
+    ----------
+    rising, falling : sequence of (angle, moment)
+        Samples with growing and with shrinking angle, one pair a repeat [rad], [N m].
+    """
+    ax = _axes(ax)
+    for pairs, colour, name in ((rising, RED, "angle grows"), (falling, BLUE, "angle shrinks")):
+        for k, (q, moment) in enumerate(pairs):
+            ax.plot(np.degrees(q), moment, color=colour, ls="", marker=".", ms=2.0, alpha=0.25, label=name if k == 0 else None)
+    ax.set(title=title, xlabel="joint angle [°]", ylabel="passive moment [N m]")
+    _legend(ax)
+    return ax
+
+
+def mean_and_spread(
+    angle: np.ndarray, mean: np.ndarray, std: np.ndarray, ax: Axes | None = None, *, label: str, colour: str = INK, dashed: bool = False
+) -> Axes:
+    """Plot a mean against the joint angle with a band of one standard deviation, shapes (k,) [rad], [N m]; NaN leaves a hole."""
+    ax = _axes(ax)
+    there = np.where(np.isfinite(std), std, 0.0)
+    ax.fill_between(np.degrees(angle), mean - there, mean + there, color=colour, alpha=0.22, lw=0)
+    ax.plot(np.degrees(angle), mean, color=colour, lw=1.8, ls="--" if dashed else "-", marker="o", ms=3, label=label)
+    ax.set(xlabel="joint angle [°]", ylabel="moment [N m]")
+    _legend(ax)
+    return ax
+
+
+def by_direction(
+    angle: np.ndarray,
+    values: np.ndarray,
+    direction: np.ndarray,
+    ax: Axes | None = None,
+    *,
+    title: str = "",
+    quantity: str = "residual [N m]",
+) -> Axes:
+    """Plot samples of one joint against its angle, coloured by the direction of its motion.
+
+    Parameters
+    ----------
+    angle, values, direction : ndarray, shape (n,)
+        [rad], unit of `quantity`, and -1, 0 or 1.
+    """
+    ax = _axes(ax)
+    for sign, colour, name in ((0, FAINT, "at rest"), (1, RED, "angle grows"), (-1, BLUE, "angle shrinks")):
+        own = direction == sign
+        ax.plot(np.degrees(angle[own]), values[own], color=colour, marker=".", ms=2.5, ls="", alpha=0.5, label=name)
+    ax.axhline(0.0, color=INK, lw=0.8)
+    ax.set(title=title, xlabel="joint angle [°]", ylabel=quantity)
+    _legend(ax)
+    return ax
+
+
+_DASHES = ("-", "--", "-.", ":")
+
+
+def _legend(ax: Axes) -> None:
+    """Put the legend where no data are: right of the title when it is short, below the axis when it is long."""
+    count = len(ax.get_legend_handles_labels()[1])
+    if count == 0:
+        return
+    if count <= 3:
+        legend = ax.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=count, columnspacing=1.2, handlelength=1.6
+        )
+    else:
+        legend = ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=4, columnspacing=1.2, handlelength=1.6)
+    handles: list[Any] = legend.legend_handles
+    for handle in handles:
+        handle.set_alpha(1.0)
+        if handle.get_marker() == "." and handle.get_linestyle() == "None":
+            handle.set_markersize(9)
+
+
+def _axes(ax: Axes | None) -> Axes:
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot
+
+    with style():
+        return pyplot.subplots(figsize=(7.0, 4.0), layout="constrained")[1]
+
+
+def _broken(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Break a line where samples are missing, rather than to draw across."""
+    if len(t) < 3:
+        return t, values
+    wide = np.flatnonzero(np.diff(t) > 2.5 * np.median(np.diff(t))) + 1
+    return np.insert(t, wide, np.nan), np.insert(values, wide, np.nan)

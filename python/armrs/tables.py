@@ -1,0 +1,162 @@
+"""Tables of results: heads and rows, for the terminal and for reports alike. They read the plain data of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+DECIDED_BY = {
+    "data": "the measurement",
+    "prior": "the model as given: the movements do not show it",
+    "bound": "a physical limit that it ran into",
+}
+"""What decided a value, in plain words."""
+
+_UNITS = {"1": ""}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Head and rows; the first `left` columns hold words."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    left: int = 1
+
+
+def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: float) -> Table:
+    """Return estimates with uncertainty, interval and what decided them."""
+    rows = [
+        [
+            label(item),
+            where(item, joints),
+            number(item["value"], item["std"]),
+            spread(item["std"]),
+            "{} … {}".format(*(number(v, item["std"]) for v in item["interval"])),
+            unit(item["unit"]),
+            item["decided_by"],
+            None if item.get("given") is None else f"{item['given']:.4g}",
+        ]
+        for item in items
+    ]
+    return Table(
+        ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "in the model"], rows, left=2
+    )
+
+
+def residuals(rms: Mapping[str, Mapping[str, float]], joints: Sequence[str]) -> Table:
+    """Return the root mean square of the torque residual by joint, fit trials beside test trials."""
+    roles = [role for role in ("fit", "test") if role in rms]
+    channels = list(next(iter(rms.values()), {}))
+    rows = [[joints[k] if k < len(joints) else name, *(f"{rms[role][name]:.4g}" for role in roles)] for k, name in enumerate(channels)]
+    return Table(["joint", *(f"{role} trials [N m]" for role in roles)], rows)
+
+
+def label(item: Mapping[str, Any]) -> str:
+    """Name a quantity so that it can stand alone: a parameter of an effect with its kind."""
+    name = str(item["name"]).replace("^2", "²").replace("*", "·")
+    return name if item["kind"] in ("segment", "combination", "calibration") else f"{item['kind']} {name}"
+
+
+def where(item: Mapping[str, Any], joints: Sequence[str]) -> str:
+    """Name the joint or segment, by number and name."""
+    joint = item.get("joint")
+    if joint is None:
+        return ""
+    name = joints[joint - 1] if joint <= len(joints) else ""
+    return f"{joint} {name}".strip()
+
+
+def unit(text: str) -> str:
+    """Return a unit as printed."""
+    return _UNITS.get(text, text.replace("^2", "²"))
+
+
+def number(value: float | None, std: float | None) -> str:
+    """Write a value with the digits that its standard deviation leaves meaningful, at least two."""
+    if value is None:
+        return "–"
+    if not std or not std > 0:
+        return f"{value:.4g}"
+    digits = _decimals(std)
+    return f"{value:.{digits}f}" if digits <= 9 else f"{value:.3g}"
+
+
+def spread(std: float | None) -> str:
+    """Write a standard deviation with two digits."""
+    if std is None:
+        return "–"
+    digits = _decimals(std) if std > 0 else 0
+    return f"{std:.{digits}f}" if std > 0 and digits <= 9 else f"{std:.2g}"
+
+
+def _decimals(std: float) -> int:
+    """Decimals that show two digits of a standard deviation."""
+    exponent = int(f"{std:.1e}".partition("e")[2])
+    return max(0, 1 - exponent)
+
+
+def run(data: Mapping[str, Any]) -> Table:
+    """Return what a simulation was made with and what came out."""
+    energy = data["energy"]
+    rows = [
+        ["duration", f"{data['duration_s']:.6g} s, {data['samples']} samples"],
+        ["engine", f"{data['engine']}, {data['integrator']}, step {1e3 * data['dt_s']:.4g} ms, {data['coupling']} coupling"],
+        ["largest force on the arm", f"{data['largest_force_N']:.4g} N at {data['largest_force_at_s']:.4g} s"],
+        ["largest joint speed", f"{data['largest_speed_rad_s']:.4g} rad/s"],
+        ["stored energy", f"changed by {energy['stored_J']:.4g} J"],
+        ["work of the handle", f"{energy['handle_J']:.4g} J"],
+        ["work of the motors", f"{energy['drive_J']:.4g} J"],
+        ["taken up by the joints", f"{energy['resisted_J']:.4g} J"],
+        ["lost in the contact", f"{energy['damped_J']:.4g} J"],
+        ["energy not accounted for", f"{energy['error_J']:.2g} J"],
+        ["digest", data["digest"]],
+    ]
+    return Table(["quantity", "value"], rows, left=2)
+
+
+def passive(data: Mapping[str, Any]) -> Table:
+    """Return the passive moment of every configuration and joint, averaged over the bins."""
+    rows = [
+        [
+            c["configuration"],
+            f"{c['joint']} {c['joint_name']}".strip(),
+            c["repeats"],
+            "{:.1f} … {:.1f}".format(c["angle_deg"][0], c["angle_deg"][-1]),
+            f"{c['elastic_mean_Nm']:.4g}",
+            f"{c['half_width_mean_Nm']:.3g}",
+            "–" if c["half_width_std_mean_Nm"] is None else f"{c['half_width_std_mean_Nm']:.2g}",
+            f"{100 * c['inertial_share']:.1f}",
+        ]
+        for c in data["curves"]
+    ]
+    head = [
+        "configuration",
+        "joint",
+        "repeats",
+        "angles [°]",
+        "elastic mean [N m]",
+        "half width [N m]",
+        "± std [N m]",
+        "inertial share [%]",
+    ]
+    return Table(head, rows, left=2)
+
+
+def comparison(data: Mapping[str, Any]) -> Table:
+    """Return identified values beside known ones, and beside the relative errors that the thesis reports."""
+    rows = [
+        [
+            label(c),
+            unit(c["unit"]),
+            f"{c['reference']:.4g}",
+            number(c["value"], c["std"]),
+            spread(c["std"]),
+            f"{c['error_percent']:+.1f}",
+            None if c["thesis_error_percent"] is None else f"{c['thesis_error_percent']:+.1f}",
+            c["decided_by"],
+        ]
+        for c in data["comparison"]
+    ]
+    return Table(["quantity", "unit", "known", "identified", "± std", "error [%]", "error in the thesis [%]", "decided by"], rows, left=2)

@@ -1,0 +1,139 @@
+"""Results in words: what the terminal prints, and the sentences of reports. Each function reads the plain data of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import console, tables
+
+PASSIVE_MEANING = (
+    "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "
+    "The mean of both directions is its elastic part, half their difference its dissipative part."
+)
+
+
+def name(result: Mapping[str, Any]) -> str:
+    """Return what a result is about."""
+    return str(result["data"]["name"])
+
+
+def is_synthetic(result: Mapping[str, Any]) -> bool:
+    """Tell whether a result rests on simulated data."""
+    return bool(result["data"].get("synthetic"))
+
+
+def verdict(result: Mapping[str, Any]) -> str:
+    """Return a result in a sentence or two."""
+    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo}
+    return sentences[result["verb"]](result)
+
+
+def _identified(result: Mapping[str, Any]) -> str:
+    by = [e["decided_by"] for e in result["parameters"]]
+    counts = [f"{by.count('data')} rest on the measurement", f"{by.count('prior')} on the model as given"]
+    if "bound" in by:
+        counts.append(f"{by.count('bound')} on a physical limit")
+    ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
+    return (
+        f"The movements determine {result['rank']} of {result['unknowns']} unknowns. "
+        f"Of the {len(by)} parameters listed {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
+    )
+
+
+def _simulated(result: Mapping[str, Any]) -> str:
+    return (
+        f"{result['duration_s']:.4g} s simulated; the force on the arm reaches {result['largest_force_N']:.4g} N. "
+        f"Energy is accounted for to {result['energy']['error_J']:.2g} J."
+    )
+
+
+def _passive(result: Mapping[str, Any]) -> str:
+    if not result["curves"]:
+        return "No joint moved far enough in both directions to tell its passive moment."
+    parts = []
+    for curve in result["curves"]:
+        half = curve["half_width_mean_Nm"]
+        parts.append(f"{curve['joint_name']} {half:.3g} N m ({curve['configuration']})")
+    return f"Half the width of the hysteresis: {'; '.join(parts)}."
+
+
+def _demo(result: Mapping[str, Any]) -> str:
+    return str(result["verdict"])
+
+
+def data_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return what a result rests on."""
+    lines = []
+    for role, meaning in (("fit", "fitted on"), ("test", "only checked on")):
+        part = data[role]
+        if part["trials"]:
+            lines.append(f"{part['trials']} trials {meaning}: {part['duration_s']:.0f} s, {part['samples']} samples.")
+    if not data["test"]["trials"]:
+        lines.append("No test trials: nothing was checked on data that the fit has not seen.")
+    lines.append(f"Movements: {', '.join(data['configurations'])}.")
+    held = [word for word, there in (("contact forces", data["forces"]), ("joint torques", data["torques"])) if there]
+    lines.append(f"Measured: angles, {', '.join(held)}.")
+    return lines + [f"Warning: {line}" for line in data["warnings"]]
+
+
+def cannot_tell(result: Mapping[str, Any]) -> list[str]:
+    """Return what the data cannot tell, a line each."""
+    lines = [f"{line}." for line in result["not_separable"]]
+    if result["scale_free"]:
+        lines.append("No torque acted: all values are known up to one common factor, which was taken from the model.")
+    return lines
+
+
+def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print an identification."""
+    data, joints, level = result["data"], result["data"]["joints"], result["level"]
+    _head(result)
+    measured = [e for e in result["combinations"] if e["decided_by"] == "data"]
+    show("What these movements determine", tables.estimates(measured, joints, level))
+    show("Parameters", tables.estimates(result["parameters"], joints, level))
+    show("Absorbed by the calibration, within the tolerance declared", tables.estimates(result["calibration"], joints, level))
+    show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
+    lines = cannot_tell(result)
+    if lines:
+        print("What cannot be told apart")
+        print("\n".join(f"  {line}" for line in lines))
+    if not data["test"]["trials"]:
+        print("No test trials: nothing was checked on data that the fit has not seen.")
+    files_written(written)
+
+
+def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what a run came to."""
+    _head(result)
+    show("", tables.run(result))
+    files_written(written)
+
+
+def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print passive moments."""
+    _head(result)
+    show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
+    files_written(written)
+
+
+def show(title: str, table: tables.Table) -> None:
+    """Print a table under a title, and an empty line; nothing when it has no rows."""
+    if table.rows:
+        if title:
+            print(title)
+        console.table(table.head, table.rows, left=table.left)
+        print()
+
+
+def files_written(written: Sequence[Path]) -> None:
+    """Print the names of files; the last is the one to open."""
+    if written:
+        print("\n".join(str(path) for path in written))
+
+
+def _head(result: Mapping[str, Any]) -> None:
+    label = " (synthetic data)" if is_synthetic(result) else ""
+    print(f"{name(result)}{label}: {verdict(result)}")
+    print()
