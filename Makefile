@@ -51,7 +51,7 @@ $(STAMPS)/rust: $(RUST) scripts/check_no_std.sh | $(STAMPS)/venv
 	cargo fmt --all --check
 	scripts/check_no_std.sh
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
-	cargo test --quiet
+	cargo test --quiet --no-fail-fast
 	@touch $@
 
 # ---- Python

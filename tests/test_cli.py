@@ -82,7 +82,7 @@ def test_convert(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture
         (["effects", "coulom"], "KIND: found unknown kind of effect 'coulom', allowed"),
         (["convert", "nothing", "-o", "out"], "nothing: file: found No such file or directory, allowed a TOML file that can be read"),
         (["convert", "nothing.csv", "-o", "out"], "nothing.csv: file: found No such file or directory"),
-        (["convert", "nul\0l.csv", "-o", "out"], "null byte"),
+        (["convert", "nul\0l.csv", "-o", "out"], "embedded null"),
     ],
 )
 def test_refuses(
