@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use arm_sim::{Experiment, Integrator, models, simulate};
+use arm_sim::{Experiment, Integrator, models, simulate, simulate_batch};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 fn w2(integrator: Integrator, output_interval: Option<f64>) -> Experiment<3> {
@@ -32,5 +32,45 @@ fn single(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, single);
+/// 1000 runs with masses, viscosities and stiffnesses that differ, recorded at 50 Hz.
+fn w3(integrator: Integrator) -> Vec<Experiment<3>> {
+    let base = models::human_experiment(2.0, [0.0; 3]).expect("a sample experiment");
+    (0..1000)
+        .map(|i| {
+            let scale = 1.0 + 1e-4 * f64::from(i);
+            let mut run = base.clone();
+            run.integrator = integrator;
+            run.output_interval = Some(0.02);
+            for segment in &mut run.setup.segments {
+                segment.mass *= scale;
+            }
+            for effect in &mut run.effects {
+                effect.parameters[0] *= scale;
+            }
+            run
+        })
+        .collect()
+}
+
+fn batch(c: &mut Criterion) {
+    let mut group = c.benchmark_group("w3");
+    group
+        .throughput(Throughput::Elements(8_000_000))
+        .sample_size(10);
+    let integrators = [
+        ("euler", Integrator::SemiImplicitEuler),
+        ("rk4", Integrator::Rk4),
+    ];
+    for (name, integrator) in integrators {
+        let experiments = w3(integrator);
+        for threads in [1, 2] {
+            group.bench_function(format!("{name}/{threads}"), |b| {
+                b.iter(|| simulate_batch(black_box(&experiments), threads));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, single, batch);
 criterion_main!(benches);

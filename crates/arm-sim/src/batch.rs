@@ -7,7 +7,7 @@ use arm_core::{Contact, Joints, Lanes, Plane, Scalar, Segment, Setup};
 
 use crate::model::{Input, Link, Model, State};
 use crate::native::diverged;
-use crate::prepare::{Prepared, command, with_ripple};
+use crate::prepare::{Prepared, Schedule, command, known, with_ripple};
 use crate::recorder::Recorder;
 use crate::step::{Inputs, Memory, step};
 use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
@@ -27,6 +27,8 @@ pub fn simulate_batch<const N: usize>(
     threads: usize,
 ) -> Outcomes<N> {
     let groups: Vec<&[Experiment<N>]> = experiments.chunks(LANES).collect();
+    let table = Commands::shared_by(experiments);
+    let group = |experiments: &[Experiment<N>]| group(experiments, table.as_ref());
     let threads = threads.clamp(1, groups.len().max(1));
     let mut done: Vec<Outcomes<N>> = Vec::new();
     if threads == 1 {
@@ -55,16 +57,44 @@ pub fn simulate_batch<const N: usize>(
 }
 
 /// Up to eight runs: in lanes where they are alike, else one by one.
-fn group<const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
+fn group<const N: usize>(
+    experiments: &[Experiment<N>],
+    table: Option<&Commands<N>>,
+) -> Outcomes<N> {
     let prepared: Result<Vec<_>, _> = experiments.iter().map(Prepared::new).collect();
     match prepared {
         Ok(prepared) if prepared.len() > 1 && prepared.iter().all(|p| alike(p, &prepared[0])) => {
-            match side_by_side(&prepared) {
+            match side_by_side(&prepared, table) {
                 Ok(outcomes) => outcomes,
                 Err(error) => vec![Err(error); prepared.len()],
             }
         }
         _ => experiments.iter().map(simulate).collect(),
+    }
+}
+
+/// What the drive commands at every half step, computed once where all runs share it.
+struct Commands<const N: usize>(Vec<Input<f64, N>>);
+
+/// Most entries of a table, some 30 MB for three joints.
+const MOST_COMMANDS: usize = 300_000;
+
+impl<const N: usize> Commands<N> {
+    /// The table of a batch whose runs have one drive and one schedule.
+    fn shared_by(experiments: &[Experiment<N>]) -> Option<Self> {
+        let first = experiments.first()?;
+        let schedule = Schedule::of(first).ok()?;
+        let entries = 2 * schedule.steps + 1;
+        let shared = entries <= MOST_COMMANDS
+            && experiments.len() > LANES
+            && known(first, &schedule).is_ok()
+            && experiments.iter().all(|e| {
+                e.drive == first.drive && Schedule::of(e).is_ok_and(|other| other == schedule)
+            });
+        shared.then(|| {
+            let times = (0..entries).map(|half_steps| schedule.half_time(half_steps));
+            Self(times.map(|time| command(&first.drive, time)).collect())
+        })
     }
 }
 
@@ -82,7 +112,10 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
 }
 
 /// The runs in the lanes of one. A group of fewer than eight repeats its last run in the lanes left over.
-fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>, SimulationError> {
+fn side_by_side<const N: usize>(
+    prepared: &[Prepared<N>],
+    table: Option<&Commands<N>>,
+) -> Result<Outcomes<N>, SimulationError> {
     let lane = |i: usize| &prepared[i.min(prepared.len() - 1)];
     let first = &prepared[0];
     let (schedule, integrator) = (first.schedule, first.integrator());
@@ -95,15 +128,13 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     let effects =
         (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
     let model = Model::new(&setup, link, effects.collect())?;
-    let same_drive = prepared
-        .iter()
-        .all(|p| p.experiment.drive == first.experiment.drive);
-    let input = |time: f64| {
-        let commanded = if same_drive {
-            let one = command(&first.experiment.drive, time);
-            pack_input(|_| one)
-        } else {
-            pack_input(|i| command(&lane(i).experiment.drive, time))
+    let input = |half_steps: usize| {
+        let commanded = match table {
+            Some(table) => pack_input(|_| table.0[half_steps]),
+            None => {
+                let time = schedule.half_time(half_steps);
+                pack_input(|i| command(&lane(i).experiment.drive, time))
+            }
         };
         with_ripple(commanded, &setup)
     };
@@ -129,7 +160,7 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
             }
         };
     sample(0, &state, &memory.state, &stopped);
-    let now = input(0.0);
+    let now = input(0);
     let mut inputs = Inputs {
         start: now,
         middle: now,
@@ -138,9 +169,9 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     for done in 1..=schedule.steps {
         inputs.start = inputs.end;
         if integrator == Integrator::Rk4 {
-            inputs.middle = input((done as f64 - 0.5) * schedule.dt);
+            inputs.middle = input(2 * done - 1);
         }
-        inputs.end = input(schedule.time(done));
+        inputs.end = input(2 * done);
         step(
             &model,
             integrator,

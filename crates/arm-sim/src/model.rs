@@ -135,25 +135,32 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let pose = Pose::new(q);
         let mut motion = Motion::new(input.time, *q, *qd);
         let mut resisting = self.resisting(&motion, memory);
-        let contact = self.contact(input, q, qd, &pose);
-        let terms = if self.base.is_some() || matches!(self.link, Link::Rigid) {
-            Some(Terms::new(&self.chain, self.base.as_ref(), &pose, qd))
-        } else {
-            None
-        };
-        let solve = |resisting: &Joints<T, N>| {
-            let torque = difference(&input.torque, resisting);
-            self.accelerations(input, (qd, &pose), (torque, contact.0), terms.as_ref())
-        };
-        let (mut qdd, mut force) = solve(&resisting);
-        if self.feels_joint_force {
-            let mut through = joint_force(&self.chain, &pose, (qd, &qdd), force);
-            if let Some(base) = &self.base {
-                base.add_joint_force(&self.chain, &qdd, &mut through);
+        let (mut force, lost) = self.contact(input, q, qd, &pose);
+        let mut qdd = Joints::<T, N>::repeat(T::ZERO);
+        if self.in_link_form() {
+            let mut load = Load {
+                torque: difference(&input.torque, &resisting),
+                force_on_arm: force,
+                moment_on_arm: T::ZERO,
+            };
+            qdd = forward_dynamics(&self.chain, &pose, qd, &load);
+            if self.feels_joint_force {
+                motion.joint_force = self.joint_force(&pose, (qd, &qdd), force);
+                resisting = self.resisting(&motion, memory);
+                load.torque = difference(&input.torque, &resisting);
+                qdd = forward_dynamics(&self.chain, &pose, qd, &load);
             }
-            motion = motion.with_joint_force(&through);
-            resisting = self.resisting(&motion, memory);
-            (qdd, force) = solve(&resisting);
+        } else {
+            let terms = Terms::new(&self.chain, self.base.as_ref(), &pose, qd);
+            let passes = if self.feels_joint_force { 2 } else { 1 };
+            for pass in 0..passes {
+                if pass > 0 {
+                    motion.joint_force = self.joint_force(&pose, (qd, &qdd), force);
+                    resisting = self.resisting(&motion, memory);
+                }
+                let torque = difference(&input.torque, &resisting);
+                (qdd, force) = self.accelerations(input, &torque, force, &terms);
+            }
         }
         let v = input.handle.velocity;
         let (mut drive, mut resisted) = (T::ZERO, T::ZERO);
@@ -164,14 +171,29 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         Outcome {
             qdd,
             force_on_arm: force,
-            power: [
-                force[0] * v[0] + force[1] * v[1],
-                drive,
-                resisted,
-                contact.1,
-            ],
+            power: [force[0] * v[0] + force[1] * v[1], drive, resisted, lost],
             joint_force: motion.joint_force,
         }
+    }
+
+    /// Whether the link-form solver of the core holds the whole rig.
+    #[inline]
+    fn in_link_form(&self) -> bool {
+        self.base.is_none() && !matches!(self.link, Link::Rigid)
+    }
+
+    /// Magnitudes of the forces through the joints \[N\].
+    fn joint_force(
+        &self,
+        pose: &Pose<T, N>,
+        (qd, qdd): (&Joints<T, N>, &Joints<T, N>),
+        force: Plane<T>,
+    ) -> [T; N] {
+        let mut through = joint_force(&self.chain, pose, (qd, qdd), force);
+        if let Some(base) = &self.base {
+            base.add_joint_force(&self.chain, qdd, &mut through);
+        }
+        through.map(|[y, z]| (y.squared() + z.squared()).sqrt())
     }
 
     /// Force of a compliant contact on the arm, and the power lost in its damping.
@@ -197,27 +219,21 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 
     /// Accelerations and the force on the arm, which for a rigid coupling follows from the constraint.
-    #[inline]
     fn accelerations(
         &self,
         input: &Input<T, N>,
-        (qd, pose): (&Joints<T, N>, &Pose<T, N>),
-        (torque, force): (Joints<T, N>, Plane<T>),
-        terms: Option<&Terms<T, N>>,
+        torque: &Joints<T, N>,
+        force: Plane<T>,
+        terms: &Terms<T, N>,
     ) -> (Joints<T, N>, Plane<T>) {
-        let Some(terms) = terms else {
-            let load = Load {
-                torque,
-                force_on_arm: force,
-                moment_on_arm: T::ZERO,
-            };
-            return (forward_dynamics(&self.chain, pose, qd, &load), force);
-        };
-        let net = sum(&difference(&torque, &terms.bias), &terms.tip_torque(force));
-        let free = terms.accelerate(&net);
+        let net = difference(torque, &terms.bias);
         if !matches!(self.link, Link::Rigid) {
-            return (free, force);
+            return (
+                terms.accelerate(&sum(&net, &terms.tip_torque(force))),
+                force,
+            );
         }
+        let free = terms.accelerate(&net);
         let (a, rate, wanted) = (
             terms.tip_rate(&free),
             terms.jacobian_rate,

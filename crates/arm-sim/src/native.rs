@@ -30,7 +30,7 @@ pub(crate) fn run<const N: usize>(
     for done in 1..=schedule.steps {
         inputs.start = inputs.end;
         if prepared.integrator() == Integrator::Rk4 {
-            inputs.middle = prepared.input((done as f64 - 0.5) * schedule.dt);
+            inputs.middle = prepared.input(schedule.half_time(2 * done - 1));
         }
         inputs.end = prepared.input(schedule.time(done));
         let at = (&mut state, &mut memory);

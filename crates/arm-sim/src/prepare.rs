@@ -32,7 +32,13 @@ impl Schedule {
         steps as f64 * self.dt
     }
 
-    fn of<const N: usize>(experiment: &Experiment<N>) -> Result<Self, SimulationError> {
+    /// Time after a number of half steps \[s\].
+    #[inline]
+    pub fn half_time(&self, half_steps: usize) -> f64 {
+        0.5 * half_steps as f64 * self.dt
+    }
+
+    pub fn of<const N: usize>(experiment: &Experiment<N>) -> Result<Self, SimulationError> {
         let dt = experiment.dt;
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::Setting {
@@ -237,7 +243,7 @@ fn link<const N: usize>(
 }
 
 /// Whether the drive is known for the whole run.
-fn known<const N: usize>(
+pub(crate) fn known<const N: usize>(
     experiment: &Experiment<N>,
     schedule: &Schedule,
 ) -> Result<(), SimulationError> {
