@@ -154,3 +154,43 @@ def data() -> Path:
             pytest.fail(reason)
         pytest.skip(reason)
     return folder
+
+
+MOVEMENT = """\
+[movement]
+waypoints_deg = [[-60, 60], [-45, 60], [-60, 60], [-60, 75], [-60, 60]]
+speed_rad_s = 0.1
+acceleration_rad_s2 = 1.0
+pause_s = 0.2
+shape = "smooth"
+"""
+
+
+@pytest.fixture(scope="session")
+def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small synthetic data set of a slow arm with dry friction that its model lacks; `truth.toml` and `movement.toml` lie beside it."""
+    from armrs import Dataset, Sensors, Trial, simulate, write_dataset
+    from armrs.demo import handed_over, true_model
+    from armrs.simulation import load_movement
+
+    folder = tmp_path_factory.mktemp("slow")
+    truth = true_model()
+    truth.write(folder / "truth.toml")
+    (folder / "movement.toml").write_text(MOVEMENT, encoding="utf-8")
+    run = simulate(truth, load_movement(folder / "movement.toml", 2), sensors=Sensors.realistic(), seeds=range(4))
+    trials = tuple(
+        Trial(
+            f"trials/slow_{k}.csv",
+            "slow",
+            k,
+            "fit" if k < 4 else "test",
+            read["time"],
+            read["q"],
+            read["force_on_arm"],
+            None,
+            read["robot_q"],
+        )
+        for k, read in enumerate(run.readings, start=1)
+    )
+    write_dataset(Dataset("slow arm", handed_over(truth), trials, "robot", synthetic=True), folder)
+    return folder

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .dataset import Dataset as Dataset
     from .dataset import load_dataset as load_dataset
     from .dataset import write_dataset as write_dataset
+    from .demo import Demonstration as Demonstration
+    from .demo import run_demo as run_demo
     from .errors import ArmrsError as ArmrsError
     from .errors import BadInput as BadInput
     from .errors import IdentificationError as IdentificationError
@@ -46,6 +48,7 @@ _HOMES = {
     "_armrs": ("Arm", "__version__", "build_profile"),
     "conversion": ("convert",),
     "dataset": ("Dataset", "load_dataset", "write_dataset"),
+    "demo": ("Demonstration", "run_demo"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
     "identification": ("Estimate", "Identified", "identify"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),

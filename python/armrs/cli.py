@@ -169,6 +169,19 @@ def convert(
 
 
 @app.command()
+def demo(context: typer.Context, out: OutFolder = Path("armrs-demo"), json: JsonFile = None) -> None:
+    """Do the main job on built-in data: simulate the experiment, identify the arm, compare with what is known, write a report."""
+    from . import words
+    from .demo import run_demo
+    from .report import read_result
+
+    with console.progress("demo"):
+        result = run_demo(out, command=_command(context))
+    plain = read_result(out / "demo.json")
+    present(lambda: plain, json, lambda: words.demo(plain, result.files))
+
+
+@app.command()
 def identify(
     context: typer.Context,
     dataset: Source,

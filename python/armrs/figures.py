@@ -22,6 +22,9 @@ MOST_CONFIGURATIONS = 8
 """So many movements are drawn; with more, a report would be too long to read."""
 
 
+Part = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
 @dataclass(frozen=True)
 class Drawn:
     """A figure with the name of its file, its title and what it shows in words."""
@@ -111,7 +114,7 @@ _TORQUES = {
     "contact": "contact",
 }
 """Torque columns of a recording, and how a legend names them."""
-_VISIBLE = 1e-3
+_VISIBLE = 5e-3
 """A torque below this part of the largest would be a line on the axis."""
 
 
@@ -127,16 +130,17 @@ def simulated(result: Simulated, trial: Trial | None = None) -> list[Drawn]:
         measured = None if trial is None else np.column_stack([np.interp(result.t, trial.t - trial.t[0], q) for q in trial.q.T])
         plotting.angles(result.t, result.q, names, top[0], measured=measured)
         plotting.force(result.t, result.force_on_arm, top[1])
+        largest = {key: np.abs(result.columns[f"torque.{key}"]).max(axis=0) for key in _TORQUES}
+        limit = _VISIBLE * np.max(list(largest.values()), axis=0)
+        visible = {key: label for key, label in _TORQUES.items() if (largest[key] > limit).any()}
         for j, name in enumerate(names):
             share = 2 * columns // n
             ax = figure.add_subplot(grid[1, j * share : (j + 1) * share])
-            torques = {label: result.columns[f"torque.{key}"][:, j] for key, label in _TORQUES.items()}
-            largest = max(np.abs(values).max() for values in torques.values())
-            shown = {label: values for label, values in torques.items() if np.abs(values).max() > _VISIBLE * largest}
+            shown = {label: result.columns[f"torque.{key}"][:, j] for key, label in visible.items()}
             plotting.contributions(result.t, shown, ax, title=f"Torques: {name}")
     text = (
         "Inertial, centrifugal, Coriolis, gravity and resisting torques stand on the left of the equation of motion, those of motors and "
-        "contact on the right. Torques below a thousandth of the largest are left out."
+        "contact on the right. Torques that would be a line on the axis are left out."
     )
     if trial is not None:
         text += f" The broad lines are the angles measured in {trial.file}."
@@ -169,6 +173,36 @@ def passive(result: PassiveMoments) -> list[Drawn]:
             )
             drawn.append(Drawn(f"passive-{slug(configuration)}", f"Passive moments of the movement {configuration}", text, figure))
     return drawn
+
+
+def direction_of_motion(before: Sequence[Part], after: Sequence[Part], joints: Sequence[str]) -> Drawn:
+    """Draw what is left of the torques against the angle, without and with friction.
+
+    A part holds angle, unexplained torque and direction of motion of one trial, each of shape (n, n_joints).
+    """
+    n = len(joints)
+    with plotting.style():
+        figure = plotting.figure(4.9 * n + 0.4, 6.4)
+        axes = figure.subplots(2, n, squeeze=False, sharex="col", sharey="col")
+        for row, (parts, which) in zip(axes, ((before, "no friction"), (after, "with friction")), strict=True):
+            angle, left, sign = (np.concatenate(items) for items in zip(*parts, strict=True))
+            for j, ax in enumerate(row):
+                title = f"{joints[j]}, {which}"
+                plotting.by_direction(angle[:, j], left[:, j], sign[:, j], ax, title=title, quantity="not explained [N m]")
+        for ax in axes[0]:
+            ax.set_xlabel("")
+    text = (
+        "Joint torque of the test trials that the model does not explain, after masses and calibration were fitted. Above, without "
+        "friction; below, with dry friction at both joints. A gap between both directions is what friction looks like."
+    )
+    return Drawn("direction", "What is left, by direction of motion", text, figure)
+
+
+def known(rows: Sequence[Mapping[str, Any]], joints: Sequence[str], level: float) -> Drawn:
+    """Draw estimates beside known values."""
+    with plotting.style():
+        drawn = parameters(rows, joints, level)
+    return Drawn("known", "Identified and known", f"{drawn.text} The green line is the value that was simulated.", drawn.figure)
 
 
 def slug(name: str) -> str:

@@ -25,8 +25,6 @@ MOVING = 0.25
 """A joint moves when its speed is above this part of its usual speed in the trial."""
 MARGIN = 0.35
 """The low-pass mixes what lies within this time, in periods of its cutoff."""
-FEWEST_IN_BIN = 3
-"""Samples that a repeat needs in a bin to count there."""
 SLOW = 0.1
 """Largest share of inertial torques at which a movement counts as slow."""
 
@@ -161,14 +159,19 @@ def passive_moments(
     if isinstance(bins, bool) or not 2 <= bins <= 1000:
         raise BadInput("bins", bins, "2 to 1000")
     trials = tuple(_of_trial(dataset, trial, cutoff) for trial in dataset.trials)
-    curves = []
+    curves, warnings = [], []
     for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
         repeats = [m for m in trials if m.trial.configuration == configuration]
         for joint in range(dataset.model.n_joints):
             curve = _curve(repeats, joint, int(bins))
             if curve is not None:
                 curves.append(curve)
-    return PassiveMoments(trials, tuple(curves), cutoff, _warnings(curves), dataset)
+            elif any(_moves(m.q[:, joint]) for m in repeats):
+                warnings.append(
+                    f"{configuration}: joint {joint + 1} moved, but not long enough in both directions over the same angles for a low-pass "
+                    f"at {cutoff:g} Hz: left out"
+                )
+    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset)
 
 
 def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
@@ -202,13 +205,18 @@ def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
     result = np.zeros(q.shape, dtype=int)
     for j in range(q.shape[1]):
         there = np.isfinite(qd[:, j])
-        if not there.any() or np.ptp(q[there, j]) < LEAST_RANGE:
+        if not _moves(q[:, j]):
             continue
         least = MOVING * np.percentile(np.abs(qd[there, j]), 90.0)
         signs = np.where(there & (np.abs(qd[:, j]) > least), np.sign(qd[:, j]), 0.0)
         for sign in (-1, 1):
             result[_deep_inside(signs == sign, margin), j] = sign
     return result
+
+
+def _moves(angle: np.ndarray) -> bool:
+    there = np.isfinite(angle)
+    return bool(there.any() and np.ptp(angle[there]) >= LEAST_RANGE)
 
 
 def _deep_inside(own: np.ndarray, margin: int) -> np.ndarray:
@@ -246,12 +254,12 @@ def _curve(repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCur
 
 
 def _binned(moments: TrialMoments, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
-    """Return the mean moment in each bin of one direction; NaN where there are too few samples."""
+    """Return the mean moment in each bin of one direction; NaN where there are no samples."""
     own = moments.direction[:, joint] == sign
     place = np.clip(np.searchsorted(edges, moments.q[own, joint], side="right") - 1, 0, len(edges) - 2)
     count = np.bincount(place, minlength=len(edges) - 1)
     total = np.bincount(place, weights=moments.moment[own, joint], minlength=len(edges) - 1)
-    return np.where(count >= FEWEST_IN_BIN, total / np.maximum(count, 1), np.nan)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _mean(values: np.ndarray) -> np.ndarray:
@@ -269,7 +277,7 @@ def _deviation(values: np.ndarray) -> np.ndarray:
     return np.where(count > 1, np.sqrt(square.sum(axis=0) / np.maximum(count - 1, 1)), np.nan)
 
 
-def _warnings(curves: Sequence[PassiveCurve]) -> tuple[str, ...]:
+def _not_slow(curves: Sequence[PassiveCurve]) -> tuple[str, ...]:
     return tuple(
         f"{c.configuration}: not slow for joint {c.joint}: inertial torques are {100 * c.inertial_share:.0f} % of the passive moment, "
         f"more than {100 * SLOW:.0f} %"

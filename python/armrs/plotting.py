@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#A6548B", "#56B4E9", "#C9B500"
 """The palette of Okabe and Ito, the two faintest darkened for thin lines."""
-INK, GREY, FAINT = "#222222", "#767676", "#D9D9D9"
+INK, GREY, SILVER, FAINT = "#222222", "#767676", "#B0B0B0", "#D9D9D9"
 CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, INK)
 
 MARKERS = {"data": (BLUE, "full"), "prior": (GREY, "none"), "bound": (RED, "none")}
@@ -85,7 +85,7 @@ def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | N
         [s], [N m].
     """
     ax = _axes(ax)
-    ax.plot(*_broken(t, measured), color=INK, lw=2.4, alpha=0.35, label="measured")
+    ax.plot(*_broken(t, measured), color=SILVER, lw=2.4, label="measured")
     ax.plot(*_broken(t, fitted), color=RED, lw=1.3, label="fitted")
     ax.set(title=title, ylabel="torque [N m]", xlabel="time [s]")
     _legend(ax)
@@ -126,6 +126,8 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
     """
     ax = _axes(ax)
     for row, item in enumerate(items):
+        if item.get("reference") is not None:
+            ax.plot(item["reference"], row, marker="|", ms=24, mew=2.4, color=GREEN, ls="")
         colour, fill = MARKERS[item["decided_by"]]
         ax.hlines(row, *item["interval"], color=colour, lw=2.2, alpha=0.9)
         ax.plot(
@@ -140,8 +142,6 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
         )
         if item.get("given") is not None:
             ax.plot(item["given"], row, marker="x", ms=7, mew=1.5, color=INK, ls="", alpha=0.75)
-        if item.get("reference") is not None:
-            ax.plot(item["reference"], row, marker="|", ms=17, mew=2.4, color=GREEN, ls="")
     ax.set_yticks(range(len(items)), labels)
     ax.set_ylim(len(items) - 0.4, -0.6)
     ax.grid(visible=False, axis="y")
@@ -170,7 +170,7 @@ def interval_legend(figure: Figure, items: Sequence[Mapping[str, Any]]) -> None:
         handles.append(Line2D([], [], color=INK, marker="x", ls="", mew=1.5, ms=7, label="model as given"))
     if any(item.get("reference") is not None for item in items):
         handles.append(Line2D([], [], color=GREEN, marker="|", ls="", mew=2.4, ms=14, label="known value"))
-    figure.legend(handles=handles, loc="outside upper left", ncols=3, fontsize=9)
+    figure.legend(handles=handles, loc="outside upper left", ncols=4 if figure.get_figwidth() > 8.0 else 2, fontsize=9)
 
 
 def angles(t: np.ndarray, q: np.ndarray, names: Sequence[str], ax: Axes | None = None, *, measured: np.ndarray | None = None) -> Axes:
@@ -188,7 +188,7 @@ def angles(t: np.ndarray, q: np.ndarray, names: Sequence[str], ax: Axes | None =
     ax = _axes(ax)
     for j, name in enumerate(names):
         if measured is not None:
-            ax.plot(*_broken(t, np.degrees(measured[:, j])), color=INK, lw=3.0, alpha=0.25, label="measured" if j == 0 else None)
+            ax.plot(*_broken(t, np.degrees(measured[:, j])), color=SILVER, lw=3.2, label="measured" if j == 0 else None)
         ax.plot(t, np.degrees(q[:, j]), color=CYCLE[j % len(CYCLE)], ls=_DASHES[j % len(_DASHES)], label=name)
     ax.set(title="Joint angles", ylabel="angle [°]", xlabel="time [s]")
     _legend(ax)
@@ -200,8 +200,7 @@ def force(t: np.ndarray, force_on_arm: np.ndarray, ax: Axes | None = None) -> Ax
     ax = _axes(ax)
     for k, name in enumerate(("forward (y)", "up (z)")):
         ax.plot(t, force_on_arm[:, k], color=CYCLE[k], ls=_DASHES[k], label=name)
-    ax.axhline(0.0, color=INK, lw=0.8)
-    ax.set(title="Contact force on the arm", ylabel="force [N]", xlabel="time [s]")
+    ax.set(title="Force on the arm", ylabel="force [N]", xlabel="time [s]")
     _legend(ax)
     return ax
 
@@ -240,7 +239,7 @@ def hysteresis(
         Samples with growing and with shrinking angle, one pair a repeat [rad], [N m].
     """
     ax = _axes(ax)
-    for pairs, colour, name in ((rising, RED, "angle grows"), (falling, BLUE, "angle shrinks")):
+    for pairs, colour, name in ((rising, RED, "rising"), (falling, BLUE, "falling")):
         for k, (q, moment) in enumerate(pairs):
             ax.plot(np.degrees(q), moment, color=colour, ls="", marker=".", ms=2.0, alpha=0.25, label=name if k == 0 else None)
     ax.set(title=title, xlabel="joint angle [°]", ylabel="passive moment [N m]")
@@ -278,7 +277,7 @@ def by_direction(
         [rad], unit of `quantity`, and -1, 0 or 1.
     """
     ax = _axes(ax)
-    for sign, colour, name in ((0, FAINT, "at rest"), (1, RED, "angle grows"), (-1, BLUE, "angle shrinks")):
+    for sign, colour, name in ((0, FAINT, None), (1, RED, "angle rising"), (-1, BLUE, "angle falling")):
         own = direction == sign
         ax.plot(np.degrees(angle[own]), values[own], color=colour, marker=".", ms=2.5, ls="", alpha=0.5, label=name)
     ax.axhline(0.0, color=INK, lw=0.8)

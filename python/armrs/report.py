@@ -218,7 +218,7 @@ def _passive(data: Mapping[str, Any]) -> str:
 def _demo(data: Mapping[str, Any]) -> str:
     out = heading("What was done") + bullets(data["story"])
     out += heading("Identified beside known") + paragraph(data["comparison_text"], "soft") + table(tables.comparison(data))
-    return out + heading("What the model handed over did not have") + paragraph(data["missing_text"])
+    return out + heading("What the model handed over lacked") + paragraph(data["missing_text"])
 
 
 def _origin(data: Mapping[str, Any]) -> str:

@@ -76,11 +76,11 @@ def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> 
     files.not_an_input([model], [result.dataset.model_path] if result.dataset.model_path else [])
     drawn = figures.identified(result, data)
     result.model.write(model)
-    return [model, *_write(folder, "identified", data, drawn)]
+    return [model, *write_result(folder, "identified", data, drawn)]
 
 
-def _write(folder: Path, stem: str, data: dict[str, Any], drawn: list[figures.Drawn]) -> list[Path]:
-    """Write figures, then the JSON that names them, then the report of both."""
+def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figures.Drawn]) -> list[Path]:
+    """Write figures, then the JSON that names them, then the report of both; return the files, the report last."""
     pictures = []
     for item in drawn:
         path = folder / "figures" / f"{item.name}.png"
@@ -163,7 +163,7 @@ def write_simulated(
     drawn = figures.simulated(result, trial)
     write_samples(samples, list(table), list(table.values()))
     data["file"] = samples.name
-    return [samples, *_write(folder, "simulated", data, drawn)]
+    return [samples, *write_result(folder, "simulated", data, drawn)]
 
 
 def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str, Any]:
@@ -189,4 +189,4 @@ def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str
 def write_passive(result: PassiveMoments, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write `passive.json`, figures and `report.html` below a folder; return the files, the report last."""
     drawn = figures.passive(result)
-    return _write(folder, "passive", data, drawn)
+    return write_result(folder, "passive", data, drawn)

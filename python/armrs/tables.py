@@ -148,7 +148,7 @@ def comparison(data: Mapping[str, Any]) -> Table:
     """Return identified values beside known ones, and beside the relative errors that the thesis reports."""
     rows = [
         [
-            label(c),
+            label(c) if c["joint"] is None or c["kind"] in ("segment", "combination") else f"{label(c)} {c['joint']}",
             unit(c["unit"]),
             f"{c['reference']:.4g}",
             number(c["value"], c["std"]),

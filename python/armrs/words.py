@@ -104,6 +104,17 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     files_written(written)
 
 
+def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what the demonstration came to."""
+    print("\n".join(result["story"]))
+    print()
+    show(result["comparison_text"], tables.comparison(result))
+    print(result["missing_text"])
+    print()
+    print(verdict(result))
+    files_written(written[-1:])
+
+
 def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what a run came to."""
     _head(result)

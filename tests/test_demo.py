@@ -1,0 +1,97 @@
+"""The demonstration: known values come back, nothing comes from outside, and everything says that it is synthetic."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli, demo
+
+WITHIN = 5.0
+"""Largest relative error of what the data determine [%]; the thesis has 2 to 10 on the real arm."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("demo")
+    assert cli.main(["demo", "-o", str(out), "--json", str(out / "copy.json")]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def result(folder: Path) -> dict:
+    return json.loads((folder / "demo.json").read_text(encoding="utf-8"))
+
+
+def test_what_the_data_determine_comes_back(result: dict) -> None:
+    measured = {(row["name"], row["joint"]): row for row in result["comparison"] if row["decided_by"] == "data"}
+    assert set(measured) == {("m1*l1 + a1*m2", 1), ("m2*l2", 2), ("torque", 1), ("torque", 2)}
+    for row in measured.values():
+        assert abs(row["error_percent"]) < WITHIN
+        low, high = row["interval"]
+        assert low < row["reference"] < high
+
+
+def test_masses_are_said_to_rest_on_the_model(result: dict) -> None:
+    by = {row["name"]: row["decided_by"] for row in result["comparison"]}
+    assert by["m2"] == by["l2"] == by["m1*l1"] == "prior"
+
+
+def test_the_known_values_are_those_of_table_4_3() -> None:
+    truth = demo.true_model()
+    assert [(s.length, s.com, s.mass) for s in truth.segments] == [(0.376, 0.184, 1.440), (0.239, 0.115, 1.160)]
+    assert [j.coulomb for j in truth.joints] == [0.139, 0.161]
+    given = demo.handed_over(truth)
+    assert [j.coulomb for j in given.joints] == [0.0, 0.0]
+    assert [s.mass for s in given.segments] == pytest.approx([1.584, 1.276])
+
+
+def test_the_data_set_is_labelled_and_the_truth_lies_apart(folder: Path) -> None:
+    dataset = armrs.load_dataset(folder / "data")
+    assert dataset.synthetic
+    assert dataset.warnings == ()
+    assert (len(dataset.fit_trials), len(dataset.test_trials)) == (10, 4)
+    assert armrs.load_model(folder / "truth.toml") == demo.true_model()
+    assert (folder / "truth.toml").read_text(encoding="utf-8").startswith("# SYNTHETIC")
+    assert "coulomb = 0.0" in (folder / "data/model.toml").read_text(encoding="utf-8")
+    assert max(np.abs(t.q - t.q[0]).max() for t in dataset.trials) < np.radians(15)
+
+
+def test_the_direction_of_motion_shows_the_friction_before_and_not_after(folder: Path, result: dict) -> None:
+    assert "shoulder 0.1" in result["missing_text"]
+    assert "not found by a search" in result["missing_text"]
+    assert (folder / "figures/direction.png").stat().st_size > 20_000
+
+
+def test_the_report_stands_alone_and_says_synthetic(folder: Path) -> None:
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("Synthetic data: simulated, not measured") == 3
+    assert page.count("<img") == page.count('src="data:image/png;base64,') >= 8
+    assert (folder / "copy.json").read_text(encoding="utf-8") == (folder / "demo.json").read_text(encoding="utf-8")
+
+
+def test_the_terminal_ends_with_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    class Stub:
+        files = (tmp_path / "report.html",)
+
+    monkeypatch.setattr(demo, "run_demo", lambda out, command: Stub)
+    (tmp_path / "demo.json").write_text(
+        json.dumps(
+            {
+                "verb": "demo",
+                "story": ["a"],
+                "comparison": [],
+                "comparison_text": "",
+                "missing_text": "b",
+                "verdict": "c",
+                "data": {"name": "d"},
+            }
+        ),
+        encoding="utf-8",
+    )
+    assert cli.main(["demo", "-o", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "report.html")

@@ -1,0 +1,104 @@
+"""Passive moments: known friction and elasticity come back, and fast movements are warned of."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.demo import BRAKES
+from conftest import Session
+
+FRICTION = 0.01
+"""Half of the hysteresis has the brake's torque to this [N m]: 0.2 N of force noise over 0.6 m, averaged over a bin and four repeats."""
+
+
+def test_half_the_hysteresis_is_the_dry_friction(slow_arm: Path) -> None:
+    result = armrs.passive_moments(slow_arm)
+    assert [(c.joint, c.repeats) for c in result.curves] == [(1, 4), (2, 4)]
+    for curve, brake in zip(result.curves, BRAKES, strict=True):
+        assert np.nanmean(curve.half_width) == pytest.approx(brake, abs=FRICTION)
+        assert np.nanmax(curve.half_width_std) < 5 * FRICTION
+        assert curve.inertial_share < 0.1
+    assert result.warnings == ()
+    assert "joint 2 in 'slow': ±0.16" in repr(result)
+
+
+def test_the_elastic_mean_is_the_spring(slow_arm: Path, tmp_path: Path) -> None:
+    stiffness, rest = 1.5, -1.0
+    dataset = armrs.load_dataset(slow_arm)
+    truth = armrs.load_model(slow_arm / "truth.toml")
+    springy = truth.replace(joints=(armrs.Joint("shoulder", stiffness=stiffness, rest=rest), truth.joints[1]))
+    run = armrs.simulate(springy, armrs.load_movement(slow_arm / "movement.toml", 2))
+    trial = armrs.Trial("trials/x.csv", "x", 1, "fit", run.t, run.q, run.force_on_arm, None, None)
+    curve = armrs.passive_moments(dataset.replace(model=truth, trials=(trial,))).curves[0]
+    inner = slice(4, -4)  # beside the reversals a bin is not full of samples, and these are not about its centre
+    assert np.allclose(curve.elastic[inner], stiffness * (curve.angle[inner] - rest), atol=0.01)
+    assert np.isnan(curve.elastic_std).all()  # one repeat has no deviation
+
+
+def test_signs_do_not_depend_on_what_the_force_acts_on(slow_arm: Path, tmp_path: Path) -> None:
+    dataset = armrs.load_dataset(slow_arm)
+    armrs.write_dataset(dataset.replace(force_on="arm"), tmp_path)
+    curves = [armrs.passive_moments(folder).curves[0] for folder in (slow_arm, tmp_path)]
+    assert np.allclose(curves[0].elastic, curves[1].elastic, atol=1e-12, equal_nan=True)
+
+
+def test_measured_torques_count(slow_arm: Path) -> None:
+    """With the force turned into joint torques, the moments stay the same."""
+    dataset = armrs.load_dataset(slow_arm)
+    model = dataset.model
+    arm = armrs.Arm(*([getattr(s, name) for s in model.segments] for name in ("length", "mass", "com", "inertia")))
+    trial = dataset.trials[0]
+    torque = arm.static_torque(trial.q, trial.force_on_arm)
+    other = armrs.Trial(trial.file, "slow", 1, "fit", trial.t, trial.q, None, None, None, torque)
+    by_force, by_torque = (armrs.passive_moments(dataset.replace(trials=(t,))).curves[1] for t in (trial, other))
+    # Filtering before and after the Jacobian differs by the noise of the angles.
+    assert np.nanmax(np.abs(by_force.elastic - by_torque.elastic)) < 0.01
+
+
+def test_a_fast_movement_is_warned_of(slow_arm: Path) -> None:
+    truth = armrs.load_model(slow_arm / "truth.toml")
+    fast = armrs.Movement(np.radians([[-60, 60], [0, 60], [-60, 60], [0, 60], [-60, 60]]), speed=4.0, acceleration=20.0)
+    run = armrs.simulate(truth, fast)
+    trial = armrs.Trial("fast.csv", "fast", 1, "fit", run.t, run.q, run.force_on_arm, None, None)
+    result = armrs.passive_moments(armrs.load_dataset(slow_arm).replace(trials=(trial,), model=truth), cutoff=5.0)
+    assert len(result.warnings) >= 1
+    assert "fast: not slow for joint 1: inertial torques are" in result.warnings[0]
+
+
+def test_a_held_joint_has_no_curve(slow_arm: Path) -> None:
+    truth = armrs.load_model(slow_arm / "truth.toml")
+    run = armrs.simulate(truth, armrs.Movement(np.radians([[-60, 60], [-48, 60], [-60, 60]])))
+    trial = armrs.Trial("one.csv", "one", 1, "fit", run.t, run.q, run.force_on_arm, None, None)
+    curves = armrs.passive_moments(armrs.load_dataset(slow_arm).replace(trials=(trial,), model=truth)).curves
+    assert [c.joint for c in curves] == [1]
+
+
+def test_gaps_stay_gaps(session: Session) -> None:
+    def hole(lines: list[str]) -> list[str]:
+        return lines[:40] + lines[70:]
+
+    session.edit_lines(hole)
+    first = armrs.passive_moments(session.folder).trials[0]
+    assert np.isnan(first.moment).any()
+    assert np.isfinite(first.moment).any()
+    assert (first.direction[np.isnan(first.q)] == 0).all()
+
+
+def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["passive", str(slow_arm), "-o", str(tmp_path), "--json", str(tmp_path / "x.json")]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "slow arm (synthetic data): Half the width of the hysteresis: shoulder 0.1" in out
+    result = json.loads((tmp_path / "x.json").read_text(encoding="utf-8"))
+    assert (result["verb"], len(result["curves"])) == ("passive", 2)
+    assert {"angle_deg", "rising_Nm", "falling_Nm", "elastic_Nm", "elastic_std_Nm", "half_width_Nm", "inertial_share"} <= set(
+        result["curves"][0]
+    )
+    assert (tmp_path / "figures/passive-slow.png").stat().st_size > 20_000
+    assert "Synthetic data" in (tmp_path / "report.html").read_text(encoding="utf-8")

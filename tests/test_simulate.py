@@ -1,0 +1,81 @@
+"""`armrs simulate`: what it writes, and that it is the run of `armrs.simulate`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.csv
+import pytest
+from pyarrow import parquet
+
+import armrs
+from armrs import cli
+from conftest import MODEL
+
+
+def run(*arguments: object) -> int:
+    return cli.main([str(a) for a in arguments])
+
+
+def test_writes_every_column_with_its_unit(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert run("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "-o", out) == 0
+    printed, err = capsys.readouterr()
+    assert err == ""
+    assert printed.splitlines()[-1] == str(out / "report.html")
+    table = pyarrow.csv.read_csv(out / "simulated.csv")
+    expected = armrs.simulate(slow_arm / "truth.toml", armrs.load_movement(slow_arm / "movement.toml", 2))
+    assert expected.digest in printed
+    columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    assert np.array_equal(columns["q2_rad"], expected.q[:, 1])
+    assert np.array_equal(columns["force_on_arm_z_N"], expected.force_on_arm[:, 1])
+    assert np.array_equal(columns["resisting_coulomb_joint2_Nm"], expected.columns["resisting"][:, 1])
+    units = ("_s", "_rad", "_rad_s", "_rad_s2", "_m", "_N", "_Nm", "_J")
+    assert all(name.endswith(units) for name in columns)
+    # The equation of motion, from the file alone: B q̈ + C q̇ + G + R = τ + Jᵀ F.
+    for j in (1, 2):
+        left = sum(columns[f"{part}{j}_Nm"] for part in ("inertial", "centrifugal", "coriolis", "gravity", "frame", "resisting"))
+        assert np.allclose(left, columns[f"drive{j}_Nm"] + columns[f"contact{j}_Nm"], atol=1e-9)
+
+
+def test_json_accounts_for_the_energy(slow_arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    energy = result["energy"]
+    balance = energy["handle_J"] + energy["drive_J"] - energy["resisted_J"] - energy["damped_J"]
+    assert energy["stored_J"] == pytest.approx(balance, abs=max(2 * energy["error_J"], 1e-12))
+    assert energy["error_J"] < 1e-4 * energy["handle_J"]
+    assert {"verb", "digest", "engine", "dt_s", "duration_s", "samples", "largest_force_N", "made_by"} <= set(result)
+
+
+def test_a_trial_drives_the_arm_along_its_robot_angles(slow_arm: Path, tmp_path: Path) -> None:
+    trial = slow_arm / "trials" / "slow_1.csv"
+    assert run("simulate", slow_arm / "truth.toml", "--trial", trial, "--to", "parquet", "-o", tmp_path) == 0
+    table = parquet.read_table(tmp_path / "simulated.parquet")
+    measured = armrs.load_dataset(slow_arm).trials[0]
+    simulated = np.column_stack([table.column(f"q{j}_rad").to_numpy() for j in (1, 2)])
+    assert np.degrees(np.abs(simulated - measured.q[: len(simulated)]).max()) < 1.0
+    assert json.loads((tmp_path / "simulated.json").read_text(encoding="utf-8"))["file"] == "simulated.parquet"
+
+
+def test_both_integrators_and_couplings_run(slow_arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    common = ("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--duration-s", 0.2, "--json", "-")
+    digests = set()
+    for options in ([], ["--integrator", "euler"], ["--coupling", "rigid"], ["--dt", 0.0005]):
+        assert run(*common, *options) == 0
+        digests.add(json.loads(capsys.readouterr().out)["digest"])
+    assert len(digests) == 4
+
+
+def test_reprs_say_units(slow_arm: Path) -> None:
+    run = armrs.simulate(slow_arm / "truth.toml", armrs.load_movement(slow_arm / "movement.toml", 2), duration=0.2)
+    assert "N; digest" in repr(run)
+    assert "2 joints" in repr(run)
+
+
+def test_a_model_without_a_robot_can_follow_a_movement(tmp_path: Path, slow_arm: Path) -> None:
+    without = MODEL[: MODEL.index("[robot]")] + MODEL[MODEL.index("[contact]") :]
+    (tmp_path / "model.toml").write_text(without, encoding="utf-8")
+    assert run("simulate", tmp_path / "model.toml", "--movement", slow_arm / "movement.toml", "--duration-s", 0.1) == 0
