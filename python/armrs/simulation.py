@@ -192,6 +192,9 @@ def simulate(
     for name, value in (("dt", dt), ("rate", rate)):
         if not (np.isfinite(value) and value > 0):
             raise BadInput(name, value, "a number above 0")
+    steps = 1.0 / (rate * dt)
+    if abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
+        raise BadInput("dt", dt, f"a whole part of the interval between samples, {1.0 / rate:g} s")
     driven = _driven(drive, coupling)
     if isinstance(drive, Trial) and start is None:
         start = drive.q[0]

@@ -1,0 +1,132 @@
+"""Plots: what is on the Axes, with units; hollow markers for what was not measured; a look that leaves no trace."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from armrs import plotting
+
+T = np.linspace(0.0, 2.0, 101)
+
+
+@pytest.fixture
+def ax() -> matplotlib.axes.Axes:
+    return plotting.figure(5, 4).subplots()
+
+
+def labels(ax: matplotlib.axes.Axes) -> tuple[str, str]:
+    return ax.get_xlabel(), ax.get_ylabel()
+
+
+def legend(ax: matplotlib.axes.Axes) -> list[str]:
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_torque(ax: matplotlib.axes.Axes) -> None:
+    assert plotting.torque(T, np.sin(T), np.cos(T), ax, title="elbow") is ax
+    assert labels(ax) == ("time [s]", "torque [N m]")
+    assert legend(ax) == ["measured", "fitted"]
+    assert np.array_equal(ax.lines[1].get_ydata(), np.cos(T))
+
+
+def test_a_line_breaks_where_samples_are_missing(ax: matplotlib.axes.Axes) -> None:
+    t = np.concatenate([T[:40], T[60:]])
+    plotting.torque(t, np.sin(t), np.sin(t), ax)
+    y = ax.lines[0].get_ydata()
+    assert np.isnan(y).sum() == 1
+    assert np.isnan(y[40])
+
+
+def test_residual_tells_fit_from_test(ax: matplotlib.axes.Axes) -> None:
+    plotting.residual([(T, np.sin(T), "fit"), (T, np.cos(T), "fit"), (T, T, "test")], ax)
+    assert legend(ax) == ["fit trials", "test trials"]
+    assert labels(ax) == ("time [s]", "residual [N m]")
+    assert len({line.get_color() for line in ax.lines[:3]}) == 2
+
+
+ITEMS = [
+    {"name": "m2*l2", "value": 0.13, "interval": (0.12, 0.14), "unit": "kg m", "decided_by": "data", "given": 0.15, "reference": 0.133},
+    {"name": "m2", "value": 1.2, "interval": (1.0, 1.4), "unit": "kg m", "decided_by": "prior", "given": None},
+    {"name": "I2", "value": 0.0, "interval": (0.0, 0.1), "unit": "kg m", "decided_by": "bound"},
+]
+
+
+def test_what_was_not_measured_has_a_hollow_marker(ax: matplotlib.axes.Axes) -> None:
+    plotting.intervals(ITEMS, ["a", "b", "c"], ax)
+    estimates = [line for line in ax.lines if line.get_marker() in "oD" and line.get_linestyle() == "None"]
+    fills = [matplotlib.colors.to_hex(line.get_markerfacecolor()) for line in estimates]
+    assert fills[0] == plotting.BLUE.lower()
+    assert fills[1:] == ["#ffffff", "#ffffff"]
+    assert [line.get_marker() for line in estimates] == ["o", "o", "D"]
+    assert [line.get_marker() for line in ax.lines].count("x") == 1
+    assert [line.get_marker() for line in ax.lines].count("|") == 1
+    assert [tick.get_text() for tick in ax.get_yticklabels()] == ["a", "b", "c"]
+    assert ax.get_xlabel() == "[kg m]"
+    assert ax.yaxis_inverted()
+
+
+def test_the_legend_of_intervals_explains_what_occurs() -> None:
+    figure = plotting.figure(10, 4)
+    plotting.interval_legend(figure, ITEMS[:1])
+    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["decided by the measurement", "model as given", "known value"]
+
+
+def test_symbols_tell_i_from_l() -> None:
+    assert plotting.symbol("I1 + m1*l1^2") == r"$I_{1} + m_{1}\,l_{1}^2$"
+
+
+def test_angles_are_in_degrees(ax: matplotlib.axes.Axes) -> None:
+    q = np.column_stack([T, -T])
+    plotting.angles(T, q, ["shoulder", "elbow"], ax, measured=q)
+    assert labels(ax) == ("time [s]", "angle [°]")
+    assert np.allclose(ax.lines[1].get_ydata(), np.degrees(T))
+    assert legend(ax) == ["measured", "shoulder", "elbow"]
+
+
+def test_force_and_contributions(ax: matplotlib.axes.Axes) -> None:
+    plotting.force(T, np.column_stack([T, T]), ax)
+    assert labels(ax) == ("time [s]", "force [N]")
+    other = plotting.contributions(T, dict.fromkeys("abcde", T), plotting.figure(5, 4).subplots(), title="elbow")
+    assert labels(other) == ("time [s]", "torque [N m]")
+    looks = {(line.get_color(), line.get_linestyle()) for line in other.lines[:5]}
+    assert len(looks) == 5
+
+
+def test_hysteresis_and_spread(ax: matplotlib.axes.Axes) -> None:
+    plotting.hysteresis([(T, T)], [(T, -T)], ax)
+    assert labels(ax) == ("joint angle [°]", "passive moment [N m]")
+    assert legend(ax) == ["rising", "falling"]
+    plotting.mean_and_spread(T, T, np.full(T.shape, np.nan), ax, label="elastic mean")
+    assert legend(ax) == ["rising", "falling", "elastic mean"]
+    assert len(ax.collections) == 1
+
+
+def test_by_direction(ax: matplotlib.axes.Axes) -> None:
+    plotting.by_direction(T, T, np.sign(T - 1).astype(int), ax, quantity="left [N m]")
+    assert labels(ax) == ("joint angle [°]", "left [N m]")
+    assert sum(len(line.get_xdata()) for line in ax.lines[:3]) == len(T)
+
+
+def test_without_axes_a_figure_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    made = plotting.force(T, np.column_stack([T, T]))
+    assert isinstance(made.figure, Figure)
+    pyplot.close(made.figure)
+
+
+def test_the_style_leaves_no_trace() -> None:
+    before = dict(matplotlib.rcParams)
+    with plotting.style():
+        assert not matplotlib.rcParams["axes.spines.top"]
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_the_palette_tells_neighbours_apart_in_grey() -> None:
+    """The first colours differ in lightness, for prints without colour."""
+    light = [np.dot(matplotlib.colors.to_rgb(c), [0.2126, 0.7152, 0.0722]) for c in plotting.CYCLE[:2]]
+    assert abs(light[0] - light[1]) > 0.2

@@ -1,0 +1,178 @@
+"""Bad input, one thing broken at a time in what is accepted: status 2, one line, nothing written.
+
+The readers' own refusals stand in test_model.py and test_dataset.py; here every verb meets them, and its own options.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import BadInput, cli
+from armrs.demo import true_model
+from armrs.moments import passive_moments
+
+
+class Folder:
+    """A copy of an accepted data set, to break one thing in."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        file = self.path / name
+        text = file.read_text(encoding="utf-8")
+        assert old in text
+        file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    def lines(self, change: Callable[[list[str]], list[str]], name: str = "trials/slow_1.csv") -> None:
+        file = self.path / name
+        file.write_text("\n".join(change(file.read_text(encoding="utf-8").splitlines())) + "\n", encoding="utf-8")
+
+    def cell(self, line: int, column: int, text: str) -> None:
+        def change(lines: list[str]) -> list[str]:
+            cells = lines[line - 1].split(",")
+            cells[column] = text
+            lines[line - 1] = ",".join(cells)
+            return lines
+
+        self.lines(change)
+
+
+def nothing(folder: Folder) -> None:
+    """Break nothing: the arguments are what is wrong."""
+
+
+IDENTIFY = ("identify", "data", "-o", "out")
+PASSIVE = ("passive", "data", "-o", "out")
+MOVE = ("simulate", "data/truth.toml", "--movement", "data/movement.toml", "-o", "out")
+FOLLOW = ("simulate", "data/truth.toml", "--trial", "data/trials/slow_1.csv", "-o", "out")
+
+CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
+    # files
+    "unknown key in the model": (IDENTIFY, lambda f: f.edit("model.toml", "gravity", "gravitiy"), "unknown key 'gravitiy'"),
+    "unknown key in the data set": (IDENTIFY, lambda f: f.edit("dataset.toml", "force_on", "forces_on"), "nearest known: force_on"),
+    "synthetic is no number": (IDENTIFY, lambda f: f.edit("dataset.toml", "synthetic = true", "synthetic = 1"), "synthetic: found 1, allowed true or false"),
+    "mass of zero": (IDENTIFY, lambda f: f.edit("model.toml", "mass = 1.58", "mass = 0.0 #"), "[[arm.segment]] 1, mass: found 0.0"),
+    "mass that is text": (MOVE, lambda f: f.edit("truth.toml", "mass = 1.44", 'mass = "x" #'), "[[arm.segment]] 1, mass: found 'x'"),
+    "no trial file": (PASSIVE, lambda f: (f.path / "trials/slow_2.csv").unlink(), "slow_2.csv: file: found no such file"),
+    "unknown unit": (IDENTIFY, lambda f: f.edit("trials/slow_1.csv", "q1_rad", "q1_grad"), "header: found 'q1_grad', allowed a known unit"),
+    "degrees under radians": (IDENTIFY, lambda f: f.cell(9, 1, "-1000"), "line 9, column q1_rad: found -1000.0"),
+    "text in a cell": (PASSIVE, lambda f: f.cell(9, 2, "abc"), "line 9, column q2_rad: found 'abc'"),
+    "NaN in a cell": (IDENTIFY, lambda f: f.cell(9, 2, "nan"), "line 9, column q2_rad: found 'nan'"),
+    "infinity in a cell": (IDENTIFY, lambda f: f.cell(9, 3, "inf"), "line 9, column Fy_N: found"),
+    "time twice": (IDENTIFY, lambda f: f.cell(5, 0, "0.04"), "time: found 0.04 s twice"),
+    "time that decreases": (IDENTIFY, lambda f: f.cell(9, 0, "0.0"), "line 9, time: found 0.0 s after"),
+    "no time stamp": (IDENTIFY, lambda f: f.cell(9, 0, ""), "line 9, time: found an empty cell"),
+    "a column is missing": (PASSIVE, lambda f: f.edit("trials/slow_1.csv", "q2_rad", "emg_x"), "header: found no column for q2"),
+    "a file cut in a line": (IDENTIFY, lambda f: f.lines(lambda lines: [*lines[:50], lines[50][:4]]), "line 51: found 1 cells"),
+    "too few samples": (IDENTIFY, lambda f: f.lines(lambda lines: lines[:10]), "file: found 9 samples, allowed at least 16"),
+    "no samples": (FOLLOW, lambda f: f.lines(lambda lines: lines[:1]), "slow_1.csv: file: found no samples below the header"),
+    "one complete gap": (IDENTIFY, lambda f: f.lines(lambda lines: [lines[0], *[x.split(",")[0] + "," * x.count(",") for x in lines[1:]]]), "no sample at all"),
+    "model that is no TOML": (MOVE, lambda f: f.edit("truth.toml", "[arm]", "[arm"), "truth.toml: "),
+    "model that is not there": (("simulate", "no.toml", "--movement", "data/movement.toml"), nothing, "no.toml: file: found No such file"),
+    "a folder as model": (("simulate", "data", "--movement", "data/movement.toml"), nothing, "data: file: found a folder"),
+    "a data set that is not there": (("identify", "nowhere", "-o", "out"), nothing, "nowhere: file: found No such file"),
+    # movements
+    "movement with another number of joints": (
+        MOVE, lambda f: f.edit("movement.toml", "[[-60, 60]", "[[-60, 60, 0]"), "movement.toml: movement.waypoints_deg: found"),
+    "movement of three joints": (
+        MOVE, lambda f: (f.path / "movement.toml").write_text("[movement]\nwaypoints_rad = [[0, 0, 0], [1, 1, 1]]\n", encoding="utf-8") and None,
+        "movement.waypoints: found 'an array of shape (2, 3)', allowed rows of 2 angles"),
+    "movement of one waypoint": (
+        MOVE, lambda f: (f.path / "movement.toml").write_text("[movement]\nwaypoints_rad = [[0, 0]]\n", encoding="utf-8") and None, "two or more rows"),
+    "movement with an unknown key": (MOVE, lambda f: f.edit("movement.toml", "speed_rad_s", "speed_rads"), "unknown key 'speed_rads'"),
+    "movement of no speed": (MOVE, lambda f: f.edit("movement.toml", "speed_rad_s = 0.1", "speed_rad_s = 0.0"), "speed"),
+    "movement with an unknown shape": (MOVE, lambda f: f.edit("movement.toml", '"smooth"', '"sine"'), "movement.shape: found 'sine'"),
+    "handle out of the robot's reach": (MOVE, lambda f: f.edit("truth.toml", "base = [1.0, -0.1]", "base = [3.0, -0.1]"), "m from the robot's base"),
+    # options
+    "unknown effect": ((*IDENTIFY, "--with", "coulom"), nothing, "--with: found unknown joint effect 'coulom'"),
+    "an effect of no joint": ((*IDENTIFY, "--with", "backlash"), nothing, "--with: found unknown joint effect 'backlash'"),
+    "unknown method": ((*IDENTIFY, "--method", "best"), nothing, "'best' is not one of"),
+    "level of one": ((*IDENTIFY, "--level", "1"), nothing, "level: found 1.0"),
+    "level that is no number": ((*IDENTIFY, "--level", "nan"), nothing, "level: found nan"),
+    "cutoff of zero": ((*IDENTIFY, "--cutoff-hz", "0"), nothing, "cutoff: found 0.0"),
+    "cutoff that is no number": ((*IDENTIFY, "--cutoff-hz", "nan"), nothing, "cutoff: found nan"),
+    "cutoff above half the rate": ((*PASSIVE, "--cutoff-hz", "25"), nothing, "cutoff: found 25, allowed above 0 and below 25 Hz"),
+    "negative cutoff": ((*PASSIVE, "--cutoff-hz", "-1"), nothing, "cutoff: found -1"),
+    "one bin": ((*PASSIVE, "--bins", "1"), nothing, "bins: found 1, allowed 2 to 1000"),
+    "negative step": ((*MOVE, "--dt", "-0.001"), nothing, "dt: found -0.001, allowed a number above 0"),
+    "step that is no number": ((*MOVE, "--dt", "nan"), nothing, "dt: found nan"),
+    "step that does not divide the sample interval": ((*MOVE, "--dt", "0.0003"), nothing, "dt: found 0.0003, allowed a whole part of the interval between samples, 0.02 s"),
+    "sample rate of zero": ((*MOVE, "--rate-hz", "0"), nothing, "rate: found 0.0"),
+    "negative duration": ((*MOVE, "--duration-s", "-1"), nothing, "duration: found -1"),
+    "unknown engine": ((*MOVE, "--engine", "bullet"), nothing, "'bullet' is not one of"),
+    "unknown integrator": ((*MOVE, "--integrator", "rk5"), nothing, "'rk5' is not one of"),
+    "neither movement nor trial": (("simulate", "data/truth.toml"), nothing, "--movement, --trial: found neither, allowed one of them"),
+    "movement and trial": ((*MOVE, "--trial", "x.csv"), nothing, "--movement, --trial: found both"),
+    "a trial without a robot": (
+        FOLLOW, lambda f: f.edit("truth.toml", "[robot]\nlengths = [0.45, 0.45]\nbase = [1.0, -0.1]\nelbow = \"up\"\n", ""), "[robot]: found none in the model"),
+    # output
+    "output folder that is a file": (("passive", "data", "-o", "data/model.toml"), nothing, "model.toml: -o: found a file, allowed a folder"),
+    "output below a file": (("passive", "data", "-o", "data/model.toml/x"), nothing, "Not a directory"),
+    "demo into a file": (("demo", "-o", "data/model.toml"), nothing, "-o: found a file"),
+    "JSON over a model": (("passive", "data", "--json", "data/model.toml"), nothing, "an existing file with suffix '.toml'"),
+    "report of nothing": (("report",), nothing, "Missing"),
+    "report of a trial": (("report", "data/trials/slow_1.csv"), nothing, "slow_1.csv: file: found"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_one_line_and_nothing_written(
+    name: str, slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments, breaks, message = CASES[name]
+    shutil.copytree(slow_arm, tmp_path / "data")
+    monkeypatch.chdir(tmp_path)
+    breaks(Folder(tmp_path / "data"))
+    before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
+    status = cli.main(list(arguments))
+    out, err = capsys.readouterr()
+    assert (status, out) == (2, "")
+    assert err.startswith("armrs: ")
+    assert err.count("\n") == 1
+    assert message in err
+    assert "Traceback" not in err
+    assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_accepted_calls_are_accepted(slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the table breaks works when it is not broken; otherwise its refusals would prove nothing."""
+    shutil.copytree(slow_arm, tmp_path / "data")
+    monkeypatch.chdir(tmp_path)
+    for arguments in (PASSIVE, MOVE, FOLLOW):
+        assert cli.main(list(arguments)) == 0
+
+
+ARM = ([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: armrs.Arm([0.3], [2.0, 1.0], [0.15], [0.02]), "masses: found 2 values, allowed 1"),
+        (lambda: armrs.Arm([], [], [], []), "segments: found 0"),
+        (lambda: armrs.Arm([0.3], [-1.0], [0.1], [0.01]), "mass"),
+        (lambda: armrs.Arm([np.nan], [1.0], [0.1], [0.01]), "length"),
+        (lambda: armrs.Arm(*ARM).gravity([0.0]), r"q: found an array of shape \[1\], allowed \(2,\) or \(n, 2\)"),
+        (lambda: armrs.Arm(*ARM).gravity([[0.0, np.nan]]), r"q\[0, 1\]: found NaN"),
+        (lambda: armrs.Arm(*ARM).coriolis(np.zeros((3, 2)), np.zeros((4, 2))), "qd: found 4 rows, allowed 3 rows"),
+        (lambda: armrs.Movement(np.zeros(2)), "waypoints: found 'an array of shape"),
+        (lambda: armrs.simulate(true_model(), coupling="loose"), "coupling: found 'loose', allowed compliant or rigid"),
+        (lambda: armrs.simulate(true_model(), engine="bullet", duration=0.1), "engine: found bullet"),
+        (lambda: armrs.simulate(true_model()), "duration: found none"),
+        (lambda: armrs.simulate(true_model(), duration=0.1, start=np.zeros(3)), "start angles: found 3 values, allowed 2"),
+        (lambda: passive_moments("nowhere"), "nowhere: file: found No such file or directory"),
+    ],
+)
+def test_functions_refuse_with_the_argument(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(BadInput, match=message) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, ValueError)
