@@ -56,16 +56,16 @@ $(STAMPS)/rust: $(RUST) scripts/check_no_std.sh | $(STAMPS)/venv
 
 # ---- Python
 python: $(STAMPS)/build $(STAMPS)/dev
-	$(BIN)/ruff format --check --quiet python tests scripts
-	$(BIN)/ruff check --quiet python tests scripts
+	$(BIN)/ruff format --check --quiet python tests scripts examples
+	$(BIN)/ruff check --quiet python tests scripts examples
 	$(BIN)/mypy --no-error-summary
 	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
 	$(BIN)/python -m pytest --quiet
 
 format: $(STAMPS)/dev
 	cargo fmt --all
-	$(BIN)/ruff format python tests scripts
-	$(BIN)/ruff check --fix python tests scripts
+	$(BIN)/ruff format python tests scripts examples
+	$(BIN)/ruff check --fix python tests scripts examples
 
 bench: build
 	cargo bench --quiet

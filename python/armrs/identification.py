@@ -49,7 +49,9 @@ class Estimate:
     decided_by: str
 
     def __str__(self) -> str:
-        return f"{self.name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
+        own = self.kind in ("segment", "combination", "calibration")
+        name = self.name if own else f"{self.kind} {self.name}"
+        return f"{name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
 
 
 @dataclass(frozen=True, eq=False)
