@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# The same run, built in three ways, alone and inside a batch: all digests must be equal.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+run() { # name, further cargo arguments; the features leave out the second engine, which takes no part
+  local name=$1; shift
+  cargo run --quiet -p arm-sim --no-default-features --example digest "$@" | sed "s/^/$name /"
+}
+found=$(run debug; run release --release
+        RUSTFLAGS="-C target-cpu=native" run native --release --target-dir target/native)
+echo "$found"
+for kind in "rk4\|lane" euler; do
+  [ "$(grep " \($kind\) " <<<"$found" | awk '{print $3}' | sort -u | wc -l)" = 1 ] || { echo "digests differ" >&2; exit 1; }
+done
+echo "check_bits: the same bits in debug, release, with target-cpu=native, alone and in a batch"

@@ -1,0 +1,39 @@
+"""Write docs/effects.md from the catalogue of the compiled core.
+
+Run with the project's own Python after a build: `.venv/bin/python scripts/effects_page.py`. A test compares the page with the catalogue.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armrs.catalogue import Kind, catalogue
+
+PAGE = Path(__file__).parent.parent / "docs" / "effects.md"
+ADDRESS = {"joint": "`joint`", "channel": "`channel`", None: "the whole rig"}
+
+
+def page() -> str:
+    """Return the whole page."""
+    kinds = list(catalogue().values())
+    places = list(dict.fromkeys(kind.where for kind in kinds))
+    blocks = [
+        "# The catalogue of effects",
+        "Generated from the core by `scripts/effects_page.py`; `armrs effects` prints the same. `R` is a torque with which a joint resists.",
+        "In a model an effect is a table `[[effect]]` with `kind`, where it acts, and its parameters; what is left out takes its default.",
+    ]
+    for place in places:
+        blocks.append(f"## {place[0].upper()}{place[1:]}")
+        blocks += [entry(kind) for kind in kinds if kind.where == place]
+    return "\n\n".join(blocks) + "\n"
+
+
+def entry(kind: Kind) -> str:
+    """Return the section of one kind."""
+    rows = [f"| `{p.name}` | {p.unit} | {p.min:g} to {p.max:g} | {p.default:g} |" for p in kind.parameters]
+    table = "\n".join(["| parameter | unit | allowed | default |", "| --- | --- | --- | --- |", *rows])
+    return f"### `{kind.kind}`\n{kind.summary}; at: {ADDRESS[kind.address]}.\n\n    {kind.formula}\n\nSource: {kind.reference}.\n\n{table}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
