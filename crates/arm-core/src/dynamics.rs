@@ -5,6 +5,7 @@ use core::array::from_fn;
 use crate::gravity::{link_gravity, weight_moments};
 use crate::inertia::link_motion;
 use crate::kinematics::{to_joint_torque, to_links};
+use crate::unroll::each;
 use crate::{Chain, Joints, Plane, Pose, Scalar, joints};
 
 /// What acts on the arm from outside and in its joints.
@@ -86,19 +87,15 @@ pub fn forward_dynamics<T: Scalar, const N: usize>(
     qd: &Joints<T, N>,
     load: &Load<T, N>,
 ) -> Joints<T, N> {
-    let (m, turning) = link_motion(chain, pose, &to_links(qd));
+    let (m, mut rows) = link_motion(chain, pose, &to_links(qd));
     let [fy, fz] = load.force_on_arm;
-    let mut rows: [T; N] = from_fn(|i| {
-        let beyond = if i + 1 < N {
-            load.torque[i + 1]
-        } else {
-            -load.moment_on_arm
-        };
+    each!(i in 0, N => {
         // Weight and force at the tip turn the link with the same two lever arms.
         let [level, upright] = weight_moments(chain, i);
         let a = chain.segments[i].length;
         let pushed = (a * fz + level) * pose.cos[i] - (a * fy + upright) * pose.sin[i];
-        load.torque[i] - beyond + pushed - turning[i]
+        let beyond = if i + 1 < N { load.torque[i + 1] } else { -load.moment_on_arm };
+        rows[i] = load.torque[i] - beyond + pushed - rows[i];
     });
     solve(m, &mut rows);
     joints(from_fn(|i| {
@@ -114,22 +111,22 @@ pub fn forward_dynamics<T: Scalar, const N: usize>(
 #[inline]
 fn solve<T: Scalar, const N: usize>(mut m: [[T; N]; N], b: &mut [T; N]) {
     let mut reciprocal = [T::ONE; N];
-    for k in 0..N {
+    each!(k in 0, N => {
         reciprocal[k] = T::ONE / m[k][k];
-        for i in k + 1..N {
+        each!(i in k + 1, N => {
             let factor = m[i][k] * reciprocal[k];
-            for c in i..N {
+            each!(c in i, N => {
                 m[c][i] -= factor * m[c][k];
-            }
+            });
             b[i] -= factor * b[k];
-        }
-    }
-    for i in (0..N).rev() {
-        for k in i + 1..N {
+        });
+    });
+    each!(i in rev 0, N => {
+        each!(k in i + 1, N => {
             b[i] -= m[k][i] * b[k];
-        }
+        });
         b[i] = b[i] * reciprocal[i];
-    }
+    });
 }
 
 /// Force of the proximal side on each joint, from the motion and the force at the tip \[N\].

@@ -1,5 +1,6 @@
 //! The inertia matrix.
 
+use crate::unroll::each;
 use crate::{Chain, JointMatrix, Pose, Scalar};
 
 /// Inertia matrix in link angles θ \[kg m²\]: `M_jj = J_j`, `M_ij = a_i (X_j cos(θ_i−θ_j) + H_j sin(θ_i−θ_j))` for i < j.
@@ -26,8 +27,8 @@ pub(crate) fn link_motion<T: Scalar, const N: usize>(
     speed: &[T; N],
 ) -> ([[T; N]; N], [T; N]) {
     let (mut m, mut turning) = ([[T::ZERO; N]; N], [T::ZERO; N]);
-    for k in 0..N {
-        for i in 0..k {
+    each!(k in 0, N => {
+        each!(i in 0, k => {
             let (c, s) = pose.difference(i, k);
             let a = chain.segments[i].length;
             let (along, normal) = (a * chain.x[k], a * chain.h[k]);
@@ -35,14 +36,14 @@ pub(crate) fn link_motion<T: Scalar, const N: usize>(
             m[k][i] = along * c + normal * s;
             turning[i] -= slope * speed[k].squared();
             turning[k] += slope * speed[i].squared();
-        }
+        });
         // A rotor turns with the angle between two links.
         m[k][k] = chain.j[k] + chain.rotor[k];
         if k > 0 {
             m[k - 1][k - 1] += chain.rotor[k];
             m[k][k - 1] -= chain.rotor[k];
         }
-    }
+    });
     (m, turning)
 }
 

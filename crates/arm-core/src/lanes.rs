@@ -3,7 +3,7 @@
 use core::array::from_fn;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use crate::scalar::{DOUBLE, LARGEST_REDUCED, Scalar, sin_cos_polynomial};
+use crate::scalar::{DOUBLE, LARGEST_REDUCED, Scalar, reduced_sin_cos, turned};
 
 /// `L` numbers that are computed with together; each lane has the bits of the same computation in `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,12 +83,20 @@ impl<const L: usize> Scalar for Lanes<L> {
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
-        if self.every(|a| f64::abs(a) <= LARGEST_REDUCED) {
-            sin_cos_polynomial(self, &DOUBLE)
-        } else {
-            let both = self.0.map(Scalar::sin_cos);
-            (Self(both.map(|(s, _)| s)), Self(both.map(|(_, c)| c)))
+        // One loop over lanes and not lanes within each operation: the compiler then uses the widest vectors.
+        let (mut sin, mut cos) = ([0.0; L], [0.0; L]);
+        let mut small = true;
+        for i in 0..L {
+            let x = self.0[i];
+            (sin[i], cos[i]) = turned(reduced_sin_cos(x, &DOUBLE));
+            small &= f64::abs(x) <= LARGEST_REDUCED;
         }
+        if !small {
+            for i in 0..L {
+                (sin[i], cos[i]) = Scalar::sin_cos(self.0[i]);
+            }
+        }
+        (Self(sin), Self(cos))
     }
     #[inline]
     fn exp(self) -> Self {

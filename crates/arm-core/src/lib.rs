@@ -37,6 +37,7 @@ mod robot;
 mod scalar;
 mod setup;
 mod trajectory;
+mod unroll;
 
 pub use body::{Body, Orthosis};
 pub use chain::{Chain, Segment};
