@@ -130,7 +130,7 @@ fn side_by_side<const N: usize>(
     let model = Model::new(&setup, link, effects.collect())?;
     let input = |half_steps: usize| {
         let commanded = match table {
-            Some(table) => pack_input(|_| table.0[half_steps]),
+            Some(table) => broadcast(&table.0[half_steps]),
             None => {
                 let time = schedule.half_time(half_steps);
                 pack_input(|i| command(&lane(i).experiment.drive, time))
@@ -242,6 +242,20 @@ fn pack_input<const N: usize>(input: impl Fn(usize) -> Input<f64, N>) -> Input<W
             acceleration: pack_plane(|i| inputs[i].handle.acceleration),
         },
         torque: Joints::from_fn(|j, _| pack(|i| inputs[i].torque[j])),
+    }
+}
+
+/// The same input in every lane.
+fn broadcast<const N: usize>(input: &Input<f64, N>) -> Input<Wide, N> {
+    let plane = |v: Plane<f64>| v.map(Wide::of);
+    Input {
+        time: Wide::of(input.time),
+        handle: Handle {
+            position: plane(input.handle.position),
+            velocity: plane(input.handle.velocity),
+            acceleration: plane(input.handle.acceleration),
+        },
+        torque: Joints::from_fn(|j, _| Wide::of(input.torque[j])),
     }
 }
 

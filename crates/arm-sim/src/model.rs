@@ -1,6 +1,6 @@
 //! The closed chain at one instant: from state and drive to accelerations, forces and powers.
 
-use arm_core::effect::{Effect, Local, Motion};
+use arm_core::effect::{Effect, Local, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Plane, Pose, Scalar, Setup, forward_dynamics,
     joint_force, tip, tip_velocity,
@@ -102,15 +102,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     /// Sum of what all effects resist with \[N m\].
     #[inline]
     pub fn resisting(&self, motion: &Motion<T, N>, memory: &[T]) -> Joints<T, N> {
-        let mut total = Joints::<T, N>::repeat(T::ZERO);
-        for (effect, &memory) in self.effects.iter().zip(memory) {
-            let torque = effect.torque(&motion.local(effect.index, memory));
-            total[effect.index] += torque;
-            if effect.index > 0 {
-                total[effect.index - 1] += effect.proximal_share() * torque;
-            }
-        }
-        total
+        resisting_torque(&self.effects, motion, memory)
     }
 
     /// Time derivatives of the effects' own states.
