@@ -202,7 +202,7 @@ def _write(out: Path, truth: Model, fits: tuple[Identified, Identified], passive
 def _half_gap(parts: list[figures.Part]) -> list[float]:
     """Return for each joint half the difference of the mean unexplained torque between both directions [N m]."""
     _, left, sign = (np.concatenate(items) for items in zip(*parts, strict=True))
-    return [float(np.mean(left[sign[:, j] > 0, j]) - np.mean(left[sign[:, j] < 0, j])) / 2.0 for j in range(left.shape[1])]
+    return [0.5 * abs(np.mean(left[sign[:, j] > 0, j]) - np.mean(left[sign[:, j] < 0, j])) for j in range(left.shape[1])]
 
 
 def _demo_data(rows: list[dict[str, Any]], found: Identified, gaps: list[list[float]], command: str | None) -> dict[str, Any]:

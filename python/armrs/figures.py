@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import plotting, tables
-from .identification import Identified
+from .identification import Explained, Identified
 from .moments import PassiveMoments
 from .simulation import Simulated
 from .trial import Trial
@@ -92,8 +92,8 @@ def _torques(result: Identified, joints: Sequence[str]) -> list[Drawn]:
         figure = plotting.figure(5.0 * max(n, 1) + 0.4, 4.6)
         axes = figure.subplots(2, n, squeeze=False, sharex=True, height_ratios=(2.0, 1.0))
         for j, name in enumerate(joints):
-            plotting.torque(shown.t, shown.measured[:, j], shown.fitted[:, j], axes[0, j], title=name)
-            plotting.residual([(e.t, e.measured[:, j] - e.fitted[:, j], e.trial.role) for e in own], axes[1, j])
+            plotting.torque(_elapsed(shown), shown.measured[:, j], shown.fitted[:, j], axes[0, j], title=name)
+            plotting.residual([(_elapsed(e), e.measured[:, j] - e.fitted[:, j], e.trial.role) for e in own], axes[1, j])
             axes[0, j].set_xlabel("")
         text = (
             f"Above, joint torques of {shown.trial.file} ({shown.trial.role} trial): what the measured forces and motion ask for, and what "
@@ -101,6 +101,11 @@ def _torques(result: Identified, joints: Sequence[str]) -> list[Drawn]:
         )
         drawn.append(Drawn(f"torques-{slug(configuration)}", f"Torques of the movement {configuration}", text, figure))
     return drawn
+
+
+def _elapsed(explained: Explained) -> np.ndarray:
+    """Return times since the start of the trial, so that repeats lie on one another whatever their clock says."""
+    return explained.t - explained.trial.t[0]
 
 
 _TORQUES = {

@@ -146,6 +146,7 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
     ax.set_ylim(len(items) - 0.4, -0.6)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
+    ax.locator_params(axis="x", nbins=6)
     ax.set_xlabel(f"[{tables.unit(items[0]['unit']) or 'relative'}]" if items else "")
     return ax
 

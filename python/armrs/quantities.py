@@ -11,6 +11,7 @@ from .model import Model, Segment
 from .rig import all_effects
 
 _FACTOR = re.compile(r"([mlaIn])([1-9][0-9]?)(?:\^([1-9]))?")
+_BRACKET = re.compile(r"((?:[^\s+*]+\*)+)\(([^()]*)\)")
 _READ: dict[str, Callable[[Segment], float]] = {
     "m": lambda s: s.mass,
     "l": lambda s: s.com,
@@ -27,8 +28,8 @@ def value_in(model: Model, name: str, *, kind: str = "segment", joint: int | Non
     ----------
     model : Model
     name : str
-        A sum of products of masses `m1`, centres of mass `l1` (along) and `n1` (normal), lengths `a1` and inertias `I1` about the centre
-        of mass, or the name of a parameter of an effect.
+        A sum of products, brackets not nested, of masses `m1`, centres of mass `l1` (along) and `n1` (normal), lengths `a1` and inertias
+        `I1` about the centre of mass, or the name of a parameter of an effect.
     kind : str
         "segment", "combination", or a kind of effect.
     joint : int, optional
@@ -48,6 +49,7 @@ def value_in(model: Model, name: str, *, kind: str = "segment", joint: int | Non
 
 
 def _sum(model: Model, name: str) -> float | None:
+    name = _BRACKET.sub(lambda found: " + ".join(f"{found[1]}{term.strip()}" for term in found[2].split("+")), name)
     factors = [[_FACTOR.fullmatch(factor.strip()) for factor in term.split("*")] for term in name.split("+")]
     total = 0.0
     for term in factors:

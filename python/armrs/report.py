@@ -25,6 +25,7 @@ _CSS = """
 body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 main { max-width: 66rem; margin: 0 auto; padding: 2rem 1.25rem 4rem; }
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .4rem; }
+h1:not(:first-child) { margin-top: 5rem; padding-top: 1.5rem; border-top: 4px solid var(--line); }
 h2 { font-size: 1.2rem; margin: 2.6rem 0 .6rem; padding-top: .9rem; border-top: 1px solid var(--line); }
 p { max-width: 46rem; margin: .5rem 0; }
 .verdict { font-size: 1.1rem; border-left: 4px solid var(--mark); padding: .2rem 0 .2rem .9rem; margin: 1rem 0; }
@@ -179,10 +180,9 @@ def _result(data: Mapping[str, Any], folder: Path) -> str:
 def _identified(data: Mapping[str, Any]) -> str:
     joints, level = data["data"]["joints"], data["level"]
     out = heading("Data set") + bullets(words.data_lines(data["data"]))
-    measured = [e for e in data["combinations"] if e["decided_by"] == "data"]
     out += heading("What these movements determine")
-    out += paragraph("These combinations are what the measurement shows, whatever the model says.", "soft")
-    out += table(tables.estimates(measured, joints, level))
+    out += paragraph("This is what the measurement shows, whatever the model says.", "soft")
+    out += table(tables.estimates(tables.measured(data), joints, level))
     out += heading("Parameters")
     out += _decided(data["parameters"])
     out += table(tables.estimates(data["parameters"], joints, level), [e["decided_by"] for e in data["parameters"]])
@@ -202,7 +202,7 @@ def _identified(data: Mapping[str, Any]) -> str:
 
 def _decided(items: Sequence[Mapping[str, Any]]) -> str:
     present = {e["decided_by"] for e in items}
-    return bullets(f"Decided by {key}: {meaning}." for key, meaning in tables.DECIDED_BY.items() if key in present)
+    return bullets(f"Decided by {key}: it rests on {meaning}." for key, meaning in tables.DECIDED_BY.items() if key in present)
 
 
 def _simulated(data: Mapping[str, Any]) -> str:
@@ -217,7 +217,11 @@ def _passive(data: Mapping[str, Any]) -> str:
 
 def _demo(data: Mapping[str, Any]) -> str:
     out = heading("What was done") + bullets(data["story"])
-    out += heading("Identified beside known") + paragraph(data["comparison_text"], "soft") + table(tables.comparison(data))
+    out += (
+        heading("Identified beside known")
+        + paragraph(data["comparison_text"], "soft")
+        + table(tables.comparison(data), [row["decided_by"] for row in data["comparison"]])
+    )
     return out + heading("What the model handed over lacked") + paragraph(data["missing_text"])
 
 

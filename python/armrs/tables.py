@@ -8,8 +8,8 @@ from typing import Any
 
 DECIDED_BY = {
     "data": "the measurement",
-    "prior": "the model as given: the movements do not show it",
-    "bound": "a physical limit that it ran into",
+    "prior": "the model as given, because these movements do not show it",
+    "bound": "a physical limit that the fit ran into",
 }
 """What decided a value, in plain words."""
 
@@ -45,6 +45,12 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
     )
 
 
+def measured(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the estimates of an identification that rest on the measurement, combinations first, each once."""
+    found = {(label(e), e["joint"]): e for e in (*result["combinations"], *result["parameters"]) if e["decided_by"] == "data"}
+    return list(found.values())
+
+
 def residuals(rms: Mapping[str, Mapping[str, float]], joints: Sequence[str]) -> Table:
     """Return the root mean square of the torque residual by joint, fit trials beside test trials."""
     roles = [role for role in ("fit", "test") if role in rms]
@@ -55,8 +61,13 @@ def residuals(rms: Mapping[str, Mapping[str, float]], joints: Sequence[str]) -> 
 
 def label(item: Mapping[str, Any]) -> str:
     """Name a quantity so that it can stand alone: a parameter of an effect with its kind."""
-    name = str(item["name"]).replace("^2", "²").replace("*", "·")
+    name = symbol(str(item["name"]))
     return name if item["kind"] in ("segment", "combination", "calibration") else f"{item['kind']} {name}"
+
+
+def symbol(text: str) -> str:
+    """Set a sum of products as print does: `m1*l1^2` is m1·l1²."""
+    return text.replace("^2", "²").replace("*", "·")
 
 
 def where(item: Mapping[str, Any], joints: Sequence[str]) -> str:
@@ -65,7 +76,7 @@ def where(item: Mapping[str, Any], joints: Sequence[str]) -> str:
     if joint is None:
         return ""
     name = joints[joint - 1] if joint <= len(joints) else ""
-    return f"{joint} {name}".strip()
+    return name if name == f"joint {joint}" else f"{joint} {name}".strip()
 
 
 def unit(text: str) -> str:

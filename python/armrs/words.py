@@ -80,18 +80,23 @@ def data_lines(data: Mapping[str, Any]) -> list[str]:
 
 def cannot_tell(result: Mapping[str, Any]) -> list[str]:
     """Return what the data cannot tell, a line each."""
-    lines = [f"{line}." for line in result["not_separable"]]
+    lines = [_trade(line) for line in result["not_separable"]]
     if result["scale_free"]:
         lines.append("No torque acted: all values are known up to one common factor, which was taken from the model.")
     return lines
+
+
+def _trade(line: str) -> str:
+    """Say in a sentence which quantities trade: `m2 and m1*l1 trade 1 : -0.376`."""
+    names, trades, ratio = tables.symbol(line).partition(" trade ")
+    return f"{names} can change together as {ratio}, and nothing that was measured changes." if trades else f"{names}."
 
 
 def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print an identification."""
     data, joints, level = result["data"], result["data"]["joints"], result["level"]
     _head(result)
-    measured = [e for e in result["combinations"] if e["decided_by"] == "data"]
-    show("What these movements determine", tables.estimates(measured, joints, level))
+    show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
     show("Absorbed by the calibration, within the tolerance declared", tables.estimates(result["calibration"], joints, level))
     show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
