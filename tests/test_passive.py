@@ -102,3 +102,19 @@ def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     )
     assert (tmp_path / "figures/passive-slow.png").stat().st_size > 20_000
     assert "Synthetic data" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_nothing_to_tell_is_a_finding(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    dataset = armrs.load_dataset(slow_arm)
+    armrs.write_dataset(dataset.replace(trials=tuple(_first_second(t) for t in dataset.trials)), tmp_path)
+    assert cli.main(["passive", str(tmp_path)]) == 1
+    out, err = capsys.readouterr()
+    assert "No joint moved far enough" in out
+    assert err.count("warning: slow: joint 1 moved, but not long enough in both directions") == 1
+
+
+def _first_second(trial: armrs.Trial) -> armrs.Trial:
+    n = 100
+    return armrs.Trial(
+        trial.file, trial.configuration, trial.repeat, trial.role, trial.t[:n], trial.q[:n], trial.force_on_arm[:n], None, None
+    )

@@ -194,8 +194,11 @@ def identify(
     motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
     level: Annotated[float, typer.Option(help="Probability of the intervals, 0.5 to 1.")] = 0.95,
     json: JsonFile = None,
-) -> None:
-    """Identify body segment and joint parameters, each with an interval and what decided it."""
+) -> int:
+    """Identify body segment and joint parameters, each with an interval and what decided it.
+
+    Exit status 1 when the solver did not quite get there.
+    """
     from . import results, words
     from .dataset import load_dataset
     from .identification import identify as run_identification
@@ -209,6 +212,7 @@ def identify(
     written = results.write_identified(result, plain, folder) if folder else []
     console.warn(data.warnings)
     present(lambda: plain, json, lambda: words.identified(plain, written))
+    return 0 if result.status == "solved" else 1
 
 
 @app.command()
@@ -256,7 +260,7 @@ def simulate(
             duration=duration_s,
             coupling=coupling.value,
         )
-    plain = results.simulated_data(result, os.fspath(movement or trial or ""), _command(context))
+    plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", _command(context))
     written = results.write_simulated(result, plain, folder, suffix=f".{to.value}", trial=measured) if folder else []
     present(lambda: plain, json, lambda: words.simulated(plain, written))
 
@@ -269,8 +273,11 @@ def passive(
     cutoff_hz: Annotated[float, typer.Option(help="Cutoff of the low-pass of angles and forces [Hz].")] = 1.0,
     bins: Annotated[int, typer.Option(help="Angle bins over the range of a joint.")] = 24,
     json: JsonFile = None,
-) -> None:
-    """Passive joint moments of slow movements: elastic mean and hysteresis against the angle."""
+) -> int:
+    """Compute passive joint moments of slow movements: elastic mean and hysteresis against the angle.
+
+    Exit status 1 when no joint moved long enough in both directions.
+    """
     from . import results, words
     from .dataset import load_dataset
     from .moments import passive_moments
@@ -283,6 +290,7 @@ def passive(
     written = results.write_passive(result, plain, folder) if folder else []
     console.warn([*data.warnings, *result.warnings])
     present(lambda: plain, json, lambda: words.passive(plain, written))
+    return 0 if result.curves else 1
 
 
 @app.command()
