@@ -3,7 +3,8 @@
 use core::array::from_fn;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use crate::scalar::{DOUBLE, LARGEST_REDUCED, Scalar, reduced_sin_cos, turned};
+use crate::scalar::Scalar;
+use crate::series::{DOUBLE, LARGEST_REDUCED, exp, reduced_sin_cos, tanh, turned};
 
 /// `L` numbers that are computed with together; each lane has the bits of the same computation in `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,11 +101,11 @@ impl<const L: usize> Scalar for Lanes<L> {
     }
     #[inline]
     fn exp(self) -> Self {
-        self.map(libm::exp)
+        self.map(exp)
     }
     #[inline]
     fn tanh(self) -> Self {
-        self.map(libm::tanh)
+        self.map(tanh)
     }
     #[inline]
     fn atan2(self, x: Self) -> Self {

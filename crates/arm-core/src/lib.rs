@@ -35,6 +35,7 @@ pub mod models;
 mod regressor;
 mod robot;
 mod scalar;
+mod series;
 mod setup;
 mod trajectory;
 mod unroll;

@@ -46,7 +46,7 @@ fn same<const L: usize>(together: Lanes<L>, lane: usize, alone: f64) {
     assert_eq!(together.0[lane].to_bits(), alone.to_bits(), "lane {lane}");
 }
 
-fn sine<const L: usize>(seed: u64) {
+fn functions<const L: usize>(seed: u64) {
     let mut random = Random(seed);
     for bound in [1.0, 1e3, 1e5, 1e7] {
         for _ in 0..2000 {
@@ -56,6 +56,8 @@ fn sine<const L: usize>(seed: u64) {
                 let (s, c) = Scalar::sin_cos(x[lane]);
                 same(sin, lane, s);
                 same(cos, lane, c);
+                same(Lanes(x).exp(), lane, Scalar::exp(x[lane]));
+                same(Lanes(x).tanh(), lane, Scalar::tanh(x[lane]));
             }
         }
     }
@@ -197,9 +199,9 @@ fn rig<const L: usize>(effect: &Effect<Lanes<L>>, all: &[Effect<f64>; L], random
 }
 
 #[test]
-fn sine_and_cosine() {
-    sine::<4>(101);
-    sine::<8>(102);
+fn transcendental_functions() {
+    functions::<4>(101);
+    functions::<8>(102);
 }
 #[test]
 fn forward_and_inverse_dynamics() {

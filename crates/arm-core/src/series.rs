@@ -1,0 +1,187 @@
+//! Sine, cosine, exponential and hyperbolic tangent by polynomials, without a branch, for one number or many at once.
+
+use crate::Scalar;
+
+/// Constants of the sine and cosine polynomials in one precision.
+pub(crate) struct Trigonometry<const S: usize, const C: usize> {
+    /// 1.5·2^(p−1): adding and subtracting it rounds to the nearest integer.
+    pub round: f64,
+    /// π/2 in three parts, the first two short enough that their products with an integer are exact.
+    pub half_pi: [f64; 3],
+    /// Sine: x + x³(s₀ + s₁x² + …).
+    pub sine: [f64; S],
+    /// Cosine: 1 − x²/2 + x⁴(c₀ + c₁x² + …).
+    pub cosine: [f64; C],
+}
+
+/// Coefficients of FreeBSD's `k_sin.c` and `k_cos.c` (error below 1 ulp on ±π/4).
+#[expect(clippy::excessive_precision, reason = "the digits of the source")]
+pub(crate) const DOUBLE: Trigonometry<6, 6> = Trigonometry {
+    round: 6_755_399_441_055_744.0,
+    half_pi: [
+        1.570_796_326_734_125_614_17,
+        6.077_100_506_303_965_976_60e-11,
+        2.022_266_248_795_950_631_54e-21,
+    ],
+    sine: [
+        -1.666_666_666_666_663_243_48e-01,
+        8.333_333_333_322_489_461_24e-03,
+        -1.984_126_982_985_794_931_34e-04,
+        2.755_731_370_707_006_767_89e-06,
+        -2.505_076_025_340_686_341_95e-08,
+        1.589_690_995_211_550_102_21e-10,
+    ],
+    cosine: [
+        4.166_666_666_666_660_190_37e-02,
+        -1.388_888_888_887_410_957_49e-03,
+        2.480_158_728_947_672_941_78e-05,
+        -2.755_731_435_139_066_330_35e-07,
+        2.087_572_321_298_174_827_90e-09,
+        -1.135_964_755_778_819_482_65e-11,
+    ],
+};
+
+/// Coefficients of Cephes `sinf.c` and `cosf.c`.
+#[allow(clippy::excessive_precision, reason = "the digits of the source")]
+pub(crate) const SINGLE: Trigonometry<3, 3> = Trigonometry {
+    round: 12_582_912.0,
+    half_pi: [
+        1.570_312_5,
+        4.837_512_969_970_703e-4,
+        7.549_789_948_768_648e-8,
+    ],
+    sine: [-1.666_665_461_1e-1, 8.332_160_873_6e-3, -1.951_529_589_1e-4],
+    cosine: [
+        4.166_664_568_298_827e-2,
+        -1.388_731_625_493_765e-3,
+        2.443_315_711_809_948e-5,
+    ],
+};
+
+/// An angle reduced to the nearest multiple of a quarter turn.
+pub(crate) struct Reduced<T> {
+    /// That multiple plus [`Trigonometry::round`]: the lowest bits of its mantissa are those of the integer.
+    pub quarters: T,
+    /// Sine of the rest.
+    pub sin: T,
+    /// Cosine of the rest.
+    pub cos: T,
+}
+
+/// Sine and cosine by reduction to ±π/4 and two polynomials, up to the quarter turns; without a branch.
+#[inline]
+pub(crate) fn reduced_sin_cos<T: Scalar, const S: usize, const C: usize>(
+    x: T,
+    k: &Trigonometry<S, C>,
+) -> Reduced<T> {
+    let quarters = x * T::of(core::f64::consts::FRAC_2_PI) + T::of(k.round);
+    let n = quarters - T::of(k.round);
+    // In this order: the first two products and differences are exact, which the tiny rest at a multiple of π/2 needs.
+    let r = ((x - n * T::of(k.half_pi[0])) - n * T::of(k.half_pi[1])) - n * T::of(k.half_pi[2]);
+    let z = r * r;
+    let sin = r + r * z * series(&k.sine, z);
+    let half = T::of(0.5) * z;
+    let w = T::ONE - half;
+    let cos = w + (((T::ONE - w) - half) + z * z * series(&k.cosine, z));
+    Reduced { quarters, sin, cos }
+}
+
+/// `c₀ + c₁z + c₂z² + …` by pairs, which wait for each other half as often as one by one.
+#[inline]
+fn series<T: Scalar>(c: &[f64], z: T) -> T {
+    let square = z * z;
+    let pair = |p: &[f64]| {
+        p[1..]
+            .iter()
+            .fold(T::of(p[0]), |sum, &next| sum + T::of(next) * z)
+    };
+    let mut pairs = c.chunks(2).rev().map(pair);
+    let last = pairs.next().unwrap_or(T::ZERO);
+    pairs.fold(last, |sum, next| next + square * sum)
+}
+
+/// Turns sine and cosine by quarters: exchanges them for odd ones, and sets the signs.
+#[inline]
+pub(crate) fn turned(reduced: Reduced<f64>) -> (f64, f64) {
+    let n = reduced.quarters.to_bits();
+    let (sin, cos) = (reduced.sin.to_bits(), reduced.cos.to_bits());
+    let exchange = (sin ^ cos) & (n & 1).wrapping_neg();
+    (
+        f64::from_bits((sin ^ exchange) ^ ((n & 2) << 62)),
+        f64::from_bits((cos ^ exchange) ^ ((n.wrapping_add(1) & 2) << 62)),
+    )
+}
+
+/// As [`turned`], in single precision.
+#[inline]
+pub(crate) fn turned_single(reduced: Reduced<f32>) -> (f32, f32) {
+    let n = reduced.quarters.to_bits();
+    let (sin, cos) = (reduced.sin.to_bits(), reduced.cos.to_bits());
+    let exchange = (sin ^ cos) & (n & 1).wrapping_neg();
+    (
+        f32::from_bits((sin ^ exchange) ^ ((n & 2) << 30)),
+        f32::from_bits((cos ^ exchange) ^ ((n.wrapping_add(1) & 2) << 30)),
+    )
+}
+
+/// Beyond this angle \[rad\] the short reduction would lose accuracy.
+pub(crate) const LARGEST_REDUCED: f64 = 1e5;
+
+/// 1.5·2⁵²: adding and subtracting it rounds to the nearest integer.
+const ROUND: f64 = DOUBLE.round;
+/// ln 2 in two parts, the first short enough that its product with an exponent is exact (FreeBSD's `e_exp.c`).
+const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
+/// 1/2!, 1/3!, … 1/13!: the first term left out is below 10⁻¹⁷ within ±½ ln 2.
+const FACTORIALS: [f64; 12] = [
+    1.0 / 2.0,
+    1.0 / 6.0,
+    1.0 / 24.0,
+    1.0 / 120.0,
+    1.0 / 720.0,
+    1.0 / 5_040.0,
+    1.0 / 40_320.0,
+    1.0 / 362_880.0,
+    1.0 / 3_628_800.0,
+    1.0 / 39_916_800.0,
+    1.0 / 479_001_600.0,
+    1.0 / 6_227_020_800.0,
+];
+
+/// `[2ⁿ⁻¹, eʳ − 1]` of `x = n ln 2 + r`.
+#[inline]
+fn power_and_rest(x: f64) -> [f64; 2] {
+    let biased = x * core::f64::consts::LOG2_E + ROUND;
+    let n = biased - ROUND;
+    let r = (x - n * LN_2[0]) - n * LN_2[1];
+    let rest = r + r * r * series(&FACTORIALS, r);
+    // The lowest bits of the mantissa are those of n.
+    let exponent = (biased.to_bits() << 52).wrapping_add(1022 << 52);
+    [f64::from_bits(exponent), rest]
+}
+
+/// Exponential; zero below −708, where it would not be a normal number.
+#[inline]
+pub(crate) fn exp(x: f64) -> f64 {
+    let inside = if x < -708.0 { -708.0 } else { x };
+    let inside = if inside > 710.0 { 710.0 } else { inside };
+    let [half, rest] = power_and_rest(inside);
+    let value = 2.0 * (half + half * rest);
+    if x < -708.0 { 0.0 } else { value }
+}
+
+/// Beyond this the hyperbolic tangent is 1 in double precision.
+pub(crate) const SATURATED: f64 = 20.0;
+
+/// Hyperbolic tangent, `(e²ˣ − 1)/(e²ˣ + 1)`.
+#[inline]
+pub(crate) fn tanh(x: f64) -> f64 {
+    let size = if x.abs() > SATURATED {
+        SATURATED
+    } else {
+        x.abs()
+    };
+    let [half, rest] = power_and_rest(2.0 * size);
+    let power = 2.0 * half;
+    let grown = power * rest + (power - 1.0);
+    (grown / (grown + 2.0)).copysign(x)
+}
