@@ -6,6 +6,7 @@ mod calculus;
 mod catalogue;
 mod chain;
 mod common;
+mod contact;
 mod dual;
 mod effects;
 mod identities;
