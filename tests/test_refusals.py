@@ -117,6 +117,9 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "output below a file": (("passive", "data", "-o", "data/model.toml/x"), nothing, "Not a directory"),
     "demo into a file": (("demo", "-o", "data/model.toml"), nothing, "-o: found a file"),
     "JSON over a model": (("passive", "data", "--json", "data/model.toml"), nothing, "an existing file with suffix '.toml'"),
+    "results and JSON over a model": ((*PASSIVE, "--json", "data/model.toml"), nothing, "an existing file with suffix '.toml'"),
+    "demo and JSON over a model": (("demo", "-o", "out", "--json", "data/model.toml"), nothing, "an existing file with suffix '.toml'"),
+    "JSON into a folder": ((*PASSIVE, "--json", "data"), nothing, "data: file: found a folder"),
     "report of nothing": (("report",), nothing, "Missing"),
     "report of a trial": (("report", "data/trials/slow_1.csv"), nothing, "slow_1.csv: file: found"),
 }  # fmt: skip

@@ -175,6 +175,7 @@ def demo(context: typer.Context, out: OutFolder = Path("armrs-demo"), json: Json
     from .demo import run_demo
     from .report import read_result
 
+    _folder(out, json)
     with console.progress("demo"):
         result = run_demo(out, command=_command(context))
     plain = read_result(out / "demo.json")
@@ -203,7 +204,7 @@ def identify(
     from .dataset import load_dataset
     from .identification import identify as run_identification
 
-    folder = _folder(out)
+    folder = _folder(out, json)
     data = load_dataset(dataset)
     kinds = [kind.strip() for kind in with_.split(",") if kind.strip()]
     with console.progress("identifying"):
@@ -245,7 +246,7 @@ def simulate(
     if (movement is None) == (trial is None):
         found = Text("neither" if movement is None else "both")
         raise BadInput("--movement, --trial", found, "one of them")
-    folder = _folder(out)
+    folder = _folder(out, json)
     arm = load_model(model)
     measured = None if trial is None else _single_trial(trial, arm.n_joints)
     drive = measured if movement is None else load_movement(movement, arm.n_joints)
@@ -282,7 +283,7 @@ def passive(
     from .dataset import load_dataset
     from .moments import passive_moments
 
-    folder = _folder(out)
+    folder = _folder(out, json)
     data = load_dataset(dataset)
     with console.progress("passive moments"):
         result = passive_moments(data, cutoff=cutoff_hz, bins=bins)
@@ -321,8 +322,10 @@ def _single_trial(path: Path, n_joints: int) -> Trial:
     return reading.trial
 
 
-def _folder(out: Path | None) -> Path | None:
-    """Refuse an output folder that cannot be one before any work is done."""
+def _folder(out: Path | None, json: Path | None = None) -> Path | None:
+    """Refuse outputs that cannot be written before any work is done."""
+    if json is not None and json != _STDOUT:
+        files.may_replace(json, ".json")
     return None if out is None else files.output_folder(out)
 
 

@@ -19,12 +19,10 @@ PathLike = str | os.PathLike[str]
 def replacing(path: PathLike) -> Iterator[Path]:
     """Give a temporary path in the same folder; on success it takes the place of `path` at once, on failure nothing remains.
 
-    The folder is made when it does not exist. The content is on the disk before the name changes, so that after a crash the file is
+    The folder is made when it does not exist; `may_replace` comes first. The content is on the disk before the name changes, so that after a crash the file is
     either the old or the new one.
     """
     target = Path(path)
-    if target.is_dir():
-        raise BadInput("file", Text("a folder"), "the name of a file", file=path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
@@ -80,8 +78,10 @@ def json_text(data: Any) -> str:
 
 
 def may_replace(path: PathLike, kind: str) -> None:
-    """Refuse to replace a file whose suffix says that it is of another kind than `kind`."""
+    """Refuse to replace a folder, and a file whose suffix says that it is of another kind than `kind`."""
     target = Path(path)
+    if target.is_dir():
+        raise BadInput("file", Text("a folder"), "the name of a file", file=path)
     if target.is_file() and target.stat().st_size > 0 and target.suffix.lower() != kind:
         raise BadInput(
             "file", Text(f"an existing file with suffix {target.suffix!r}"), f"a new file, or a {kind} file to replace", file=path

@@ -69,7 +69,9 @@ def data_lines(data: Mapping[str, Any]) -> list[str]:
     for role, meaning in (("fit", "fitted on"), ("test", "only checked on")):
         part = data[role]
         if part["trials"]:
-            lines.append(f"{part['trials']} trials {meaning}: {part['duration_s']:.0f} s, {part['samples']} samples.")
+            lines.append(
+                f"{part['trials']} trial{'s' * (part['trials'] > 1)} {meaning}: {part['duration_s']:.0f} s, {part['samples']} samples."
+            )
     if not data["test"]["trials"]:
         lines.append("No test trials: nothing was checked on data that the fit has not seen.")
     lines.append(f"Movements: {', '.join(data['configurations'])}.")
