@@ -7,7 +7,7 @@ use arm_core::{Contact, Joints, Lanes, Plane, Scalar, Segment, Setup};
 
 use crate::model::{Input, Link, Model, State};
 use crate::native::diverged;
-use crate::prepare::{Prepared, Schedule, command, known, with_ripple};
+use crate::prepare::{Prepared, Schedule, add_ripple, command, known};
 use crate::recorder::Recorder;
 use crate::step::{Inputs, Memory, step};
 use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
@@ -129,14 +129,15 @@ fn side_by_side<const N: usize>(
         (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
     let model = Model::new(&setup, link, effects.collect())?;
     let input = |half_steps: usize| {
-        let commanded = match table {
+        let mut input = match table {
             Some(table) => broadcast(&table.0[half_steps]),
             None => {
                 let time = schedule.half_time(half_steps);
                 pack_input(|i| command(&lane(i).experiment.drive, time))
             }
         };
-        with_ripple(commanded, &setup)
+        add_ripple(&mut input, &setup);
+        input
     };
 
     let mut memory = Memory::<Wide>::new(model.effects.len());

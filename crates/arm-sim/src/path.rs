@@ -1,6 +1,6 @@
 //! Where the robot's handle is at any time.
 
-use arm_core::{Chain, Lanes, Plane, Robot, Scalar};
+use arm_core::{Chain, Plane, Robot, Scalar};
 
 use crate::{Interpolation, Jet, JointMotion, Movement, Series, SimulationError};
 
@@ -161,26 +161,21 @@ fn joints(jet: Jet<2>) -> JointMotion<2> {
     }
 }
 
-/// Position, velocity and acceleration of an arm's tip: the sums over its links, with all sines and cosines at once.
+/// Position, velocity and acceleration of an arm's tip: the sums over its links.
 #[inline]
 fn tip_motion<const N: usize>(arm: &Chain<f64, N>, motion: &JointMotion<N>) -> Handle<f64> {
-    let mut angles = [0.0; N];
-    let mut sum = 0.0;
-    for (angle, q) in angles.iter_mut().zip(motion.q.iter()) {
-        sum += q;
-        *angle = sum;
-    }
-    let (sin, cos) = Lanes(angles).sin_cos();
     let mut handle = Handle {
         position: arm.base(),
         velocity: [0.0; 2],
         acceleration: [0.0; 2],
     };
-    let (mut speed, mut acceleration) = (0.0, 0.0);
+    let (mut angle, mut speed, mut acceleration) = (0.0, 0.0, 0.0);
     for (i, segment) in arm.segments().iter().enumerate() {
+        angle += motion.q[i];
         speed += motion.qd[i];
         acceleration += motion.qdd[i];
-        let [y, z] = [segment.length * cos.0[i], segment.length * sin.0[i]];
+        let (sin, cos) = Scalar::sin_cos(angle);
+        let [y, z] = [segment.length * cos, segment.length * sin];
         let inward = speed * speed;
         handle.position[0] += y;
         handle.position[1] += z;

@@ -126,7 +126,9 @@ impl<'a, const N: usize> Prepared<'a, N> {
     /// Handle, ripple included, and torques at a time \[s\].
     #[inline]
     pub fn input(&self, time: f64) -> Input<f64, N> {
-        with_ripple(command(&self.experiment.drive, time), &self.setup)
+        let mut input = command(&self.experiment.drive, time);
+        add_ripple(&mut input, &self.setup);
+        input
     }
 
     pub fn integrator(&self) -> Integrator {
@@ -160,12 +162,9 @@ pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64,
 
 /// The periodic error of the robot's position on top of the commanded handle: `amplitude · sin(2π f t + phase)`.
 #[inline]
-pub(crate) fn with_ripple<T: Scalar, const N: usize>(
-    mut input: Input<T, N>,
-    setup: &Setup<T, N>,
-) -> Input<T, N> {
+pub(crate) fn add_ripple<T: Scalar, const N: usize>(input: &mut Input<T, N>, setup: &Setup<T, N>) {
     if setup.ripple.iter().all(|a| a.every(|a| a == 0.0)) {
-        return input;
+        return;
     }
     let omega = T::of(core::f64::consts::TAU) * setup.ripple_frequency;
     let (sin, cos) = (omega * input.time + setup.ripple_phase).sin_cos();
@@ -175,7 +174,6 @@ pub(crate) fn with_ripple<T: Scalar, const N: usize>(
         input.handle.velocity[axis] += amplitude * omega * cos;
         input.handle.acceleration[axis] -= amplitude * omega.squared() * sin;
     }
-    input
 }
 
 /// What the chain does not check.
