@@ -61,6 +61,11 @@ def test_the_data_set_is_labelled_and_the_truth_lies_apart(folder: Path) -> None
     assert max(np.abs(t.q - t.q[0]).max() for t in dataset.trials) < np.radians(15)
 
 
+def test_a_converted_data_set_is_still_synthetic(folder: Path, tmp_path: Path) -> None:
+    armrs.convert(folder / "data", tmp_path, to="parquet")
+    assert armrs.load_dataset(tmp_path).synthetic
+
+
 def test_the_direction_of_motion_shows_the_friction_before_and_not_after(folder: Path, result: dict) -> None:
     assert "shoulder 0.1" in result["missing_text"]
     assert "not found by a search" in result["missing_text"]

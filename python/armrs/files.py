@@ -19,8 +19,8 @@ PathLike = str | os.PathLike[str]
 def replacing(path: PathLike) -> Iterator[Path]:
     """Give a temporary path in the same folder; on success it takes the place of `path` at once, on failure nothing remains.
 
-    The folder is made when it does not exist; `may_replace` comes first. The content is on the disk before the name changes, so that after a crash the file is
-    either the old or the new one.
+    The folder is made when it does not exist; `may_replace` comes first. The content is on the disk before the name changes, so that
+    after a crash the file is either the old or the new one.
     """
     target = Path(path)
     try:
