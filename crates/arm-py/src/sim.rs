@@ -97,7 +97,8 @@ pub fn simulate<'py>(
         let experiment = experiment(chain, rig, drive, settings)?;
         let engine = match settings.engine.as_str() {
             "native" => Engine::Native,
-            other => return Err(bad_input("engine", other, "native")),
+            "rapier" => Engine::Rapier,
+            other => return Err(bad_input("engine", other, "native or rapier")),
         };
         let recording = py
             .detach(|| arm_sim::simulate_with(engine, &experiment))

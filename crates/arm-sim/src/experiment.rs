@@ -123,6 +123,9 @@ pub enum Integrator {
 pub enum Engine {
     /// Minimal coordinates: the joint angles.
     Native,
+    /// Maximal coordinates: rigid bodies and joints, solved by rapier. A second opinion.
+    #[cfg(feature = "rapier")]
+    Rapier,
 }
 
 /// Simulates an experiment with the native engine.
@@ -145,6 +148,8 @@ pub fn simulate_with<const N: usize>(
 ) -> Result<Recording<N>, SimulationError> {
     match engine {
         Engine::Native => simulate(experiment),
+        #[cfg(feature = "rapier")]
+        Engine::Rapier => crate::rapier::run(experiment)?.complete(),
     }
 }
 

@@ -30,6 +30,8 @@ mod native;
 mod noise;
 mod path;
 mod prepare;
+#[cfg(feature = "rapier")]
+mod rapier;
 mod record;
 mod recorder;
 mod sensor;
@@ -48,6 +50,8 @@ pub use experiment::{
 };
 pub use movement::{JointMotion, Movement};
 pub use path::{Handle, HandlePath};
+#[cfg(feature = "rapier")]
+pub use rapier::{RapierSettings, simulate_rapier};
 pub use record::{EnergyColumns, Recording, TorqueColumns, WorkColumns};
 pub use sensor::{Channel, Readings, Sensors};
 pub use series::{Interpolation, Jet, Series};

@@ -7,6 +7,8 @@ mod energy;
 mod golden;
 mod long;
 mod pendulum;
+#[cfg(feature = "rapier")]
+mod rapier;
 mod refused;
 mod rigid;
 mod sensor;
