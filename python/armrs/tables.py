@@ -40,9 +40,9 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
         ]
         for item in items
     ]
-    return Table(
-        ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "in the model"], rows, left=2
-    )
+    head = ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "in the model"]
+    used = [k for k in range(len(head)) if any(row[k] not in (None, "") for row in rows)]
+    return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1)
 
 
 def measured(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -91,7 +91,8 @@ def number(value: float | None, std: float | None) -> str:
     if not std or not std > 0:
         return f"{value:.4g}"
     digits = _decimals(std)
-    return f"{value:.{digits}f}" if digits <= 9 else f"{value:.3g}"
+    # Adding zero turns a rounded -0 into 0.
+    return f"{round(value, digits) + 0.0:.{digits}f}" if digits <= 9 else f"{value:.3g}"
 
 
 def spread(std: float | None) -> str:

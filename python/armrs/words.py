@@ -10,7 +10,8 @@ from . import console, tables
 
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "
-    "The mean of both directions is its elastic part, half their difference its dissipative part."
+    "The mean of both directions is its elastic part, half their difference its dissipative part. The mean also holds what is wrong with "
+    "the masses of the model."
 )
 
 
