@@ -22,7 +22,7 @@ pub const LARGEST: f64 = 1e140;
 /// Sums of squares below this are taken as zero, as their inverse would overflow.
 const NOTHING: f64 = 1e-280;
 
-type Column = [f64; BLOCK];
+pub(crate) type Column = [f64; BLOCK];
 
 /// Folds rows of a least-squares problem into a triangular factor. Memory is fixed at [`Condenser::new`]; pushing never allocates.
 ///
@@ -122,6 +122,37 @@ impl Condenser {
             (rows, rhs) = (later, rest);
         }
         Ok(())
+    }
+
+    /// Adds [`BLOCK`] rows at once where no row waits; `false`, and nothing is done, where some do.
+    ///
+    /// * `write` - writes `p + 1` columns, the last of them b
+    ///
+    /// # Errors
+    /// [`IdentError::NotFinite`] as [`Condenser::push`]; then none of the rows is added.
+    #[inline]
+    pub(crate) fn push_panel(
+        &mut self,
+        write: impl FnOnce(&mut [Column]),
+    ) -> Result<bool, IdentError> {
+        if self.waiting > 0 {
+            return Ok(false);
+        }
+        write(&mut self.panel);
+        for column in &self.panel {
+            if !acceptable(column) {
+                let bad = |v: &&f64| v.abs() >= LARGEST || v.is_nan();
+                return Err(IdentError::NotFinite {
+                    name: "rows",
+                    index: self.rows,
+                    found: column.iter().find(bad).copied().unwrap_or(f64::NAN),
+                });
+            }
+        }
+        self.waiting = BLOCK;
+        self.rows += BLOCK;
+        self.fold();
+        Ok(true)
     }
 
     /// Adds all rows of another condenser, after those pushed here. The result depends on the order of merging in its last bits: merge in a fixed order.

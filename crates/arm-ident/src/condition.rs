@@ -9,6 +9,9 @@ use crate::trial::Trial;
 /// Samples kept for each period of the cutoff frequency; a little above the two that the sampling theorem asks for.
 const SAMPLES_PER_PERIOD: f64 = 2.5;
 
+/// Periods of the cutoff frequency that are dropped next to an end or a gap, where filters and differences have guessed.
+const MARGIN: f64 = 1.5;
+
 /// Fewest decimated samples in a stretch that is used.
 const SHORTEST: usize = 8;
 
@@ -48,7 +51,7 @@ pub fn filtered<const N: usize>(
         .collect::<Result<Vec<_>, _>>()?;
     let rhs = smooth(&rows.rhs)?;
     let step = ((trial.rate / (SAMPLES_PER_PERIOD * cutoff)) as usize).max(1);
-    let margin = ((trial.rate / cutoff / 2.0) as usize).max(1);
+    let margin = ((MARGIN * trial.rate / cutoff) as usize).max(1);
     let kept = kept_samples(&trial.valid, margin, step);
     Ok(kept
         .into_iter()
@@ -174,6 +177,24 @@ impl<const N: usize> Noise<N> {
             }
         }
         Self { inverse }
+    }
+
+    /// The same weights, lowered until the residuals are no larger than the noise: what repeats do not show but the
+    /// model cannot explain limits how far data may overrule what is known beforehand.
+    pub fn at_least(mut self, residuals: &[Vec<f64>]) -> Self {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for sample in residuals.iter().flat_map(|p| p.chunks_exact(N)) {
+            for j in 0..N {
+                let value = (0..=j).fold(0.0, |sum, k| sum + self.inverse[j][k] * sample[k]);
+                sum += value * value;
+                count += 1.0;
+            }
+        }
+        let excess = libm::sqrt(sum / f64::max(count, 1.0));
+        if excess > 1.0 {
+            self.inverse.iter_mut().flatten().for_each(|v| *v /= excess);
+        }
+        self
     }
 
     /// Weighs rows in place.

@@ -4,12 +4,11 @@
 //! fitted effects and small imperfections c of the measurement, each through its first-order influence on the row.
 
 use arm_core::effect::{Effect, Motion, resisting_torque};
-use arm_core::{
-    Chain, Joints, Plane, Pose, inverse_dynamics, joint_force, regressor, static_torque,
-};
+use arm_core::{Chain, Joints, Pose, inverse_dynamics, joint_force, regressor, static_torque};
 
+use crate::calibration::{influence, predicted_force};
 use crate::trial::{Model, Trial};
-use crate::unknown::{Imperfection, Moment, Source, Unknown};
+use crate::unknown::{Moment, Source, Unknown};
 
 /// Joint motion at the samples of a trial.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +46,7 @@ pub fn rows<const N: usize>(
     let samples = trial.len();
     let mut columns = vec![vec![0.0; samples * N]; unknowns.len()];
     let mut rhs = vec![0.0; samples * N];
+    let predicted = predicted_force(model, trial, motion);
     let mut memory = Memory::new(model);
     for i in 0..samples {
         let at = Sample::new(model, trial, motion, i);
@@ -62,7 +62,7 @@ pub fn rows<const N: usize>(
             let column = match unknown.source {
                 Source::Segment(k, moment) => inertial[k][position(moment)],
                 Source::Effect(e, p) => gradient(&model.fitted[e], p, &at.motion, memory.fitted[e]),
-                Source::Calibration(what) => at.influence(model, trial, what, i),
+                Source::Calibration(what) => influence(model, trial, motion, (&predicted, i), what),
             };
             if let Source::Segment(k, moment) = unknown.source {
                 explained += column * value_of(&model.chain, k, moment);
@@ -120,14 +120,14 @@ fn gradient<const N: usize>(
 }
 
 /// The states of effects that have one, carried along the motion.
-struct Memory {
-    fitted: Vec<f64>,
-    held: Vec<f64>,
+pub(crate) struct Memory {
+    pub(crate) fitted: Vec<f64>,
+    pub(crate) held: Vec<f64>,
     effects: (Vec<Effect<f64>>, Vec<Effect<f64>>),
 }
 
 impl Memory {
-    fn new<const N: usize>(model: &Model<N>) -> Self {
+    pub(crate) fn new<const N: usize>(model: &Model<N>) -> Self {
         Self {
             fitted: vec![0.0; model.fitted.len()],
             held: vec![0.0; model.held.len()],
@@ -136,7 +136,7 @@ impl Memory {
     }
 
     /// One sampling interval in ten steps, the motion taken as constant in it.
-    fn advance<const N: usize>(&mut self, motion: &Motion<f64, N>, interval: f64) {
+    pub(crate) fn advance<const N: usize>(&mut self, motion: &Motion<f64, N>, interval: f64) {
         const STEPS: usize = 10;
         let lists = [
             (&self.effects.0, &mut self.fitted),
@@ -159,8 +159,6 @@ impl Memory {
 struct Sample<const N: usize> {
     pose: Pose<f64, N>,
     motion: Motion<f64, N>,
-    force: Plane<f64>,
-    moment: f64,
     measured: Joints<f64, N>,
 }
 
@@ -177,62 +175,7 @@ impl<const N: usize> Sample<N> {
         Self {
             pose,
             motion: seen,
-            force,
-            moment,
             measured: torque + static_torque(&model.chain, &pose, force, moment),
         }
-    }
-
-    /// Influence of a small imperfection on the row: what it adds to the left-hand side.
-    fn influence(
-        &self,
-        model: &Model<N>,
-        trial: &Trial<N>,
-        what: Imperfection,
-        i: usize,
-    ) -> Joints<f64, N> {
-        match what {
-            Imperfection::AngleOffset(joint) => self.angle_offset(model, joint),
-            Imperfection::ForceBias(channel) => {
-                let mut unit = [0.0; 2];
-                unit[channel] = 1.0;
-                static_torque(&model.chain, &self.pose, unit, 0.0)
-            }
-            Imperfection::ForceGain(channel) => {
-                let mut share = [0.0; 2];
-                share[channel] = self.force[channel];
-                static_torque(&model.chain, &self.pose, share, 0.0)
-            }
-            Imperfection::TimeDelay => {
-                let Some(force) = &trial.force_on_arm else {
-                    return Joints::zeros();
-                };
-                let (before, after) = (i.saturating_sub(1), (i + 1).min(force.len() - 1));
-                let span = (after - before).max(1) as f64 / trial.rate;
-                let rate = [0, 1].map(|c| (force[after][c] - force[before][c]) / span);
-                -static_torque(&model.chain, &self.pose, rate, 0.0)
-            }
-            Imperfection::HandlePlacement(axis) => {
-                // A displaced handle lengthens the lever of the last segment; every joint feels the same moment.
-                let angle = self.motion.q.iter().fold(0.0, |sum, q| sum + q);
-                let (s, c) = arm_core::Scalar::sin_cos(angle);
-                let direction = if axis == 0 { [c, s] } else { [-s, c] };
-                let moment = direction[0] * self.force[1] - direction[1] * self.force[0];
-                Joints::repeat(-moment)
-            }
-        }
-    }
-
-    /// The measured angle is the true one plus the offset: the row moves against the offset.
-    fn angle_offset(&self, model: &Model<N>, joint: usize) -> Joints<f64, N> {
-        const STEP: f64 = 1e-5;
-        let row = |shift: f64| {
-            let mut q = self.motion.q;
-            q[joint] += shift;
-            let pose = Pose::new(&q);
-            inverse_dynamics(&model.chain, &pose, &self.motion.qd, &self.motion.qdd)
-                - static_torque(&model.chain, &pose, self.force, self.moment)
-        };
-        (row(-STEP) - row(STEP)) / (2.0 * STEP)
     }
 }

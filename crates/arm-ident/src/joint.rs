@@ -17,8 +17,13 @@ use crate::trial::{Model, Role, Tolerance, Trial};
 use crate::unknown::{Moment, Source, Unknown, unknowns};
 use crate::{Condenser, Factor, Matrix};
 
-/// Rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
-const ROUNDS: usize = 3;
+/// Most rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
+const MOST_ROUNDS: usize = 15;
+/// First rounds in which the calibration is held: while the simulated motion is still that of a wrong arm, what it cannot
+/// explain must not be taken for a wrong sensor.
+const SETTLING_ROUNDS: usize = 2;
+/// The estimate stands when a round moves it by less than this, in units of its noise.
+const SETTLED: f64 = 1e-2;
 /// From this number of trials on, a trial is a cluster; below, trials are cut into blocks.
 const ENOUGH_TRIALS: usize = 5;
 /// Fewest clusters aimed at when trials are cut into blocks.
@@ -108,9 +113,14 @@ pub fn identify<const N: usize>(
         None => best_cutoff(model, &unknowns, &fit)?,
     };
     let mut current = model.clone();
-    let mut last = None;
-    for _ in 0..ROUNDS {
-        let prepared = prepare(&current, &unknowns, trials, (cutoff, simulate))?;
+    let mut last: Option<(Solved, Vec<Pieces>)> = None;
+    for round in 0..MOST_ROUNDS {
+        let asked = if round < SETTLING_ROUNDS {
+            calibration_held(&unknowns)
+        } else {
+            unknowns.clone()
+        };
+        let prepared = prepare(&current, &asked, trials, (cutoff, simulate))?;
         let fitted: Vec<&Pieces> = prepared
             .iter()
             .zip(trials)
@@ -118,12 +128,18 @@ pub fn identify<const N: usize>(
             .map(|(p, _)| p)
             .collect();
         let deviations = deviations(&fit, &fitted);
-        let solved = weighted(&current, &unknowns, &fitted, (&deviations, scale_free))?;
+        let solved = weighted(&current, &asked, &fitted, (&deviations, scale_free))?;
         current = updated(&current, &unknowns, &solved.outcome.x)?;
+        let moved = last
+            .as_ref()
+            .map_or(f64::INFINITY, |(before, _)| moved(&solved, before));
         last = Some((solved, prepared));
+        if round > SETTLING_ROUNDS && moved < SETTLED {
+            break;
+        }
     }
     let Some((solved, prepared)) = last else {
-        unreachable!("ROUNDS is not zero")
+        unreachable!("there is at least one round")
     };
     let explained = prepared
         .iter()
@@ -137,6 +153,29 @@ pub fn identify<const N: usize>(
         level: options.level,
     };
     summarise(&fit, cutoff, explained)
+}
+
+/// The same unknowns with a calibration that is trusted a thousand times more.
+fn calibration_held(unknowns: &[Unknown]) -> Vec<Unknown> {
+    let mut held = unknowns.to_vec();
+    for unknown in &mut held {
+        if matches!(unknown.source, Source::Calibration(_)) {
+            unknown.sd *= 1e-3;
+        }
+    }
+    held
+}
+
+/// How far a round moved the estimate, in units of its noise.
+fn moved(solved: &Solved, before: &Solved) -> f64 {
+    let step: Vec<f64> = solved
+        .outcome
+        .x
+        .iter()
+        .zip(&before.outcome.x)
+        .map(|(a, b)| a - b)
+        .collect();
+    crate::matrix::norm(&solved.posterior.r.times(&step))
 }
 
 /// The lowest cutoff with which the fit trials are explained nearly as well as with the best one.
@@ -267,20 +306,24 @@ fn weighted<const N: usize>(
     (deviations, scale_free): (&[Vec<f64>], bool),
 ) -> Result<Solved, IdentError> {
     let (mut solved, level) = first_solution::<N>(model, unknowns, fit, scale_free)?;
+    // Repeats of a simulation without noise do not scatter, and tell nothing.
+    let repeated = root_mean_square(deviations.iter().flatten()) > 1e-6 * level;
     for _ in 0..2 {
-        let residuals: Vec<Vec<f64>> = fit
-            .iter()
-            .flat_map(|p| p.iter())
-            .map(|r| residual(r, &solved.outcome.x))
-            .collect();
+        let rest = |x: &[f64]| -> Vec<Vec<f64>> {
+            fit.iter()
+                .flat_map(|p| p.iter())
+                .map(|r| residual(r, x))
+                .collect()
+        };
+        let residuals = rest(&solved.outcome.x);
         // Data without any noise (a check on exact values) would make infinite weights.
         if root_mean_square(residuals.iter().flatten()) <= 1e-9 * level {
             break;
         }
-        let noise = if deviations.is_empty() {
-            Noise::<N>::of_residuals(&residuals)?
+        let noise = if repeated {
+            Noise::<N>::of_repeats(deviations)?.at_least(&residuals)
         } else {
-            Noise::of_repeats(deviations)?
+            Noise::of_residuals(&residuals)?
         };
         solved = solve(model, unknowns, fit, &noise, scale_free)?;
     }
@@ -307,7 +350,7 @@ fn first_solution<const N: usize>(
     Ok((solve(model, unknowns, fit, &noise, scale_free)?, level))
 }
 
-fn root_mean_square<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+pub(crate) fn root_mean_square<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
     if count > 0.0 {
         libm::sqrt(sum / count)
@@ -324,39 +367,24 @@ fn solve<const N: usize>(
     scale_free: bool,
 ) -> Result<Solved, IdentError> {
     let p = unknowns.len();
-    let mut clusters = Vec::new();
-    let samples: usize = fit
+    let weighed: Vec<Pieces> = fit
         .iter()
-        .flat_map(|f| f.iter())
-        .map(|r| r.samples.len())
-        .sum();
-    let block = (samples / BLOCKS).max(SHORTEST_BLOCK);
-    for pieces in fit {
-        let mut trial = Condenser::new(p);
-        for piece in pieces.iter() {
-            let mut weighed = piece.clone();
-            noise.weigh(&mut weighed);
-            if fit.len() >= ENOUGH_TRIALS {
-                push(&mut trial, &weighed, 0..piece.samples.len() * N)?;
-            } else {
-                for range in blocks(piece.samples.len(), block.min(piece.samples.len()))? {
-                    let mut part = Condenser::new(p);
-                    push(&mut part, &weighed, range.start * N..range.end * N)?;
-                    clusters.push(part.finish());
-                }
+        .map(|pieces| {
+            let mut weighed = (*pieces).clone();
+            weighed.iter_mut().for_each(|rows| noise.weigh(rows));
+            weighed
+        })
+        .collect();
+    let clusters = cluster_ranges(&weighed.iter().collect::<Vec<_>>())?
+        .iter()
+        .map(|cluster| {
+            let mut condenser = Condenser::new(p);
+            for (rows, range) in cluster {
+                push(&mut condenser, rows, range.start * N..range.end * N)?;
             }
-        }
-        if fit.len() >= ENOUGH_TRIALS {
-            clusters.push(trial.finish());
-        }
-    }
-    if clusters.len() < 2 {
-        return Err(IdentError::TooFew {
-            name: "usable stretches of data",
-            found: clusters.len(),
-            expected: 2,
-        });
-    }
+            Ok(condenser.finish())
+        })
+        .collect::<Result<Vec<_>, IdentError>>()?;
     let mut all = Condenser::new(p);
     for cluster in &clusters {
         all.merge_factor(cluster)?;
@@ -379,6 +407,43 @@ fn solve<const N: usize>(
         clusters,
         binding,
     })
+}
+
+/// Stretches of data whose errors are independent: a trial each, or blocks of trials where there are few.
+///
+/// # Errors
+/// [`IdentError::TooFew`] when there are fewer than two.
+#[expect(clippy::type_complexity, reason = "a list of lists of stretches")]
+pub(crate) fn cluster_ranges<'a>(
+    fit: &[&'a Pieces],
+) -> Result<Vec<Vec<(&'a Rows, core::ops::Range<usize>)>>, IdentError> {
+    let samples: usize = fit
+        .iter()
+        .flat_map(|f| f.iter())
+        .map(|r| r.samples.len())
+        .sum();
+    let block = (samples / BLOCKS).max(SHORTEST_BLOCK);
+    let mut clusters = Vec::new();
+    for pieces in fit.iter().filter(|p| !p.is_empty()) {
+        if fit.len() >= ENOUGH_TRIALS {
+            clusters.push(pieces.iter().map(|r| (r, 0..r.samples.len())).collect());
+            continue;
+        }
+        for rows in pieces.iter() {
+            let n = rows.samples.len();
+            for range in blocks(n, block.min(n))? {
+                clusters.push(vec![(rows, range)]);
+            }
+        }
+    }
+    if clusters.len() < 2 {
+        return Err(IdentError::TooFew {
+            name: "usable stretches of data",
+            found: clusters.len(),
+            expected: 2,
+        });
+    }
+    Ok(clusters)
 }
 
 fn push(
@@ -434,7 +499,8 @@ fn updated<const N: usize>(
     Ok(next)
 }
 
-fn explain<const N: usize>(pieces: &Pieces, x: &[f64]) -> Explained<N> {
+/// How rows are explained by values of the unknowns.
+pub(crate) fn explain<const N: usize>(pieces: &Pieces, x: &[f64]) -> Explained<N> {
     let mut out = Explained {
         samples: Vec::new(),
         measured: Vec::new(),

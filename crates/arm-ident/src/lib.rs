@@ -14,6 +14,8 @@
 //! Everything is `f64`, has a fixed order of operations and takes its transcendental functions from `libm`: the same input gives the same bits on
 //! every platform.
 
+pub mod calibration;
+pub mod cascade;
 pub mod coloured;
 pub mod condition;
 pub mod constraint;
@@ -21,6 +23,7 @@ pub mod equation;
 pub mod estimate;
 pub mod joint;
 pub mod motion;
+pub mod quasi_static;
 pub mod simulated;
 pub mod trial;
 pub mod unknown;

@@ -28,7 +28,20 @@ pub fn low_pass(cutoff: f64, rate: f64) -> Result<Butterworth, IdentError> {
     Butterworth::for_both_ways(ORDER, cutoff, rate)
 }
 
-/// Measured angles, filtered and differentiated.
+/// Bandwidth of the motion, in bandwidths of the rows.
+///
+/// The rows are low-passed as a whole, so every factor of a column may be filtered only that once: the motion itself keeps
+/// a band so wide that its own filter does not count, yet narrow enough for differentiation.
+const MOTION_BAND: f64 = 3.0;
+
+/// Cutoff of the low-pass before differentiation, for rows that are low-passed at `cutoff` \[Hz\].
+pub fn motion_cutoff(cutoff: f64, rate: f64) -> f64 {
+    (MOTION_BAND * cutoff).min(0.4 * rate)
+}
+
+/// Measured angles as they are, with speeds and accelerations from low-passed ones.
+///
+/// * `cutoff` - of the rows in which the motion is used \[Hz\], see [`motion_cutoff`]
 ///
 /// # Errors
 /// [`IdentError`] for a trial too short for the filter or a cutoff above half the sampling rate.
@@ -36,10 +49,10 @@ pub fn measured<const N: usize>(
     trial: &Trial<N>,
     cutoff: f64,
 ) -> Result<Kinematics<N>, IdentError> {
-    let filter = low_pass(cutoff, trial.rate)?;
+    let filter = low_pass(motion_cutoff(cutoff, trial.rate), trial.rate)?;
     let step = 1.0 / trial.rate;
     let mut motion = Kinematics {
-        q: vec![Joints::zeros(); trial.len()],
+        q: trial.q.clone(),
         qd: vec![Joints::zeros(); trial.len()],
         qdd: vec![Joints::zeros(); trial.len()],
     };
@@ -49,7 +62,6 @@ pub fn measured<const N: usize>(
         let qd = derivative::first(&q, step)?;
         let qdd = derivative::second(&q, step)?;
         for i in 0..trial.len() {
-            motion.q[i][j] = q[i];
             motion.qd[i][j] = qd[i];
             motion.qdd[i][j] = qdd[i];
         }
@@ -62,6 +74,7 @@ pub fn measured<const N: usize>(
 /// The variance σ² of the angle noise is read off third differences, where motion vanishes and white noise has 20 σ².
 /// Through an ideal low-pass its speed has the variance `σ² (2/f_s) (2π)² f_c³/3`.
 pub fn speed_noise<const N: usize>(trial: &Trial<N>, cutoff: f64) -> [f64; N] {
+    let cutoff = motion_cutoff(cutoff, trial.rate);
     core::array::from_fn(|j| {
         let third = |w: &[Joints<f64, N>]| w[3][j] - 3.0 * w[2][j] + 3.0 * w[1][j] - w[0][j];
         let (sum, count) = trial

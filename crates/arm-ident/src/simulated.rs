@@ -9,7 +9,7 @@ use arm_sim::{Coupling, Drive, Experiment, HandlePath, Start, simulate};
 
 use crate::equation::Kinematics;
 use crate::error::IdentError;
-use crate::motion::low_pass;
+use crate::motion::{low_pass, motion_cutoff};
 use crate::trial::{Model, Trial};
 
 /// Longest simulation step \[s\]; small enough for stiff contacts and smoothed dry friction.
@@ -68,7 +68,7 @@ fn experiment<const N: usize>(
     seen: &Kinematics<N>,
     cutoff: f64,
 ) -> Result<Experiment<N>, IdentError> {
-    let filter = low_pass(cutoff, trial.rate)?;
+    let filter = low_pass(motion_cutoff(cutoff, trial.rate), trial.rate)?;
     let axis = |a: usize| filter.both_ways(&handle.iter().map(|p| p[a]).collect::<Vec<_>>());
     let (y, z) = (axis(0)?, axis(1)?);
     let points: Vec<[f64; 2]> = y.into_iter().zip(z).map(|(y, z)| [y, z]).collect();

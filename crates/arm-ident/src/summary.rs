@@ -13,11 +13,13 @@ use crate::unknown::{Moment, Source, Unknown};
 
 /// Relative singular value below which a combination does not act on the data. Filtering and whitening leave exact
 /// dependencies exact to rounding; inertia in a slow movement is many orders above.
-const RANK_TOLERANCE: f64 = 1e-8;
+pub(crate) const RANK_TOLERANCE: f64 = 1e-8;
 /// Share in the null space below which a quantity counts as determined.
 const DETERMINED: f64 = 1e-4;
 /// A quantity with a prior counts as measured when the data took away this share of the prior variance.
 const MEASURED: f64 = 0.9;
+/// A bound decides a quantity when it narrows its standard deviation to less than this share.
+const FREE: f64 = 0.9;
 
 /// What is summarised.
 pub(crate) struct Fit<'a, const N: usize> {
@@ -29,17 +31,20 @@ pub(crate) struct Fit<'a, const N: usize> {
 }
 
 /// Covariance, intervals and decisions of a fit.
-struct Certainty<'a> {
-    unknowns: &'a [Unknown],
-    x: &'a [f64],
-    active: &'a [i8],
-    covariance: Matrix,
+pub(crate) struct Certainty<'a> {
+    pub unknowns: &'a [Unknown],
+    pub x: &'a [f64],
+    /// Unknowns on a bound: −1, 0, 1.
+    pub active: &'a [i8],
+    pub covariance: Matrix,
     /// Covariance as if no bound held, for the parameters that sit on one.
-    unbounded: Matrix,
-    /// Share of the estimate's information that comes from the data alone is judged against this.
-    report: RankReport,
-    physical: usize,
-    quantile: f64,
+    pub unbounded: Matrix,
+    /// What the movements can tell apart.
+    pub report: RankReport,
+    /// Number of unknowns that are not calibration; they come first.
+    pub physical: usize,
+    /// Half width of the intervals in standard deviations.
+    pub quantile: f64,
 }
 
 /// Puts a result together.
@@ -149,7 +154,7 @@ fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Mat
 }
 
 impl Certainty<'_> {
-    fn unknown(&self, u: usize) -> Result<Estimate, IdentError> {
+    pub(crate) fn unknown(&self, u: usize) -> Result<Estimate, IdentError> {
         let mut w = vec![0.0; self.unknowns.len()];
         w[u] = 1.0;
         let unknown = &self.unknowns[u];
@@ -165,15 +170,21 @@ impl Certainty<'_> {
     }
 
     /// A linear function of the unknowns.
-    fn linear(&self, w: &[f64], name: String, unit: &'static str) -> Result<Estimate, IdentError> {
+    pub(crate) fn linear(
+        &self,
+        w: &[f64],
+        name: String,
+        unit: &'static str,
+    ) -> Result<Estimate, IdentError> {
         let value = w.iter().zip(self.x).map(|(w, x)| w * x).sum();
-        let bound = w.iter().zip(self.active).any(|(&w, &a)| w != 0.0 && a != 0);
-        let covariance = if bound {
-            &self.unbounded
-        } else {
-            &self.covariance
-        };
-        let std = standard_error(covariance, w)?;
+        let touched = w.iter().zip(self.active).any(|(&w, &a)| w != 0.0 && a != 0);
+        let (held, open) = (
+            standard_error(&self.covariance, w)?,
+            standard_error(&self.unbounded, w)?,
+        );
+        // A combination whose parts sit on a bound may still be free to move: X_j is, where m_{j+1} is not.
+        let bound = touched && held < FREE * open;
+        let std = if bound { open } else { held };
         let reach = self.quantile * std;
         let decided_by = if bound {
             Decision::Bound
@@ -214,7 +225,7 @@ impl Certainty<'_> {
     }
 
     /// A nonlinear function through its gradient; decided by the weakest of what it rests on.
-    fn nonlinear(
+    pub(crate) fn nonlinear(
         &self,
         value: f64,
         gradient: &[f64],
@@ -276,7 +287,7 @@ fn derived(certainty: &Certainty<'_>, k: usize) -> Result<[Estimate; 2], IdentEr
 }
 
 /// Name and unit of base parameter `i` of `X_1 … X_N, J_1 … J_N`.
-fn base_name<const N: usize>(i: usize) -> (String, &'static str) {
+pub(crate) fn base_name<const N: usize>(i: usize) -> (String, &'static str) {
     let j = i % N + 1;
     let beyond: Vec<String> = (j + 1..=N).map(|k| format!("m{k}")).collect();
     let mass = match beyond.len() {

@@ -5,7 +5,7 @@ use arm_core::effect::Place;
 use crate::trial::{Model, Tolerance, Trial};
 
 /// Smallest mass that a fit may return \[kg\].
-const LEAST_MASS: f64 = 1e-3;
+pub(crate) const LEAST_MASS: f64 = 1e-3;
 
 /// An inertial parameter of a segment, in which the dynamics are linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,690 @@
+//! The cascade of thesis section 3.5.1: wrist, elbow, shoulder, one small problem a joint, quasi-static.
+//!
+//! Joint j has the unknowns `m_j l_j`, `m_{j+1}`, a constant passive moment `τ_pj` and a dissipative torque `d_j`:
+//!
+//! `g [cosθ_j, a_j cosθ_j] [m_j l_j, m_{j+1}]ᵀ + τ_pj + d_j s_j = (JᵀF)_j − g Σ_{k>j} cosθ_k X_k − g a_j cosθ_j Σ_{k>j+1} m_k`
+//!
+//! with θ_j = q_1 + … + q_j, F the force **on the arm**, s_j the direction of motion (−1 … 1), `X_k = m_k l_k + a_k Σ_{i>k} m_i`
+//! from the steps before, and bounds `l_b ≤ π ≤ u_b` (equation 3.30).
+//!
+//! Where this departs from the text:
+//! - one sign for F throughout (equations 3.18 and 3.23 contradict each other), and `cos123` where 3.24 has `cos12`;
+//! - the first two columns are multiples of each other: only X_j can be read from data. What `m_j l_j` and `m_{j+1}` come out
+//!   as is the point of the line `X_j = const` that lies nearest to the model, or a bound, and is labelled so;
+//! - d_j is a regression on the direction of motion in the same problem. The mean of |residual| (equation 3.32) is 0.8 σ
+//!   where there is no friction at all;
+//! - the same zero-phase low-pass acts on torque and regressors.
+//!
+//! The joint method (`joint`) is better in every respect; the cascade is for comparison with the thesis.
+
+use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
+use arm_core::{Chain, Joints, Pose, gravity, regressor, static_torque};
+
+use crate::coloured::effective_samples;
+use crate::condition::{Pieces, filtered};
+use crate::covariance::Bread;
+use crate::equation::{Memory, Rows, value_of};
+use crate::error::{IdentError, check_range};
+use crate::estimate::{Estimate, Identified};
+use crate::joint::{cluster_ranges, explain, root_mean_square};
+use crate::motion::{candidates, low_pass, speed_noise};
+use crate::program::{Program, Status};
+use crate::rank::{RankOptions, analyse};
+use crate::summary::{Certainty, RANK_TOLERANCE, base_name};
+use crate::trial::{Model, Role, Trial};
+use crate::unknown::{LEAST_MASS, Moment, Source, Unknown};
+use crate::{Condenser, Factor, Matrix, derivative, student};
+
+/// Direction is read from angles below this frequency \[Hz\]: a quasi-static movement has nothing above.
+const DIRECTION_CUTOFF: f64 = 1.0;
+/// Motion counts in full from this many standard deviations of the speed's noise on.
+const DEAD_BAND: f64 = 3.0;
+/// Slowest speed that counts as motion in full \[rad/s\], however little noise there is.
+const SLOWEST: f64 = 1e-4;
+/// Residual, relative to the torques, assumed before the first fit.
+const FIRST_GUESS: f64 = 0.05;
+
+/// Choices of the cascade.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Cutoff of the common low-pass \[Hz\]; 5 Hz, the thesis' own, when absent.
+    pub cutoff: Option<f64>,
+    /// Half width of the box `l_b … u_b` around the model, in its standard deviations.
+    pub bound_width: f64,
+    /// Probability of the intervals.
+    pub level: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            cutoff: None,
+            bound_width: 3.0,
+            level: 0.95,
+        }
+    }
+}
+
+/// Identifies by the cascade on the trials whose role is [`Role::Fit`]; the others are only explained.
+///
+/// Fitted effects of kind `coulomb` are the dissipative torques. The passive moment of a joint is free where
+/// `constant_moment` is fitted there, else it is pinned to zero (thesis section 3.5.2). Other fitted effects keep the
+/// values of the model.
+///
+/// # Errors
+/// [`IdentError`] when there is nothing to fit on, no force or torque acts, or a trial is too short for the filter.
+pub fn identify<const N: usize>(
+    model: &Model<N>,
+    trials: &[Trial<N>],
+    options: &Options,
+) -> Result<Identified<N>, IdentError> {
+    check_range("bound_width", options.bound_width, [0.0, f64::MAX])?;
+    let fit: Vec<&Trial<N>> = trials.iter().filter(|t| t.role == Role::Fit).collect();
+    let loaded = fit.iter().filter(|t| !t.is_unloaded()).count();
+    if loaded == 0 {
+        return Err(IdentError::TooFew {
+            name: "trials with role fit in which a force or torque acts",
+            found: 0,
+            expected: 1,
+        });
+    }
+    let unknowns = unknowns(model, options.bound_width);
+    if unknowns.is_empty() {
+        return Err(IdentError::TooFew {
+            name: "unknowns",
+            found: 0,
+            expected: 1,
+        });
+    }
+    let cutoff = options.cutoff.unwrap_or(candidates(&fit)[0]);
+    let prepared = trials
+        .iter()
+        .map(|t| filtered(&rows(model, &unknowns, t, cutoff)?, t, cutoff))
+        .collect::<Result<Vec<Pieces>, _>>()?;
+    let fitted: Vec<&Pieces> = prepared
+        .iter()
+        .zip(trials)
+        .filter(|(_, t)| t.role == Role::Fit)
+        .map(|(p, _)| p)
+        .collect();
+    let ranges = cluster_ranges(&fitted)?;
+
+    let mut x: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
+    let mut steps = Vec::with_capacity(N);
+    for joint in (0..N).rev() {
+        let clusters = ranges
+            .iter()
+            .map(|cluster| condensed::<N>(cluster, joint, unknowns.len()))
+            .collect::<Result<Vec<_>, _>>()?;
+        let series: Vec<&Rows> = fitted.iter().flat_map(|p| p.iter()).collect();
+        steps.push(step::<N>(
+            &unknowns,
+            own(model, &unknowns, joint),
+            (joint, clusters, &series),
+            &mut x,
+        )?);
+    }
+    summarise(
+        model,
+        &unknowns,
+        &steps,
+        (&x, options.level, cutoff),
+        &prepared,
+    )
+}
+
+/// One joint's problem and its solution.
+struct Step {
+    /// Indices of the unknowns that are found here.
+    own: Vec<usize>,
+    /// Own unknowns on a bound: −1, 0, 1.
+    active: Vec<i8>,
+    /// Weighed rows of this joint, all unknowns, for each cluster.
+    clusters: Vec<Factor>,
+    /// Their sum.
+    data: Factor,
+    /// In the own unknowns, with the prior.
+    posterior: Factor,
+    /// How the solver ended.
+    status: Status,
+}
+
+/// The unknowns: `m_2, m_1 l_1, …` of the segments, then passive moments and dissipative torques.
+pub(crate) fn unknowns<const N: usize>(model: &Model<N>, width: f64) -> Vec<Unknown> {
+    let mut list = Vec::new();
+    let u = model.segment_uncertainty;
+    if u > 0.0 {
+        for k in 0..N {
+            // The first segment's mass lies on no lever.
+            let moments: &[Moment] = if k == 0 {
+                &[Moment::Along]
+            } else {
+                &[Moment::Mass, Moment::Along]
+            };
+            list.extend(moments.iter().map(|&moment| {
+                let mean = value_of(&model.chain, k, moment);
+                let s = &model.chain.segments()[k];
+                // Mass and centre of mass are uncertain independently: the product has both uncertainties.
+                let (name, unit, sd, least) = match moment {
+                    Moment::Mass => (format!("m{}", k + 1), "kg", u * mean, LEAST_MASS),
+                    _ => (
+                        format!("m{0}*l{0}", k + 1),
+                        "kg m",
+                        u * f64::max(
+                            core::f64::consts::SQRT_2 * mean.abs(),
+                            1e-3 * s.mass * s.length,
+                        ),
+                        0.0,
+                    ),
+                };
+                Unknown {
+                    source: Source::Segment(k, moment),
+                    name,
+                    unit,
+                    mean,
+                    sd,
+                    min: (mean - width * sd).max(least),
+                    max: mean + width * sd,
+                }
+            }));
+        }
+    }
+    for (e, effect) in model.fitted.iter().enumerate().filter(|(_, e)| is_found(e)) {
+        let info = effect.kind.info();
+        let parameter = &info.parameters[0];
+        list.push(Unknown {
+            source: Source::Effect(e, 0),
+            name: format!("{}{} {}", info.kind, effect.index + 1, parameter.name),
+            unit: parameter.unit,
+            mean: 0.0,
+            sd: f64::INFINITY,
+            min: parameter.min,
+            max: parameter.max,
+        });
+    }
+    list
+}
+
+/// Whether the cascade finds this effect's first parameter.
+fn is_found(effect: &Effect<f64>) -> bool {
+    matches!(effect.kind, Kind::Coulomb | Kind::ConstantMoment)
+}
+
+/// Indices of the unknowns that the step of a joint finds.
+pub(crate) fn own<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    joint: usize,
+) -> Vec<usize> {
+    let belongs = |source| match source {
+        Source::Segment(k, Moment::Along) => k == joint,
+        Source::Segment(k, _) => k == joint + 1,
+        Source::Effect(e, _) => model.fitted[e].index == joint,
+        Source::Calibration(_) => false,
+    };
+    (0..unknowns.len())
+        .filter(|&u| belongs(unknowns[u].source))
+        .collect()
+}
+
+/// Quasi-static rows of a whole trial: gravity and the static contact torque, inertia left out.
+fn rows<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    trial: &Trial<N>,
+    cutoff: f64,
+) -> Result<Rows, IdentError> {
+    let samples = trial.len();
+    let (q, speed, direction) = motion(trial, cutoff)?;
+    let mut columns = vec![vec![0.0; samples * N]; unknowns.len()];
+    let mut rhs = vec![0.0; samples * N];
+    let kept = Model {
+        fitted: Vec::new(),
+        held: model
+            .fitted
+            .iter()
+            .filter(|e| !is_found(e))
+            .chain(&model.held)
+            .copied()
+            .collect(),
+        ..model.clone()
+    };
+    let mut memory = Memory::new(&kept);
+    let rest = Joints::<f64, N>::zeros();
+    for i in 0..samples {
+        let pose = Pose::new(&q[i]);
+        let at = Motion::new(i as f64 / trial.rate, q[i], speed[i]);
+        memory.advance(&at, 1.0 / trial.rate);
+        let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
+        let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
+        let mut measured = static_torque(&model.chain, &pose, force, moment)
+            - resisting_torque(&kept.held, &at, &memory.held);
+        if let Some(torque) = &trial.torque {
+            measured += torque[i];
+        }
+        let y = regressor(&model.chain, &pose, &rest, &rest);
+        let mut held = gravity(&model.chain, &pose);
+        for (column, unknown) in columns.iter_mut().zip(unknowns) {
+            let value = match unknown.source {
+                Source::Segment(k, moment) => {
+                    let [mass, along, ..] = y.segment_columns(&model.chain, k);
+                    let value = if moment == Moment::Mass { mass } else { along };
+                    held -= value * unknown.mean;
+                    value
+                }
+                Source::Effect(e, _) => {
+                    let effect = &model.fitted[e];
+                    let mut value = rest;
+                    value[effect.index] = match effect.kind {
+                        Kind::Coulomb => direction[i][effect.index],
+                        _ => 1.0,
+                    };
+                    value
+                }
+                Source::Calibration(_) => rest,
+            };
+            column[i * N..(i + 1) * N].copy_from_slice(value.as_slice());
+        }
+        rhs[i * N..(i + 1) * N].copy_from_slice((measured - held).as_slice());
+    }
+    Ok(Rows {
+        columns,
+        rhs,
+        samples: (0..samples).collect(),
+    })
+}
+
+/// Angles at the common cutoff, speeds, and the direction of motion of every joint, from −1 to 1.
+#[expect(clippy::type_complexity, reason = "three series of one type")]
+fn motion<const N: usize>(
+    trial: &Trial<N>,
+    cutoff: f64,
+) -> Result<
+    (
+        Vec<Joints<f64, N>>,
+        Vec<Joints<f64, N>>,
+        Vec<Joints<f64, N>>,
+    ),
+    IdentError,
+> {
+    let slow_cutoff = DIRECTION_CUTOFF.min(cutoff);
+    let (filter, slow) = (
+        low_pass(cutoff, trial.rate)?,
+        low_pass(slow_cutoff, trial.rate)?,
+    );
+    let noise = speed_noise(trial, slow_cutoff);
+    let mut q = vec![Joints::zeros(); trial.len()];
+    let (mut speed, mut direction) = (q.clone(), q.clone());
+    for j in 0..N {
+        let raw: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();
+        let step = 1.0 / trial.rate;
+        let smooth = filter.both_ways(&raw)?;
+        let qd = derivative::first(&slow.both_ways(&raw)?, step)?;
+        let full = f64::max(DEAD_BAND * noise[j], SLOWEST);
+        for i in 0..trial.len() {
+            q[i][j] = smooth[i];
+            speed[i][j] = qd[i];
+            direction[i][j] = (qd[i] / full).clamp(-1.0, 1.0);
+        }
+    }
+    Ok((q, speed, direction))
+}
+
+/// Rows of one joint over the stretches of a cluster.
+fn condensed<const N: usize>(
+    cluster: &[(&Rows, core::ops::Range<usize>)],
+    joint: usize,
+    p: usize,
+) -> Result<Factor, IdentError> {
+    let mut condenser = Condenser::new(p);
+    let mut row = vec![0.0; p];
+    for (rows, range) in cluster {
+        for i in range.clone() {
+            let at = i * N + joint;
+            for (value, column) in row.iter_mut().zip(&rows.columns) {
+                *value = column[at];
+            }
+            condenser.push(&row, rows.rhs[at])?;
+        }
+    }
+    Ok(condenser.finish())
+}
+
+/// Solves one joint with the unknowns of the joints beyond it held at `x`, and writes its own into `x`.
+fn step<const N: usize>(
+    unknowns: &[Unknown],
+    own: Vec<usize>,
+    (joint, mut clusters, series): (usize, Vec<Factor>, &[&Rows]),
+    x: &mut [f64],
+) -> Result<Step, IdentError> {
+    let mut data = merged(&clusters, unknowns.len())?;
+    let level = libm::sqrt(data.residual2(&vec![0.0; x.len()])? / data.rows.max(1) as f64);
+    let mut variance = f64::max(FIRST_GUESS * level, f64::MIN_POSITIVE.sqrt());
+    variance *= variance;
+    let part = |values: fn(&Unknown) -> f64| -> Vec<f64> {
+        own.iter().map(|&u| values(&unknowns[u])).collect()
+    };
+    let (mean, sd) = (part(|u| u.mean), part(|u| u.sd));
+    let mut solved = None;
+    for _ in 0..3 {
+        let posterior = weighed(&data.restricted(&own, x)?, variance).with_prior(&mean, &sd)?;
+        let (values, active, status) = bounded(&posterior, &own, unknowns)?;
+        for (&u, value) in own.iter().zip(values) {
+            x[u] = value;
+        }
+        solved = Some((posterior, active, status, variance));
+        let next = residual_variance::<N>(series, x, joint)?;
+        // Data without any noise (a check on exact values) would make infinite weights.
+        if next <= 1e-18 * level * level {
+            break;
+        }
+        variance = next;
+    }
+    let Some((posterior, active, status, variance)) = solved else {
+        unreachable!("at least one round")
+    };
+    data = weighed(&data, variance);
+    clusters.iter_mut().for_each(|c| *c = weighed(c, variance));
+    Ok(Step {
+        own,
+        active,
+        clusters,
+        data,
+        posterior,
+        status,
+    })
+}
+
+/// The least-squares solution within the bounds, which bounds hold, and how the solver ended.
+pub(crate) fn bounded(
+    posterior: &Factor,
+    own: &[usize],
+    unknowns: &[Unknown],
+) -> Result<(Vec<f64>, Vec<i8>, Status), IdentError> {
+    if own.is_empty() {
+        return Ok((Vec::new(), Vec::new(), Status::Solved));
+    }
+    let lower: Vec<f64> = own.iter().map(|&u| unknowns[u].min).collect();
+    let upper: Vec<f64> = own.iter().map(|&u| unknowns[u].max).collect();
+    let norms = posterior.r.column_norms();
+    let scale: Vec<f64> = own
+        .iter()
+        .zip(&norms)
+        .map(|(&u, &n)| match unknowns[u].sd {
+            sd if sd.is_finite() => sd,
+            _ if n > 0.0 => crate::matrix::norm(&posterior.z).max(f64::MIN_POSITIVE.sqrt()) / n,
+            _ => 1.0,
+        })
+        .collect();
+    let outcome = Program::of(posterior)?
+        .scale(&scale)?
+        .bounds(&lower, &upper)?
+        .solve()?;
+    if outcome.x.iter().any(|v| !v.is_finite()) {
+        return Err(IdentError::NoSolution {
+            status: outcome.status,
+        });
+    }
+    Ok((outcome.x, outcome.active, outcome.status))
+}
+
+fn merged(factors: &[Factor], p: usize) -> Result<Factor, IdentError> {
+    let mut all = Condenser::new(p);
+    for factor in factors {
+        all.merge_factor(factor)?;
+    }
+    Ok(all.finish())
+}
+
+/// The problem with every row divided by a standard deviation.
+pub(crate) fn weighed(factor: &Factor, variance: f64) -> Factor {
+    let w = 1.0 / variance.sqrt();
+    Factor {
+        r: factor.r.scaled_columns(&vec![w; factor.r.cols()]),
+        z: factor.z.iter().map(|v| v * w).collect(),
+        rho2: factor.rho2 / variance,
+        rows: factor.rows,
+    }
+}
+
+/// Variance that the residual of one joint has for each *effective* sample \[N² m²\].
+fn residual_variance<const N: usize>(
+    series: &[&Rows],
+    x: &[f64],
+    joint: usize,
+) -> Result<f64, IdentError> {
+    let (mut sum, mut effective) = (0.0, 0.0);
+    for rows in series {
+        let rest: Vec<f64> = crate::condition::residual(rows, x)
+            .into_iter()
+            .skip(joint)
+            .step_by(N)
+            .collect();
+        let square = root_mean_square(rest.iter());
+        sum += square * square * rest.len() as f64;
+        effective += effective_samples(&rest)?;
+    }
+    Ok(sum / f64::max(effective, 1.0))
+}
+
+/// By how much every unknown moves with the scores of all steps: an error of one step is carried into the next.
+fn influence(
+    steps: &[(&Step, Bread)],
+    p: usize,
+    score: impl Fn(usize) -> Vec<f64>,
+) -> Result<Vec<f64>, IdentError> {
+    let mut moved = vec![0.0; p];
+    for (i, (step, bread)) in steps.iter().enumerate() {
+        if step.own.is_empty() {
+            continue;
+        }
+        let score = score(i);
+        let carried = step.data.r.transpose_times(&step.data.r.times(&moved));
+        let own: Vec<f64> = step.own.iter().map(|&u| score[u] - carried[u]).collect();
+        for (&u, value) in step.own.iter().zip(bread.apply(&own)?) {
+            moved[u] = value;
+        }
+    }
+    Ok(moved)
+}
+
+/// Covariance of all unknowns: scatter of the clusters and the prior's own variance, each through all steps.
+fn covariance(
+    steps: &[Step],
+    unknowns: &[Unknown],
+    x: &[f64],
+    bounds: bool,
+) -> Result<Matrix, IdentError> {
+    let p = unknowns.len();
+    let breads = steps
+        .iter()
+        .map(|s| {
+            let fixed: Vec<bool> = s.active.iter().map(|&a| bounds && a != 0).collect();
+            Ok((s, Bread::with_fixed(&s.posterior.r, &fixed)?))
+        })
+        .collect::<Result<Vec<_>, IdentError>>()?;
+    let n = steps.first().map_or(0, |s| s.clusters.len());
+    let mut moves = Vec::with_capacity(n);
+    for g in 0..n {
+        let scores = steps
+            .iter()
+            .map(|s| s.clusters[g].score(x))
+            .collect::<Result<Vec<_>, _>>()?;
+        moves.push(influence(&breads, p, |i| scores[i].clone())?);
+    }
+    let mean: Vec<f64> = (0..p)
+        .map(|i| moves.iter().map(|m| m[i]).sum::<f64>() / n as f64)
+        .collect();
+    let mut priors = Vec::new();
+    for (u, unknown) in unknowns
+        .iter()
+        .enumerate()
+        .filter(|(_, u)| u.sd.is_finite())
+    {
+        let owner = steps.iter().position(|s| s.own.contains(&u));
+        priors.push(influence(&breads, p, |i| {
+            let mut score = vec![0.0; p];
+            if Some(i) == owner {
+                score[u] = 1.0 / unknown.sd;
+            }
+            score
+        })?);
+    }
+    let correction = n as f64 / (n as f64 - 1.0);
+    Ok(Matrix::from_fn(p, p, |i, j| {
+        let scatter: f64 = moves
+            .iter()
+            .map(|m| (m[i] - mean[i]) * (m[j] - mean[j]))
+            .sum();
+        scatter * correction + priors.iter().map(|m| m[i] * m[j]).sum::<f64>()
+    }))
+}
+
+fn summarise<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    steps: &[Step],
+    (x, level, cutoff): (&[f64], f64, f64),
+    prepared: &[Pieces],
+) -> Result<Identified<N>, IdentError> {
+    let p = unknowns.len();
+    let mut all = Condenser::new(p);
+    let mut active = vec![0; p];
+    for step in steps {
+        all.merge_factor(&step.data)?;
+        for (&u, &a) in step.own.iter().zip(&step.active) {
+            active[u] = a;
+        }
+    }
+    let data = all.finish();
+    let options = RankOptions {
+        scale: None,
+        rows: data.rows,
+        tolerance: Some(RANK_TOLERANCE),
+    };
+    let report = analyse(&data.r, &options)?;
+    let names: Vec<&str> = unknowns.iter().map(|u| u.name.as_str()).collect();
+    let trades = report.describe_trades(&names)?;
+    let rank = report.rank;
+    let clusters = steps.first().map_or(0, |s| s.clusters.len());
+    let certainty = Certainty {
+        unknowns,
+        x,
+        active: &active,
+        covariance: covariance(steps, unknowns, x, true)?,
+        unbounded: covariance(steps, unknowns, x, false)?,
+        report,
+        physical: p,
+        quantile: student::quantile(0.5 + level / 2.0, (clusters - 1) as f64)?,
+    };
+    let mut parameters = Vec::new();
+    for (u, unknown) in unknowns.iter().enumerate() {
+        let mut estimate = certainty.unknown(u)?;
+        if let Source::Effect(e, _) = unknown.source {
+            estimate.joint = Some(model.fitted[e].index);
+        }
+        parameters.push(estimate);
+        if let Source::Segment(k, Moment::Along) = unknown.source {
+            parameters.extend(centre_of_mass(&certainty, k)?);
+        }
+    }
+    let combinations = if model.segment_uncertainty > 0.0 {
+        (0..N)
+            .map(|j| first_moment(&certainty, model, j))
+            .collect::<Result<Vec<_>, _>>()?
+    } else {
+        Vec::new()
+    };
+    let (chain, fitted) = updated(model, unknowns, x)?;
+    Ok(Identified {
+        status: steps
+            .iter()
+            .map(|s| s.status)
+            .find(|&s| s != Status::Solved)
+            .unwrap_or(Status::Solved),
+        rank,
+        unknowns: p,
+        parameters,
+        combinations,
+        calibration: Vec::new(),
+        trades,
+        scale_free: false,
+        cutoff,
+        clusters,
+        explained: prepared.iter().map(|pieces| explain(pieces, x)).collect(),
+        chain,
+        fitted,
+    })
+}
+
+/// `l_k = m_k l_k / m_k` (equation 3.28); none for the first segment, whose mass does not act.
+fn centre_of_mass(certainty: &Certainty<'_>, k: usize) -> Result<Option<Estimate>, IdentError> {
+    let find = |moment| {
+        certainty
+            .unknowns
+            .iter()
+            .position(|u| u.source == Source::Segment(k, moment))
+    };
+    let (Some(m), Some(h)) = (find(Moment::Mass), find(Moment::Along)) else {
+        return Ok(None);
+    };
+    let x = certainty.x;
+    let mut gradient = vec![0.0; x.len()];
+    gradient[h] = 1.0 / x[m];
+    gradient[m] = -x[h] / (x[m] * x[m]);
+    let estimate = certainty.nonlinear(x[h] / x[m], &gradient, format!("l{}", k + 1), "m")?;
+    Ok(Some(Estimate {
+        joint: Some(k),
+        ..estimate
+    }))
+}
+
+/// `X_j`, what the data determine.
+fn first_moment<const N: usize>(
+    certainty: &Certainty<'_>,
+    model: &Model<N>,
+    j: usize,
+) -> Result<Estimate, IdentError> {
+    let weight = |source| match source {
+        Source::Segment(k, Moment::Along) if k == j => 1.0,
+        Source::Segment(k, Moment::Mass) if k > j => model.chain.segments()[j].length,
+        _ => 0.0,
+    };
+    let w: Vec<f64> = certainty
+        .unknowns
+        .iter()
+        .map(|u| weight(u.source))
+        .collect();
+    let (name, unit) = base_name::<N>(j);
+    Ok(Estimate {
+        joint: Some(j),
+        ..certainty.linear(&w, name, unit)?
+    })
+}
+
+/// The arm and the effects with the estimates; moments of inertia about the centres of mass stay the model's.
+fn updated<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    x: &[f64],
+) -> Result<(Chain<f64, N>, Vec<Effect<f64>>), IdentError> {
+    let mut segments = *model.chain.segments();
+    let mut fitted = model.fitted.clone();
+    let mut along: [f64; N] = core::array::from_fn(|k| value_of(&model.chain, k, Moment::Along));
+    for (unknown, &value) in unknowns.iter().zip(x) {
+        match unknown.source {
+            Source::Segment(k, Moment::Mass) => segments[k].mass = value,
+            Source::Segment(k, _) => along[k] = value,
+            Source::Effect(e, p) => fitted[e].parameters[p] = value,
+            Source::Calibration(_) => {}
+        }
+    }
+    for (k, segment) in segments.iter_mut().enumerate() {
+        let normal = value_of(&model.chain, k, Moment::Normal);
+        segment.com = [along[k] / segment.mass, normal / segment.mass];
+    }
+    let chain = Chain::new(segments, model.chain.base(), model.chain.gravity())
+        .and_then(|c| c.with_rotor_inertia(*model.chain.rotor_inertia()))
+        .map_err(IdentError::Model)?;
+    Ok((chain, fitted))
+}
