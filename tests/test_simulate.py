@@ -79,3 +79,17 @@ def test_a_model_without_a_robot_can_follow_a_movement(tmp_path: Path, slow_arm:
     without = MODEL[: MODEL.index("[robot]")] + MODEL[MODEL.index("[contact]") :]
     (tmp_path / "model.toml").write_text(without, encoding="utf-8")
     assert run("simulate", tmp_path / "model.toml", "--movement", slow_arm / "movement.toml", "--duration-s", 0.1) == 0
+
+
+def test_both_engines_come_to_the_same(slow_arm: Path, tmp_path: Path) -> None:
+    command = ("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--duration-s", 1)
+    tables = {}
+    for engine in ("native", "rapier"):
+        assert run(*command, "--engine", engine, "-o", tmp_path / engine) == 0
+        tables[engine] = pyarrow.csv.read_csv(tmp_path / engine / "simulated.csv")
+        result = json.loads((tmp_path / engine / "simulated.json").read_text(encoding="utf-8"))
+        assert (result["engine"], result["integrator"]) == (engine, "rk4" if engine == "native" else None)
+    assert tables["native"].column_names == tables["rapier"].column_names
+    for name, tolerance in (("q1_rad", 1e-5), ("q2_rad", 1e-5), ("force_on_arm_y_N", 0.02), ("force_on_arm_z_N", 0.02)):
+        native, rapier = (tables[engine].column(name).to_numpy() for engine in ("native", "rapier"))
+        assert np.abs(native - rapier).max() < tolerance

@@ -119,7 +119,7 @@ class Simulated:
         What the sensors read, one for each seed asked for.
     model : Model
     settings : dict
-        Engine, integrator, step and rate that made it.
+        Engine, integrator (of the native engine), step and rate that made it.
     """
 
     t: np.ndarray
@@ -221,7 +221,13 @@ def simulate(
         digest=raw["digest"],
         readings=tuple(raw.get("readings", ())),
         model=model,
-        settings={"engine": engine, "integrator": integrator, "dt_s": dt, "rate_Hz": rate, "coupling": coupling},
+        settings={
+            "engine": engine,
+            "integrator": integrator if engine == "native" else None,
+            "dt_s": dt,
+            "rate_Hz": rate,
+            "coupling": coupling,
+        },
     )
 
 

@@ -112,9 +112,10 @@ def _decimals(std: float) -> int:
 def run(data: Mapping[str, Any]) -> Table:
     """Return what a simulation was made with and what came out."""
     energy = data["energy"]
+    made_with = " ".join(filter(None, (data["engine"], data["integrator"])))
     rows = [
         ["duration", f"{data['duration_s']:.6g} s, {data['samples']} samples"],
-        ["engine", f"{data['engine']}, {data['integrator']}, step {1e3 * data['dt_s']:.4g} ms, {data['coupling']} coupling"],
+        ["engine", f"{made_with}, step {1e3 * data['dt_s']:.4g} ms, {data['coupling']} coupling"],
         ["largest force on the arm", f"{data['largest_force_N']:.4g} N at {data['largest_force_at_s']:.4g} s"],
         ["largest joint speed", f"{data['largest_speed_rad_s']:.4g} rad/s"],
         ["stored energy", f"changed by {energy['stored_J']:.4g} J"],
