@@ -549,12 +549,8 @@ fn summarise<const N: usize>(
 ) -> Result<Identified<N>, IdentError> {
     let p = unknowns.len();
     let mut all = Condenser::new(p);
-    let mut active = vec![0; p];
     for step in steps {
         all.merge_factor(&step.data)?;
-        for (&u, &a) in step.own.iter().zip(&step.active) {
-            active[u] = a;
-        }
     }
     let data = all.finish();
     let options = RankOptions {
@@ -567,10 +563,16 @@ fn summarise<const N: usize>(
     let trades = report.describe_trades(&names)?;
     let rank = report.rank;
     let clusters = steps.first().map_or(0, |s| s.clusters.len());
+    let mut limited = vec![false; p];
+    for step in steps {
+        for (&u, &a) in step.own.iter().zip(&step.active) {
+            limited[u] = a != 0;
+        }
+    }
     let certainty = Certainty {
         unknowns,
         x,
-        active: &active,
+        limited,
         covariance: covariance(steps, unknowns, x, true)?,
         unbounded: covariance(steps, unknowns, x, false)?,
         report,

@@ -107,7 +107,7 @@ fn cone(p: usize, s: &Place) -> Cone {
 }
 
 /// Sum of all first and second moments of the links, each relative to the model's value.
-fn common_scale<const N: usize>(unknowns: &[Unknown], model: &Model<N>) -> Vec<f64> {
+pub fn common_scale<const N: usize>(unknowns: &[Unknown], model: &Model<N>) -> Vec<f64> {
     let mut row = vec![0.0; unknowns.len()];
     for (weights, value) in base_parameters(unknowns, model) {
         for (total, w) in row.iter_mut().zip(&weights) {
@@ -148,12 +148,11 @@ pub fn base_parameters<const N: usize>(
     list
 }
 
-/// Gradients of the constraints that hold with equality, bounds excepted.
+/// Gradients of the inequalities and cones that hold with equality.
 pub fn binding_gradients<const N: usize>(
     outcome: &Outcome,
     unknowns: &[Unknown],
     model: &Model<N>,
-    scale_free: bool,
 ) -> Vec<Vec<f64>> {
     let p = unknowns.len();
     let mut list = Vec::new();
@@ -171,9 +170,6 @@ pub fn binding_gradients<const N: usize>(
             }
             list.push(gradient);
         }
-    }
-    if scale_free {
-        list.push(common_scale(unknowns, model));
     }
     list
 }

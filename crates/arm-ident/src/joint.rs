@@ -4,7 +4,7 @@ use arm_core::Chain;
 use arm_core::effect::Effect;
 
 use crate::condition::{Noise, Pieces, filtered, repeat_deviations, residual};
-use crate::constraint::{binding_gradients, program};
+use crate::constraint::{binding_gradients, common_scale, program};
 use crate::covariance::blocks;
 use crate::equation::{Kinematics, Rows, rows};
 use crate::error::IdentError;
@@ -294,8 +294,10 @@ pub(crate) struct Solved {
     pub posterior: Factor,
     /// Factors of the independent clusters.
     pub clusters: Vec<Factor>,
-    /// Gradients of the constraints that bind, bounds excepted.
+    /// Gradients of the inequalities and cones that bind, bounds excepted.
     pub binding: Vec<Vec<f64>>,
+    /// Rows of the equalities.
+    pub equalities: Vec<Vec<f64>>,
 }
 
 /// Iteratively weighted least squares: the weights of the joints and the estimate in turn.
@@ -399,13 +401,19 @@ fn solve<const N: usize>(
             status: outcome.status,
         });
     }
-    let binding = binding_gradients(&outcome, unknowns, model, scale_free);
+    let binding = binding_gradients(&outcome, unknowns, model);
+    let equalities = if scale_free {
+        vec![common_scale(unknowns, model)]
+    } else {
+        Vec::new()
+    };
     Ok(Solved {
         outcome,
         data,
         posterior,
         clusters,
         binding,
+        equalities,
     })
 }
 

@@ -34,8 +34,8 @@ pub(crate) struct Fit<'a, const N: usize> {
 pub(crate) struct Certainty<'a> {
     pub unknowns: &'a [Unknown],
     pub x: &'a [f64],
-    /// Unknowns on a bound: −1, 0, 1.
-    pub active: &'a [i8],
+    /// Unknowns that a bound or another physical limit takes part in deciding.
+    pub limited: Vec<bool>,
     pub covariance: Matrix,
     /// Covariance as if no bound held, for the parameters that sit on one.
     pub unbounded: Matrix,
@@ -74,7 +74,9 @@ pub(crate) fn summarise<const N: usize>(
     let certainty = Certainty {
         unknowns,
         x: &solved.outcome.x,
-        active: &solved.outcome.active,
+        limited: (0..unknowns.len())
+            .map(|u| solved.outcome.active[u] != 0 || solved.binding.iter().any(|b| b[u] != 0.0))
+            .collect(),
         covariance: covariance(solved, unknowns, true)?,
         unbounded: covariance(solved, unknowns, false)?,
         report,
@@ -124,9 +126,12 @@ pub(crate) fn summarise<const N: usize>(
 /// `H⁻¹ (Σ s sᵀ n/(n−1) + prior) H⁻¹`: scatter of the clusters for the data, the prior's own variance for the prior.
 fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Matrix, IdentError> {
     let p = unknowns.len();
-    let mut binding = solved.binding.clone();
-    for u in (0..p).filter(|&u| bounds && solved.outcome.active[u] != 0) {
-        binding.push((0..p).map(|i| if i == u { 1.0 } else { 0.0 }).collect());
+    let mut binding = solved.equalities.clone();
+    if bounds {
+        binding.extend(solved.binding.iter().cloned());
+        for u in (0..p).filter(|&u| solved.outcome.active[u] != 0) {
+            binding.push((0..p).map(|i| if i == u { 1.0 } else { 0.0 }).collect());
+        }
     }
     let bread = Bread::new(&solved.posterior.r, &binding)?;
     let n = solved.clusters.len() as f64;
@@ -177,13 +182,13 @@ impl Certainty<'_> {
         unit: &'static str,
     ) -> Result<Estimate, IdentError> {
         let value = w.iter().zip(self.x).map(|(w, x)| w * x).sum();
-        let touched = w.iter().zip(self.active).any(|(&w, &a)| w != 0.0 && a != 0);
         let (held, open) = (
             standard_error(&self.covariance, w)?,
             standard_error(&self.unbounded, w)?,
         );
         // A combination whose parts sit on a bound may still be free to move: X_j is, where m_{j+1} is not.
-        let bound = touched && held < FREE * open;
+        let limited = w.iter().zip(&self.limited).any(|(&w, &l)| w != 0.0 && l);
+        let bound = limited && held < FREE * open;
         let std = if bound { open } else { held };
         let reach = self.quantile * std;
         let decided_by = if bound {
@@ -238,8 +243,8 @@ impl Certainty<'_> {
         estimate.interval = [value - reach, value + reach];
         for (u, _) in gradient.iter().enumerate().filter(|(_, g)| **g != 0.0) {
             match self.unknown(u)?.decided_by {
-                Decision::Data => {}
-                other => estimate.decided_by = other,
+                other if estimate.decided_by == Decision::Data => estimate.decided_by = other,
+                _ => {}
             }
         }
         Ok(estimate)
@@ -266,7 +271,8 @@ fn derived(certainty: &Certainty<'_>, k: usize) -> Result<[Estimate; 2], IdentEr
         });
     };
     let x = certainty.x;
-    let n = find(Moment::Normal).map_or(0.0, |n| x[n]);
+    let normal = find(Moment::Normal);
+    let n = normal.map_or(0.0, |n| x[n]);
     let com = x[h] / x[m];
     let mut to_com = vec![0.0; x.len()];
     to_com[h] = 1.0 / x[m];
@@ -275,6 +281,9 @@ fn derived(certainty: &Certainty<'_>, k: usize) -> Result<[Estimate; 2], IdentEr
     to_inertia[i] = 1.0;
     to_inertia[h] = -2.0 * com;
     to_inertia[m] = (x[h] * x[h] + n * n) / (x[m] * x[m]);
+    if let Some(place) = normal {
+        to_inertia[place] = -2.0 * n / x[m];
+    }
     let inertia = x[i] - (x[h] * x[h] + n * n) / x[m];
     let mut list = [
         certainty.nonlinear(com, &to_com, format!("l{}", k + 1), "m")?,
@@ -282,6 +291,8 @@ fn derived(certainty: &Certainty<'_>, k: usize) -> Result<[Estimate; 2], IdentEr
     ];
     for estimate in &mut list {
         estimate.joint = Some(k);
+        // Neither a distance within the segment nor an inertia is negative.
+        estimate.interval = estimate.interval.map(|end| end.max(0.0));
     }
     Ok(list)
 }
