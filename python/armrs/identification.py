@@ -99,6 +99,8 @@ class Identified:
         Cutoff of the zero-phase low-pass that motion and torque share, -3 dB of both passes [Hz].
     residual_rms : dict
         Role -> channel -> root mean square of the torque residual after the low-pass [N m].
+    residual_rms_by_configuration : dict
+        The same, role -> configuration -> channel.
     explained : tuple of Explained
     model : Model
         The model with the estimates.
@@ -116,6 +118,7 @@ class Identified:
     level: float
     cutoff: float
     residual_rms: dict[str, dict[str, float]]
+    residual_rms_by_configuration: dict[str, dict[str, dict[str, float]]]
     explained: tuple[Explained, ...]
     model: Model
     dataset: Dataset
@@ -139,6 +142,7 @@ class Identified:
             "level": self.level,
             "cutoff_Hz": self.cutoff,
             "residual_rms": self.residual_rms,
+            "residual_rms_by_configuration": self.residual_rms_by_configuration,
             "model": "identified.toml",
         }
 
@@ -188,6 +192,7 @@ def identify(
     fitted = [e.kind in _joint_kinds() for e in effects]
     tolerance = dataset.tolerance
     settings = {
+        "method": method,
         "fitted": fitted,
         "segment_uncertainty": model.segment_uncertainty,
         "angle_offset": np.radians(tolerance.angle_offset_deg),
@@ -222,6 +227,7 @@ def identify(
         level=level,
         cutoff=raw["cutoff"],
         residual_rms=_residuals(explained),
+        residual_rms_by_configuration=_residuals_by_configuration(explained),
         explained=explained,
         model=_identified_model(model, raw, effects),
         dataset=dataset,
@@ -273,13 +279,22 @@ def _estimates(items: list[dict[str, Any]]) -> tuple[Estimate, ...]:
     return tuple(Estimate(**{**item, "interval": tuple(item["interval"])}) for item in items)
 
 
-def _residuals(explained: tuple[Explained, ...]) -> dict[str, dict[str, float]]:
+def _residuals(explained: Sequence[Explained]) -> dict[str, dict[str, float]]:
     result: dict[str, dict[str, float]] = {}
     for role in ("fit", "test"):
-        rows = [e.measured - e.fitted for e in explained if e.trial.role == role]
+        rows = [e.measured - e.fitted for e in explained if e.trial.role == role and len(e.t)]
         if rows:
             rms = np.sqrt(np.mean(np.square(np.concatenate(rows)), axis=0))
             result[role] = {f"tau{j}_Nm": float(v) for j, v in enumerate(rms, start=1)}
+    return result
+
+
+def _residuals_by_configuration(explained: Sequence[Explained]) -> dict[str, dict[str, dict[str, float]]]:
+    result: dict[str, dict[str, dict[str, float]]] = {}
+    for configuration in dict.fromkeys(e.trial.configuration for e in explained):
+        own = [e for e in explained if e.trial.configuration == configuration]
+        for role, channels in _residuals(own).items():
+            result.setdefault(role, {})[configuration] = channels
     return result
 
 

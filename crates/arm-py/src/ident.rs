@@ -34,6 +34,7 @@ pub struct Columns<'py> {
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Settings {
+    method: String,
     fitted: Vec<bool>,
     segment_uncertainty: f64,
     angle_offset: f64,
@@ -127,7 +128,7 @@ pub fn model<const N: usize>(
     })
 }
 
-/// Identifies by the joint method; see `armrs.identify`.
+/// Identifies by the joint method or the cascade; see `armrs.identify`.
 #[pyfunction]
 pub fn identify<'py>(
     py: Python<'py>,
@@ -164,9 +165,17 @@ pub fn identify<'py>(
             },
             level: settings.level,
         };
-        let result = py
-            .detach(|| arm_ident::joint::identify(&model, &trials, &options))
-            .map_err(identification)?;
+        let cascade = arm_ident::cascade::Options {
+            cutoff: settings.cutoff,
+            level: settings.level,
+            ..Default::default()
+        };
+        let result = match settings.method.as_str() {
+            "joint" => py.detach(|| arm_ident::joint::identify(&model, &trials, &options)),
+            "cascade" => py.detach(|| arm_ident::cascade::identify(&model, &trials, &cascade)),
+            other => return Err(bad_input("method", other, "joint or cascade")),
+        }
+        .map_err(identification)?;
         outcome(py, &result)
     }
     each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)))

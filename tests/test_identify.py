@@ -1,0 +1,105 @@
+"""Identification on measured rigs, against what their owners published, and what its JSON says."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+import armrs
+from armrs.cli import main
+
+# DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
+DFKI_M2L2 = 0.6043459469186889 * 0.18377686083653508
+DFKI_H1 = 0.5593806151425046 * 0.3 + 0.6043459469186889 * 0.3
+
+
+@pytest.fixture(scope="module")
+def dfki(data: Path) -> armrs.Identified:
+    return armrs.identify(data / "dfki_a0", with_effects=["coulomb", "viscous"])
+
+
+def value(result: armrs.Identified, name: str) -> float:
+    return next(e.value for e in result.combinations if e.name == name)
+
+
+def test_dfki_torques_are_explained_on_the_trial_kept_apart(dfki: armrs.Identified) -> None:
+    track = dfki.residual_rms_by_configuration["test"]["track"]
+    assert track["tau1_Nm"] <= 0.13
+    assert track["tau2_Nm"] <= 0.11
+
+
+def test_dfki_base_parameters_are_those_published(dfki: armrs.Identified) -> None:
+    assert value(dfki, "m2*l2") == pytest.approx(DFKI_M2L2, rel=0.08)
+    assert value(dfki, "m1*l1 + a1*m2") == pytest.approx(DFKI_H1, rel=0.08)
+
+
+def test_dfki_says_what_the_movement_cannot_tell_apart(dfki: armrs.Identified) -> None:
+    assert (dfki.rank, dfki.unknowns) == (8, 10)
+    assert any("m1 " in line for line in dfki.trades)
+    decided = {e.name: e.decided_by for e in dfki.parameters}
+    assert decided["m1"] == "prior"
+    assert decided["m2*l2"] == "data"
+    friction = [e for e in dfki.parameters if e.kind == "coulomb"]
+    assert [e.decided_by for e in friction] == ["data", "data"]
+    assert all(e.interval[0] > 0.05 for e in friction)
+
+
+def test_double_pendulum_ratios_are_those_published(data: Path) -> None:
+    published = json.loads((data / "raw" / "multiarm_pendulum" / "published_parameters.json").read_text())["double"]
+    m1, m2, a1, a2 = (published[k] for k in ("m1", "m2", "a1", "a2"))
+    length, i1, i2 = (published[k] for k in ("L1", "I1", "I2"))
+    expected = [m1 * a1 + length * m2, m2 * a2, i1 + m1 * a1**2 + length**2 * m2, i2 + m2 * a2**2]
+    result = armrs.identify(data / "pendulum_double", with_effects=["viscous"])
+    assert result.scale_free
+    found = [e.value for e in result.combinations]
+    for f, e in zip(found, expected, strict=True):
+        assert f / found[0] == pytest.approx(e / expected[0], rel=0.01)
+
+
+def test_json_has_the_keys_that_are_promised(data: Path, tmp_path: Path) -> None:
+    file = tmp_path / "identified.json"
+    assert main(["identify", str(data / "dfki_c1"), "--with", "coulomb", "--json", str(file)]) == 0
+    written = json.loads(file.read_text(encoding="utf-8"))
+    assert {"method", "status", "rank", "unknowns", "parameters", "combinations", "residual_rms", "model"} <= set(written)
+    assert (written["method"], written["model"]) == ("joint", "identified.toml")
+    for entry in written["parameters"]:
+        assert {"name", "joint", "kind", "value", "std", "unit", "interval", "decided_by"} <= set(entry)
+        assert entry["decided_by"] in ("data", "prior", "bound")
+        low, high = entry["interval"]
+        assert low <= entry["value"] <= high
+        assert math.isfinite(entry["std"])
+    assert {"name", "value", "std", "unit"} <= set(written["combinations"][0])
+    assert set(written["residual_rms"]) == {"fit", "test"}
+
+
+def test_cascade_is_another_method_and_finds_the_same_sums(data: Path, dfki: armrs.Identified) -> None:
+    cascade = armrs.identify(data / "dfki_a0", method="cascade", with_effects=["coulomb"])
+    assert (cascade.method, dfki.method) == ("cascade", "joint")
+    assert cascade.unknowns < dfki.unknowns
+    for name in ("m2*l2", "m1*l1 + a1*m2"):
+        assert value(cascade, name) == pytest.approx(value(dfki, name), rel=0.05)
+        assert value(cascade, name) != value(dfki, name)
+    mass = next(e for e in cascade.parameters if e.name == "m2")
+    assert mass.decided_by in ("prior", "bound")
+
+
+@pytest.mark.parametrize(
+    ("choice", "words"),
+    [
+        ({"method": "guess"}, "joint or cascade"),
+        ({"with_effects": ["coulom"]}, "nearest known: coulomb"),
+        ({"with_effects": ["force_bias"]}, "joint effect"),
+        ({"cutoff": -1.0}, "above 0 Hz"),
+        ({"cutoff": 1000.0}, "cutoff"),
+        ({"level": 1.5}, "0.5 to 1"),
+        ({"motion": "guessed"}, "auto, measured or simulated"),
+        ({"motion": "simulated"}, "robot angles"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_a_line(data: Path, choice: dict[str, object], words: str) -> None:
+    with pytest.raises(armrs.ArmrsError, match=words) as refused:
+        armrs.identify(data / "dfki_c1", **choice)  # type: ignore[arg-type]
+    assert "\n" not in str(refused.value)
