@@ -32,7 +32,8 @@ def entry(kind: Kind) -> str:
     """Return the section of one kind."""
     rows = [f"| `{p.name}` | {p.unit} | {p.min:g} to {p.max:g} | {p.default:g} |" for p in kind.parameters]
     table = "\n".join(["| parameter | unit | allowed | default |", "| --- | --- | --- | --- |", *rows])
-    return f"### `{kind.kind}`\n{kind.summary}; at: {ADDRESS[kind.address]}.\n\n    {kind.formula}\n\nSource: {kind.reference}.\n\n{table}"
+    head = f"### `{kind.kind}`\n{kind.summary}; at: {ADDRESS[kind.address]}."
+    return f"{head}\n\n    {kind.formula}\n\nSource: {kind.reference}.\n\n{table}"
 
 
 if __name__ == "__main__":

@@ -241,7 +241,7 @@ BROKEN_TRIAL: dict[str, tuple[Callable[[Session], None], str, str]] = {
     "activity beyond reason": (cell(30, "emg_biceps", "1e300"), "line 30, column emg_biceps: found 1e+300, allowed -1e+12 to 1e+12", ""),
     "time in ms": (lines_changed(lambda lines: [lines[0], *(str(20 * k) + x[x.index(",") :] for k, x in enumerate(lines[1:]))]),
                    "time: found 20 s between samples, allowed at least one sample a second", "(milliseconds?)"),
-    "degrees": (cell(30, "q1_rad", "145.0"), "line 30, column q1_rad: found 145.0, allowed -100 to 100 rad", "(looks like degrees)"),
+    "degrees": (cell(30, "q1_rad", "145.0"), "line 30, column q1_rad: found 145.0, allowed -25.1327 to 25.1327 rad", "(looks like degrees)"),
     "robot in degrees": (cell(30, "qr1_rad", "-145.0"), "line 30, column qr1_rad: found -145.0", "(looks like degrees)"),
     "millinewtons": (cell(30, "Fy_N", "25000"), "line 30, column Fy_N: found 25000.0, allowed -10000 to 10000 N", "(looks like millinewtons)"),
     "newton millimetres": (cell(30, "Mx_Nm", "25000"), "line 30, column Mx_Nm: found 25000.0", "(looks like newton millimetres)"),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import pytest
 
 import armrs
+from armrs.catalogue import catalogue
 from armrs.cli import main
 
 # DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
@@ -103,3 +105,30 @@ def test_what_cannot_be_done_is_refused_in_a_line(data: Path, choice: dict[str, 
     with pytest.raises(armrs.ArmrsError, match=words) as refused:
         armrs.identify(data / "dfki_c1", **choice)  # type: ignore[arg-type]
     assert "\n" not in str(refused.value)
+
+
+def test_forces_with_the_other_sign_are_called_out(slow_arm: Path, tmp_path: Path) -> None:
+    turned = tmp_path / "turned"
+    shutil.copytree(slow_arm, turned)
+    description = turned / "dataset.toml"
+    text = description.read_text(encoding="utf-8")
+    assert 'force_on = "robot"' in text
+    description.write_text(text.replace('force_on = "robot"', 'force_on = "arm"'), encoding="utf-8")
+    right = armrs.identify(slow_arm, with_effects="coulomb")
+    wrong = armrs.identify(turned, with_effects="coulomb")
+    assert right.contradictions == ()
+    assert wrong.contradictions
+    assert main(["identify", str(turned), "--with", "coulomb", "--json", str(tmp_path / "x.json")]) == 1
+
+
+@pytest.mark.parametrize("kind", [k.kind for k in catalogue().values() if k.where == "joint"])
+def test_every_joint_effect_can_be_asked_for(slow_arm: Path, kind: str) -> None:
+    if kind == "stretch_reflex":  # this arm never moves faster than the reflex' threshold
+        with pytest.raises(armrs.IdentificationError, match="leave out effects that these movements do not show"):
+            armrs.identify(slow_arm, with_effects=kind)
+        return
+    result = armrs.identify(slow_arm, with_effects=kind)
+    assert result.status == "solved"
+    for e in result.parameters:
+        assert math.isfinite(e.value), e
+        assert e.interval[0] <= e.interval[1], e

@@ -49,6 +49,8 @@ class Kind:
     parameters: tuple[Parameter, ...]
     address: str | None = None
     """What else an effect of this kind must say: "joint", "channel" or nothing (None)."""
+    first_joint: int = 1
+    """Lowest joint at which it can stand; 2 where it also acts in the joint before."""
 
 
 @functools.cache

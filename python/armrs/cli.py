@@ -25,7 +25,7 @@ from .errors import ArmrsError, BadInput, Text, one_line, unknown_name
 if TYPE_CHECKING:
     from .trial import Trial
 
-app = typer.Typer(name="armrs", add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+app = typer.Typer(name="armrs", add_completion=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
 
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is standard output.")]
 OutFolder = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write below; made when it does not exist.")]
@@ -198,7 +198,7 @@ def identify(
 ) -> int:
     """Identify body segment and joint parameters, each with an interval and what decided it.
 
-    Exit status 1 when the solver did not quite get there.
+    Exit status 1 when the solver did not quite get there, or when the result cannot be true of this arm and these sensors.
     """
     from . import results, words
     from .dataset import load_dataset
@@ -211,9 +211,9 @@ def identify(
         result = run_identification(data, method=method.value, with_effects=kinds, cutoff=cutoff_hz, motion=motion.value, level=level)
     plain = results.identified_data(result, _command(context))
     written = results.write_identified(result, plain, folder) if folder else []
-    console.warn(data.warnings)
+    console.warn([*data.warnings, *result.contradictions, *result.misfits])
     present(lambda: plain, json, lambda: words.identified(plain, written))
-    return 0 if result.status == "solved" else 1
+    return 0 if result.status == "solved" and not result.contradictions else 1
 
 
 @app.command()

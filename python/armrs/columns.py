@@ -39,7 +39,7 @@ class Quantity:
 
 
 TIME = Quantity(_TIME, 1e11, "milliseconds?")  # seconds since 1970 are welcome
-ANGLE = Quantity(_ANGLE, 100.0, "looks like degrees")
+ANGLE = Quantity(_ANGLE, 8 * math.pi, "looks like degrees")  # an arm does not wind up four turns
 SPEED = Quantity(_SPEED, 1e4, "looks like degrees per second")
 FORCE = Quantity(_FORCE, 1e4, "looks like millinewtons")
 MOMENT = Quantity(_MOMENT, 1e4, "looks like newton millimetres")

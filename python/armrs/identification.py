@@ -89,6 +89,11 @@ class Identified:
         The base parameters: what a planar chain can show at all.
     calibration : tuple of Estimate
         Small imperfections of the measurement that were refitted within the declared tolerance.
+    contradictions : tuple of str
+        What in the result no arm can be, such as a mass at its limit. Then no number is to be trusted.
+    misfits : tuple of str
+        Joints whose torque the fitted model does not describe, calibrations far beyond their tolerance, speeds that are noise. Intervals hold
+        only where the model's structure is right.
     trades : tuple of str
         Which unknowns the movements cannot tell apart, in words.
     scale_free : bool
@@ -113,6 +118,8 @@ class Identified:
     parameters: tuple[Estimate, ...]
     combinations: tuple[Estimate, ...]
     calibration: tuple[Estimate, ...]
+    contradictions: tuple[str, ...]
+    misfits: tuple[str, ...]
     trades: tuple[str, ...]
     scale_free: bool
     level: float
@@ -137,6 +144,7 @@ class Identified:
             "parameters": [dataclasses.asdict(e) for e in self.parameters],
             "combinations": [dataclasses.asdict(e) for e in self.combinations],
             "calibration": [dataclasses.asdict(e) for e in self.calibration],
+            "warnings": [*self.contradictions, *self.misfits],
             "not_separable": list(self.trades),
             "scale_free": self.scale_free,
             "level": self.level,
@@ -151,7 +159,7 @@ def identify(
     dataset: Dataset | str | os.PathLike[str],
     *,
     method: str = "joint",
-    with_effects: Sequence[str] = (),
+    with_effects: Sequence[str] | str = (),
     cutoff: float | None = None,
     motion: str = "auto",
     level: float = 0.95,
@@ -163,7 +171,7 @@ def identify(
     dataset : Dataset or path
     method : {"joint", "cascade"}
         All joints at once with physical constraints, or the thesis' order wrist, elbow, shoulder.
-    with_effects : sequence of str
+    with_effects : sequence of str, or names separated by commas
         Kinds of joint effects that are fitted at every joint besides those of the model.
     cutoff : float, optional
         Cutoff of the common low-pass [Hz]; chosen from the data when absent.
@@ -183,10 +191,14 @@ def identify(
         dataset = load_dataset(dataset)
     if method not in ("joint", "cascade"):
         raise BadInput("method", method, "joint or cascade")
+    with_effects = with_effects.split(",") if isinstance(with_effects, str) else with_effects
     if not 0.5 <= level < 1.0:
         raise BadInput("level", level, "0.5 to 1")
     if cutoff is not None and not cutoff > 0:
         raise BadInput("cutoff", cutoff, "a frequency above 0 Hz")
+    slowest = min(trial.rate for trial in dataset.trials)
+    if cutoff is not None and cutoff >= 0.4 * slowest:
+        raise BadInput("cutoff", f"{cutoff:g} Hz", f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
     model = dataset.model
     effects = [*all_effects(model), *_added(model, with_effects)]
     fitted = [e.kind in _joint_kinds() for e in effects]
@@ -214,14 +226,17 @@ def identify(
         Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
         for trial, e in zip(dataset.trials, raw["explained"], strict=True)
     )
+    parameters, calibration = _estimates(raw["parameters"]), _estimates(raw["calibration"])
     return Identified(
         method=method,
         status=raw["status"],
         rank=raw["rank"],
         unknowns=raw["unknowns"],
-        parameters=_estimates(raw["parameters"]),
+        parameters=parameters,
         combinations=_estimates(raw["combinations"]),
-        calibration=_estimates(raw["calibration"]),
+        calibration=calibration,
+        contradictions=_contradictions(parameters),
+        misfits=(*_beyond_tolerance(calibration, settings), *_misfits(explained), *_noisy_speeds(raw["speed_noise"])),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
         level=level,
@@ -232,6 +247,62 @@ def identify(
         model=_identified_model(model, raw, effects),
         dataset=dataset,
     )
+
+
+_BEYOND = 5.0
+"""A calibration this many times its tolerance is no calibration."""
+_POOR = 0.2
+"""A residual above this share of the torques is no fit."""
+
+
+def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return what no arm can be, a line each."""
+    return tuple(
+        f"{e.name} was driven to its lower limit: does force_on name the right side, and does the robot fit?"
+        for e in parameters
+        if e.kind == "segment" and e.decided_by == "bound" and e.name.startswith("m") and abs(e.value) <= 1e-2 * abs(e.interval[1])
+    )
+
+
+def _beyond_tolerance(calibration: Sequence[Estimate], settings: dict[str, Any]) -> tuple[str, ...]:
+    """Return the calibrations that came out far larger than promised, a line each."""
+    lines = []
+    for e in calibration:
+        promised = next(settings[key] for key in _TOLERANCES if e.name.startswith(key.replace("_", " ")))
+        if abs(e.value) > _BEYOND * promised:
+            lines.append(f"{e.name} came out as {e.value:.3g} {e.unit}, {abs(e.value) / promised:.1f} times the declared tolerance")
+    return tuple(lines)
+
+
+def _misfits(explained: Sequence[Explained]) -> tuple[str, ...]:
+    """Return the joints whose torque the fitted model does not describe, a line each."""
+    lines = []
+    measured = np.concatenate([e.measured for e in explained if e.trial.role == "fit"])
+    rest = np.concatenate([e.measured - e.fitted for e in explained if e.trial.role == "fit"])
+    if measured.any():
+        for j, (m, r) in enumerate(zip(np.std(measured, axis=0), np.std(rest, axis=0), strict=True), start=1):
+            if r > _POOR * m > 0:
+                lines.append(
+                    f"the residual of joint {j} is {r / m:.0%} of the variation of its torque: the model does not describe these data"
+                )
+    return tuple(lines)
+
+
+_NOISY = 0.1
+"""Noise of a speed above this share of the speed biases what is read from speeds."""
+
+
+def _noisy_speeds(shares: Sequence[float]) -> tuple[str, ...]:
+    """Return the joints whose friction, viscosity and inertia rest on speeds that are noise to a good part, a line each."""
+    return tuple(
+        f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are biased by more "
+        "than their intervals say; give the robot's angles and a [robot], or smoother angles"
+        for j, share in enumerate(shares, start=1)
+        if share > _NOISY
+    )
+
+
+_TOLERANCES = ("angle_offset", "force_bias", "force_gain", "time_delay", "handle_placement")
 
 
 def _joint_kinds() -> dict[str, Any]:
@@ -246,7 +317,10 @@ def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
     for kind in dict.fromkeys(kinds):
         if kind not in known:
             raise unknown_name("--with", kind, known, what="joint effect")
-        added += [Effect(kind, j) for j in range(1, model.n_joints + 1) if (kind, j) not in present]
+        first = known[kind].first_joint
+        if first > model.n_joints:
+            raise BadInput("--with", kind, f"an arm of {first} joints or more: it acts over two of them")
+        added += [Effect(kind, j) for j in range(first, model.n_joints + 1) if (kind, j) not in present]
     return added
 
 
@@ -307,10 +381,13 @@ def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) 
     joints = [dataclasses.asdict(j) | {"stiffness": 0.0, "rest": 0.0, "viscosity": 0.0, "coulomb": 0.0} for j in model.joints]
     listed = []
     fitted = [Effect(kind, index + 1, parameters=_named(kind, values)) for kind, index, values in raw["effects"]]
-    held = [e for e in effects if e.kind not in _joint_kinds()]
+    # What an effect did to the segments is in them now.
+    absorbed = {name for name, kind in catalogue().items() if kind.where in ("segment", "hand")}
+    held = [e for e in effects if e.kind not in _joint_kinds() and e.kind not in absorbed]
     for effect in fitted:
         joint, values = joints[(effect.joint or 1) - 1], effect.parameters
-        if effect.kind == "elastic" and not joint["stiffness"]:
+        # A joint of a model has no negative spring; a fit may find one, and an effect may say it.
+        if effect.kind == "elastic" and not joint["stiffness"] and values["stiffness"] >= 0.0:
             joint.update(stiffness=values["stiffness"], rest=values["rest"])
         elif effect.kind == "viscous" and not joint["viscosity"]:
             joint["viscosity"] = values["viscosity"]

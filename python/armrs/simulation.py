@@ -50,6 +50,8 @@ class Movement:
         points = np.array(self.waypoints, dtype=float)
         if points.ndim != 2 or len(points) < 2:
             raise BadInput("waypoints", f"an array of shape {points.shape}", "two or more rows of joint angles")
+        if np.isfinite(points).all() and np.abs(points).max() > 4 * np.pi:
+            raise BadInput("waypoints", float(np.abs(points).max()), "angles within two turns, in radians", hint="looks like degrees")
         points.flags.writeable = False
         object.__setattr__(self, "waypoints", points)
 
@@ -197,9 +199,10 @@ def simulate(
         raise BadInput("dt", dt, f"a whole part of the interval between samples, {1.0 / rate:g} s")
     driven = _driven(drive, coupling)
     if isinstance(drive, Trial) and start is None:
-        start = drive.q[0]
+        first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
+        start = drive.q[first]
         if driven["kind"] != "robot" and start_speed is None and drive.dq is not None:
-            start_speed = drive.dq[0]
+            start_speed = drive.dq[first]
     settings = {
         "engine": engine,
         "integrator": integrator,
@@ -272,7 +275,7 @@ def _movement(document: dict[str, Any], n_joints: int) -> Movement:
     from . import checks
 
     checks.keys("", document, required=["movement"])
-    table = document["movement"]
+    table = checks.table("movement", document["movement"])
     known = [
         "waypoints_deg", "waypoints_rad", "speed_rad_s", "speed_deg_s", "acceleration_rad_s2", "acceleration_deg_s2", "pause_s", "shape",
     ]  # fmt: skip
@@ -292,8 +295,8 @@ def _movement(document: dict[str, Any], n_joints: int) -> Movement:
             numbers = np.asarray(value, dtype=float)
         except (TypeError, ValueError):
             raise BadInput(f"movement.{name}", value, "numbers") from None
-        if not np.isfinite(numbers).all():
-            raise BadInput(f"movement.{name}", value, "finite numbers")
+        if not np.isfinite(numbers).all() or (key != "waypoints" and numbers.ndim):
+            raise BadInput(f"movement.{name}", value, "finite numbers" if key == "waypoints" else "one finite number")
         if key in fields:
             raise BadInput(f"movement.{name}", "a second unit", f"{key} once, in degrees or radians")
         numbers = np.radians(numbers) if unit.startswith("deg") else numbers

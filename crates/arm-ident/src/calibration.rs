@@ -13,7 +13,7 @@ use crate::unknown::Imperfection;
 
 /// The force on the arm \[N\] at every sample that the model predicts for a motion.
 ///
-/// Least squares of `Jᵀ F = B q̈ + C q̇ + G + R − τ` over the two components of the force; in a pose in which a component
+/// Least squares of `Jᵀ F = B q̈ + C q̇ + G + R − τ − M` over the two components of the force; in a pose in which a component
 /// does no work (a stretched arm) that component is zero. Zero where the arm is not led by a force.
 pub fn predicted_force<const N: usize>(
     model: &Model<N>,
@@ -33,7 +33,8 @@ pub fn predicted_force<const N: usize>(
             let torque = inverse_dynamics(&model.chain, &pose, qd, qdd)
                 + resisting_torque(&model.fitted, &seen, &memory.fitted)
                 + resisting_torque(&model.held, &seen, &memory.held)
-                - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i]);
+                - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i])
+                - Joints::repeat(trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]));
             let j = jacobian(&model.chain, &pose);
             let (a, b, c) = (
                 j.row(0).dot(&j.row(0)),

@@ -570,6 +570,7 @@ fn summarise<const N: usize>(
         }
     }
     let certainty = Certainty {
+        scale_sd: 0.0,
         unknowns,
         x,
         limited,
@@ -613,6 +614,7 @@ fn summarise<const N: usize>(
         scale_free: false,
         cutoff,
         clusters,
+        speed_noise: vec![0.0; N],
         explained: prepared.iter().map(|pieces| explain(pieces, x)).collect(),
         chain,
         fitted,

@@ -96,6 +96,9 @@ pub struct Identified<const N: usize> {
     pub cutoff: f64,
     /// Number of independent clusters behind the standard deviations.
     pub clusters: usize,
+    /// Noise of each joint's speed relative to the speed itself, where the motion was measured; zero where it was simulated.
+    /// Above a few tenths friction, viscosity and inertia are biased in a way that no interval shows.
+    pub speed_noise: Vec<f64>,
     /// For each trial handed in: how it is explained.
     pub explained: Vec<Explained<N>>,
     /// The arm with the estimates.

@@ -25,7 +25,7 @@ const SETTLING_ROUNDS: usize = 2;
 /// The estimate stands when a round moves it by less than this, in units of its noise.
 const SETTLED: f64 = 1e-2;
 /// From this number of trials on, a trial is a cluster; below, trials are cut into blocks.
-const ENOUGH_TRIALS: usize = 5;
+const ENOUGH_TRIALS: usize = 10;
 /// Fewest clusters aimed at when trials are cut into blocks.
 const BLOCKS: usize = 12;
 /// Shortest block, in decimated samples.
@@ -91,11 +91,11 @@ pub fn identify<const N: usize>(
     }
     let scale_free = fit.iter().all(|t| t.is_unloaded());
     let simulate = match options.motion {
-        MotionSource::Auto => trials.iter().all(|t| t.handle.is_some()),
+        MotionSource::Auto => fit.iter().all(|t| can_simulate(t)),
         MotionSource::Measured => false,
         MotionSource::Simulated => true,
     };
-    let unknowns = unknowns(model, &options.tolerance, trials);
+    let unknowns = unknowns(model, &options.tolerance, &fit);
     if unknowns
         .iter()
         .all(|u| matches!(u.source, Source::Calibration(_)))
@@ -152,7 +152,41 @@ pub fn identify<const N: usize>(
         scale_free,
         level: options.level,
     };
-    summarise(&fit, cutoff, explained)
+    let mut result = summarise(&fit, cutoff, explained)?;
+    if !simulate {
+        result.speed_noise = relative_speed_noise(trials, cutoff)?;
+    }
+    Ok(result)
+}
+
+/// Standard deviation of the speed's noise over the root mean square of the speed, the worst of the fit trials by joint.
+fn relative_speed_noise<const N: usize>(
+    trials: &[Trial<N>],
+    cutoff: f64,
+) -> Result<Vec<f64>, IdentError> {
+    let mut worst = vec![0.0; N];
+    for trial in trials.iter().filter(|t| t.role == Role::Fit) {
+        let (noise, motion) = (speed_noise(trial, cutoff), measured(trial, cutoff)?);
+        for (j, worst) in worst.iter_mut().enumerate() {
+            let speeds: Vec<f64> = motion.qd.iter().map(|qd| qd[j]).collect();
+            let speed = root_mean_square(speeds.iter());
+            if speed > 0.0 {
+                *worst = f64::max(*worst, noise[j] / speed);
+            }
+        }
+    }
+    Ok(worst)
+}
+
+/// Whether the robot's angles alone tell how a trial moved: its path is known, and nothing else drives the arm.
+fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
+    let moment = trial.moment_on_arm.iter().flatten().any(|&m| m != 0.0);
+    let torque = trial
+        .torque
+        .iter()
+        .flatten()
+        .any(|t| t.iter().any(|&v| v != 0.0));
+    trial.handle.is_some() && !moment && !torque
 }
 
 /// The same unknowns with a calibration that is trusted a thousand times more.
@@ -224,7 +258,8 @@ fn prepare<const N: usize>(
         .iter()
         .map(|t| {
             let seen = measured(t, cutoff)?;
-            if simulate {
+            // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
+            if simulate && (t.role == Role::Fit || can_simulate(t)) {
                 simulated(model, t, seen, cutoff)
             } else {
                 Ok(seen)

@@ -36,6 +36,8 @@ pub(crate) struct Certainty<'a> {
     pub x: &'a [f64],
     /// Unknowns that a bound or another physical limit takes part in deciding.
     pub limited: Vec<bool>,
+    /// Relative standard deviation of the scale that the model gives to data without a load, else zero.
+    pub scale_sd: f64,
     pub covariance: Matrix,
     /// Covariance as if no bound held, for the parameters that sit on one.
     pub unbounded: Matrix,
@@ -72,6 +74,11 @@ pub(crate) fn summarise<const N: usize>(
     let rank = report.rank - usize::from(fit.scale_free);
     let clusters = solved.clusters.len();
     let certainty = Certainty {
+        scale_sd: if fit.scale_free {
+            fit.model.segment_uncertainty
+        } else {
+            0.0
+        },
         unknowns,
         x: &solved.outcome.x,
         limited: (0..unknowns.len())
@@ -117,6 +124,7 @@ pub(crate) fn summarise<const N: usize>(
         scale_free: fit.scale_free,
         cutoff,
         clusters,
+        speed_noise: vec![0.0; N],
         explained,
         chain: fit.model.chain,
         fitted: fit.model.fitted.clone(),
@@ -181,7 +189,7 @@ impl Certainty<'_> {
         name: String,
         unit: &'static str,
     ) -> Result<Estimate, IdentError> {
-        let value = w.iter().zip(self.x).map(|(w, x)| w * x).sum();
+        let value: f64 = w.iter().zip(self.x).map(|(w, x)| w * x).sum();
         let (held, open) = (
             standard_error(&self.covariance, w)?,
             standard_error(&self.unbounded, w)?,
@@ -190,8 +198,12 @@ impl Certainty<'_> {
         let limited = w.iter().zip(&self.limited).any(|(&w, &l)| w != 0.0 && l);
         let bound = limited && held < FREE * open;
         let std = if bound { open } else { held };
+        // Without a load every value is a ratio to the model's scale, and knows no more than that scale.
+        let std = libm::hypot(std, self.scale_sd * value);
         let reach = self.quantile * std;
-        let decided_by = if bound {
+        let decided_by = if self.scale_sd > 0.0 && w[..self.physical].iter().any(|&v| v != 0.0) {
+            Decision::Prior
+        } else if bound {
             Decision::Bound
         } else {
             self.decision(w, std)?

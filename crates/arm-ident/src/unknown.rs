@@ -69,7 +69,7 @@ pub struct Unknown {
 pub fn unknowns<const N: usize>(
     model: &Model<N>,
     tolerance: &Tolerance,
-    trials: &[Trial<N>],
+    trials: &[&Trial<N>],
 ) -> Vec<Unknown> {
     let mut list = Vec::new();
     if model.segment_uncertainty > 0.0 {
@@ -162,7 +162,7 @@ fn segment<const N: usize>(model: &Model<N>, k: usize) -> Vec<Unknown> {
     list
 }
 
-fn calibration<const N: usize>(tolerance: &Tolerance, trials: &[Trial<N>]) -> Vec<Unknown> {
+fn calibration<const N: usize>(tolerance: &Tolerance, trials: &[&Trial<N>]) -> Vec<Unknown> {
     let mut list = Vec::new();
     let mut push = |imperfection, name: String, unit, sd: f64| {
         if sd > 0.0 {

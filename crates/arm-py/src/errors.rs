@@ -64,6 +64,15 @@ pub fn identification(error: IdentError) -> PyErr {
             min,
             max,
         } => bad_input(name, found, &format!("{min} to {max}")),
+        IdentError::Rank {
+            found, expected, ..
+        } => in_python(
+            "IdentificationError",
+            &format!(
+                "the data determine {found} of {expected} unknowns and nothing is known beforehand of the others: \
+                 leave out effects that these movements do not show"
+            ),
+        ),
         other => in_python("IdentificationError", &other.to_string()),
     }
 }

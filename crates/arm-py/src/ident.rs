@@ -104,6 +104,12 @@ pub fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
     Ok(trial)
 }
 
+/// An effect that a simulation applies and an identification has no way to take out of measured data.
+fn cannot_undo(effect: &Effect<f64>) -> PyErr {
+    let allowed = "effects of joints, segments, hand, contact stiffness and gravity; take it out of the data and the model";
+    bad_input("effects of the model", effect.kind.info().kind, allowed)
+}
+
 /// Splits the effects into those that are fitted and those that are held, and applies those that alter the rig.
 pub fn model<const N: usize>(
     chain: &Chain<f64, N>,
@@ -116,7 +122,15 @@ pub fn model<const N: usize>(
         match effect.kind.info().place {
             Place::Joint if fit => fitted.push(*effect),
             Place::Joint => held.push(*effect),
+            Place::AngleSensor | Place::ForceSensor | Place::Sensors => {
+                return Err(cannot_undo(effect));
+            }
             _ => effect.alter(&mut setup),
+        }
+        let moved =
+            setup.base_motion != [0.0; 2] || setup.ripple != [0.0; 2] || setup.force_delay != 0.0;
+        if moved {
+            return Err(cannot_undo(effect));
         }
     }
     Ok(Model {
@@ -192,6 +206,7 @@ fn outcome<'py, const N: usize>(
     out.set_item("scale_free", result.scale_free)?;
     out.set_item("cutoff", result.cutoff)?;
     out.set_item("clusters", result.clusters)?;
+    out.set_item("speed_noise", &result.speed_noise)?;
     out.set_item("trades", &result.trades)?;
     for (name, list) in [
         ("parameters", &result.parameters),

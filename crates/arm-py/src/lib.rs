@@ -27,6 +27,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(signal::smooth, m)?)?;
+    m.add_function(wrap_pyfunction!(signal::low_pass_both_ways, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
     Ok(())
 }

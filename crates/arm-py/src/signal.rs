@@ -1,6 +1,7 @@
 //! The common low-pass and the derivatives behind it, for time series.
 
 use arm_ident::derivative;
+use arm_ident::filter::Butterworth;
 use arm_ident::motion::low_pass;
 use numpy::ndarray::{Array1, Array2};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
@@ -38,4 +39,25 @@ pub fn smooth<'py>(
     }
     let [passed, first, second] = out.map(|table| table.into_pyarray(py));
     Ok((passed, first, second))
+}
+
+/// Zero-phase Butterworth low-pass of uniform time series, `(n, k)`.
+///
+/// `cutoff` is −3 dB of a single pass [Hz], so −6 dB of both; the ends are continued as `scipy.signal.sosfiltfilt` does.
+#[pyfunction]
+pub fn low_pass_both_ways<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray2<'py, f64>,
+    rate: f64,
+    cutoff: f64,
+    order: usize,
+) -> PyResult<Table<'py>> {
+    let filter = Butterworth::low_pass(order, cutoff, rate).map_err(identification)?;
+    let mut out = Array2::zeros((values.shape()[0], values.shape()[1]));
+    for c in 0..values.shape()[1] {
+        let column = values.as_array().column(c).to_vec();
+        let passed = filter.both_ways(&column).map_err(identification)?;
+        out.column_mut(c).assign(&Array1::from(passed));
+    }
+    Ok(out.into_pyarray(py))
 }

@@ -60,6 +60,9 @@ pub(crate) struct Outcome<T, const N: usize> {
     pub joint_force: [T; N],
 }
 
+/// Passes of the fixed-point iteration for friction that grows with the force through its joint.
+const PASSES: usize = 8;
+
 impl<T: Scalar, const N: usize> Model<T, N> {
     /// * `setup` - the rig, effects applied
     /// * `effects` - joint effects only
@@ -114,8 +117,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// Accelerations, contact force and powers at a state.
     ///
-    /// Friction that depends on the force through its joint is evaluated at the joint forces of the motion without it:
-    /// one pass of a fixed-point iteration, whose error is of the second order in that friction.
+    /// Friction that depends on the force through its joint changes the motion and so that force: a fixed-point iteration of
+    /// [`PASSES`] passes from the motion without it, each of which takes one more order of the friction into account.
     #[inline]
     pub fn evaluate(
         &self,
@@ -136,7 +139,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 moment_on_arm: T::ZERO,
             };
             qdd = forward_dynamics(&self.chain, &pose, qd, &load);
-            if self.feels_joint_force {
+            for _ in 1..self.passes() {
                 motion.joint_force = self.joint_force(&pose, (qd, &qdd), force);
                 resisting = self.resisting(&motion, memory);
                 load.torque = difference(&input.torque, &resisting);
@@ -144,8 +147,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             }
         } else {
             let terms = Terms::new(&self.chain, self.base.as_ref(), &pose, qd);
-            let passes = if self.feels_joint_force { 2 } else { 1 };
-            for pass in 0..passes {
+            for pass in 0..self.passes() {
                 if pass > 0 {
                     motion.joint_force = self.joint_force(&pose, (qd, &qdd), force);
                     resisting = self.resisting(&motion, memory);
@@ -166,6 +168,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             power: [force[0] * v[0] + force[1] * v[1], drive, resisted, lost],
             joint_force: motion.joint_force,
         }
+    }
+
+    /// Evaluations of the dynamics for one state.
+    #[inline]
+    fn passes(&self) -> usize {
+        if self.feels_joint_force { PASSES } else { 1 }
     }
 
     /// Whether the link-form solver of the core holds the whole rig.

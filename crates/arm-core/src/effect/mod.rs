@@ -34,6 +34,13 @@ macro_rules! catalogue {
             }
         }
 
+        impl Kind {
+            /// Whether it also acts in the joint before, so that it cannot stand at the first one.
+            pub const fn crosses(self) -> bool {
+                match self { $(Self::$law => <$module::$law as Law>::CROSSES),* }
+            }
+        }
+
         impl<T: Scalar> Effect<T> {
             /// Torque with which the joint resists \[N m\].
             #[inline]

@@ -201,20 +201,17 @@ fn effects_with_states_and_over_two_joints_agree() {
     assert!(memory < 5e-5, "states differ by {memory}");
 }
 
-/// The native engine evaluates this friction at the joint forces of the motion without it, rapier at those that act. What
-/// is left is of the second order in the friction.
+/// Friction under load changes the force that makes it: both engines must find the same balance, also where it is strong.
 #[test]
-fn friction_under_load_agrees_up_to_its_second_order() {
-    let with = |coefficient| {
+fn friction_under_load_agrees() {
+    for coefficient in [0.003, 0.02] {
         let mut experiment = free_swing();
         let friction = Effect::new(Kind::LoadFriction, 1).with(&[coefficient, 0.1]);
         experiment.effects.push(friction);
-        difference(&experiment, 0.125e-3)[0]
-    };
-    let [whole, half] = [with(0.003), with(0.0015)];
-    assert!(whole < 3e-3, "{whole} rad");
-    let order = libm::log2(whole / half);
-    assert!((order - 2.0).abs() < 0.2, "order {order}");
+        let [angles, ..] = difference(&experiment, 0.125e-3);
+        println!("load friction {coefficient} m: {angles} rad");
+        assert!(angles < 2e-4, "{coefficient} m: {angles} rad");
+    }
 }
 
 #[test]
