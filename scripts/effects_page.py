@@ -19,7 +19,8 @@ def page() -> str:
     places = list(dict.fromkeys(kind.where for kind in kinds))
     blocks = [
         "# The catalogue of effects",
-        "Generated from the core by `scripts/effects_page.py`; `armrs effects` prints the same. `R` is a torque with which a joint resists.",
+        "Generated from the core by `scripts/effects_page.py`; `armrs effects` prints the same. "
+        "`R` is a torque with which a joint resists.",
         "In a model an effect is a table `[[effect]]` with `kind`, where it acts, and its parameters; what is left out takes its default.",
     ]
     for place in places:

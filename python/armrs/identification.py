@@ -92,8 +92,8 @@ class Identified:
     contradictions : tuple of str
         What in the result no arm can be, such as a mass at its limit. Then no number is to be trusted.
     misfits : tuple of str
-        Joints whose torque the fitted model does not describe, calibrations far beyond their tolerance, speeds that are noise. Intervals hold
-        only where the model's structure is right.
+        Joints whose torque the fitted model does not describe, calibrations far beyond their tolerance, speeds that are noise.
+        Intervals hold only where the model's structure is right.
     trades : tuple of str
         Which unknowns the movements cannot tell apart, in words.
     scale_free : bool
