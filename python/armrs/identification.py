@@ -295,8 +295,8 @@ _NOISY = 0.1
 def _noisy_speeds(shares: Sequence[float]) -> tuple[str, ...]:
     """Return the joints whose friction, viscosity and inertia rest on speeds that are noise to a good part, a line each."""
     return tuple(
-        f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are biased by more "
-        "than their intervals say; give the robot's angles and a [robot], or smoother angles"
+        f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are "
+        "biased by more than their intervals say; give the robot's angles and a [robot], or smoother angles"
         for j, share in enumerate(shares, start=1)
         if share > _NOISY
     )
