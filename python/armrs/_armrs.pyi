@@ -5,7 +5,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Arm", "Rig", "__version__", "build_profile", "effects", "identify", "simulate", "smooth"]
+__all__ = ["Arm", "Rig", "__version__", "build_profile", "effects", "identify", "low_pass_both_ways", "simulate", "smooth"]
 
 __version__: str
 build_profile: str

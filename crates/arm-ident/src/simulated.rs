@@ -9,11 +9,14 @@ use arm_sim::{Coupling, Drive, Experiment, HandlePath, Start, simulate};
 
 use crate::equation::Kinematics;
 use crate::error::IdentError;
-use crate::motion::{low_pass, motion_cutoff};
+use crate::motion::low_pass;
 use crate::trial::{Model, Trial};
 
 /// Longest simulation step \[s\]; small enough for stiff contacts and smoothed dry friction.
 const LONGEST_STEP: f64 = 0.25e-3;
+/// Bandwidth of the handle's path, in bandwidths of the rows. Wider, and noise of the robot's encoders makes a resting arm
+/// creep to and fro, which is read as friction; narrower, and the corners of the path are rounded twice.
+const HANDLE_BAND: f64 = 2.0;
 /// Largest root mean square difference between simulated and measured angles that is still the same movement \[rad\].
 const SAME_MOVEMENT: f64 = 0.15;
 
@@ -68,7 +71,7 @@ fn experiment<const N: usize>(
     seen: &Kinematics<N>,
     cutoff: f64,
 ) -> Result<Experiment<N>, IdentError> {
-    let filter = low_pass(motion_cutoff(cutoff, trial.rate), trial.rate)?;
+    let filter = low_pass((HANDLE_BAND * cutoff).min(0.4 * trial.rate), trial.rate)?;
     let axis = |a: usize| filter.both_ways(&handle.iter().map(|p| p[a]).collect::<Vec<_>>());
     let (y, z) = (axis(0)?, axis(1)?);
     let points: Vec<[f64; 2]> = y.into_iter().zip(z).map(|(y, z)| [y, z]).collect();
