@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from ._armrs import __version__ as __version__
     from .conversion import convert as convert
     from .dataset import Dataset as Dataset
+    from .dataset import Subject as Subject
+    from .dataset import Tolerance as Tolerance
     from .dataset import load_dataset as load_dataset
     from .dataset import write_dataset as write_dataset
     from .demo import Demonstration as Demonstration
@@ -47,7 +49,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "_armrs": ("Arm", "__version__", "build_profile"),
     "conversion": ("convert",),
-    "dataset": ("Dataset", "load_dataset", "write_dataset"),
+    "dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
     "demo": ("Demonstration", "run_demo"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
     "identification": ("Estimate", "Identified", "identify"),
