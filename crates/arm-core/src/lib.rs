@@ -32,6 +32,7 @@ mod inertia;
 mod kinematics;
 mod lanes;
 pub mod models;
+pub mod monitor;
 mod regressor;
 mod robot;
 mod scalar;
@@ -54,7 +55,7 @@ pub use kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_vel
 pub use lanes::Lanes;
 pub use regressor::{Regressor, regressor};
 pub use robot::{Elbow, Robot};
-pub use scalar::Scalar;
+pub use scalar::{Real, Scalar};
 pub use setup::{Reading, Setup};
 pub use trajectory::{Limits, Path, Profile, Sample, Shape};
 

@@ -78,6 +78,26 @@ pub trait Scalar:
     }
 }
 
+/// One real number, of which a device may ask which of two is larger: `f64` or `f32`, but not lanes.
+pub trait Real: Scalar + PartialOrd {
+    /// The same number in double precision.
+    fn to_f64(self) -> f64;
+}
+
+impl Real for f64 {
+    #[inline]
+    fn to_f64(self) -> f64 {
+        self
+    }
+}
+
+impl Real for f32 {
+    #[inline]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
 /// Kept out of the way of the usual case.
 #[cold]
 #[inline(never)]

@@ -11,6 +11,7 @@ mod dual;
 mod effects;
 mod identities;
 mod lanes;
+mod monitor;
 mod newton_euler;
 mod pendulum;
 mod robot;

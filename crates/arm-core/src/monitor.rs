@@ -1,0 +1,316 @@
+//! The safety monitor: stops a device at the first value that is not allowed, and stays stopped.
+
+use crate::scalar::Real;
+use crate::{Invalid, check};
+
+/// What a watched channel measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Angle of a joint \[rad\].
+    Angle,
+    /// Its speed \[rad/s\].
+    Speed,
+    /// Its acceleration \[rad/s²\].
+    Acceleration,
+    /// A force \[N\] or torque \[N m\].
+    Force,
+    /// Power that flows into the arm \[W\].
+    Power,
+}
+
+impl Quantity {
+    /// The word for it in messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Angle => "angle",
+            Self::Speed => "speed",
+            Self::Acceleration => "acceleration",
+            Self::Force => "force",
+            Self::Power => "power",
+        }
+    }
+}
+
+/// What one channel must not do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channel<T> {
+    /// What it measures.
+    pub quantity: Quantity,
+    /// Smallest value allowed.
+    pub min: T,
+    /// Largest value allowed.
+    pub max: T,
+    /// How long the value may stay the same to the last bit while motion is commanded \[µs\]; `None` for ever.
+    pub frozen_after: Option<u64>,
+}
+
+impl<T: Real> Channel<T> {
+    /// A channel with a range, never taken as frozen.
+    pub const fn range(quantity: Quantity, min: T, max: T) -> Self {
+        Self {
+            quantity,
+            min,
+            max,
+            frozen_after: None,
+        }
+    }
+
+    /// A channel whose magnitude is limited.
+    pub fn magnitude(quantity: Quantity, max: T) -> Self {
+        Self::range(quantity, -max, max)
+    }
+
+    /// The same channel, stopped when it freezes for longer than this \[µs\].
+    ///
+    /// Give a sensor that resolves coarsely as long as the slowest commanded motion needs to cross one step.
+    pub const fn frozen_after(self, limit: u64) -> Self {
+        Self {
+            frozen_after: Some(limit),
+            ..self
+        }
+    }
+}
+
+/// What a monitor sees of one control period. Times count from any start, in microseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation<T, const C: usize> {
+    /// The controller's clock \[µs\].
+    pub now: u64,
+    /// When the values were measured, by the same clock \[µs\].
+    pub stamp: u64,
+    /// One value a channel, in the unit of its quantity.
+    pub values: [T; C],
+    /// Whether motion is commanded that must change the channel.
+    pub moving: [bool; C],
+}
+
+/// Why a device was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// A value above its largest or below its smallest.
+    Limit,
+    /// A value that is NaN or infinite.
+    NotFinite,
+    /// A value that stayed the same to the last bit while motion was commanded; value and limit are times \[s\].
+    Frozen,
+    /// Data older than allowed; value and limit are ages \[s\].
+    Late,
+    /// A clock or a time stamp that ran backwards, or data from the future; value and limit are ages \[s\].
+    Clock,
+}
+
+impl Reason {
+    /// The words for it in messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Limit => "beyond the limit",
+            Self::NotFinite => "not finite",
+            Self::Frozen => "frozen",
+            Self::Late => "late data",
+            Self::Clock => "clock runs backwards",
+        }
+    }
+}
+
+/// The stop of a device: the first thing that was not allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop<T> {
+    /// Why.
+    pub reason: Reason,
+    /// Zero-based channel; `None` where the time stamp of all was at fault.
+    pub channel: Option<usize>,
+    /// The value found.
+    pub value: T,
+    /// The limit that it broke.
+    pub limit: T,
+    /// The controller's clock \[µs\].
+    pub at: u64,
+}
+
+/// Watches `C` channels in fixed time and memory.
+///
+/// A fault is reported in the control period in which it is seen: a value beyond its limit at once, late or frozen data in
+/// the first period after the time allowed. The first stop is kept, whatever comes after it, until [`Monitor::reset`].
+///
+/// ```
+/// use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason};
+/// let channels = [Channel::range(Quantity::Angle, -1.5, 0.5).frozen_after(50_000)];
+/// let mut monitor = Monitor::new(channels, 2_000)?;
+/// let mut seen = Observation { now: 1_000, stamp: 1_000, values: [0.2], moving: [true] };
+/// assert!(monitor.check(&seen).is_ok());
+/// seen = Observation { now: 2_000, stamp: 2_000, values: [0.6], ..seen };
+/// let stop = monitor.check(&seen).unwrap_err();
+/// assert_eq!((stop.reason, stop.channel, stop.value, stop.limit), (Reason::Limit, Some(0), 0.6, 0.5));
+/// # Ok::<(), arm_core::Invalid>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Monitor<T, const C: usize> {
+    channels: [Channel<T>; C],
+    oldest: u64,
+    last: Option<Seen<T, C>>,
+    stop: Option<Stop<T>>,
+}
+
+/// What is remembered of the observations before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Seen<T, const C: usize> {
+    now: u64,
+    stamp: u64,
+    values: [T; C],
+    /// The stamp from which each channel has not changed under a command to move.
+    unchanged: [u64; C],
+}
+
+impl<T: Real, const C: usize> Monitor<T, C> {
+    /// A monitor that has not stopped.
+    ///
+    /// * `oldest` - greatest age of the data that is allowed \[µs\], usually one or two control periods
+    ///
+    /// # Errors
+    /// [`Invalid`] for a limit that is NaN, and a range that is empty. An infinite limit is none.
+    pub fn new(channels: [Channel<T>; C], oldest: u64) -> Result<Self, Invalid> {
+        for (index, channel) in channels.iter().enumerate() {
+            let (min, max) = (channel.min, channel.max);
+            if min.partial_cmp(&max).is_none_or(|order| order.is_gt()) {
+                check::finite("smallest value of channel", index, min)?;
+                check::finite("largest value of channel", index, max)?;
+                return Err(Invalid::OutOfRange {
+                    name: "largest value of channel",
+                    index,
+                    found: max.to_f64(),
+                    min: min.to_f64(),
+                    max: f64::INFINITY,
+                });
+            }
+        }
+        Ok(Self {
+            channels,
+            oldest,
+            last: None,
+            stop: None,
+        })
+    }
+
+    /// Looks at one control period.
+    ///
+    /// # Errors
+    /// The first [`Stop`], in every period from then on.
+    #[inline]
+    pub fn check(&mut self, seen: &Observation<T, C>) -> Result<(), Stop<T>> {
+        if self.stop.is_none() {
+            self.stop = self.fault(seen);
+        }
+        self.stop.map_or(Ok(()), Err)
+    }
+
+    /// Why the device was stopped, if it was.
+    pub fn stop(&self) -> Option<&Stop<T>> {
+        self.stop.as_ref()
+    }
+
+    /// Lets the device start again; nothing is remembered of the time before.
+    pub fn reset(&mut self) {
+        self.last = None;
+        self.stop = None;
+    }
+
+    /// The channels and their limits.
+    pub fn channels(&self) -> &[Channel<T>; C] {
+        &self.channels
+    }
+
+    fn fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+        let clock = self.clock_fault(seen);
+        let value = self.value_fault(seen);
+        let frozen = self.frozen_fault(seen);
+        clock.or(value).or(frozen)
+    }
+
+    fn clock_fault(&self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+        let stop = |reason, age: T| Stop {
+            reason,
+            channel: None,
+            value: age,
+            limit: seconds(self.oldest),
+            at: seen.now,
+        };
+        if seen.stamp > seen.now {
+            return Some(stop(Reason::Clock, -seconds::<T>(seen.stamp - seen.now)));
+        }
+        let age = seen.now - seen.stamp;
+        if let Some(last) = &self.last
+            && (seen.now < last.now || seen.stamp < last.stamp)
+        {
+            return Some(stop(Reason::Clock, seconds(age)));
+        }
+        (age > self.oldest).then(|| stop(Reason::Late, seconds(age)))
+    }
+
+    fn value_fault(&self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+        let both = self.channels.iter().zip(seen.values);
+        for (index, (channel, value)) in both.enumerate() {
+            let limit = if value > channel.max {
+                channel.max
+            } else {
+                channel.min
+            };
+            let reason = if !value.is_finite() {
+                Reason::NotFinite
+            } else if value > channel.max || value < channel.min {
+                Reason::Limit
+            } else {
+                continue;
+            };
+            return Some(Stop {
+                reason,
+                channel: Some(index),
+                value,
+                limit,
+                at: seen.now,
+            });
+        }
+        None
+    }
+
+    /// Remembers the observation and finds the first channel that is frozen. Repeats of one sample count as one.
+    fn frozen_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+        let mut unchanged = [seen.stamp; C];
+        let mut found = None;
+        if let Some(last) = &self.last {
+            let values = seen.values.iter().zip(&last.values);
+            let rows = unchanged.iter_mut().zip(&last.unchanged).zip(seen.moving);
+            let all = rows.zip(values).zip(&self.channels).enumerate();
+            for (index, (((row, moving), (new, old)), channel)) in all {
+                let (since, before) = row;
+                if !(moving && new == old) {
+                    continue;
+                }
+                *since = *before;
+                let time = seen.stamp.saturating_sub(*before);
+                if let Some(limit) = channel.frozen_after
+                    && time > limit
+                    && found.is_none()
+                {
+                    found = Some(Stop {
+                        reason: Reason::Frozen,
+                        channel: Some(index),
+                        value: seconds(time),
+                        limit: seconds(limit),
+                        at: seen.now,
+                    });
+                }
+            }
+        }
+        self.last = Some(Seen {
+            now: seen.now,
+            stamp: seen.stamp,
+            values: seen.values,
+            unchanged,
+        });
+        found
+    }
+}
+
+fn seconds<T: Real>(microseconds: u64) -> T {
+    T::of(microseconds as f64 * 1e-6)
+}
