@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from .identification import Estimate as Estimate
     from .identification import Identified as Identified
     from .identification import identify as identify
+    from .markers import Markers as Markers
+    from .markers import PlanarMotion as PlanarMotion
+    from .markers import planar_motion as planar_motion
     from .model import Contact as Contact
     from .model import Effect as Effect
     from .model import Joint as Joint
@@ -36,6 +39,9 @@ if TYPE_CHECKING:
     from .moments import PassiveCurve as PassiveCurve
     from .moments import PassiveMoments as PassiveMoments
     from .moments import passive_moments as passive_moments
+    from .motions import convert_markers as convert_markers
+    from .motions import convert_motion as convert_motion
+    from .motions import read_markers as read_markers
     from .report import write_report as write_report
     from .simulation import Channel as Channel
     from .simulation import Movement as Movement
@@ -53,8 +59,10 @@ _HOMES = {
     "demo": ("Demonstration", "run_demo"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
     "identification": ("Estimate", "Identified", "identify"),
+    "markers": ("Markers", "PlanarMotion", "planar_motion"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
     "moments": ("PassiveCurve", "PassiveMoments", "passive_moments"),
+    "motions": ("convert_markers", "convert_motion", "read_markers"),
     "report": ("write_report",),
     "simulation": ("Channel", "Movement", "Sensors", "Simulated", "load_movement", "simulate"),
     "trial": ("Trial",),

@@ -46,6 +46,15 @@ class Format(str, enum.Enum):
     parquet = "parquet"
 
 
+class TableFormat(str, enum.Enum):
+    """Formats of tables over time."""
+
+    csv = "csv"
+    parquet = "parquet"
+    mot = "mot"
+    sto = "sto"
+
+
 class Method(str, enum.Enum):
     """Methods of identification."""
 
@@ -156,15 +165,48 @@ def effects(
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Data set folder, dataset.toml, or one .csv or .parquet file.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="Data set folder, dataset.toml, or one .csv, .parquet, .mot, .sto, .c3d or .trc file.")
+    ],
     out: OutFolder,
-    to: Annotated[Format, typer.Option("--to", help="Format to write.")] = Format.parquet,
+    to: Annotated[TableFormat, typer.Option("--to", help="Format to write.")] = TableFormat.parquet,
+    points: Annotated[
+        str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the point half way.")
+    ] = "",
+    up: Annotated[
+        str | None, typer.Option(metavar="AXIS", help="Axis of the markers that points up: z in C3D, y in TRC when absent.")
+    ] = None,
+    forward: Annotated[
+        str | None, typer.Option(metavar="AXIS", help="Axis that points forward; where the arm reaches when absent.")
+    ] = None,
+    coordinates: Annotated[str, typer.Option(metavar="NAME,…", help="Joint angles of a MOT or STO file, first joint first.")] = "",
     json: JsonFile = None,
 ) -> None:
-    """Convert trial files between CSV and Parquet; every column and every value is kept to the bit."""
+    """Convert between file formats, every value kept to the bit; turn marker trajectories into joint angles and segment lengths."""
+    from . import motions, words
     from .conversion import convert as run_conversion
+    from .markers import MARKER_SUFFIXES
+    from .opensim import MOTION_SUFFIXES
 
-    written = run_conversion(source, out, to=to.value)
+    suffix = "" if source.is_dir() else source.suffix.lower()
+    chosen, named = _listed(points), _listed(coordinates)
+    if suffix in MARKER_SUFFIXES:
+        _folder(out, json)
+        file, motion, notes = motions.convert_markers(source, out, to=to.value, points=chosen, up=up, forward=forward)
+        console.warn(notes)
+        present(
+            lambda: {"files": [file], "points": chosen, **motion.to_dict(), "warnings": notes},
+            json,
+            lambda: words.planar(motion, chosen, file),
+        )
+        return
+    for option, given in (("--points", points), ("--up", up), ("--forward", forward)):
+        if given:
+            raise BadInput(option, Text(f"a {suffix or 'data set'} source"), f"{option} with {' or '.join(MARKER_SUFFIXES)} files only")
+    if suffix in MOTION_SUFFIXES or f".{to.value}" in MOTION_SUFFIXES or named:
+        written = [motions.convert_motion(source, out, to=to.value, coordinates=named)]
+    else:
+        written = run_conversion(source, out, to=to.value)
     present(lambda: {"files": written}, json, lambda: print("\n".join(os.fspath(path) for path in written)))
 
 
@@ -206,7 +248,7 @@ def identify(
 
     folder = _folder(out, json)
     data = load_dataset(dataset)
-    kinds = [kind.strip() for kind in with_.split(",") if kind.strip()]
+    kinds = _listed(with_)
     with console.progress("identifying"):
         result = run_identification(data, method=method.value, with_effects=kinds, cutoff=cutoff_hz, motion=motion.value, level=level)
     plain = results.identified_data(result, _command(context))
@@ -320,6 +362,10 @@ def _single_trial(path: Path, n_joints: int) -> Trial:
         raise BadInput("file", Text("no samples below the header"), "samples", file=path)
     console.warn(reading.warnings)
     return reading.trial
+
+
+def _listed(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]
 
 
 def _folder(out: Path | None, json: Path | None = None) -> Path | None:

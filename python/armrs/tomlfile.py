@@ -31,20 +31,20 @@ def read(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise BadInput(place, Text(message), "TOML", file=path) from None
 
 
-def read_text(path: str | os.PathLike[str], what: str) -> str:
-    """Return the text of a UTF-8 file, or raise `BadInput`."""
+def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> str:
+    """Return the text of a UTF-8 file of at most `most` bytes, or raise `BadInput`."""
     file = Path(path)
     try:
         is_folder, size = file.is_dir(), file.stat().st_size
-        raw = b"" if is_folder or size > _LIMIT else file.read_bytes()
+        raw = b"" if is_folder or size > most else file.read_bytes()
     except OSError as error:
         raise BadInput("file", Text(error.strerror or "unreadable"), f"{what} that can be read", file=path) from None
     except ValueError:  # a path with a null character
         raise BadInput("file", Text("a name no file can have"), what, file=path) from None
     if is_folder:
         raise BadInput("file", Text("a folder"), what, file=path)
-    if size > _LIMIT:
-        raise BadInput("file", Text(f"{size} bytes"), f"{what} of at most {_LIMIT} bytes", file=path)
+    if size > most:
+        raise BadInput("file", Text(f"{size} bytes"), f"{what} of at most {most} bytes", file=path)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

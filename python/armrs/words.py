@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import console, tables
+
+if TYPE_CHECKING:
+    from .markers import PlanarMotion
 
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "
@@ -156,3 +159,22 @@ def _head(result: Mapping[str, Any]) -> None:
     label = " (synthetic data)" if is_synthetic(result) else ""
     print(f"{name(result)}{label}: {verdict(result)}")
     print()
+
+
+def planar(motion: PlanarMotion, points: Sequence[str], file: Path) -> None:
+    """Print what markers show of a planar arm."""
+    plain = motion.to_dict()
+    bends = [None, *(f"{low:.1f} to {high:.1f}" for low, high in plain["flexion_deg"])]
+    rows = [
+        (f"{a} to {b}", length, std, f"{q[0]:.1f} to {q[1]:.1f}", bend)
+        for a, b, length, std, q, bend in zip(
+            points, points[1:], plain["lengths_m"], plain["length_stds_m"], plain["q_range_deg"], bends, strict=False
+        )
+    ]
+    console.table(["segment", "length [m]", "std [m]", "angle in the plane [deg]", "between segments [deg]"], rows)
+    plane = plain["plane"]
+    print(
+        f"\n{'planar' if plane['planar'] else 'not planar'}: the segments leave the plane by {plane['out_of_plane_rms_deg']:.3g}° (rms), "
+        f"{plane['out_of_plane_most_deg']:.3g}° at most; the plane leans {plane['tilt_deg']:.3g}° from the vertical"
+    )
+    print(file)
