@@ -123,6 +123,10 @@ fn side_by_side<const N: usize>(
     let link = match first.model.link {
         Link::Compliant(_) => Link::Compliant(setup.contact),
         Link::Free => Link::Free,
+        Link::Forced(_) => Link::Forced(pack_plane(|i| match lane(i).model.link {
+            Link::Forced(force) => force,
+            _ => [0.0; 2],
+        })),
         Link::Rigid => Link::Rigid,
     };
     let effects =

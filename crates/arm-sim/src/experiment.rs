@@ -57,13 +57,21 @@ impl<const N: usize> Experiment<N> {
     /// # Errors
     /// [`SimulationError::Invalid`] for an effect with a value or a place outside what its kind allows.
     pub fn altered(&self) -> Result<Setup<f64, N>, SimulationError> {
-        let mut setup = self.setup;
-        for effect in &self.effects {
-            effect.validate(N)?;
-            effect.alter(&mut setup);
-        }
-        Ok(setup)
+        altered(&self.setup, &self.effects)
     }
+}
+
+/// A rig with all effects applied that alter it.
+pub(crate) fn altered<const N: usize>(
+    setup: &Setup<f64, N>,
+    effects: &[Effect<f64>],
+) -> Result<Setup<f64, N>, SimulationError> {
+    let mut setup = *setup;
+    for effect in effects {
+        effect.validate(N)?;
+        effect.alter(&mut setup);
+    }
+    Ok(setup)
 }
 
 /// How the arm is driven.

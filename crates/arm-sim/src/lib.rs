@@ -39,6 +39,7 @@ mod series;
 mod stability;
 mod start;
 mod step;
+mod stepper;
 mod terms;
 
 pub use batch::simulate_batch;
@@ -56,3 +57,4 @@ pub use record::{EnergyColumns, Recording, TorqueColumns, WorkColumns};
 pub use sensor::{Channel, Readings, Sensors};
 pub use series::{Interpolation, Jet, Series};
 pub use stability::Vibration;
+pub use stepper::{Outside, Port, Seen, Snapshot, Stepper};

@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, Local, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Plane, Pose, Scalar, Setup, forward_dynamics,
-    joint_force, tip, tip_velocity,
+    joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
 };
 
 use crate::Handle;
@@ -13,6 +13,8 @@ use crate::terms::{MovingBase, Terms};
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Link<T> {
     Free,
+    /// A force on the arm at its tip, whatever the tip does \[N\].
+    Forced(Plane<T>),
     Compliant(Contact<T>),
     Rigid,
 }
@@ -92,14 +94,47 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         point
     }
 
+    /// Velocity of the tip \[m/s\].
     #[inline]
-    fn tip_velocity(&self, qd: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
+    pub fn tip_velocity(&self, qd: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
         let mut velocity = tip_velocity(&self.chain, pose, qd);
         if let Some(base) = &self.base {
             let v = base.velocity(qd);
             velocity = [velocity[0] + v[0], velocity[1] + v[1]];
         }
         velocity
+    }
+
+    /// Acceleration of the tip \[m/s²\].
+    pub fn tip_acceleration(&self, state: &State<T, N>, qdd: &Joints<T, N>) -> Plane<T> {
+        let (_, terms) = self.terms(state);
+        let (change, turning) = (terms.tip_rate(qdd), terms.jacobian_rate);
+        [change[0] + turning[0], change[1] + turning[1]]
+    }
+
+    /// Kinetic and potential energy, and the energy in the springs of the contact \[J\].
+    pub fn energy(
+        &self,
+        pose: &Pose<T, N>,
+        (q, qd): (&Joints<T, N>, &Joints<T, N>),
+        handle: Plane<T>,
+    ) -> [T; 3] {
+        let [kinetic, potential] = match &self.base {
+            Some(base) => base.energy(&self.chain, pose, q, qd),
+            None => [T::ZERO; 2],
+        };
+        let contact = match &self.link {
+            Link::Compliant(contact) => {
+                let tip = self.tip(q, pose);
+                contact.energy([handle[0] - tip[0], handle[1] - tip[1]])
+            }
+            Link::Free | Link::Forced(_) | Link::Rigid => T::ZERO,
+        };
+        [
+            kinetic_energy(&self.chain, pose, qd) + kinetic,
+            potential_energy(&self.chain, pose) + potential,
+            contact,
+        ]
     }
 
     /// Sum of what all effects resist with \[N m\].
@@ -156,7 +191,10 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 (qdd, force) = self.accelerations(input, &torque, force, &terms);
             }
         }
-        let v = input.handle.velocity;
+        let v = match &self.link {
+            Link::Forced(_) => self.tip_velocity(qd, &pose),
+            _ => input.handle.velocity,
+        };
         let (mut drive, mut resisted) = (T::ZERO, T::ZERO);
         for i in 0..N {
             drive += input.torque[i] * qd[i];
@@ -198,15 +236,17 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// Force of a compliant contact on the arm, and the power lost in its damping.
     #[inline]
-    fn contact(
+    pub fn contact(
         &self,
         input: &Input<T, N>,
         q: &Joints<T, N>,
         qd: &Joints<T, N>,
         pose: &Pose<T, N>,
     ) -> (Plane<T>, T) {
-        let Link::Compliant(contact) = &self.link else {
-            return ([T::ZERO; 2], T::ZERO);
+        let contact = match &self.link {
+            Link::Compliant(contact) => contact,
+            Link::Forced(force) => return (*force, T::ZERO),
+            Link::Free | Link::Rigid => return ([T::ZERO; 2], T::ZERO),
         };
         let (at, v) = (self.tip(q, pose), self.tip_velocity(qd, pose));
         let handle = &input.handle;

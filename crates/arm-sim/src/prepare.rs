@@ -97,10 +97,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
     pub fn new(experiment: &'a Experiment<N>) -> Result<Self, SimulationError> {
         let schedule = Schedule::of(experiment)?;
         let setup = experiment.altered()?;
-        check(&setup)?;
-        let in_joints = |e: &&Effect<f64>| e.on && e.kind.info().place == Place::Joint;
-        let effects = experiment.effects.iter().filter(in_joints).copied();
-        let model = Model::new(&setup, link(experiment, &setup)?, effects.collect())?;
+        let model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
         known(experiment, &schedule)?;
         let robot = robot_motion(experiment, &schedule)?;
         let mut prepared = Self {
@@ -111,15 +108,17 @@ impl<'a, const N: usize> Prepared<'a, N> {
             start: (Joints::zeros(), Joints::zeros()),
             robot,
         };
+        let (input, solver) = (prepared.input(0.0), (experiment.integrator, schedule.dt));
+        let model = &prepared.model;
         prepared.start = match &experiment.start {
-            Start::Given { q, qd } => start::given(&prepared, q, qd)?,
+            Start::Given { q, qd } => start::given(model, &input, (q, qd))?,
             Start::Equilibrium { near } => {
                 // First near it: no equilibrium need be found of a contact that is refused anyhow.
-                stability::check(&prepared, near)?;
-                (start::equilibrium(&prepared, near)?, Joints::zeros())
+                stability::check(model, solver, near)?;
+                (start::equilibrium(model, &input, near)?, Joints::zeros())
             }
         };
-        stability::check(&prepared, &prepared.start.0)?;
+        stability::check(model, solver, &prepared.start.0)?;
         Ok(prepared)
     }
 
@@ -174,6 +173,18 @@ pub(crate) fn add_ripple<T: Scalar, const N: usize>(input: &mut Input<T, N>, set
         input.handle.velocity[axis] += amplitude * omega * cos;
         input.handle.acceleration[axis] -= amplitude * omega.squared() * sin;
     }
+}
+
+/// The model of a rig whose effects have been applied.
+pub(crate) fn assemble<const N: usize>(
+    setup: &Setup<f64, N>,
+    effects: &[Effect<f64>],
+    link: Link<f64>,
+) -> Result<Model<f64, N>, SimulationError> {
+    check(setup)?;
+    let in_joints = |e: &&Effect<f64>| e.on && e.kind.info().place == Place::Joint;
+    let effects = effects.iter().filter(in_joints).copied();
+    Ok(Model::new(setup, link, effects.collect())?)
 }
 
 /// What the chain does not check.

@@ -1,9 +1,9 @@
 //! Fills a recording from states, for every engine in the same way.
 
 use arm_core::effect::Motion;
-use arm_core::{Joints, Load, Plane, Pose, contributions, kinetic_energy, potential_energy};
+use arm_core::{Joints, Load, Plane, Pose, contributions};
 
-use crate::model::{Link, State};
+use crate::model::State;
 use crate::prepare::Prepared;
 use crate::{JointMotion, Recording};
 
@@ -155,19 +155,11 @@ impl<'a, const N: usize> Recorder<'a, N> {
         t.drive.extend(input.torque.iter());
         t.contact.extend(parts.contact.iter());
 
-        let [kinetic, potential] = match &model.base {
-            Some(base) => base.energy(&model.chain, &pose, q, qd),
-            None => [0.0; 2],
-        };
+        let [kinetic, potential, contact] = model.energy(&pose, (q, qd), handle);
         let e = &mut r.energy;
-        e.kinetic
-            .push(kinetic_energy(&model.chain, &pose, qd) + kinetic);
-        e.potential
-            .push(potential_energy(&model.chain, &pose) + potential);
-        e.contact.push(match &model.link {
-            Link::Compliant(contact) => contact.energy([handle[0] - tip[0], handle[1] - tip[1]]),
-            Link::Free | Link::Rigid => 0.0,
-        });
+        e.kinetic.push(kinetic);
+        e.potential.push(potential);
+        e.contact.push(contact);
         let columns = &mut r.work;
         columns.handle.push(work[0]);
         columns.drive.push(work[1]);

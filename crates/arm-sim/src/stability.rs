@@ -2,8 +2,7 @@
 
 use arm_core::{Contact, Joints, Pose};
 
-use crate::model::Link;
-use crate::prepare::Prepared;
+use crate::model::{Link, Model};
 use crate::terms::{MovingBase, Terms};
 use crate::{Integrator, SimulationError};
 
@@ -63,18 +62,15 @@ const RK4_RADIUS: f64 = 2.61;
 ///
 /// Dry friction of joints is stiffer still near rest, but bounded, so that it cannot grow without limit; it is not judged.
 pub(crate) fn check<const N: usize>(
-    prepared: &Prepared<N>,
+    model: &Model<f64, N>,
+    (integrator, dt): (Integrator, f64),
     q: &Joints<f64, N>,
 ) -> Result<(), SimulationError> {
-    let Link::Compliant(contact) = &prepared.model.link else {
+    let Link::Compliant(contact) = &model.link else {
         return Ok(());
     };
-    let model = &prepared.model;
     let vibration = Vibration::at(contact, &model.chain, model.base.as_ref(), q);
-    let (dt, largest) = (
-        prepared.schedule.dt,
-        vibration.largest_step(prepared.integrator()),
-    );
+    let largest = vibration.largest_step(integrator);
     if dt <= largest {
         return Ok(());
     }

@@ -4,8 +4,7 @@ use arm_core::effect::Motion;
 use arm_core::{Joints, Pose};
 
 use crate::SimulationError;
-use crate::model::{Input, Link, State};
-use crate::prepare::Prepared;
+use crate::model::{Input, Link, Model, State};
 use crate::terms::Terms;
 
 /// Largest torque left in an equilibrium, and largest gap of a rigid coupling \[N m, m\].
@@ -15,9 +14,9 @@ const ITERATIONS: usize = 100;
 
 /// A given state, which a rigid coupling pulls onto its constraint.
 pub(crate) fn given<const N: usize>(
-    prepared: &Prepared<N>,
-    q: &Joints<f64, N>,
-    qd: &Joints<f64, N>,
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
 ) -> Result<(Joints<f64, N>, Joints<f64, N>), SimulationError> {
     for (name, values) in [("start angle", q), ("start speed", qd)] {
         for &found in values.iter() {
@@ -36,10 +35,9 @@ pub(crate) fn given<const N: usize>(
         qd: *qd,
         work: [0.0; 4],
     };
-    if matches!(prepared.model.link, Link::Rigid) {
-        let input = prepared.input(0.0);
-        prepared.model.project(&input, &mut state, ITERATIONS);
-        let [y, z] = gap(prepared, &input, &state.q);
+    if matches!(model.link, Link::Rigid) {
+        model.project(input, &mut state, ITERATIONS);
+        let [y, z] = gap(model, input, &state.q);
         let gap = libm::hypot(y, z);
         // Not a number counts as apart.
         if !matches!(gap.partial_cmp(&BALANCED), Some(core::cmp::Ordering::Less)) {
@@ -53,22 +51,22 @@ pub(crate) fn given<const N: usize>(
 ///
 /// With a rigid coupling the force on the arm is unknown too, and the gap between handle and tip must vanish.
 pub(crate) fn equilibrium<const N: usize>(
-    prepared: &Prepared<N>,
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
     near: &Joints<f64, N>,
 ) -> Result<Joints<f64, N>, SimulationError> {
-    let input = prepared.input(0.0);
-    let rigid = matches!(prepared.model.link, Link::Rigid);
+    let rigid = matches!(model.link, Link::Rigid);
     let mut x: Vec<f64> = near.iter().copied().collect();
     if rigid {
         x.extend([0.0; 2]);
     }
-    let stiffest = match &prepared.model.link {
+    let stiffest = match &model.link {
         Link::Compliant(contact) => contact.stiffness[0].max(contact.stiffness[1]),
-        Link::Free | Link::Rigid => 0.0,
+        Link::Free | Link::Forced(_) | Link::Rigid => 0.0,
     };
     // A stiff contact turns the rounding of a position into a force.
     let balanced = BALANCED + 1e-15 * stiffest;
-    let residual = |x: &[f64]| imbalance(prepared, &input, x);
+    let residual = |x: &[f64]| imbalance(model, input, x);
     let size = |r: &[f64]| {
         r.iter()
             .fold(0.0, |m: f64, v| if v.abs() <= m { m } else { v.abs() })
@@ -106,15 +104,15 @@ pub(crate) fn equilibrium<const N: usize>(
 }
 
 /// Left-hand side less right-hand side at rest; for a rigid coupling the last two of `x` are the force on the arm.
-fn imbalance<const N: usize>(prepared: &Prepared<N>, input: &Input<f64, N>, x: &[f64]) -> Vec<f64> {
-    let model = &prepared.model;
+fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[f64]) -> Vec<f64> {
     let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
     let rest = Joints::<f64, N>::zeros();
     let pose = Pose::new(&q);
     let memory = vec![0.0; model.effects.len()];
     let resisting = model.resisting(&Motion::new(0.0, q, rest), &memory);
     let force = match (&model.link, x.get(N..)) {
-        (Link::Compliant(contact), _) => contact.force_on_arm(gap(prepared, input, &q), [0.0; 2]),
+        (Link::Compliant(contact), _) => contact.force_on_arm(gap(model, input, &q), [0.0; 2]),
+        (Link::Forced(force), _) => *force,
         (Link::Rigid, Some(&[y, z])) => [y, z],
         _ => [0.0; 2],
     };
@@ -124,17 +122,17 @@ fn imbalance<const N: usize>(prepared: &Prepared<N>, input: &Input<f64, N>, x: &
         .map(|i| terms.bias[i] + resisting[i] - input.torque[i] - held[i])
         .collect();
     if matches!(model.link, Link::Rigid) {
-        r.extend(gap(prepared, input, &q));
+        r.extend(gap(model, input, &q));
     }
     r
 }
 
 fn gap<const N: usize>(
-    prepared: &Prepared<N>,
+    model: &Model<f64, N>,
     input: &Input<f64, N>,
     q: &Joints<f64, N>,
 ) -> [f64; 2] {
-    let at = prepared.model.tip(q, &Pose::new(q));
+    let at = model.tip(q, &Pose::new(q));
     let handle = input.handle.position;
     [handle[0] - at[0], handle[1] - at[1]]
 }

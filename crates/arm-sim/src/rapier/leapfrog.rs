@@ -119,7 +119,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         let resisting = model.resisting(&motion, &self.memory);
         let (pull, damping) = match &model.link {
             Link::Compliant(contact) => self.contact(contact, input),
-            Link::Free | Link::Rigid => ([0.0; 2], 0.0),
+            Link::Free | Link::Forced(_) | Link::Rigid => ([0.0; 2], 0.0),
         };
         let loads = Loads {
             torque: input.torque - resisting,

@@ -13,4 +13,5 @@ mod refused;
 mod rigid;
 mod sensor;
 mod series;
+mod stepper;
 mod switch;

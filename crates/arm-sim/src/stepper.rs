@@ -1,0 +1,403 @@
+//! The native engine a piece at a time: what couples an arm to other simulators drives it through this.
+
+use arm_core::effect::Effect;
+use arm_core::{Joints, Plane, Pose, Setup};
+
+use crate::experiment::altered;
+use crate::model::{Input, Link, Model, State};
+use crate::native::diverged;
+use crate::prepare::assemble;
+use crate::step::{Inputs, Memory, step};
+use crate::{Handle, Integrator, SimulationError, stability, start};
+
+/// Most inner steps in one call of [`Stepper::advance`].
+const MOST_STEPS: f64 = 1e7;
+
+/// Where the arm is cut off from what it is coupled to. Force and velocity of either port make a power bond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// A force on the arm at its tip comes in, position and velocity of the tip go out.
+    Force,
+    /// Position and velocity of the robot's handle come in; the spring and damper of the contact are on this side, and the
+    /// force on the robot goes out.
+    Motion,
+}
+
+/// What acts on the arm from outside. Each port reads what belongs to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outside<const N: usize> {
+    /// Force port: force on the arm at its tip, held \[N\].
+    pub force_on_arm: Plane<f64>,
+    /// Motion port: the handle \[m\] when `age` was zero.
+    pub position: Plane<f64>,
+    /// Motion port: velocity of the handle, held: it goes on along a straight line \[m/s\].
+    pub velocity: Plane<f64>,
+    /// Time since the handle was where `position` says \[s\].
+    pub age: f64,
+    /// Torques of motors in the joints, held \[N m\].
+    pub torque: Joints<f64, N>,
+}
+
+impl<const N: usize> Default for Outside<N> {
+    fn default() -> Self {
+        Self {
+            force_on_arm: [0.0; 2],
+            position: [0.0; 2],
+            velocity: [0.0; 2],
+            age: 0.0,
+            torque: Joints::zeros(),
+        }
+    }
+}
+
+impl<const N: usize> Outside<N> {
+    fn input(&self, time: f64, later: f64) -> Input<f64, N> {
+        let since = self.age + later;
+        Input {
+            time,
+            handle: Handle {
+                position: [0, 1].map(|i| self.position[i] + self.velocity[i] * since),
+                velocity: self.velocity,
+                acceleration: [0.0; 2],
+            },
+            torque: self.torque,
+        }
+    }
+}
+
+/// A state with everything that the future depends on but the inputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot<const N: usize> {
+    /// Joint angles \[rad\].
+    pub q: Joints<f64, N>,
+    /// Joint speeds \[rad/s\].
+    pub qd: Joints<f64, N>,
+    /// Work since the start: by the port, by motors, against resistance, lost in the damping of the contact \[J\].
+    pub work: [f64; 4],
+    /// States of the effects that have one.
+    pub memory: Vec<f64>,
+    /// Time from which whole inner steps are counted \[s\].
+    pub origin: f64,
+    /// Whole inner steps since.
+    pub ticks: u64,
+}
+
+/// What follows from state and inputs at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen<const N: usize> {
+    /// Position of the tip \[m\].
+    pub tip: Plane<f64>,
+    /// Velocity of the tip \[m/s\].
+    pub tip_velocity: Plane<f64>,
+    /// Acceleration of the tip \[m/s²\].
+    pub tip_acceleration: Plane<f64>,
+    /// Accelerations of the joints \[rad/s²\].
+    pub qdd: Joints<f64, N>,
+    /// Force on the arm at its tip \[N\].
+    pub force_on_arm: Plane<f64>,
+    /// Time derivative of the works \[W\].
+    pub power: [f64; 4],
+}
+
+/// An arm that is advanced by communication steps through one of its ports.
+///
+/// It makes the steps of [`simulate`](crate::simulate): with the same inputs at the same inner steps both have the same bits.
+/// What the rig says of the robot itself (ripple) has no place here, since the robot is what the port is connected to.
+///
+/// ```
+/// use arm_sim::{Outside, Port, Stepper, models};
+/// let experiment = models::mechanical_experiment(1.0, [0.0; 2])?;
+/// let mut arm = Stepper::new(&experiment.setup, &experiment.effects, Port::Force, 0.25e-3)?;
+/// arm.start([-1.0, 0.5].into(), [0.0; 2].into(), 0.0)?;
+/// let before = arm.snapshot();
+/// arm.advance(&Outside::default(), 1e-3)?;
+/// let after = arm.snapshot();
+/// arm.restore(&before);
+/// arm.advance(&Outside::default(), 1e-3)?;
+/// assert_eq!(arm.snapshot(), after);
+/// # Ok::<(), arm_sim::SimulationError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Stepper<const N: usize> {
+    model: Model<f64, N>,
+    port: Port,
+    dt: f64,
+    state: State<f64, N>,
+    memory: Memory<f64>,
+    origin: f64,
+    ticks: u64,
+    /// Room for the state before a step, so that a failed one leaves no trace.
+    before: Snapshot<N>,
+}
+
+impl<const N: usize> Stepper<N> {
+    /// An arm at the zero angles at time zero.
+    ///
+    /// * `setup` - the rig without the effects
+    /// * `dt` - inner step of [`Integrator::Rk4`] \[s\]
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig, an effect or a step that is refused.
+    pub fn new(
+        setup: &Setup<f64, N>,
+        effects: &[Effect<f64>],
+        port: Port,
+        dt: f64,
+    ) -> Result<Self, SimulationError> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(SimulationError::Setting {
+                name: "step",
+                found: dt,
+                allowed: "a positive number of seconds",
+            });
+        }
+        let setup = altered(setup, effects)?;
+        let link = match port {
+            Port::Force => Link::Forced([0.0; 2]),
+            Port::Motion => Link::Compliant(setup.contact),
+        };
+        let model = assemble(&setup, effects, link)?;
+        let memory = Memory::new(model.effects.len());
+        let before = Snapshot {
+            q: Joints::zeros(),
+            qd: Joints::zeros(),
+            work: [0.0; 4],
+            memory: memory.state.clone(),
+            origin: 0.0,
+            ticks: 0,
+        };
+        let state = State {
+            q: before.q,
+            qd: before.qd,
+            work: before.work,
+        };
+        Ok(Self {
+            model,
+            port,
+            dt,
+            state,
+            memory,
+            origin: 0.0,
+            ticks: 0,
+            before,
+        })
+    }
+
+    /// Starts anew at given angles \[rad\], speeds \[rad/s\] and time \[s\]; memories of effects and works are zero.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a value that is not finite, or a contact too stiff for the inner step.
+    pub fn start(
+        &mut self,
+        q: Joints<f64, N>,
+        qd: Joints<f64, N>,
+        time: f64,
+    ) -> Result<(), SimulationError> {
+        if !time.is_finite() {
+            return Err(SimulationError::Setting {
+                name: "start time",
+                found: time,
+                allowed: "a finite number of seconds",
+            });
+        }
+        let (q, qd) = start::given(&self.model, &Outside::default().input(0.0, 0.0), (&q, &qd))?;
+        stability::check(&self.model, (Integrator::Rk4, self.dt), &q)?;
+        self.state = State {
+            q,
+            qd,
+            work: [0.0; 4],
+        };
+        self.memory.state.fill(0.0);
+        (self.origin, self.ticks) = (time, 0);
+        Ok(())
+    }
+
+    /// Angles near given ones at which the arm rests under constant inputs \[rad\].
+    ///
+    /// # Errors
+    /// [`SimulationError::NoEquilibrium`] where none is found.
+    pub fn equilibrium(
+        &mut self,
+        outside: &Outside<N>,
+        near: &Joints<f64, N>,
+    ) -> Result<Joints<f64, N>, SimulationError> {
+        self.apply(outside);
+        start::equilibrium(&self.model, &outside.input(0.0, 0.0), near)
+    }
+
+    /// Which port this is.
+    pub fn port(&self) -> Port {
+        self.port
+    }
+
+    /// Joint angles \[rad\].
+    pub fn q(&self) -> &Joints<f64, N> {
+        &self.state.q
+    }
+
+    /// Joint speeds \[rad/s\].
+    pub fn qd(&self) -> &Joints<f64, N> {
+        &self.state.qd
+    }
+
+    /// Work since the start, as in [`Snapshot::work`] \[J\].
+    pub fn work(&self) -> &[f64; 4] {
+        &self.state.work
+    }
+
+    /// Time \[s\]; whole inner steps are counted and not summed, so that it does not drift.
+    pub fn time(&self) -> f64 {
+        self.origin + self.ticks as f64 * self.dt
+    }
+
+    /// Advances by a communication step: a whole number of inner steps where `duration` is one but for rounding, and else
+    /// the next number of equal steps that are no longer than the inner step.
+    ///
+    /// Does not allocate. `outside.age` is not changed: it grows by `duration` unless new inputs are set.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a duration that is not positive or too long, and when the state ceases to be finite; the state
+    /// is then as before the call.
+    pub fn advance(&mut self, outside: &Outside<N>, duration: f64) -> Result<(), SimulationError> {
+        let steps = duration / self.dt;
+        if !(steps > 0.0 && steps <= MOST_STEPS) {
+            return Err(SimulationError::Setting {
+                name: "communication step",
+                found: duration,
+                allowed: "a positive number of seconds, at most 10 million inner steps",
+            });
+        }
+        self.keep();
+        self.apply(outside);
+        let whole = (steps + 0.5).floor();
+        let regular = whole >= 1.0 && (steps - whole).abs() < 1e-6;
+        let (count, h) = if regular {
+            (whole as u64, self.dt)
+        } else {
+            let count = steps.ceil();
+            (count as u64, duration / count)
+        };
+        let end = self.time() + duration;
+        // Whole steps are counted from the origin, as in a run of the native engine.
+        let (from, first) = if regular {
+            (self.origin, 2 * self.ticks)
+        } else {
+            (self.time(), 0)
+        };
+        let input = |half: u64| {
+            let time = from + 0.5 * (first + half) as f64 * h;
+            outside.input(time, 0.5 * half as f64 * h)
+        };
+        let now = input(0);
+        let mut inputs = Inputs {
+            start: now,
+            middle: now,
+            end: now,
+        };
+        for done in 1..=count {
+            inputs.start = inputs.end;
+            inputs.middle = input(2 * done - 1);
+            inputs.end = input(2 * done);
+            let at = (&mut self.state, &mut self.memory);
+            step(&self.model, Integrator::Rk4, h, &inputs, at);
+            if let Some(joint) = diverged(&self.state) {
+                let time = inputs.end.time;
+                self.undo();
+                return Err(SimulationError::Diverged {
+                    step: done as usize,
+                    time,
+                    joint,
+                });
+            }
+        }
+        if regular {
+            self.ticks += count;
+        } else {
+            (self.origin, self.ticks) = (end, 0);
+        }
+        Ok(())
+    }
+
+    /// What can be seen from outside at the present state and inputs.
+    pub fn seen(&mut self, outside: &Outside<N>) -> Seen<N> {
+        self.apply(outside);
+        let State { q, qd, .. } = &self.state;
+        let pose = Pose::new(q);
+        let input = outside.input(self.time(), 0.0);
+        let outcome = self.model.evaluate(&input, q, qd, &self.memory.state);
+        Seen {
+            tip: self.model.tip(q, &pose),
+            tip_velocity: self.model.tip_velocity(qd, &pose),
+            tip_acceleration: self.model.tip_acceleration(&self.state, &outcome.qdd),
+            qdd: outcome.qdd,
+            force_on_arm: outcome.force_on_arm,
+            power: outcome.power,
+        }
+    }
+
+    /// Position and velocity of the tip \[m, m/s\], and the force on the arm there \[N\]: less work than [`Stepper::seen`].
+    #[inline]
+    pub fn tip(&mut self, outside: &Outside<N>) -> (Plane<f64>, Plane<f64>, Plane<f64>) {
+        self.apply(outside);
+        let State { q, qd, .. } = &self.state;
+        let pose = Pose::new(q);
+        let input = outside.input(self.time(), 0.0);
+        let (force, _) = self.model.contact(&input, q, qd, &pose);
+        (
+            self.model.tip(q, &pose),
+            self.model.tip_velocity(qd, &pose),
+            force,
+        )
+    }
+
+    /// Kinetic and potential energy, and the energy in the springs of the contact \[J\].
+    pub fn energy(&self, outside: &Outside<N>) -> [f64; 3] {
+        let State { q, qd, .. } = &self.state;
+        let handle = outside.input(0.0, 0.0).handle.position;
+        self.model.energy(&Pose::new(q), (q, qd), handle)
+    }
+
+    /// The state, to come back to it.
+    pub fn snapshot(&self) -> Snapshot<N> {
+        Snapshot {
+            q: self.state.q,
+            qd: self.state.qd,
+            work: self.state.work,
+            memory: self.memory.state.clone(),
+            origin: self.origin,
+            ticks: self.ticks,
+        }
+    }
+
+    /// Comes back to a state of an arm with the same effects.
+    ///
+    /// # Panics
+    /// For a snapshot with another number of effects.
+    pub fn restore(&mut self, snapshot: &Snapshot<N>) {
+        self.state = State {
+            q: snapshot.q,
+            qd: snapshot.qd,
+            work: snapshot.work,
+        };
+        self.memory.state.copy_from_slice(&snapshot.memory);
+        (self.origin, self.ticks) = (snapshot.origin, snapshot.ticks);
+    }
+
+    fn apply(&mut self, outside: &Outside<N>) {
+        if let Link::Forced(force) = &mut self.model.link {
+            *force = outside.force_on_arm;
+        }
+    }
+
+    fn keep(&mut self) {
+        let before = &mut self.before;
+        (before.q, before.qd, before.work) = (self.state.q, self.state.qd, self.state.work);
+        before.memory.copy_from_slice(&self.memory.state);
+    }
+
+    fn undo(&mut self) {
+        let before = &self.before;
+        (self.state.q, self.state.qd, self.state.work) = (before.q, before.qd, before.work);
+        self.memory.state.copy_from_slice(&before.memory);
+    }
+}
