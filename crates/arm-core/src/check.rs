@@ -1,5 +1,6 @@
 //! Checks of values handed to the core.
 
+use crate::scalar::Real;
 use crate::{Invalid, Scalar};
 
 pub(crate) fn finite<T: Scalar>(name: &'static str, index: usize, value: T) -> Result<(), Invalid> {
@@ -48,4 +49,23 @@ pub(crate) fn positive<T: Scalar>(
     value: T,
 ) -> Result<(), Invalid> {
     at_least(name, index, value, f64::MIN_POSITIVE)
+}
+
+/// That a range is one; either end may be infinite.
+pub(crate) fn ordered<T: Real>(
+    name: &'static str,
+    index: usize,
+    [min, max]: [T; 2],
+) -> Result<(), Invalid> {
+    match min.partial_cmp(&max) {
+        None => Err(Invalid::NotFinite { name, index }),
+        Some(order) if order.is_gt() => Err(Invalid::OutOfRange {
+            name,
+            index,
+            found: max.to_f64(),
+            min: min.to_f64(),
+            max: f64::INFINITY,
+        }),
+        Some(_) => Ok(()),
+    }
 }

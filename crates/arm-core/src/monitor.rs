@@ -170,18 +170,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     /// [`Invalid`] for a limit that is NaN, and a range that is empty. An infinite limit is none.
     pub fn new(channels: [Channel<T>; C], oldest: u64) -> Result<Self, Invalid> {
         for (index, channel) in channels.iter().enumerate() {
-            let (min, max) = (channel.min, channel.max);
-            if min.partial_cmp(&max).is_none_or(|order| order.is_gt()) {
-                check::finite("smallest value of channel", index, min)?;
-                check::finite("largest value of channel", index, max)?;
-                return Err(Invalid::OutOfRange {
-                    name: "largest value of channel",
-                    index,
-                    found: max.to_f64(),
-                    min: min.to_f64(),
-                    max: f64::INFINITY,
-                });
-            }
+            check::ordered("limit of channel", index, [channel.min, channel.max])?;
         }
         Ok(Self {
             channels,

@@ -1,32 +1,11 @@
 //! What an identification returns.
 
 use arm_core::effect::Effect;
+pub use arm_core::estimator::Decision;
 use arm_core::{Chain, Joints};
 
 use crate::program::Status;
 use crate::unknown::Source;
-
-/// What a value rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Decision {
-    /// The data.
-    Data,
-    /// What was assumed beforehand: the data leave it open.
-    Prior,
-    /// A bound that the data push against.
-    Bound,
-}
-
-impl Decision {
-    /// The word for it in tables and files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Data => "data",
-            Self::Prior => "prior",
-            Self::Bound => "bound",
-        }
-    }
-}
 
 /// One estimated quantity.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,6 +13,7 @@ mod identities;
 mod lanes;
 mod monitor;
 mod newton_euler;
+mod online;
 mod pendulum;
 mod robot;
 mod scalar;

@@ -10,6 +10,7 @@ mod filter;
 mod joint;
 mod long_run;
 mod noise;
+mod online;
 mod program;
 mod rank;
 mod student;

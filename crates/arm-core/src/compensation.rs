@@ -1,0 +1,99 @@
+//! The torque that carries an arm: its weight and its passive moments, and what that torque may be wrong by.
+
+use core::array::from_fn;
+
+use crate::effect::Motion;
+use crate::equation::Equation;
+use crate::scalar::Real;
+use crate::{Invalid, Joints, check, joints};
+
+/// Torques and what they may be wrong by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carry<T, const N: usize> {
+    /// Torque of each joint on its distal segment \[N m\].
+    pub torque: Joints<T, N>,
+    /// Its standard deviation \[N m\].
+    pub sd: Joints<T, N>,
+}
+
+/// An arm that was identified: the unknowns of an [`Equation`] and the covariance of their errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compensation<T, const N: usize, const P: usize, const E: usize> {
+    equation: Equation<T, N, P, E>,
+    values: [T; P],
+    /// Lower triangular square root of the covariance.
+    root: [[T; P]; P],
+}
+
+impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N, P, E> {
+    /// From an identification.
+    ///
+    /// * `values` - in the order of the unknowns
+    /// * `covariance` - symmetric; only its lower triangle is read. What is known exactly has a row of zeros.
+    ///
+    /// # Errors
+    /// [`Invalid`] for values that are not finite, and a covariance that is none: then its error is negative in some
+    /// direction.
+    pub fn new(
+        equation: Equation<T, N, P, E>,
+        values: [T; P],
+        covariance: &[[T; P]; P],
+    ) -> Result<Self, Invalid> {
+        let mut root = [[T::ZERO; P]; P];
+        for i in 0..P {
+            check::finite("value of unknown", i, values[i])?;
+            for k in 0..=i {
+                let mut value = covariance[i][k];
+                check::finite("covariance of unknown", i, value)?;
+                for m in 0..k {
+                    value -= root[i][m] * root[k][m];
+                }
+                if i != k {
+                    let pivot = root[k][k];
+                    root[i][k] = if pivot > T::ZERO {
+                        value / pivot
+                    } else {
+                        T::ZERO
+                    };
+                    continue;
+                }
+                // Rounding may leave a little less than nothing of a variance that others explain.
+                let rounding = covariance[i][i] * T::of(ROUNDING);
+                check::at_least_zero("variance of unknown", i, value + rounding)?;
+                root[i][i] = value.max(T::ZERO).sqrt();
+            }
+        }
+        Ok(Self {
+            equation,
+            values,
+            root,
+        })
+    }
+
+    /// The torques that carry the arm at rest, or with what its effects resist with at the speeds of `motion`.
+    ///
+    /// Give a motion without speed for the weight and the passive moments alone.
+    ///
+    /// * `memory` - the state of each effect; zeros where none has any
+    pub fn carry(&self, motion: &Motion<T, N>, memory: &[T; E]) -> Carry<T, N> {
+        let rows = self.equation.carrying(motion, memory);
+        let deviation = |row: &[T; P]| {
+            let mut sum = T::ZERO;
+            for k in 0..P {
+                let mut value = T::ZERO;
+                for i in k..P {
+                    value += self.root[i][k] * row[i];
+                }
+                sum += value.squared();
+            }
+            sum.sqrt()
+        };
+        Carry {
+            torque: rows.torque(&self.values),
+            sd: joints(from_fn(|j| deviation(&rows.columns[j]))),
+        }
+    }
+}
+
+/// Share of a variance that may be lost to rounding.
+const ROUNDING: f64 = 1e-4;

@@ -1,0 +1,336 @@
+//! The equation of motion as rows that are linear in what is not known: base parameters and effects.
+
+use core::array::from_fn;
+
+use crate::effect::{Effect, Motion};
+use crate::scalar::Real;
+use crate::{
+    Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, regressor, static_torque,
+};
+
+/// What is known of an unknown before any data, and what it may never be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior<T> {
+    /// Value expected.
+    pub mean: T,
+    /// Its standard deviation; positive and finite.
+    pub sd: T,
+    /// Smallest value allowed; −∞ for none.
+    pub min: T,
+    /// Largest value allowed; ∞ for none.
+    pub max: T,
+}
+
+impl<T: Real> Prior<T> {
+    pub(crate) fn validate(&self, index: usize) -> Result<(), Invalid> {
+        check::finite("expected value of unknown", index, self.mean)?;
+        check::positive("standard deviation of unknown", index, self.sd)?;
+        check::finite("standard deviation of unknown", index, self.sd)?;
+        check::ordered("bound of unknown", index, [self.min, self.max])
+    }
+}
+
+/// Standard deviation of an effect's parameter of which nothing is known, in its SI unit.
+const OPEN: f64 = 10.0;
+
+/// An arm with `E` effects as `P` unknowns: `X_1 … X_N, J_1 … J_N` of the [`Chain`], then the linear parameters of every
+/// effect in turn, then places that stay unused.
+///
+/// Effects without a linear parameter are known torques, and so are normal moments and rotors. An effect that is switched
+/// off is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Equation<T, const N: usize, const P: usize, const E: usize> {
+    chain: Chain<T, N>,
+    effects: [Effect<T>; E],
+    used: usize,
+}
+
+/// One row a joint: `columns · unknowns + known` is the torque that the motion needs \[N m\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Needed<T, const N: usize, const P: usize> {
+    /// Torque for each unit of each unknown.
+    pub columns: [[T; P]; N],
+    /// Torque of what is known.
+    pub known: Joints<T, N>,
+}
+
+impl<T: Scalar, const N: usize, const P: usize> Needed<T, N, P> {
+    /// The torques at values of the unknowns \[N m\].
+    #[inline]
+    pub fn torque(&self, unknowns: &[T; P]) -> Joints<T, N> {
+        joints(from_fn(|j| {
+            let columns = self.columns[j].iter().zip(unknowns);
+            columns.fold(self.known[j], |sum, (&c, &x)| sum + c * x)
+        }))
+    }
+}
+
+/// What acts on an arm and was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured<T, const N: usize> {
+    /// Torques of motors in the joints \[N m\]; zero where there are none.
+    pub torque: Joints<T, N>,
+    /// Force on the arm at its tip \[N\].
+    pub force_on_arm: [T; 2],
+    /// Moment on the arm at its tip \[N m\].
+    pub moment_on_arm: T,
+}
+
+impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P, E> {
+    /// The unknowns of an arm; the values of chain and effects are what is expected of them.
+    ///
+    /// # Errors
+    /// [`Invalid`] for an effect that does not suit the arm, and for more unknowns than `P`.
+    pub fn new(chain: Chain<T, N>, effects: [Effect<T>; E]) -> Result<Self, Invalid> {
+        let mut used = 2 * N;
+        for effect in effects.iter().filter(|e| e.on) {
+            effect.validate(N)?;
+            used += linear(effect).count();
+        }
+        if used > P {
+            return Err(Invalid::OutOfRange {
+                name: "number of unknowns",
+                index: 0,
+                found: used as f64,
+                min: 0.0,
+                max: P as f64,
+            });
+        }
+        Ok(Self {
+            chain,
+            effects,
+            used,
+        })
+    }
+
+    /// The arm that is expected.
+    pub fn chain(&self) -> &Chain<T, N> {
+        &self.chain
+    }
+    /// The effects with the values expected of them.
+    pub fn effects(&self) -> &[Effect<T>; E] {
+        &self.effects
+    }
+    /// Number of unknowns in use; the others have no influence.
+    pub fn used(&self) -> usize {
+        self.used
+    }
+
+    /// What the arm as given says of its unknowns: base parameters from masses, centres of mass and inertias that are
+    /// each uncertain by a relative standard deviation, effects about their values and otherwise open.
+    pub fn priors(&self, uncertainty: T) -> [Prior<T>; P] {
+        let infinite = T::of(f64::INFINITY);
+        let unused = Prior {
+            mean: T::ZERO,
+            sd: T::ONE,
+            min: -infinite,
+            max: infinite,
+        };
+        let mut priors = [unused; P];
+        let inertial = |mean: T, variance: T| Prior {
+            mean,
+            sd: uncertainty * variance.sqrt(),
+            min: T::ZERO,
+            max: infinite,
+        };
+        let mut next = priors.iter_mut();
+        for second in [false, true] {
+            for (j, s) in self.chain.segments.iter().enumerate() {
+                let about_joint = s.inertia + s.mass * (s.com[0].squared() + s.com[1].squared());
+                // Mass and centre of mass vary by themselves: their product by √2, an inertia about the joint by 2.
+                let own = if second {
+                    T::of(4.0) * about_joint.squared()
+                } else {
+                    T::of(2.0) * (s.mass * s.com[0]).squared()
+                };
+                let lever = if second { s.length.squared() } else { s.length };
+                let beyond = self.chain.segments.iter().skip(j + 1);
+                let variance = beyond.fold(own, |sum, d| sum + (lever * d.mass).squared());
+                let mean = if second {
+                    self.chain.j[j]
+                } else {
+                    self.chain.x[j]
+                };
+                if let Some(place) = next.next() {
+                    *place = inertial(mean, variance);
+                }
+            }
+        }
+        let effects = self.effects.iter().filter(|e| e.on);
+        for (prior, (mean, parameter)) in next.zip(effects.flat_map(linear)) {
+            *prior = Prior {
+                mean,
+                sd: T::of(OPEN),
+                min: T::of(parameter.min),
+                max: T::of(parameter.max),
+            };
+        }
+        priors
+    }
+
+    /// The arm and the effects with values in place of the unknowns.
+    ///
+    /// Of a chain only base parameters are known; the masses stay as they are, and centres of mass and inertias are
+    /// moved so that the base parameters come out. Their gravity and motion are exact, the force in a bearing is not.
+    pub fn with_values(&self, values: &[T; P]) -> (Chain<T, N>, [Effect<T>; E]) {
+        let (mut chain, mut effects) = (self.chain, self.effects);
+        let mut next = values.iter();
+        for second in [false, true] {
+            for j in 0..N {
+                let Some(&value) = next.next() else { continue };
+                let s = &mut chain.segments[j];
+                if second {
+                    s.inertia += value - chain.j[j];
+                    chain.j[j] = value;
+                } else {
+                    let along = s.com[0] + (value - chain.x[j]) / s.mass;
+                    s.inertia += s.mass * (s.com[0].squared() - along.squared());
+                    s.com[0] = along;
+                    chain.x[j] = value;
+                }
+            }
+        }
+        for effect in effects.iter_mut().filter(|e| e.on) {
+            let parameters = effect.kind.info().parameters;
+            for (value, _) in effect
+                .parameters
+                .iter_mut()
+                .zip(parameters)
+                .filter(|(_, p)| p.linear)
+            {
+                if let Some(&new) = next.next() {
+                    *value = new;
+                }
+            }
+        }
+        (chain, effects)
+    }
+
+    /// The torques that a motion needs.
+    ///
+    /// * `motion` - without joint forces: they are taken from the arm as expected and from `measured`
+    /// * `memory` - the state of each effect
+    pub fn needed(
+        &self,
+        motion: &Motion<T, N>,
+        memory: &[T; E],
+        measured: &Measured<T, N>,
+    ) -> (Needed<T, N, P>, Joints<T, N>) {
+        let pose = Pose::new(&motion.q);
+        let force = joint_force(
+            &self.chain,
+            &pose,
+            (&motion.qd, &motion.qdd),
+            measured.force_on_arm,
+        );
+        let seen = motion.with_joint_force(&force);
+        let mut rows = self.inertial(&pose, &motion.qd, &motion.qdd);
+        self.add_effects(&seen, memory, &mut rows);
+        let acting = static_torque(
+            &self.chain,
+            &pose,
+            measured.force_on_arm,
+            measured.moment_on_arm,
+        );
+        (rows, joints(from_fn(|j| acting[j] + measured.torque[j])))
+    }
+
+    /// The torques that carry the arm: its weight, and what its effects resist with at this motion. Inertia is left out.
+    pub fn carrying(&self, motion: &Motion<T, N>, memory: &[T; E]) -> Needed<T, N, P> {
+        let rest = joints([T::ZERO; N]);
+        let pose = Pose::new(&motion.q);
+        let mut rows = self.inertial(&pose, &rest, &rest);
+        self.add_effects(motion, memory, &mut rows);
+        rows
+    }
+
+    /// The states of the effects one period later, the motion taken as constant in it.
+    pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [T; E], period: T) {
+        for (effect, state) in self.effects.iter().zip(memory) {
+            if effect.on && effect.kind.info().memory {
+                let local = motion.local(effect.index, *state);
+                *state += effect.memory_rate(&local) * period;
+            }
+        }
+    }
+
+    fn inertial(
+        &self,
+        pose: &Pose<T, N>,
+        qd: &Joints<T, N>,
+        qdd: &Joints<T, N>,
+    ) -> Needed<T, N, P> {
+        let y = regressor(&self.chain, pose, qd, qdd);
+        let mut columns = [[T::ZERO; P]; N];
+        let mut known = [T::ZERO; N];
+        for j in 0..N {
+            let moments = (0..N).map(|k| y.x[(j, k)]);
+            let inertias = (0..N).map(|k| y.j[(j, k)]);
+            for (place, value) in columns[j].iter_mut().zip(moments.chain(inertias)) {
+                *place = value;
+            }
+            known[j] = self.chain.rotor[j] * qdd[j];
+            for k in 0..N {
+                known[j] += y.h[(j, k)] * self.chain.h[k];
+            }
+        }
+        Needed {
+            columns,
+            known: joints(known),
+        }
+    }
+
+    fn add_effects(&self, motion: &Motion<T, N>, memory: &[T; E], rows: &mut Needed<T, N, P>) {
+        let mut column = 2 * N;
+        for (effect, &state) in self.effects.iter().zip(memory).filter(|(e, _)| e.on) {
+            let local = motion.local(effect.index, state);
+            let mut add = |joint: usize, share: T, gradient: Option<&[T]>, torque: T| {
+                if joint >= N {
+                    return;
+                }
+                match gradient {
+                    None => rows.known[joint] += share * torque,
+                    Some(values) => {
+                        let places = rows.columns[joint].iter_mut().skip(column);
+                        for (place, &value) in places.zip(values) {
+                            *place += share * value;
+                        }
+                    }
+                }
+            };
+            let parameters = effect.kind.info().parameters;
+            let count = parameters.iter().filter(|p| p.linear).count();
+            let share = effect.proximal_share();
+            let crosses = effect.kind.crosses() && effect.index > 0;
+            if count == 0 {
+                let torque = effect.torque(&local);
+                add(effect.index, T::ONE, None, torque);
+                if crosses {
+                    add(effect.index - 1, share, None, torque);
+                }
+                continue;
+            }
+            let gradient = effect.gradient(&local);
+            let mut packed = [T::ZERO; crate::effect::MAX_PARAMETERS];
+            let chosen = gradient.iter().zip(parameters).filter(|(_, p)| p.linear);
+            for (place, (&value, _)) in packed.iter_mut().zip(chosen) {
+                *place = value;
+            }
+            let values = packed.get(..count);
+            add(effect.index, T::ONE, values, T::ZERO);
+            if crosses {
+                add(effect.index - 1, share, values, T::ZERO);
+            }
+            column += count;
+        }
+    }
+}
+
+/// Values and descriptions of the linear parameters of an effect.
+fn linear<T: Scalar>(
+    effect: &Effect<T>,
+) -> impl Iterator<Item = (T, &'static crate::effect::Parameter)> {
+    let parameters = effect.kind.info().parameters;
+    let values = effect.parameters.into_iter().zip(parameters);
+    values.filter(|(_, p)| p.linear)
+}

@@ -1,0 +1,538 @@
+//! Identification while the arm moves, in bounded memory and fixed time for each control period.
+//!
+//! The equation of motion of every sample is linear in the unknowns of an [`Equation`]. Its rows are averaged over a short
+//! window and taken into a square-root information matrix; bounds are then imposed by fixing what lies outside. The work is
+//! spread over the periods of the next window, one unit in each.
+//!
+//! Angles, forces and torques pass the same low-pass, so that none of them runs ahead of the others, and a sample that is
+//! missing or wrong is bridged there and counts nowhere. Nothing is learned and nothing forgotten while the arm rests. What
+//! is forgotten comes back from the prior, so that what a movement does not show returns to what was known before instead of
+//! drifting.
+
+mod channel;
+mod information;
+mod settings;
+mod window;
+
+pub use channel::Fault;
+pub use settings::Settings;
+
+use channel::{Channel, Smooth};
+use information::Information;
+use settings::Tuning;
+use window::Window;
+
+use core::array::from_fn;
+
+use crate::compensation::Carry;
+use crate::effect::Motion;
+use crate::equation::{Equation, Measured, Prior};
+use crate::scalar::Real;
+use crate::{Invalid, Joints, joints};
+
+/// What a value rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// The data.
+    Data,
+    /// What was assumed beforehand: the data leave it open.
+    Prior,
+    /// A bound that the data push against.
+    Bound,
+}
+
+impl Decision {
+    /// The word for it in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Prior => "prior",
+            Self::Bound => "bound",
+        }
+    }
+}
+
+/// The measurements of one control period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<T, const N: usize> {
+    /// Joint angles \[rad\].
+    pub q: Joints<T, N>,
+    /// Joint angles from which speeds and accelerations are taken, where better ones are known than `q`: from the encoders
+    /// of the robot that leads the arm, or from its command \[rad\].
+    pub lead: Option<Joints<T, N>>,
+    /// What acts on the arm.
+    pub measured: Measured<T, N>,
+}
+
+/// What became of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heed {
+    /// It counts.
+    Taken,
+    /// No joint moves: it says nothing.
+    Resting,
+    /// The filters have not yet settled after a start or a gap.
+    Settling,
+    /// It was refused.
+    Refused(Fault),
+}
+
+/// What is known of one unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate<T> {
+    /// The value, within its bounds.
+    pub value: T,
+    /// Its standard deviation, never above the prior's.
+    pub sd: T,
+    /// What it rests on; anything but data is not yet identified.
+    pub decided_by: Decision,
+}
+
+impl<T: Real> Estimate<T> {
+    /// The interval of so many standard deviations, cut at the bounds.
+    pub fn interval(&self, deviations: T, prior: &Prior<T>) -> [T; 2] {
+        [-deviations, deviations].map(|k| (self.value + k * self.sd).max(prior.min).min(prior.max))
+    }
+}
+
+/// Share of the prior's variance that the data must have taken away before an unknown counts as identified.
+const MEASURED: f64 = 0.9;
+/// Windows over which the size of the residual is averaged.
+const LONG: f64 = 100.0;
+/// Largest correlation between neighbouring windows that is believed.
+const MOST_CORRELATED: f64 = 0.9;
+/// Samples over which the usual size of the unexplained torque is averaged.
+const USUAL: f64 = 200.0;
+
+/// What is left to do with a full window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Work {
+    /// Nothing.
+    Idle,
+    /// To wait for so many periods.
+    Wait(u32),
+    /// To forget, and to bring back one prior row.
+    Forget,
+    /// To take in the row of a joint.
+    Row(usize),
+    /// To solve; once more for each unknown that is fixed to a bound.
+    Solve,
+    /// To say how certain an unknown is.
+    Deviation(usize),
+}
+
+/// Identifies `P` unknowns of an arm of `N` joints and `E` effects while it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
+    equation: Equation<T, N, P, E>,
+    priors: [Prior<T>; P],
+    tuning: Tuning<T, N>,
+    /// Angles, angles that lead, torques.
+    joints: [[Channel<T>; N]; 3],
+    /// Force in y and z, moment.
+    hand: [Channel<T>; 3],
+    /// False until the first good sample, and after a gap.
+    running: bool,
+    settling: u32,
+    moving: bool,
+    memory: [T; E],
+    /// Usual size of the torque that the estimate does not explain \[N m\].
+    usual: Option<[T; N]>,
+    window: Window<T, N, P>,
+    full: Window<T, N, P>,
+    work: Work,
+    information: Information<T, P>,
+    /// The same with unknowns fixed to their bounds.
+    bounded: Information<T, P>,
+    fixed: [bool; P],
+    prior_row: usize,
+    /// Running means of squared residuals and of products of neighbouring ones, in units of the noise; windows so far.
+    residual: [T; 2],
+    last_residual: [Option<T>; N],
+    windows: T,
+    estimates: [Estimate<T>; P],
+}
+
+impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P, E> {
+    /// An estimator that knows its priors.
+    ///
+    /// # Errors
+    /// [`Invalid`] for settings that are out of range, and priors without a positive standard deviation or with an empty
+    /// range.
+    pub fn new(
+        equation: Equation<T, N, P, E>,
+        priors: [Prior<T>; P],
+        settings: &Settings<T, N>,
+    ) -> Result<Self, Invalid> {
+        for (index, prior) in priors.iter().enumerate() {
+            prior.validate(index)?;
+        }
+        let tuning = Tuning::new(settings, P)?;
+        let [angle, load] = tuning.farthest;
+        let information = Information::independent(priors.iter().map(|p| (p.mean, p.sd)));
+        let estimates = priors.map(|p| Estimate {
+            value: p.mean.max(p.min).min(p.max),
+            sd: p.sd,
+            decided_by: Decision::Prior,
+        });
+        Ok(Self {
+            equation,
+            priors,
+            joints: [angle, angle, load].map(|far| [Channel::new(tuning.g, far); N]),
+            hand: [Channel::new(tuning.g, load); 3],
+            tuning,
+            running: false,
+            settling: 0,
+            moving: false,
+            memory: [T::ZERO; E],
+            usual: None,
+            window: Window::EMPTY,
+            full: Window::EMPTY,
+            work: Work::Idle,
+            information,
+            bounded: information,
+            fixed: [false; P],
+            prior_row: 0,
+            residual: [T::ZERO; 2],
+            last_residual: [None; N],
+            windows: T::ZERO,
+            estimates,
+        })
+    }
+
+    /// The unknowns.
+    pub fn equation(&self) -> &Equation<T, N, P, E> {
+        &self.equation
+    }
+    /// What was known of them beforehand.
+    pub fn priors(&self) -> &[Prior<T>; P] {
+        &self.priors
+    }
+    /// What is known of them now.
+    pub fn estimates(&self) -> &[Estimate<T>; P] {
+        &self.estimates
+    }
+    /// Their values.
+    pub fn values(&self) -> [T; P] {
+        self.estimates.map(|e| e.value)
+    }
+
+    /// How much larger the standard deviations are than the noise that was declared would make them: by residuals that are
+    /// larger, and by neighbouring ones that resemble each other. Never below one.
+    pub fn excess(&self) -> T {
+        let [square, product] = self.residual;
+        let alike = T::if_less(T::ZERO, square, product / square, T::ZERO);
+        let alike = alike.max(T::ZERO).min(T::of(MOST_CORRELATED));
+        (square.max(T::ONE) * (T::ONE + alike) / (T::ONE - alike)).sqrt()
+    }
+
+    /// The torques that carry the arm at rest, or with what its effects resist with at the speeds of `motion`.
+    ///
+    /// With their standard deviation from the covariance of all unknowns. Give a motion without speed for the weight and
+    /// the passive moments alone.
+    pub fn carry(&self, motion: &Motion<T, N>) -> Carry<T, N> {
+        let rows = self.equation.carrying(motion, &self.memory);
+        let excess = self.excess();
+        Carry {
+            torque: rows.torque(&self.values()),
+            sd: joints(from_fn(|j| {
+                excess * self.information.deviation(&rows.columns[j])
+            })),
+        }
+    }
+
+    /// One control period; `None` where a sample is missing.
+    ///
+    /// Takes the same time whatever the data are, to within the units of work in [`Estimator`]'s description.
+    pub fn update(&mut self, sample: Option<&Sample<T, N>>) -> Heed {
+        for _ in 0..self.tuning.pace_of_work {
+            self.work();
+        }
+        let fault = match self.sense(sample) {
+            Ok((motion, measured)) => return self.learn(&motion, &measured),
+            Err(heed) => heed,
+        };
+        if fault == Heed::Refused(Fault::Frozen) {
+            // What was read since it froze is not to be trusted either.
+            self.window = Window::EMPTY;
+            if let Work::Wait(_) = self.work {
+                self.work = Work::Idle;
+            }
+        }
+        self.age();
+        fault
+    }
+
+    /// Checks and filters a sample.
+    fn sense(
+        &mut self,
+        sample: Option<&Sample<T, N>>,
+    ) -> Result<(Motion<T, N>, Measured<T, N>), Heed> {
+        if !self.running {
+            return Err(self.start(sample));
+        }
+        let frozen_after = self.moving.then_some(self.tuning.frozen_after);
+        let mut fault = None;
+        let mut pass = |channel: &mut Channel<T>, value: Option<T>| {
+            let found = channel.fault(value, frozen_after);
+            fault = fault.or(found);
+            channel.step(if found.is_some() { None } else { value })
+        };
+        let smooth: [[Smooth<T>; N]; 3] = from_fn(|kind| {
+            from_fn(|j| {
+                pass(
+                    &mut self.joints[kind][j],
+                    sample.map(|s| of_joint(s, kind, j)),
+                )
+            })
+        });
+        let hand = from_fn::<_, 3, _>(|c| pass(&mut self.hand[c], sample.map(|s| of_hand(s, c))));
+        let all = self.joints.iter().flatten().chain(&self.hand);
+        if all.map(Channel::bridged).fold(0, Ord::max) > self.tuning.longest_gap {
+            self.running = false;
+        }
+        let [angle, lead, torque] = smooth;
+        let pace = self.tuning.pace;
+        let mut motion = Motion::new(
+            T::ZERO,
+            joints(angle.map(|s| s.value)),
+            joints(lead.map(|s| s.rate * pace)),
+        );
+        motion.qdd = joints(lead.map(|s| s.rate_of_rate * pace.squared()));
+        self.moving = motion.qd.iter().any(|qd| qd.abs() > self.tuning.dead_band);
+        self.equation
+            .advance(&motion, &mut self.memory, self.tuning.period);
+        if let Some(fault) = fault {
+            return Err(Heed::Refused(fault));
+        }
+        if self.settling > 0 {
+            self.settling -= 1;
+            return Err(Heed::Settling);
+        }
+        let measured = Measured {
+            torque: joints(torque.map(|s| s.value)),
+            force_on_arm: [hand[0].value, hand[1].value],
+            moment_on_arm: hand[2].value,
+        };
+        Ok((motion, measured))
+    }
+
+    /// Restarts all filters at a sample.
+    fn start(&mut self, sample: Option<&Sample<T, N>>) -> Heed {
+        let Some(sample) = sample else {
+            return Heed::Refused(Fault::Missing);
+        };
+        let mut good = true;
+        for (kind, channels) in self.joints.iter_mut().enumerate() {
+            for (j, channel) in channels.iter_mut().enumerate() {
+                good &= channel.restart(of_joint(sample, kind, j));
+            }
+        }
+        for (c, channel) in self.hand.iter_mut().enumerate() {
+            good &= channel.restart(of_hand(sample, c));
+        }
+        if !good {
+            return Heed::Refused(Fault::NotFinite);
+        }
+        self.running = true;
+        self.moving = false;
+        self.settling = self.tuning.settling;
+        self.window = Window::EMPTY;
+        Heed::Settling
+    }
+
+    /// Adds a sample to the window.
+    ///
+    /// At rest it is added as well, for to leave out slow samples would favour one side of every reversal; what counts is
+    /// whether the arm moved at any time in the window.
+    fn learn(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> Heed {
+        let heed = self.weigh(motion, measured);
+        self.window.moved |= self.moving;
+        self.age();
+        match heed {
+            Heed::Taken if !self.moving => Heed::Resting,
+            other => other,
+        }
+    }
+
+    fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> Heed {
+        let (rows, acting) = self.equation.needed(motion, &self.memory, measured);
+        let expected = rows.torque(&self.values());
+        let rest: [T; N] = from_fn(|j| (acting[j] - expected[j]).abs());
+        let usual = self.usual.get_or_insert(rest);
+        let mut expected = true;
+        for j in 0..N {
+            let floor = T::ONE / self.tuning.weight[j];
+            let most = self.tuning.gate * usual[j].max(floor);
+            expected &= rest[j] <= most;
+            // What is refused counts as much as what could just be taken: a change that lasts is soon believed.
+            usual[j] += (rest[j].min(most) - usual[j]) * T::of(1.0 / USUAL);
+        }
+        if !expected {
+            return Heed::Refused(Fault::Unexpected);
+        }
+        for j in 0..N {
+            self.window
+                .add(j, &rows.columns[j], acting[j] - rows.known[j]);
+        }
+        Heed::Taken
+    }
+
+    /// One period more in the window; a full one is handed on.
+    fn age(&mut self) {
+        self.window.age += 1;
+        if self.window.age >= self.tuning.window {
+            if self.window.moved && self.window.counts.iter().any(|&n| n >= self.tuning.enough) {
+                self.full = self.window;
+                self.work = Work::Wait(self.tuning.quarantine);
+            }
+            self.window = Window::EMPTY;
+        }
+    }
+
+    /// One unit of work on the full window.
+    fn work(&mut self) {
+        self.work = match self.work {
+            Work::Idle => Work::Idle,
+            Work::Wait(0) => Work::Forget,
+            Work::Wait(periods) => Work::Wait(periods - 1),
+            Work::Forget => {
+                if self.tuning.fade < T::ONE {
+                    self.forget();
+                }
+                Work::Row(0)
+            }
+            Work::Row(j) => {
+                if let Some((row, value)) = self.full.mean(j, &self.tuning) {
+                    self.information.absorb(row, value);
+                }
+                if j + 1 < N {
+                    Work::Row(j + 1)
+                } else {
+                    self.bounded = self.information;
+                    self.fixed = [false; P];
+                    Work::Solve
+                }
+            }
+            Work::Solve => self.solve(),
+            Work::Deviation(unknown) => {
+                self.judge(unknown);
+                if unknown + 1 < P {
+                    Work::Deviation(unknown + 1)
+                } else {
+                    Work::Idle
+                }
+            }
+        }
+    }
+
+    fn forget(&mut self) {
+        self.information.fade(self.tuning.fade);
+        let mut row = [T::ZERO; P];
+        if let (Some(place), Some(prior)) =
+            (row.get_mut(self.prior_row), self.priors.get(self.prior_row))
+        {
+            let weight = self.tuning.refresh / prior.sd;
+            *place = weight;
+            self.information.absorb(row, weight * prior.mean);
+        }
+        self.prior_row = if self.prior_row + 1 < P {
+            self.prior_row + 1
+        } else {
+            0
+        };
+    }
+
+    /// Solves, and fixes the unknown that lies farthest outside its bounds; when none does, the values stand.
+    fn solve(&mut self) -> Work {
+        let values = self.bounded.solve();
+        let mut worst: Option<(usize, T)> = None;
+        let mut most = T::ZERO;
+        for i in 0..P {
+            let prior = &self.priors[i];
+            let within = values[i].max(prior.min).min(prior.max);
+            let outside = (values[i] - within).abs() * self.bounded.sharpness(i);
+            if outside > most && !self.fixed[i] {
+                most = outside;
+                worst = Some((i, within));
+            }
+        }
+        if let Some((unknown, to)) = worst {
+            self.bounded.fix(unknown, to);
+            if let Some(fixed) = self.fixed.get_mut(unknown) {
+                *fixed = true;
+            }
+            return Work::Solve;
+        }
+        for i in 0..P {
+            let prior = &self.priors[i];
+            if values[i].is_finite() {
+                self.estimates[i].value = values[i].max(prior.min).min(prior.max);
+            }
+        }
+        self.look_back();
+        Work::Deviation(0)
+    }
+
+    /// Counts what the new values leave of the window.
+    fn look_back(&mut self) {
+        let values = self.values();
+        self.windows = (self.windows + T::ONE).min(T::of(LONG));
+        let (mut square, mut product, mut count) = (T::ZERO, T::ZERO, T::ZERO);
+        for j in 0..N {
+            let Some((row, value)) = self.full.mean(j, &self.tuning) else {
+                self.last_residual[j] = None;
+                continue;
+            };
+            let rest = row.iter().zip(&values).fold(value, |r, (&c, &x)| r - c * x);
+            square += rest.squared();
+            product += rest * self.last_residual[j].unwrap_or(T::ZERO);
+            count += T::ONE;
+            self.last_residual[j] = Some(rest);
+        }
+        if count > T::ZERO {
+            let share = T::ONE / self.windows;
+            let [old_square, old_product] = self.residual;
+            self.residual = [
+                old_square + share * (square / count - old_square),
+                old_product + share * (product / count - old_product),
+            ];
+        }
+    }
+
+    /// How certain an unknown is, and by what.
+    fn judge(&mut self, unknown: usize) {
+        let sd = self.information.deviation_of(unknown) * self.excess();
+        let places = self
+            .estimates
+            .get_mut(unknown)
+            .zip(self.priors.get(unknown));
+        if let (Some((estimate, prior)), Some(&fixed)) = (places, self.fixed.get(unknown)) {
+            let left = (sd / prior.sd).squared();
+            estimate.sd = sd.min(prior.sd);
+            estimate.decided_by = if fixed {
+                Decision::Bound
+            } else if left < T::of(1.0 - MEASURED) {
+                Decision::Data
+            } else {
+                Decision::Prior
+            };
+        }
+    }
+}
+
+fn of_joint<T: Real, const N: usize>(sample: &Sample<T, N>, kind: usize, j: usize) -> T {
+    match kind {
+        0 => sample.q[j],
+        1 => sample.lead.as_ref().unwrap_or(&sample.q)[j],
+        _ => sample.measured.torque[j],
+    }
+}
+
+fn of_hand<T: Real, const N: usize>(sample: &Sample<T, N>, channel: usize) -> T {
+    match channel {
+        0 => sample.measured.force_on_arm[0],
+        1 => sample.measured.force_on_arm[1],
+        _ => sample.measured.moment_on_arm,
+    }
+}

@@ -1,0 +1,168 @@
+//! How an estimator works, and what follows from it for one control period.
+
+use crate::check::{finite, positive};
+use crate::scalar::Real;
+use crate::{Invalid, Scalar};
+
+/// How an estimator works.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings<T, const N: usize> {
+    /// Control period \[s\].
+    pub period: T,
+    /// Cutoff of the low-pass from which speeds and accelerations come \[Hz\]; three times the fastest movement is enough.
+    pub cutoff: T,
+    /// Time over which the equation of motion is averaged before it counts \[s\].
+    pub window: T,
+    /// Standard deviation of such an average, of what the model leaves, by joint \[N m\].
+    pub noise: [T; N],
+    /// Speed below which a joint counts as at rest; while all rest, nothing is learned and nothing forgotten \[rad/s\].
+    pub dead_band: T,
+    /// Fastest that a joint can move \[rad/s\]; an angle that jumps farther is a spike. Infinite for no check.
+    pub fastest: T,
+    /// Fastest that a force \[N/s\] or torque \[N m/s\] can change. Infinite for no check.
+    pub steepest: T,
+    /// Torques that the estimate does not explain, in multiples of what it usually leaves, are not learned from.
+    pub gate: T,
+    /// How long a sensor may show the same bits while the arm moves \[s\]; infinite for ever.
+    pub frozen_after: T,
+    /// Time in which what was learned fades, counted while the arm moves \[s\]; infinite to forget nothing.
+    pub forgetting: T,
+}
+
+impl<T: Real, const N: usize> Settings<T, N> {
+    /// Settings for a control period: movements to 3 Hz, 0.1 N m of noise, nothing forgotten, only gross faults refused.
+    pub fn new(period: T) -> Self {
+        let infinite = T::of(f64::INFINITY);
+        Self {
+            period,
+            cutoff: T::of(15.0).min(T::of(0.2) / period),
+            window: T::of(0.1).max(T::of(4.0) * period),
+            noise: [T::of(0.1); N],
+            dead_band: T::of(0.005),
+            fastest: infinite,
+            steepest: infinite,
+            gate: T::of(8.0),
+            frozen_after: infinite,
+            forgetting: infinite,
+        }
+    }
+}
+
+/// Settings in control periods.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tuning<T, const N: usize> {
+    pub period: T,
+    /// `tan(π f/f_s)` of the low-pass.
+    pub g: T,
+    /// One over the low-pass's own time, `2 g/period` \[1/s\].
+    pub pace: T,
+    /// Periods in a window.
+    pub window: u32,
+    /// Good samples of a joint that a window needs.
+    pub enough: u32,
+    /// One over the noise of one joint's average.
+    pub weight: [T; N],
+    pub dead_band: T,
+    pub gate: T,
+    /// Farthest that an angle and a load move in one period.
+    pub farthest: [T; 2],
+    pub frozen_after: u32,
+    /// Periods that may be bridged before the filters start anew.
+    pub longest_gap: u32,
+    /// Periods until restarted filters have settled.
+    pub settling: u32,
+    /// Periods that a full window waits, so that a sensor found frozen can still spoil it.
+    pub quarantine: u32,
+    /// Units of work in each period.
+    pub pace_of_work: u32,
+    /// Factor of what was learned, for each window; one to forget nothing.
+    pub fade: T,
+    /// Weight with which one prior row comes back for each window.
+    pub refresh: T,
+}
+
+/// Longest time that is bridged by going on as before \[s\].
+const LONGEST_GAP: f64 = 0.02;
+/// Time after which restarted filters have settled, in periods of their cutoff.
+const SETTLING: f64 = 1.5;
+/// Share of its samples that a window needs.
+const ENOUGH: f64 = 0.5;
+
+impl<T: Real, const N: usize> Tuning<T, N> {
+    /// * `unknowns` - how many there are: the work to be spread over a window
+    pub fn new(s: &Settings<T, N>, unknowns: usize) -> Result<Self, Invalid> {
+        let (period, cutoff) = (s.period.to_f64(), s.cutoff.to_f64());
+        let window = s.window.to_f64();
+        positive("control period", 0, s.period)?;
+        finite("control period", 0, s.period)?;
+        positive("cutoff", 0, s.cutoff)?;
+        in_range(
+            "cutoff in units of the sampling rate",
+            cutoff * period,
+            0.0,
+            0.45,
+        )?;
+        in_range("control periods in a window", window / period, 2.0, 1e6)?;
+        for (index, &noise) in s.noise.iter().enumerate() {
+            positive("noise of joint", index, noise)?;
+        }
+        for (name, value) in [
+            ("fastest speed", s.fastest),
+            ("steepest force", s.steepest),
+            ("gate", s.gate),
+            ("freezing time", s.frozen_after),
+            ("time of forgetting", s.forgetting),
+        ] {
+            in_range(name, value.to_f64(), f64::MIN_POSITIVE, f64::INFINITY)?;
+        }
+        in_range("dead band", s.dead_band.to_f64(), 0.0, f64::MAX)?;
+
+        let (sin, cos) = Scalar::sin_cos(core::f64::consts::PI * cutoff * period);
+        let g = sin / cos;
+        let length = libm::round(window / period) as u32;
+        let quarantine = periods(s.frozen_after.to_f64() / period).min(length / 2);
+        // Rows, forgetting, a copy, a publication, and at most every unknown to its bound and its deviation.
+        let work = (N + 3 + 2 * unknowns) as u32;
+        let forgotten = libm::exp(-window / s.forgetting.to_f64());
+        Ok(Self {
+            period: s.period,
+            g: T::of(g),
+            pace: T::of(2.0 * g / period),
+            window: length,
+            enough: (libm::ceil(ENOUGH * f64::from(length)) as u32).max(1),
+            weight: s.noise.map(|noise| T::ONE / noise),
+            dead_band: s.dead_band,
+            gate: s.gate,
+            farthest: [s.fastest * s.period, s.steepest * s.period],
+            frozen_after: periods(s.frozen_after.to_f64() / period),
+            longest_gap: periods(LONGEST_GAP / period).max(2),
+            settling: periods(SETTLING / (cutoff * period)),
+            quarantine,
+            pace_of_work: work.div_ceil((length - quarantine).max(1)),
+            fade: T::of(libm::sqrt(forgotten)),
+            // One of the unknowns in turn, so that each comes back at the pace at which it fades.
+            refresh: T::of(libm::sqrt((1.0 - forgotten) * unknowns as f64)),
+        })
+    }
+}
+
+fn periods(count: f64) -> u32 {
+    // The conversion saturates: an infinite time is as many periods as can be counted.
+    libm::ceil(count) as u32
+}
+
+fn in_range(name: &'static str, found: f64, min: f64, max: f64) -> Result<(), Invalid> {
+    if found >= min && found <= max {
+        return Ok(());
+    }
+    if found.is_nan() {
+        return Err(Invalid::NotFinite { name, index: 0 });
+    }
+    Err(Invalid::OutOfRange {
+        name,
+        index: 0,
+        found,
+        min,
+        max,
+    })
+}

@@ -1,0 +1,52 @@
+//! The rows of a few control periods, added up.
+
+use super::settings::Tuning;
+use crate::scalar::Real;
+
+/// Sums over a window of rows that the movement made meaningful.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Window<T, const N: usize, const P: usize> {
+    /// Periods since it was begun.
+    pub age: u32,
+    /// Whether the arm moved at any time.
+    pub moved: bool,
+    /// Rows of each joint.
+    pub counts: [u32; N],
+    columns: [[T; P]; N],
+    values: [T; N],
+}
+
+impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
+    pub const EMPTY: Self = Self {
+        age: 0,
+        moved: false,
+        counts: [0; N],
+        columns: [[T::ZERO; P]; N],
+        values: [T::ZERO; N],
+    };
+
+    /// Adds the row of a joint.
+    pub fn add(&mut self, joint: usize, columns: &[T; P], value: T) {
+        if joint < N {
+            self.counts[joint] += 1;
+            for (sum, &column) in self.columns[joint].iter_mut().zip(columns) {
+                *sum += column;
+            }
+            self.values[joint] += value;
+        }
+    }
+
+    /// The mean row of a joint in units of its noise; `None` with too few samples.
+    ///
+    /// A window with gaps counts less, as a mean of fewer samples does.
+    pub fn mean(&self, joint: usize, tuning: &Tuning<T, N>) -> Option<([T; P], T)> {
+        let count = *self.counts.get(joint)?;
+        if count < tuning.enough {
+            return None;
+        }
+        let (columns, value) = (self.columns.get(joint)?, *self.values.get(joint)?);
+        let [count, length] = [count, tuning.window].map(|n| T::of(f64::from(n)));
+        let factor = *tuning.weight.get(joint)? / (count * length).sqrt();
+        Some((columns.map(|c| c * factor), value * factor))
+    }
+}
