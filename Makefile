@@ -9,7 +9,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 
-RUST    := $(shell find crates -type f \( -name '*.rs' -o -name Cargo.toml \)) Cargo.toml Cargo.lock clippy.toml
+RUST    := $(shell find crates bench -type f \( -name '*.rs' -o -name Cargo.toml \)) Cargo.toml Cargo.lock clippy.toml
 PACKAGE := $(RUST) $(shell find python -type f -name "*.pyi") pyproject.toml
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1

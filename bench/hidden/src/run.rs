@@ -1,0 +1,203 @@
+//! One trial: the robot leads, the arm follows.
+
+use crate::effect::{Acts, Hidden, Instant, Loads};
+use crate::motion::{Lead, RATE, STEPS};
+use crate::random::Random;
+use crate::rig::{Plane, Rig};
+use crate::start::{equilibrium, resting};
+use crate::world::World;
+
+/// What happened in a trial, at every [`KEPT`]th step.
+#[derive(Clone, Debug, Default)]
+pub struct Truth {
+    /// Joint angles \[rad\].
+    pub q: Vec<Vec<f64>>,
+    /// Force on the arm \[N\].
+    pub force_on_arm: Vec<Plane>,
+    /// Joint angles of the robot \[rad\].
+    pub robot: Vec<Plane>,
+}
+
+/// Steps from one record to the next: forces that are read late lie between samples.
+pub const KEPT: usize = 4;
+/// Records from one sample to the next.
+pub const RECORDS: usize = (STEPS / RATE) as usize / KEPT;
+
+/// What differs from trial to trial besides the movement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// Where the hand holds the handle, beside the tip of the last segment: along it and across \[m\].
+    pub in_hand: Plane,
+    /// Where the handle is, beside where the robot's angles put it \[m\].
+    pub in_room: Plane,
+}
+
+impl Grip {
+    /// Where the model thinks it is.
+    pub const NOMINAL: Self = Self {
+        in_hand: [0.0; 2],
+        in_room: [0.0; 2],
+    };
+}
+
+/// Runs a trial.
+///
+/// * `rig` - the true one, with the hidden effects applied to it
+/// * `near` - joint angles from which the equilibrium at the start is sought \[rad\]
+/// * `grip_of_friction` - damping of dry friction where it sticks \[N m s/rad\]
+///
+/// # Errors
+/// In words, when it has no start or does not stay finite.
+pub fn run(
+    rig: &Rig,
+    hidden: &[Hidden],
+    lead: &Lead,
+    (trial, grip, near): (usize, &Grip, &[f64]),
+    grip_of_friction: f64,
+    random: &mut Random,
+) -> Result<Truth, String> {
+    let step = 1.0 / STEPS;
+    let mut acting: Vec<_> = hidden
+        .iter()
+        .filter_map(|effect| effect.acting(rig, trial, random))
+        .collect();
+    let handle: Vec<Plane> = lead
+        .handle
+        .iter()
+        .enumerate()
+        .map(|(n, at)| {
+            let mut at = [at[0] + grip.in_room[0], at[1] + grip.in_room[1]];
+            for effect in hidden {
+                let [y, z] = effect.ripple(n as f64 * step);
+                at = [at[0] + y, at[1] + z];
+            }
+            at
+        })
+        .collect();
+    let hand = rig.size() - 1;
+    let grip_point = [rig.links[hand].length + grip.in_hand[0], grip.in_hand[1]];
+    let q = equilibrium(rig, &acting, near, (handle[0], grip_point))?;
+    let dry = rubs(&acting, &resting(rig, &q));
+    let mut world = World::new(rig, &q, step, (dry, grip_of_friction));
+    let mut bodies = world.read();
+    // At rest the hinges carry what is in equilibrium.
+    let mut weights = Loads::none(rig.size());
+    for effect in &acting {
+        effect.act(&resting(rig, &q), &mut weights);
+    }
+    let held = rig.contact.force_on_arm(
+        gap(
+            &handle[0],
+            &grip_point_at(rig, &resting(rig, &q), grip_point),
+        ),
+        [0.0; 2],
+    );
+    world.note(&bodies, &bodies.clone(), &weights, held);
+    let (mut speed_before, mut tip_before) = (bodies.qd.clone(), None);
+    let mut truth = Truth::default();
+    for n in 0..handle.len() {
+        // Speeds are known half a step before now; forces need them now.
+        let ahead = |k: usize| bodies.qd[k] + 0.5 * (bodies.qd[k] - speed_before[k]);
+        let (points, angles) = rig.points(&bodies.q);
+        let now = Instant {
+            time: n as f64 * step,
+            q: bodies.q.clone(),
+            qd: (0..rig.size()).map(ahead).collect(),
+            through: world
+                .reaction
+                .iter()
+                .map(|[y, z]| (y * y + z * z).sqrt())
+                .collect(),
+            points,
+            angles,
+        };
+        let (tip, velocity) = grip_motion(rig, &now, grip_point, &mut tip_before, step);
+        let lead_velocity = Lead::velocity(&handle, n);
+        let rate = gap(&lead_velocity, &velocity);
+        let force = rig.contact.force_on_arm(gap(&handle[n], &tip), rate);
+        if n % KEPT == 0 {
+            truth.q.push(now.q.clone());
+            truth.force_on_arm.push(force);
+            truth.robot.push(lead.robot[n]);
+        }
+        let mut loads = passive(rig, &now);
+        for effect in &acting {
+            effect.act(&now, &mut loads);
+        }
+        // The guide of a base that moves does no work: what the base does to the arm turns the first joint.
+        let (_, per_angle) = rig.base_path.at(now.q[0]);
+        let [y, z] = world.reaction[0];
+        loads.resist[0] += per_angle[0] * y + per_angle[1] * z;
+        world
+            .step(&bodies, &loads, (force, grip_point))
+            .map_err(|joint| format!("joint {} left the world at {:.2} s", joint + 1, now.time))?;
+        for effect in &mut acting {
+            effect.advance(&now, step);
+        }
+        let after = world.read();
+        world.note(&bodies, &after, &loads, force);
+        speed_before = core::mem::replace(&mut bodies, after).qd;
+    }
+    match truth.q.iter().flatten().all(|q| q.abs() < 10.0) {
+        true => Ok(truth),
+        false => Err("the arm spun".to_owned()),
+    }
+}
+
+/// Whether any effect is dry friction.
+fn rubs(acting: &[Box<dyn Acts>], rest: &Instant) -> bool {
+    let mut loads = Loads::none(rest.q.len());
+    let moving = Instant {
+        qd: vec![0.05; rest.q.len()],
+        through: vec![1.0; rest.q.len()],
+        ..rest.clone()
+    };
+    let everywhere = [-3.0, 3.0].map(|q| Instant {
+        q: vec![q; rest.q.len()],
+        ..moving.clone()
+    });
+    for place in everywhere.iter().chain([&moving]) {
+        for effect in acting {
+            effect.act(place, &mut loads);
+        }
+    }
+    loads.dry.iter().flatten().any(|torque| *torque > 0.0)
+}
+
+/// What the joints do by themselves.
+fn passive(rig: &Rig, now: &Instant) -> Loads {
+    let mut loads = Loads::none(rig.size());
+    for (j, joint) in rig.joints.iter().enumerate() {
+        loads.resist[j] = joint.stiffness * (now.q[j] - joint.rest) + joint.viscosity * now.qd[j];
+    }
+    loads
+}
+
+/// Place and velocity of the point at which the hand holds the handle; the velocity now, from the last three places.
+fn grip_motion(
+    rig: &Rig,
+    now: &Instant,
+    grip_point: Plane,
+    before: &mut Option<[Plane; 2]>,
+    step: f64,
+) -> (Plane, Plane) {
+    let at = grip_point_at(rig, now, grip_point);
+    let [last, last_but_one] = before.unwrap_or([at, at]);
+    *before = Some([at, last]);
+    let velocity =
+        core::array::from_fn(|k| (1.5 * at[k] - 2.0 * last[k] + 0.5 * last_but_one[k]) / step);
+    (at, velocity)
+}
+
+/// Where a point of the last segment is (along it and across, \[m\]).
+fn grip_point_at(rig: &Rig, now: &Instant, [x, y]: Plane) -> Plane {
+    let hand = rig.size() - 1;
+    let (sin, cos) = libm::sincos(now.angles[hand]);
+    let from = now.points[hand];
+    [from[0] + x * cos - y * sin, from[1] + x * sin + y * cos]
+}
+
+/// What lies between two points, or moves between two velocities.
+fn gap(there: &Plane, here: &Plane) -> Plane {
+    [there[0] - here[0], there[1] - here[1]]
+}
