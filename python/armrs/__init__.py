@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from .identification import Estimate as Estimate
     from .identification import Identified as Identified
     from .identification import identify as identify
+    from .laboratory import Recorded as Recorded
+    from .laboratory import record as record
     from .markers import Markers as Markers
     from .markers import PlanarMotion as PlanarMotion
     from .markers import planar_motion as planar_motion
@@ -59,6 +61,7 @@ _HOMES = {
     "demo": ("Demonstration", "run_demo"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
     "identification": ("Estimate", "Identified", "identify"),
+    "laboratory": ("Recorded", "record"),
     "markers": ("Markers", "PlanarMotion", "planar_motion"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
     "moments": ("PassiveCurve", "PassiveMoments", "passive_moments"),

@@ -5,7 +5,19 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Arm", "Rig", "__version__", "build_profile", "effects", "identify", "low_pass_both_ways", "simulate", "smooth"]
+__all__ = [
+    "Arm",
+    "Rig",
+    "__version__",
+    "build_profile",
+    "control",
+    "effects",
+    "identify",
+    "literature",
+    "low_pass_both_ways",
+    "simulate",
+    "smooth",
+]
 
 __version__: str
 build_profile: str
@@ -44,8 +56,15 @@ class Arm:
 class Rig:
     def __new__(cls, arm: Arm, effects: Sequence[Any], contact: Any, robot: Any = None) -> Rig: ...
 
+def control(
+    rig: Rig,
+    drive: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    watch: Mapping[str, Any],
+) -> dict[str, Any]: ...
 def effects() -> list[dict[str, Any]]: ...
 def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...
+def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[dict[str, Any]]: ...
 def simulate(
     rig: Rig,
     drive: Mapping[str, Any],

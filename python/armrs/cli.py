@@ -337,6 +337,28 @@ def passive(
 
 
 @app.command()
+def record(
+    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="EXPERIMENT.toml: subject, robot, sensors, movements.")],
+    out: OutFolder,
+    json: JsonFile = None,
+) -> int:
+    """Run an experiment in the virtual laboratory; writes a data set, the markers, and the truth in a folder of its own.
+
+    Exit status 1 when the safety supervisor stopped a trial; that trial is not in the data set.
+    """
+    from . import words
+    from .experiment import load_experiment
+    from .laboratory import record as run_record
+
+    _folder(out, json)
+    planned = load_experiment(experiment)
+    with console.progress("recording", sum(run.repeats + run.tests for run in planned.runs)) as step:
+        result = run_record(planned, out, step=step)
+    present(result.to_dict, json, lambda: words.recorded(result.to_dict()))
+    return 1 if result.stopped else 0
+
+
+@app.command()
 def report(
     sources: Annotated[list[Path], typer.Argument(metavar="RESULT.json…", help="Results that other verbs wrote.")],
     out: OutFolder = Path(),

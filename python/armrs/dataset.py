@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from . import checks, files, tomlfile
-from .errors import BadInput, Text
-from .model import Model, load_model
+from .errors import BadInput, Text, unknown_name
+from .model import Model, load_model, part_of
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Trial, read_trial
 
@@ -82,6 +82,37 @@ class Tolerance:
         return math.radians(self.angle_offset_deg)
 
 
+@dataclass(frozen=True)
+class Added:
+    """A mass that is fixed to a segment in some configurations, such as one part of an orthosis.
+
+    Attributes
+    ----------
+    segment : int
+        Number of the segment, from 1.
+    mass : float
+        [kg]
+    at : float
+        From the segment's proximal joint [m].
+    configurations : tuple of str
+        Where it is worn.
+    """
+
+    segment: int
+    mass: float
+    at: float
+    configurations: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        checks.whole("segment", self.segment, least=1)
+        object.__setattr__(self, "mass", checks.number("mass", self.mass, above=0.0, most=20.0, unit="kg"))
+        object.__setattr__(self, "at", checks.number("at", self.at, least=0.0, most=2.0, unit="m", hint="millimetres?"))
+        names: object = self.configurations
+        if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
+            raise BadInput("configurations", names, "a list of names")
+        object.__setattr__(self, "configurations", tuple(names))
+
+
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """A model and the trials that challenge it.
@@ -106,6 +137,8 @@ class Dataset:
         What the user should know, one line each.
     synthetic : bool
         Whether the trials were simulated; reports say so.
+    added : tuple of Added
+        Masses that are worn in some configurations besides the model.
     """
 
     name: str
@@ -119,6 +152,7 @@ class Dataset:
     model_path: Path | None = None
     warnings: tuple[str, ...] = ()
     synthetic: bool = False
+    added: tuple[Added, ...] = ()
 
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
@@ -133,6 +167,14 @@ class Dataset:
     def __repr__(self) -> str:
         counts = f"{len(self.fit_trials)} fit and {len(self.test_trials)} test trials"
         return f"Dataset({self.name!r}, {self.model.n_joints} joints, {counts}, {len(self.warnings)} warnings)"
+
+    def model_of(self, configuration: str) -> Model:
+        """Return the model with what was worn in a configuration."""
+        model = self.model
+        for item in self.added:
+            if configuration in item.configurations:
+                model = model.with_mass(item.segment, item.mass, item.at)
+        return model
 
     def replace(self, **changes: Any) -> Dataset:
         """Return a data set with some attributes changed."""
@@ -162,6 +204,7 @@ class Description:
     subject: Subject
     tolerance: Tolerance
     synthetic: bool
+    added: tuple[Added, ...]
 
     @property
     def model_path(self) -> Path:
@@ -198,6 +241,9 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     description = describe(source)
     model_path = description.model_path
     model = load_model(model_path)
+    for item in description.added:
+        if item.segment > model.n_joints:
+            raise BadInput("[[added]], segment", item.segment, f"1 to {model.n_joints}", file=description.path)
     trials: list[Trial] = []
     warnings: list[str] = []
     for entry in description.entries:
@@ -232,6 +278,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         model_path=model_path,
         warnings=tuple(warnings),
         synthetic=description.synthetic,
+        added=description.added,
     )
 
 
@@ -247,7 +294,7 @@ def describe(source: str | os.PathLike[str]) -> Description:
 
 
 def _description(path: Path, document: dict[str, Any]) -> Description:
-    optional = ["name", "force_on", "sample_rate", "synthetic", "subject", "tolerance"]
+    optional = ["name", "force_on", "sample_rate", "synthetic", "subject", "tolerance", "added"]
     checks.keys("", document, required=["model", "trial"], optional=optional)
     tables = checks.tables("trial", document["trial"])
     entries = tuple(_entry(f"[[trial]] {k}", table) for k, table in enumerate(tables, 1))
@@ -261,19 +308,23 @@ def _description(path: Path, document: dict[str, Any]) -> Description:
         entries=entries,
         force_on=None if force_on is None else checks.choice("force_on", force_on, ("robot", "arm")),
         sample_rate=None if rate is None else checks.number("sample_rate", rate, above=0.0, most=1e6, unit="Hz"),
-        subject=_part(Subject, "[subject]", document.get("subject", {})),
-        tolerance=_part(Tolerance, "[tolerance]", document.get("tolerance", {})),
+        subject=part_of(Subject, "[subject]", document.get("subject", {})),
+        tolerance=part_of(Tolerance, "[tolerance]", document.get("tolerance", {})),
+        added=_added(document.get("added", []), entries),
         synthetic=checks.flag("synthetic", document.get("synthetic", False)),
     )
 
 
-def _part(kind: Any, place: str, value: object) -> Any:
-    table = checks.table(place, value)
-    checks.keys(place, table, optional=[f.name for f in dataclasses.fields(kind)])
-    try:
-        return kind(**table)
-    except BadInput as error:
-        raise error.within(place=place) from None
+def _added(tables: object, entries: tuple[Entry, ...]) -> tuple[Added, ...]:
+    known = {entry.configuration for entry in entries}
+    added: list[Added] = []
+    for number, table in enumerate(checks.tables("added", tables), start=1):
+        item: Added = part_of(Added, f"[[added]] {number}", table)
+        for name in item.configurations:
+            if name not in known:
+                raise unknown_name(f"[[added]] {number}, configurations", name, known, what="configuration")
+        added.append(item)
+    return tuple(added)
 
 
 def _entry(place: str, table: dict[str, Any]) -> Entry:
@@ -389,5 +440,6 @@ def description_text(source: Dataset | Description, model: str, entries: list[En
         blocks.append(["[subject]", *subject])
     if source.tolerance != Tolerance():
         blocks.append(["[tolerance]", *tomlfile.lines(dataclasses.asdict(source.tolerance))])
+    blocks += [["[[added]]", *tomlfile.lines(dataclasses.asdict(item))] for item in source.added]
     blocks += [["[[trial]]", *tomlfile.lines(dataclasses.asdict(entry))] for entry in entries]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"

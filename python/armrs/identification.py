@@ -189,6 +189,8 @@ def identify(
     """
     if not isinstance(dataset, Dataset):
         dataset = load_dataset(dataset)
+    if dataset.added:
+        raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
     if method not in ("joint", "cascade"):
         raise BadInput("method", method, "joint or cascade")
     with_effects = with_effects.split(",") if isinstance(with_effects, str) else with_effects

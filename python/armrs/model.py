@@ -252,6 +252,28 @@ class Model:
                 raise unknown_name("Model", name, names, what="attribute")
         return dataclasses.replace(self, **changes)
 
+    def with_mass(self, number: int, mass: float, at: float | None = None) -> Model:
+        """Return a model with a point mass on a segment.
+
+        Parameters
+        ----------
+        number : int
+            The segment, from 1.
+        mass : float
+            [kg]
+        at : float, optional
+            From the segment's proximal joint [m]; at its end when absent. The centre of mass stays on the segment.
+        """
+        old = self.segments[number - 1]
+        place = old.length if at is None else at
+        total = old.mass + mass
+        com = (old.mass * old.com + mass * place) / total
+        normal = old.mass * old.com_normal / total
+        shift = (old.com - com) ** 2 + (old.com_normal - normal) ** 2
+        inertia = old.inertia + old.mass * shift + mass * ((place - com) ** 2 + normal**2)
+        new = Segment(old.name, old.length, total, com, inertia, com_normal=normal)
+        return self.replace(segments=(*self.segments[: number - 1], new, *self.segments[number:]))
+
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write `model.toml`; reading it back gives an equal model, to the last bit. The file is replaced at once or not at all."""
         files.write_text(path, self.to_toml(), kind=".toml")
@@ -302,16 +324,17 @@ def _model(document: dict[str, Any]) -> Model:
     joints = checks.tables("arm.joint", arm.pop("joint", []))
     effects = checks.tables("effect", document.get("effect", []))
     return Model(
-        segments=tuple(_build(Segment, f"[[arm.segment]] {k}", t, f"segment {k}") for k, t in enumerate(segments, 1)),
-        joints=tuple(_build(Joint, f"[[arm.joint]] {k}", t, f"joint {k}") for k, t in enumerate(joints, 1)),
-        robot=_build(Robot, "[robot]", document["robot"]) if "robot" in document else None,
-        contact=_build(Contact, "[contact]", document["contact"]) if "contact" in document else None,
-        effects=tuple(_effect(f"[[effect]] {k}", t) for k, t in enumerate(effects, 1)),
+        segments=tuple(part_of(Segment, f"[[arm.segment]] {k}", t, f"segment {k}") for k, t in enumerate(segments, 1)),
+        joints=tuple(part_of(Joint, f"[[arm.joint]] {k}", t, f"joint {k}") for k, t in enumerate(joints, 1)),
+        robot=part_of(Robot, "[robot]", document["robot"]) if "robot" in document else None,
+        contact=part_of(Contact, "[contact]", document["contact"]) if "contact" in document else None,
+        effects=tuple(effect_of(f"[[effect]] {k}", t) for k, t in enumerate(effects, 1)),
         **arm,
     )
 
 
-def _build(kind: type, place: str, value: object, default_name: str | None = None) -> Any:
+def part_of(kind: type, place: str, value: object, default_name: str | None = None) -> Any:
+    """Return the dataclass `kind` that a table describes; `place` names the table in refusals."""
     table = checks.table(place, value)
     own = [f for f in dataclasses.fields(kind) if f.init]
     if default_name is not None:
@@ -324,7 +347,8 @@ def _build(kind: type, place: str, value: object, default_name: str | None = Non
         raise error.within(place=place) from None
 
 
-def _effect(place: str, table: dict[str, Any]) -> Effect:
+def effect_of(place: str, table: dict[str, Any]) -> Effect:
+    """Return the effect that a table `[[effect]]` describes."""
     if "kind" not in table:
         raise BadInput(f"{place}, kind", Text("nothing"), "key kind is required")
     parameters = dict(table)

@@ -177,7 +177,7 @@ def passive_moments(
 def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
     if trial.force_on_arm is None and trial.tau is None:
         raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
-    chain, n = arm(dataset.model), dataset.model.n_joints
+    chain, n = arm(dataset.model_of(trial.configuration)), dataset.model.n_joints
     q, qd, moment, inertial = (np.full((len(trial), n), np.nan) for _ in range(4))
     for piece in trial.pieces():
         if piece.stop - piece.start < FEWEST_SAMPLES:

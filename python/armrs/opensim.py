@@ -120,6 +120,25 @@ def read_trc(path: Path) -> Markers:
     return Markers(names, table[:, 1], positions, up="y", warnings=notes)
 
 
+def write_trc(path: Path, markers: Markers) -> Path:
+    """Write marker trajectories in metres; a sample that is missing is an empty cell."""
+    rate = (len(markers.t) - 1) / float(markers.t[-1] - markers.t[0])
+    count = len(markers.t)
+    head = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate:.10g}\t{rate:.10g}\t{count}\t{len(markers.names)}\tm\t{rate:.10g}\t1\t{count}",
+        "Frame#\tTime\t" + "\t\t\t".join(markers.names),
+        "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(markers.names) + 1) for axis in "XYZ"),
+    ]
+    rows = [
+        "\t".join([str(k), repr(t), *("" if math.isnan(v) else repr(v) for v in row)])
+        for k, (t, row) in enumerate(zip(markers.t.tolist(), markers.positions.reshape(count, -1).tolist(), strict=True), 1)
+    ]
+    files.write_text(path, "\n".join([*head, *rows, ""]), kind=".trc")
+    return path
+
+
 def _lines(path: Path) -> list[str]:
     try:
         return tomlfile.read_text(path, "a text file", most=_LARGEST).splitlines()

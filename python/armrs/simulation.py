@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _armrs, tomlfile
+from . import _armrs, checks, tomlfile
 from .errors import BadInput
 from .model import Model, load_model
 from .rig import rig
@@ -197,11 +197,11 @@ def simulate(
     steps = 1.0 / (rate * dt)
     if abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
         raise BadInput("dt", dt, f"a whole part of the interval between samples, {1.0 / rate:g} s")
-    driven = _driven(drive, coupling)
+    led = driven(drive, coupling)
     if isinstance(drive, Trial) and start is None:
         first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
         start = drive.q[first]
-        if driven["kind"] != "robot" and start_speed is None and drive.dq is not None:
+        if led["kind"] != "robot" and start_speed is None and drive.dq is not None:
             start_speed = drive.dq[first]
     settings = {
         "engine": engine,
@@ -213,7 +213,7 @@ def simulate(
         "qd": None if start_speed is None else [float(v) for v in start_speed],
     }
     sensing = None if sensors is None else _sensing(sensors, seeds)
-    raw = _armrs.simulate(rig(model), driven, settings, sensing)
+    raw = _armrs.simulate(rig(model), led, settings, sensing)
     return Simulated(
         t=raw["time"],
         q=raw["q"],
@@ -234,8 +234,9 @@ def simulate(
     )
 
 
-def _driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
-    driven: dict[str, Any] = {
+def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
+    """Return a drive as the core takes it."""
+    led: dict[str, Any] = {
         "kind": "free",
         "values": None,
         "times": None,
@@ -247,14 +248,14 @@ def _driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
     }
     if isinstance(drive, Movement):
         shared = ("shape", "speed", "acceleration", "pause")
-        driven |= {"kind": "movement", "values": np.array(drive.waypoints)} | {name: getattr(drive, name) for name in shared}
+        led |= {"kind": "movement", "values": np.array(drive.waypoints)} | {name: getattr(drive, name) for name in shared}
     elif drive is not None:
         kind, values = ("robot", drive.robot_q) if drive.robot_q is not None else ("torque", drive.tau)
         if values is None:
             raise BadInput("columns", "neither robot angles nor joint torques", "qr1_rad and qr2_rad, or tau1_Nm …", file=drive.file)
         keep = np.isfinite(values).all(axis=1)
-        driven |= {"kind": kind, "values": np.array(values[keep]), "times": np.array(drive.t[keep] - drive.t[0])}
-    return driven
+        led |= {"kind": kind, "values": np.array(values[keep]), "times": np.array(drive.t[keep] - drive.t[0])}
+    return led
 
 
 def _sensing(sensors: Sensors, seeds: Sequence[int]) -> dict[str, Any]:
@@ -266,16 +267,14 @@ def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
     """Read a movement file: a TOML table `[movement]` with `waypoints_deg` (or `_rad`), speed, acceleration, pause, shape."""
     document = tomlfile.read(Path(path))
     try:
-        return _movement(document, n_joints)
+        checks.keys("", document, required=["movement"])
+        return movement_of(checks.table("movement", document["movement"]), n_joints)
     except BadInput as error:
         raise error.within(file=path) from None
 
 
-def _movement(document: dict[str, Any], n_joints: int) -> Movement:
-    from . import checks
-
-    checks.keys("", document, required=["movement"])
-    table = checks.table("movement", document["movement"])
+def movement_of(table: dict[str, Any], n_joints: int) -> Movement:
+    """Return the movement that a table describes."""
     known = [
         "waypoints_deg", "waypoints_rad", "speed_rad_s", "speed_deg_s", "acceleration_rad_s2", "acceleration_deg_s2", "pause_s", "shape",
     ]  # fmt: skip

@@ -178,3 +178,14 @@ def planar(motion: PlanarMotion, points: Sequence[str], file: Path) -> None:
         f"{plane['out_of_plane_most_deg']:.3g}° at most; the plane leans {plane['tilt_deg']:.3g}° from the vertical"
     )
     print(file)
+
+
+def recorded(result: Mapping[str, Any]) -> None:
+    """Print what the virtual laboratory did."""
+    rows = []
+    for trial in result["trials"]:
+        stop = trial["stop"]
+        end = "complete" if stop is None else f"stopped at {stop['at_s']:.4f} s: {stop['what']} {stop['reason']}"
+        rows.append((trial["configuration"], trial["repeat"], f"{1e3 * trial['tracking_error_rad']:.3g}", end))
+    console.table(["configuration", "repeat", "robot off by [mrad]", "end"], rows)
+    print("\n" + "\n".join(result["files"][:3]))

@@ -5,6 +5,7 @@ mod catalogue;
 mod convert;
 mod errors;
 mod ident;
+mod lab;
 mod rig;
 mod signal;
 mod sim;
@@ -26,6 +27,8 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<rig::Rig>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
+    m.add_function(wrap_pyfunction!(lab::control, m)?)?;
+    m.add_function(wrap_pyfunction!(lab::literature, m)?)?;
     m.add_function(wrap_pyfunction!(signal::smooth, m)?)?;
     m.add_function(wrap_pyfunction!(signal::low_pass_both_ways, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;

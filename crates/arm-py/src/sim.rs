@@ -117,7 +117,8 @@ pub fn simulate<'py>(
     each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
 }
 
-fn experiment<const N: usize>(
+/// The experiment that Python describes.
+pub fn experiment<const N: usize>(
     chain: &Chain<f64, N>,
     rig: &Rig,
     drive: &Driven<'_>,

@@ -20,6 +20,7 @@
 //! ```
 
 mod batch;
+mod controlled;
 mod digest;
 mod error;
 mod experiment;
@@ -43,6 +44,7 @@ mod stepper;
 mod terms;
 
 pub use batch::simulate_batch;
+pub use controlled::{Controlled, Controller, Fault, Safety, control};
 pub use digest::digest;
 pub use error::SimulationError;
 pub use experiment::{

@@ -3,6 +3,7 @@
 mod accuracy;
 mod batch;
 mod common;
+mod controlled;
 mod energy;
 mod golden;
 mod long;

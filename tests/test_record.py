@@ -1,0 +1,184 @@
+"""The virtual laboratory: what it measures, what it hides, and the supervisor that stops it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import BadInput
+from armrs.cli import main
+from armrs.experiment import load_experiment
+
+EXPERIMENT = """\
+name = "virtual S1"
+seed = 3
+
+[subject]
+body_mass = 77.0
+height = 1.80
+sex = "male"
+lengths_m = [0.322, 0.30]
+spread = 0.5
+
+[[joint]]
+coulomb = 0.15
+
+[[joint]]
+stiffness = 0.6
+rest = 0.9
+coulomb = 0.1
+
+[handle]
+mass = 0.193
+
+[sensors]
+marker_gaps = 0.01
+emg = true
+
+[variation]
+moment_Nm = [0.05, 0.02]
+
+[[movement]]
+configuration = "slow"
+waypoints_deg = [[-60, 60], [-48, 60], [-60, 72], [-60, 60]]
+speed_rad_s = 0.4
+acceleration_rad_s2 = 2.0
+shape = "smooth"
+repeats = 2
+tests = 1
+"""
+
+
+@pytest.fixture
+def experiment(tmp_path: Path) -> Path:
+    path = tmp_path / "EXPERIMENT.toml"
+    path.write_text(EXPERIMENT, encoding="utf-8")
+    return path
+
+
+def test_writes_a_data_set_that_hides_the_truth(experiment: Path, tmp_path: Path) -> None:
+    done = armrs.record(experiment, tmp_path / "out")
+    data = armrs.load_dataset(tmp_path / "out")
+    assert [(t.configuration, t.repeat, t.role) for t in data.trials] == [("slow", 1, "fit"), ("slow", 2, "fit"), ("slow", 3, "test")]
+    assert data.synthetic and not done.stopped
+    assert [s.length for s in data.model.segments] == pytest.approx([0.322, 0.30], abs=1e-4)
+    truth = armrs.load_model(tmp_path / "out" / "truth" / "truth.toml")
+    assert [j.coulomb for j in truth.joints] == [0.15, 0.1]
+    assert [j.coulomb for j in data.model.joints] == [0.0, 0.0] and data.model.effects == ()
+    assert all(abs(a.mass / b.mass - 1) > 1e-3 for a, b in zip(truth.segments, data.model.segments, strict=True))
+    story = json.loads((tmp_path / "out" / "truth" / "truth.json").read_text())
+    assert story["trials"][0]["moment_Nm"] != story["trials"][1]["moment_Nm"]
+    assert max(t["tracking_error_rad"] for t in done.trials) < 2e-4
+
+
+def test_the_markers_written_show_the_angles_recorded(experiment: Path, tmp_path: Path) -> None:
+    done = armrs.record(experiment, tmp_path / "out")
+    markers = armrs.read_markers(tmp_path / "out" / "markers" / "slow_1.trc")
+    assert np.isnan(markers.positions).any()
+    motion = armrs.planar_motion(markers, ["shoulder", "elbow", "handle"], up="z", forward="y")
+    np.testing.assert_allclose(motion.q, done.dataset.trials[0].q, atol=1e-12)
+
+
+def test_the_same_seed_gives_the_same_bytes(experiment: Path, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        armrs.record(experiment, tmp_path / name)
+    files = sorted(p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*") if p.is_file())
+    assert all((tmp_path / "a" / f).read_bytes() == (tmp_path / "b" / f).read_bytes() for f in files)
+    other = experiment.with_name("other.toml")
+    other.write_text(EXPERIMENT.replace("seed = 3", "seed = 4"), encoding="utf-8")
+    armrs.record(other, tmp_path / "c")
+    assert (tmp_path / "a" / "trials/slow_1.csv").read_bytes() != (tmp_path / "c" / "trials/slow_1.csv").read_bytes()
+
+
+def test_clocks_apart_delay_the_angles(experiment: Path, tmp_path: Path) -> None:
+    late = experiment.with_name("late.toml")
+    late.write_text(EXPERIMENT.replace("emg = true", "clock_offset_s = 0.04").replace("marker_gaps = 0.01\n", ""), encoding="utf-8")
+    plain = experiment.with_name("plain.toml")
+    plain.write_text(EXPERIMENT.replace("marker_gaps = 0.01\n", ""), encoding="utf-8")
+    a, b = (armrs.record(path, tmp_path / path.stem).dataset.trials[0] for path in (late, plain))
+    np.testing.assert_array_equal(a.force_on_arm, b.force_on_arm)
+    ahead = np.interp(b.t + 0.04, b.t, b.q[:, 0])
+    assert np.abs(a.q[:-3, 0] - ahead[:-3]).max() < 5e-3 < np.abs(a.q[:-3, 0] - b.q[:-3, 0]).max()
+
+
+def test_load_cells_read_the_brakes_and_muscles_their_activity(experiment: Path, tmp_path: Path) -> None:
+    text = EXPERIMENT.replace("emg = true", "emg = true\nbrake_noise_Nm = 0.001")
+    burst = '[[effect]]\nkind = "voluntary"\njoint = 2\namplitude = 1.0\nstart = 0.5\nduration = 0.4\n\n[[movement]]'
+    experiment.write_text(text.replace("[[movement]]", burst), encoding="utf-8")
+    trial = armrs.record(experiment, tmp_path / "out").dataset.trials[0]
+    assert trial.tau is not None
+    assert np.abs(trial.tau).max(axis=0) == pytest.approx([0.15, 0.1], abs=0.01)
+    sides = [trial.emg[f"emg_elbow_{side}_uV"] for side in ("flexor", "extensor")]
+    during = (trial.t > 0.6) & (trial.t < 0.8)
+    assert max(s[during].mean() for s in sides) > 10.0
+    assert max(s[~during & ((trial.t < 0.4) | (trial.t > 1.0))].max() for s in sides) < 8.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ('kind = "runaway"\njoint = 1', "beyond the limit"),
+        ('kind = "nan"\njoint = 2', "not finite"),
+        ('kind = "late"\ndelay_s = 0.002', "clock runs backwards"),
+        ('kind = "force"\nforce_N = [0.0, 140.0]', "beyond the limit"),
+        ('kind = "frozen"\njoint = 1', ""),
+    ],
+)
+def test_a_fault_stops_the_trial(experiment: Path, tmp_path: Path, fault: str, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
+    experiment.write_text(EXPERIMENT + f"\n[[fault]]\nat_s = 0.3\nrepeat = 2\n{fault}\n", encoding="utf-8")
+    assert main(["record", str(experiment), "-o", str(tmp_path / "out"), "--json", str(tmp_path / "r.json")]) == 1
+    result = json.loads((tmp_path / "r.json").read_text())
+    (stop,) = [t["stop"] for t in result["trials"] if t["stop"]]
+    assert reason in stop["reason"] and stop["periods_after_fault"] <= 2 and stop["way_after_stop_m"] < 0.01
+    assert len(armrs.load_dataset(tmp_path / "out").trials) == 2
+    assert "stopped at 0.3" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("body_mass = 77.0", "", r"\[subject\], body_mass: found nothing, allowed a value"),
+        ("body_mass = 77.0", "body_mas = 77.0", r"unknown key 'body_mas', .*nearest known: body_mass"),
+        ("height = 1.80", "height = 180.0", r"height: found 180\.0, .*centimetres"),
+        ("lengths_m = [0.322, 0.30]", "lengths_m = [0.322]", r"lengths_m: found \[0\.322\], allowed 2 lengths"),
+        ("coulomb = 0.15", "coulomb = -1", r"\[\[joint\]\] 1, coulomb: found -1\.0"),
+        ("moment_Nm = [0.05, 0.02]", "moment_Nm = [nan, 0.02]", r"\[variation\], moment_Nm: found nan"),
+        ("marker_gaps = 0.01", "marker_gaps = 2", r"\[sensors\], marker_gaps: found 2\.0, allowed a finite number 0 to 0\.5"),
+        ("repeats = 2", "repeats = 0", r"\[\[movement\]\]: found no repeats"),
+        ("seed = 3", "seed = -3", r"seed: found -3, allowed a whole number 0 to"),
+        ("[[-60, 60], [-48, 60]", "[[-60, 60], [-48]", r"\[\[movement\]\] 1, movement.waypoints_deg"),
+        ("[[-60, 60], [-48, 60]", "[[-60, 60], [90, 0]", r"from the robot's base, allowed"),
+        ("[handle]", '[[fault]]\nkind = "fire"\nat_s = 1\n[handle]', r"\[\[fault\]\] 1, kind: found 'fire', allowed \"runaway\" or"),
+        ("[handle]", "[safety]\nforce_N = 0\n[handle]", r"\[safety\], force_N: found 0\.0, allowed a finite number > 0"),
+        ("[subject]", 'model = "absent.toml"\n[subject]', r"lengths_m: found a value beside model"),
+    ],
+)
+def test_refuses_what_cannot_be_recorded(experiment: Path, tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert EXPERIMENT.count(old) == 1
+    experiment.write_text(EXPERIMENT.replace(old, new), encoding="utf-8")
+    with pytest.raises(BadInput, match=message):
+        armrs.record(experiment, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_experiment_of_the_documents_loads() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "files.md").read_text(encoding="utf-8")
+    block = text.partition("```toml EXPERIMENT.toml\n")[2].partition("```")[0]
+    assert block
+    for name, value in vars(armrs.experiment.Controller()).items():
+        assert f"{name} = {value}" in block
+
+
+def test_what_was_worn_is_in_the_truth_and_named(experiment: Path, tmp_path: Path) -> None:
+    worn = "worn = [{ segment = 2, mass = 0.191, at = 0.066 }]\nconfiguration"
+    experiment.write_text(EXPERIMENT.replace("configuration", worn), encoding="utf-8")
+    armrs.record(experiment, tmp_path / "out")
+    data = armrs.load_dataset(tmp_path / "out")
+    assert [(a.segment, a.mass, a.at, a.configurations) for a in data.added] == [(2, 0.191, 0.066, ("slow",))]
+    with pytest.raises(BadInput, match="masses worn in some configurations"):
+        armrs.identify(data)
+    assert load_experiment(experiment).runs[0].worn[0].mass == 0.191
