@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import armrs
 from armrs.catalogue import catalogue
 from armrs.cli import main
+from armrs.demo import BRAKES
 
 # DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
 DFKI_M2L2 = 0.6043459469186889 * 0.18377686083653508
@@ -99,6 +102,8 @@ def test_cascade_is_another_method_and_finds_the_same_sums(data: Path, dfki: arm
         ({"level": 1.5}, "0.5 to 1"),
         ({"motion": "guessed"}, "auto, measured or simulated"),
         ({"motion": "simulated"}, "robot angles"),
+        ({"method": "cascade", "with_effects": "viscous"}, "coulomb or constant_moment for the cascade"),
+        ({"method": "cascade", "motion": "simulated"}, "measured for the cascade"),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_a_line(data: Path, choice: dict[str, object], words: str) -> None:
@@ -132,3 +137,53 @@ def test_every_joint_effect_can_be_asked_for(slow_arm: Path, kind: str) -> None:
     for e in result.parameters:
         assert math.isfinite(e.value), e
         assert e.interval[0] <= e.interval[1], e
+
+
+def without_robot(slow_arm: Path, speed_noise: float | None) -> armrs.Dataset:
+    """The slow arm as a laboratory without robot angles has it, with or without sensors of speed (noise in rad/s)."""
+    data = armrs.load_dataset(slow_arm)
+    truth = armrs.simulate(slow_arm / "truth.toml", armrs.load_movement(slow_arm / "movement.toml", 2))
+    random = np.random.default_rng(5)
+    trials = tuple(
+        dataclasses.replace(
+            t, robot_q=None, dq=None if speed_noise is None else truth.qd[: len(t)] + random.normal(0.0, speed_noise, t.q.shape)
+        )
+        for t in data.trials
+    )
+    return data.replace(trials=trials)
+
+
+def friction(result: armrs.Identified) -> np.ndarray:
+    return np.array([e.value for e in result.parameters if e.kind == "coulomb"])
+
+
+def test_friction_from_noisy_angles_is_called_doubtful(slow_arm: Path, tmp_path: Path) -> None:
+    data = without_robot(slow_arm, None)
+    result = armrs.identify(data, with_effects="coulomb")
+    assert {e.caveat for e in (*result.parameters, *result.combinations) if e.decided_by == "data"} == {"noisy speed"}
+    assert all(e.caveat is None for e in result.parameters if e.decided_by != "data")
+    assert any("noisy angles" in line for line in result.misfits)
+    # Speeds below 5 Hz are noise at 0.1 rad/s and 0.1 degrees; the cutoff is lowered so far that friction is nearly right.
+    assert result.cutoff < 2.0
+    assert friction(result) == pytest.approx(BRAKES, rel=0.15)  # 10 % off at the shoulder, five standard deviations
+    armrs.write_dataset(data, tmp_path / "data")
+    assert main(["identify", str(tmp_path / "data"), "--with", "coulomb"]) == 1
+
+
+def test_friction_is_read_from_measured_speeds(slow_arm: Path) -> None:
+    result = armrs.identify(without_robot(slow_arm, 0.002), with_effects="coulomb")
+    assert {e.caveat for e in result.parameters} == {None}
+    assert result.is_sound
+    assert friction(result) == pytest.approx(BRAKES, rel=0.03)
+
+
+def test_the_cascade_holds_what_it_does_not_find(slow_arm: Path) -> None:
+    """Friction that grows with the joint force: half of what Coulomb friction would explain is taken by it, where the model has it."""
+    data = armrs.load_dataset(slow_arm)
+    plain = friction(armrs.identify(data, method="cascade", with_effects="coulomb"))
+    held = armrs.Effect("load_friction", 2, parameters={"coefficient": 0.005})
+    less = armrs.identify(data.replace(model=data.model.replace(effects=(held,))), method="cascade", with_effects="coulomb")
+    assert plain[1] - friction(less)[1] > 0.01
+    rotor = armrs.Effect("motor_inertia", 1, parameters={"inertia": 0.01})
+    with_rotor = armrs.identify(data.replace(model=data.model.replace(effects=(rotor,))), method="cascade", with_effects="coulomb")
+    assert any("motor_inertia of joint 1" in line for line in with_rotor.misfits)

@@ -37,6 +37,8 @@ class Estimate:
     interval : (float, float)
     decided_by : {"data", "prior", "bound"}
         What the value rests on. A prior's value is an assumption that the data left open, not a measurement.
+    caveat : str or None
+        Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Estimate:
     unit: str
     interval: tuple[float, float]
     decided_by: str
+    caveat: str | None = None
 
     def __str__(self) -> str:
         own = self.kind in ("segment", "combination", "calibration")
@@ -134,6 +137,12 @@ class Identified:
         known = f"{self.rank} of {self.unknowns} unknowns determined"
         return f"Identified({self.dataset.name!r}, {self.method} method, {self.status}: {known}; {'; '.join(map(str, self.combinations))})"
 
+    @property
+    def is_sound(self) -> bool:
+        """Whether the solver got there, the result is possible, and nothing is known against what the data decided."""
+        doubtful = any(e.caveat for e in (*self.parameters, *self.combinations))
+        return self.status == "solved" and not self.contradictions and not doubtful
+
     def to_dict(self) -> dict[str, Any]:
         """Return the result as it is written to JSON; the model stands in a file of its own."""
         return {
@@ -193,7 +202,10 @@ def identify(
         raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
     if method not in ("joint", "cascade"):
         raise BadInput("method", method, "joint or cascade")
-    with_effects = with_effects.split(",") if isinstance(with_effects, str) else with_effects
+    if isinstance(with_effects, str):
+        with_effects = [kind.strip() for kind in with_effects.split(",")]
+        if not all(with_effects):
+            raise BadInput("with_effects", ",".join(with_effects), "kinds of effects with commas between them")
     if not 0.5 <= level < 1.0:
         raise BadInput("level", level, "0.5 to 1")
     if cutoff is not None and not cutoff > 0:
@@ -202,6 +214,8 @@ def identify(
     if cutoff is not None and cutoff >= 0.4 * slowest:
         raise BadInput("cutoff", f"{cutoff:g} Hz", f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
     model = dataset.model
+    if method == "cascade":
+        _cascade_can(with_effects, motion)
     effects = [*all_effects(model), *_added(model, with_effects)]
     fitted = [e.kind in _joint_kinds() for e in effects]
     tolerance = dataset.tolerance
@@ -228,17 +242,22 @@ def identify(
         Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
         for trial, e in zip(dataset.trials, raw["explained"], strict=True)
     )
-    parameters, calibration = _estimates(raw["parameters"]), _estimates(raw["calibration"])
+    noisy = _noisy_speeds(raw["speed_noise"], raw["speed_noise_allowed"])
+    parameters, combinations, calibration = (
+        _estimates(raw[name], NOISY_SPEED if noisy else None) for name in ("parameters", "combinations", "calibration")
+    )
+    # Without a load there is no torque that a residual could be a part of.
+    poor = () if raw["scale_free"] else _misfits(explained)
     return Identified(
         method=method,
         status=raw["status"],
         rank=raw["rank"],
         unknowns=raw["unknowns"],
         parameters=parameters,
-        combinations=_estimates(raw["combinations"]),
+        combinations=combinations,
         calibration=calibration,
         contradictions=_contradictions(parameters),
-        misfits=(*_beyond_tolerance(calibration, settings), *_misfits(explained), *_noisy_speeds(raw["speed_noise"])),
+        misfits=(*_left_out(method, effects), *_beyond_tolerance(calibration, settings), *poor, *noisy),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
         level=level,
@@ -249,6 +268,25 @@ def identify(
         model=_identified_model(model, raw, effects),
         dataset=dataset,
     )
+
+
+_IN_CASCADE = ("coulomb", "constant_moment")
+"""Effects that the cascade finds; others it holds at what the model says."""
+
+
+def _cascade_can(with_effects: Sequence[str], motion: str) -> None:
+    """Refuse what the cascade would silently leave out."""
+    for kind in with_effects:
+        if kind in _joint_kinds() and kind not in _IN_CASCADE:
+            raise BadInput("with_effects", kind, f"{' or '.join(_IN_CASCADE)} for the cascade, or the joint method")
+    if motion == "simulated":
+        raise BadInput("motion", motion, "measured for the cascade, or the joint method")
+
+
+def _left_out(method: str, effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Return what the method leaves out of the model, a line each."""
+    rotors = [e.joint for e in effects if e.kind == "motor_inertia"] if method == "cascade" else []
+    return tuple(f"the cascade takes no inertia into account, and so not the motor_inertia of joint {joint}" for joint in rotors)
 
 
 _BEYOND = 5.0
@@ -281,26 +319,24 @@ def _misfits(explained: Sequence[Explained]) -> tuple[str, ...]:
     lines = []
     measured = np.concatenate([e.measured for e in explained if e.trial.role == "fit"])
     rest = np.concatenate([e.measured - e.fitted for e in explained if e.trial.role == "fit"])
-    if measured.any():
-        for j, (m, r) in enumerate(zip(np.std(measured, axis=0), np.std(rest, axis=0), strict=True), start=1):
-            if r > _POOR * m > 0:
-                lines.append(
-                    f"the residual of joint {j} is {r / m:.0%} of the variation of its torque: the model does not describe these data"
-                )
+    for j, (m, r) in enumerate(zip(np.std(measured, axis=0), np.std(rest, axis=0), strict=True), start=1):
+        if r > _POOR * m > 0:
+            lines.append(f"the residual of joint {j} is {r / m:.0%} of the variation of its torque: the model does not describe these data")
     return tuple(lines)
 
 
-_NOISY = 0.1
-"""Noise of a speed above this share of the speed biases what is read from speeds."""
+NOISY_SPEED = "noisy speed"
+"""Caveat of what the data decided where speeds and accelerations are noise to a good part: friction is then misread, and what it
+leaves or takes goes into masses and calibration."""
 
 
-def _noisy_speeds(shares: Sequence[float]) -> tuple[str, ...]:
-    """Return the joints whose friction, viscosity and inertia rest on speeds that are noise to a good part, a line each."""
+def _noisy_speeds(shares: Sequence[float], allowed: float) -> tuple[str, ...]:
+    """Return the joints whose speeds are noise to a good part, a line each."""
     return tuple(
-        f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are "
-        "biased by more than their intervals say; give the robot's angles and a [robot], or smoother angles"
+        f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are biased by "
+        "more than their intervals say, and masses with them; give the robot's angles and a [robot], measured speeds, or a lower cutoff"
         for j, share in enumerate(shares, start=1)
-        if share > _NOISY
+        if share > allowed
     )
 
 
@@ -318,10 +354,10 @@ def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
     added = []
     for kind in dict.fromkeys(kinds):
         if kind not in known:
-            raise unknown_name("--with", kind, known, what="joint effect")
+            raise unknown_name("with_effects", kind, known, what="joint effect")
         first = known[kind].first_joint
         if first > model.n_joints:
-            raise BadInput("--with", kind, f"an arm of {first} joints or more: it acts over two of them")
+            raise BadInput("with_effects", kind, f"an arm of {first} joints or more: it acts over two of them")
         added += [Effect(kind, j) for j in range(first, model.n_joints + 1) if (kind, j) not in present]
     return added
 
@@ -343,6 +379,7 @@ def _columns(trial: Trial) -> dict[str, Any]:
         "role": trial.role,
         "rate": trial.rate,
         "q": whole(trial.q),
+        "dq": whole(trial.dq),
         "force_on_arm": whole(trial.force_on_arm),
         "moment_on_arm": whole(trial.moment_on_arm),
         "tau": whole(trial.tau),
@@ -351,8 +388,11 @@ def _columns(trial: Trial) -> dict[str, Any]:
     }
 
 
-def _estimates(items: list[dict[str, Any]]) -> tuple[Estimate, ...]:
-    return tuple(Estimate(**{**item, "interval": tuple(item["interval"])}) for item in items)
+def _estimates(items: list[dict[str, Any]], caveat: str | None) -> tuple[Estimate, ...]:
+    """Return estimates; a caveat is one against the data, and so against what they decided alone."""
+    return tuple(
+        Estimate(**{**item, "interval": tuple(item["interval"])}, caveat=caveat if item["decided_by"] == "data" else None) for item in items
+    )
 
 
 def _residuals(explained: Sequence[Explained]) -> dict[str, dict[str, float]]:

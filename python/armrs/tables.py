@@ -36,18 +36,23 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
             "{} … {}".format(*(number(v, item["std"]) for v in item["interval"])),
             unit(item["unit"]),
             item["decided_by"],
+            item.get("caveat"),
             None if item.get("given") is None else f"{item['given']:.4g}",
         ]
         for item in items
     ]
-    head = ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "in the model"]
+    head = ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "but", "in the model"]
     used = [k for k in range(len(head)) if any(row[k] not in (None, "") for row in rows)]
     return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1)
 
 
 def measured(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the estimates of an identification that rest on the measurement, combinations first, each once."""
-    found = {(label(e), e["joint"]): e for e in (*result["combinations"], *result["parameters"]) if e["decided_by"] == "data"}
+    """Return the estimates of an identification that rest on the measurement and can be trusted, combinations first, each once."""
+    found = {
+        (label(e), e["joint"]): e
+        for e in (*result["combinations"], *result["parameters"])
+        if e["decided_by"] == "data" and e.get("caveat") is None
+    }
     return list(found.values())
 
 

@@ -189,6 +189,7 @@ fn main() {
 fn measured(run: &arm_sim::Recording<2>, session: &Session, random: &mut ChaCha8Rng) -> Trial<2> {
     let n = run.time.len();
     let mut trial = Trial {
+        speed: None,
         role: Role::Fit,
         configuration: 0,
         rate: RATE,

@@ -18,7 +18,7 @@
 //! The joint method (`joint`) is better in every respect; the cascade is for comparison with the thesis.
 
 use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
-use arm_core::{Chain, Joints, Pose, gravity, regressor, static_torque};
+use arm_core::{Chain, Joints, Pose, gravity, joint_force, regressor, static_torque};
 
 use crate::coloured::effective_samples;
 use crate::condition::{Pieces, filtered};
@@ -27,13 +27,13 @@ use crate::equation::{Memory, Rows, value_of};
 use crate::error::{IdentError, check_range};
 use crate::estimate::{Estimate, Identified};
 use crate::joint::{cluster_ranges, explain, root_mean_square};
-use crate::motion::{candidates, low_pass, speed_noise};
+use crate::motion::{candidates, low_pass, speed, speed_noise};
 use crate::program::{Program, Status};
 use crate::rank::{RankOptions, analyse};
 use crate::summary::{Certainty, RANK_TOLERANCE, base_name};
 use crate::trial::{Model, Role, Trial};
 use crate::unknown::{LEAST_MASS, Moment, Source, Unknown};
-use crate::{Condenser, Factor, Matrix, derivative, student};
+use crate::{Condenser, Factor, Matrix, student};
 
 /// Direction is read from angles below this frequency \[Hz\]: a quasi-static movement has nothing above.
 const DIRECTION_CUTOFF: f64 = 1.0;
@@ -69,7 +69,7 @@ impl Default for Options {
 ///
 /// Fitted effects of kind `coulomb` are the dissipative torques. The passive moment of a joint is free where
 /// `constant_moment` is fitted there, else it is pinned to zero (thesis section 3.5.2). Other fitted effects keep the
-/// values of the model.
+/// values of the model. Inertia is left out, that of motors too.
 ///
 /// # Errors
 /// [`IdentError`] when there is nothing to fit on, no force or torque acts, or a trial is too short for the filter.
@@ -253,9 +253,10 @@ fn rows<const N: usize>(
     let rest = Joints::<f64, N>::zeros();
     for i in 0..samples {
         let pose = Pose::new(&q[i]);
-        let at = Motion::new(i as f64 / trial.rate, q[i], speed[i]);
-        memory.advance(&at, 1.0 / trial.rate);
         let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
+        let joint = joint_force(&model.chain, &pose, (&rest, &rest), force);
+        let at = Motion::new(i as f64 / trial.rate, q[i], speed[i]).with_joint_force(&joint);
+        memory.advance(&at, 1.0 / trial.rate);
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let mut measured = static_torque(&model.chain, &pose, force, moment)
             - resisting_torque(&kept.held, &at, &memory.held);
@@ -314,20 +315,19 @@ fn motion<const N: usize>(
     );
     let noise = speed_noise(trial, slow_cutoff);
     let mut q = vec![Joints::zeros(); trial.len()];
-    let (mut speed, mut direction) = (q.clone(), q.clone());
+    let (mut speeds, mut direction) = (q.clone(), q.clone());
     for j in 0..N {
         let raw: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();
-        let step = 1.0 / trial.rate;
         let smooth = filter.both_ways(&raw)?;
-        let qd = derivative::first(&slow.both_ways(&raw)?, step)?;
+        let qd = speed(trial, j, &slow)?;
         let full = f64::max(DEAD_BAND * noise[j], SLOWEST);
         for i in 0..trial.len() {
             q[i][j] = smooth[i];
-            speed[i][j] = qd[i];
+            speeds[i][j] = qd[i];
             direction[i][j] = (qd[i] / full).clamp(-1.0, 1.0);
         }
     }
-    Ok((q, speed, direction))
+    Ok((q, speeds, direction))
 }
 
 /// Rows of one joint over the stretches of a cluster.

@@ -9,7 +9,9 @@ use crate::covariance::blocks;
 use crate::equation::{Kinematics, Rows, rows};
 use crate::error::IdentError;
 use crate::estimate::{Explained, Identified};
-use crate::motion::{candidates, measured, speed_noise};
+use crate::motion::{
+    candidates, candidates_of_measured, measured, motion_cutoff, relative_speed_noise, speed_noise,
+};
 use crate::outcome::Outcome;
 use crate::simulated::simulated;
 use crate::summary::{Fit, summarise};
@@ -145,6 +147,7 @@ pub fn identify<const N: usize>(
         .iter()
         .map(|pieces| explain(pieces, &solved.outcome.x))
         .collect();
+    let fit_trials = fit;
     let fit = Fit {
         solved: &solved,
         unknowns: &unknowns,
@@ -154,28 +157,9 @@ pub fn identify<const N: usize>(
     };
     let mut result = summarise(&fit, cutoff, explained)?;
     if !simulate {
-        result.speed_noise = relative_speed_noise(trials, cutoff)?;
+        result.speed_noise = relative_speed_noise(&fit_trials, cutoff)?.to_vec();
     }
     Ok(result)
-}
-
-/// Standard deviation of the speed's noise over the root mean square of the speed, the worst of the fit trials by joint.
-fn relative_speed_noise<const N: usize>(
-    trials: &[Trial<N>],
-    cutoff: f64,
-) -> Result<Vec<f64>, IdentError> {
-    let mut worst = vec![0.0; N];
-    for trial in trials.iter().filter(|t| t.role == Role::Fit) {
-        let (noise, motion) = (speed_noise(trial, cutoff), measured(trial, cutoff)?);
-        for (j, worst) in worst.iter_mut().enumerate() {
-            let speeds: Vec<f64> = motion.qd.iter().map(|qd| qd[j]).collect();
-            let speed = root_mean_square(speeds.iter());
-            if speed > 0.0 {
-                *worst = f64::max(*worst, noise[j] / speed);
-            }
-        }
-    }
-    Ok(worst)
 }
 
 /// Whether the robot's angles alone tell how a trial moved: its path is known, and nothing else drives the arm.
@@ -223,7 +207,7 @@ fn best_cutoff<const N: usize>(
     let trials: Vec<Trial<N>> = fit.iter().map(|&t| t.clone()).collect();
     let scale_free = fit.iter().all(|t| t.is_unloaded());
     let mut scored = Vec::new();
-    for cutoff in candidates(fit) {
+    for cutoff in candidates_of_measured(fit)? {
         let prepared = prepare(model, unknowns, &trials, (cutoff, false))?;
         let pieces: Vec<&Pieces> = prepared.iter().collect();
         let solved = first_solution(model, unknowns, &pieces, scale_free)?.0;
@@ -269,7 +253,7 @@ fn prepare<const N: usize>(
     let mut model = model.clone();
     if !simulate {
         for trial in trials.iter().filter(|t| t.role == Role::Fit) {
-            let noise = speed_noise(trial, cutoff);
+            let noise = speed_noise(trial, motion_cutoff(cutoff, trial.rate));
             for effect in model.fitted.iter_mut().chain(&mut model.held) {
                 widen(
                     effect,

@@ -23,6 +23,8 @@ pub struct Trial<const N: usize> {
     pub rate: f64,
     /// Joint angles \[rad\].
     pub q: Vec<Joints<f64, N>>,
+    /// Joint speeds \[rad/s\], where measured; else angles are differentiated.
+    pub speed: Option<Vec<Joints<f64, N>>>,
     /// Contact force on the arm \[N\], where measured.
     pub force_on_arm: Option<Vec<Plane<f64>>>,
     /// Contact moment on the arm \[N m\], where measured; else the handle turns freely and it is zero.

@@ -23,6 +23,7 @@ pub struct Columns<'py> {
     configuration: usize,
     rate: f64,
     q: PyReadonlyArray2<'py, f64>,
+    dq: Option<PyReadonlyArray2<'py, f64>>,
     force_on_arm: Option<PyReadonlyArray2<'py, f64>>,
     moment_on_arm: Option<PyReadonlyArray1<'py, f64>>,
     tau: Option<PyReadonlyArray2<'py, f64>>,
@@ -74,6 +75,7 @@ pub fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
         configuration: c.configuration,
         rate: c.rate,
         q: joints("q", &c.q)?,
+        speed: c.dq.as_ref().map(|v| joints("dq", v)).transpose()?,
         force_on_arm: c
             .force_on_arm
             .as_ref()
@@ -86,6 +88,7 @@ pub fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
     };
     let n = trial.len();
     let lengths = [
+        ("dq", trial.speed.as_ref().map(Vec::len)),
         ("force_on_arm", trial.force_on_arm.as_ref().map(Vec::len)),
         ("moment_on_arm", trial.moment_on_arm.as_ref().map(Vec::len)),
         ("tau", trial.torque.as_ref().map(Vec::len)),
@@ -207,6 +210,7 @@ fn outcome<'py, const N: usize>(
     out.set_item("cutoff", result.cutoff)?;
     out.set_item("clusters", result.clusters)?;
     out.set_item("speed_noise", &result.speed_noise)?;
+    out.set_item("speed_noise_allowed", arm_ident::motion::QUIET)?;
     out.set_item("trades", &result.trades)?;
     for (name, list) in [
         ("parameters", &result.parameters),

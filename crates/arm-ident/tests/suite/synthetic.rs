@@ -112,6 +112,7 @@ impl<const N: usize> Recipe<N> {
             configuration: 0,
             rate: self.rate,
             q: Vec::new(),
+            speed: None,
             force_on_arm: None,
             moment_on_arm: None,
             torque: None,
