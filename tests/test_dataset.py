@@ -389,6 +389,34 @@ def test_short_gaps_are_bridged_and_marked(session: Session) -> None:
     assert np.delete(trial.q[:, 0], range(50, 55)).tobytes() == np.delete(values[:, 1], range(50, 55)).tobytes()
 
 
+def test_many_bridged_samples_are_said(session: Session) -> None:
+    values = rows(200)
+    for k in range(3, 200, 10):
+        values[k, 2] = np.nan
+    write_rows(session, values)
+    few = armrs.load_dataset(session.folder).warnings
+    assert "trials/slow_1.csv: column q2_rad: 10% of the samples were missing and are bridged" in few[0]
+    values[3:50, 2] = values[0, 2]
+    write_rows(session, values)
+    assert len([line for line in armrs.load_dataset(session.folder).warnings if "bridged" in line]) == 1
+    values[:, 2] = np.where(np.arange(200) == 9, np.nan, 0.1)
+    write_rows(session, values)
+    assert armrs.load_dataset(session.folder).warnings == ()
+
+
+def test_a_stated_rate_a_little_off_is_said(session: Session) -> None:
+    session.edit("dataset.toml", "= 50.0", "= 48.0")
+    data = armrs.load_dataset(session.folder)
+    assert "time stamps give 50 Hz, sample_rate says 48 Hz: the time stamps are used" in data.warnings[0]
+    assert data.trials[0].rate == pytest.approx(50.0)
+
+
+def test_an_inertia_in_another_unit_is_said(session: Session) -> None:
+    session.edit("model.toml", "inertia = 0.0165", "inertia = 165")
+    line = armrs.load_dataset(session.folder).warnings[0]
+    assert "inertia 165 kg m² of segment 'upper arm' is 753 times mass · length²" in line
+
+
 def test_long_gaps_stay_open_and_are_reported(session: Session) -> None:
     values = rows(200)
     values[50:80, 3] = np.nan

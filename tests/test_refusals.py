@@ -93,19 +93,24 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     # options
     "unknown effect": ((*IDENTIFY, "--with", "coulom"), nothing, "--with: found unknown joint effect 'coulom'"),
     "an effect of no joint": ((*IDENTIFY, "--with", "backlash"), nothing, "--with: found unknown joint effect 'backlash'"),
+    "no effect at all": ((*IDENTIFY, "--with", ","), nothing, "--with: found ',', allowed kinds of effects with commas between them"),
+    "an empty effect": ((*IDENTIFY, "--with", ""), nothing, "--with: found ''"),
     "unknown method": ((*IDENTIFY, "--method", "best"), nothing, "'best' is not one of"),
-    "level of one": ((*IDENTIFY, "--level", "1"), nothing, "level: found 1.0"),
-    "level that is no number": ((*IDENTIFY, "--level", "nan"), nothing, "level: found nan"),
-    "cutoff of zero": ((*IDENTIFY, "--cutoff-hz", "0"), nothing, "cutoff: found 0.0"),
-    "cutoff that is no number": ((*IDENTIFY, "--cutoff-hz", "nan"), nothing, "cutoff: found nan"),
-    "cutoff above half the rate": ((*PASSIVE, "--cutoff-hz", "25"), nothing, "cutoff: found 25, allowed above 0 and below 25 Hz"),
-    "negative cutoff": ((*PASSIVE, "--cutoff-hz", "-1"), nothing, "cutoff: found -1"),
-    "one bin": ((*PASSIVE, "--bins", "1"), nothing, "bins: found 1, allowed 2 to 1000"),
-    "negative step": ((*MOVE, "--dt", "-0.001"), nothing, "dt: found -0.001, allowed a number above 0"),
-    "step that is no number": ((*MOVE, "--dt", "nan"), nothing, "dt: found nan"),
-    "step that does not divide the sample interval": ((*MOVE, "--dt", "0.0003"), nothing, "dt: found 0.0003, allowed a whole part of the interval between samples, 0.02 s"),
-    "sample rate of zero": ((*MOVE, "--rate-hz", "0"), nothing, "rate: found 0.0"),
-    "negative duration": ((*MOVE, "--duration-s", "-1"), nothing, "duration: found -1"),
+    "level of one": ((*IDENTIFY, "--level", "1"), nothing, "--level: found 1.0"),
+    "level that is no number": ((*IDENTIFY, "--level", "nan"), nothing, "--level: found nan"),
+    "cutoff of zero": ((*IDENTIFY, "--cutoff-hz", "0"), nothing, "--cutoff-hz: found 0.0"),
+    "cutoff that is no number": ((*IDENTIFY, "--cutoff-hz", "nan"), nothing, "--cutoff-hz: found nan"),
+    "cutoff above half the rate": ((*PASSIVE, "--cutoff-hz", "25"), nothing, "--cutoff-hz: found 25, allowed above 0 and below 25 Hz"),
+    "negative cutoff": ((*PASSIVE, "--cutoff-hz", "-1"), nothing, "--cutoff-hz: found -1"),
+    "one bin": ((*PASSIVE, "--bins", "1"), nothing, "--bins: found 1, allowed 2 to 1000"),
+    "negative step": ((*MOVE, "--dt", "-0.001"), nothing, "--dt: found -0.001, allowed a number above 0"),
+    "step that is no number": ((*MOVE, "--dt", "nan"), nothing, "--dt: found nan"),
+    "step that does not divide the sample interval": ((*MOVE, "--dt", "0.0003"), nothing, "--dt: found 0.0003, allowed a whole part of the interval between samples, 0.02 s"),
+    "sample rate of zero": ((*MOVE, "--rate-hz", "0"), nothing, "--rate-hz: found 0.0"),
+    "negative duration": ((*MOVE, "--duration-s", "-1"), nothing, "--duration-s: found -1"),
+    "duration of no sample": ((*MOVE, "--duration-s", "0.001"), nothing, "--duration-s: found 0.001, allowed 0.02 s (one interval between samples) to"),
+    "duration between steps": ((*MOVE, "--duration-s", "1.0001"), nothing, "allowed a whole number of steps of 0.00025 s (nearest: 1 s)"),
+    "duration that is no number": ((*MOVE, "--duration-s", "nan"), nothing, "--duration-s: found nan"),
     "unknown engine": ((*MOVE, "--engine", "bullet"), nothing, "'bullet' is not one of"),
     "unknown integrator": ((*MOVE, "--integrator", "rk5"), nothing, "'rk5' is not one of"),
     "neither movement nor trial": (("simulate", "data/truth.toml"), nothing, "--movement, --trial: found neither, allowed one of them"),
@@ -151,6 +156,57 @@ def test_the_accepted_calls_are_accepted(slow_arm: Path, tmp_path: Path, monkeyp
     monkeypatch.chdir(tmp_path)
     for arguments in (PASSIVE, MOVE, FOLLOW):
         assert cli.main(list(arguments)) == 0
+
+
+def test_a_run_says_what_its_model_does_not(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bare = armrs.load_model(slow_arm / "truth.toml").replace(contact=None, robot=None)
+    bare.write(tmp_path / "bare.toml")
+    call = ["simulate", str(tmp_path / "bare.toml"), "--movement", str(slow_arm / "movement.toml"), "--duration-s", "0.1"]
+    assert cli.main(call) == 0
+    out = capsys.readouterr().out
+    assert "no [contact]: 10000 N/m and 25 N s/m" in out
+    assert "no [robot]: its angles were not computed" in out
+    assert cli.main([*call, "--coupling", "rigid"]) == 0
+    assert "[contact]" not in capsys.readouterr().out
+    assert cli.main(["simulate", str(slow_arm / "truth.toml"), *call[2:]]) == 0
+    assert "The model has no" not in capsys.readouterr().out
+
+
+def test_passive_moments_say_that_effects_do_not_count(slow_arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["passive", str(slow_arm)]) == 0
+    assert "only the rigid arm counts" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_a_folder_is_never_left_half_written(slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exists: bool) -> None:
+    """The report is written last; when it fails, nothing else has changed."""
+    from armrs import report
+
+    out = tmp_path / "out"
+    if exists:
+        out.mkdir()
+        (out / "passive.json").write_text("old", encoding="utf-8")
+        (out / "mine.txt").write_text("mine", encoding="utf-8")
+    before = {p.name: p.read_bytes() for p in out.rglob("*") if p.is_file()}
+
+    def fails(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(report, "write_report", fails)
+        assert cli.main(["passive", str(slow_arm), "-o", str(out)]) == 2
+    assert {p.name: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
+    assert [p for p in tmp_path.iterdir() if p != out] == []
+    assert out.exists() == exists
+    assert cli.main(["passive", str(slow_arm), "-o", str(out)]) == 0
+    assert {"passive.json", "report.html", "figures"} <= {p.name for p in out.iterdir()}
+    assert not exists or (out / "mine.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_folder_with_something_else_under_a_name_is_left_alone(slow_arm: Path, tmp_path: Path) -> None:
+    (tmp_path / "out" / "report.html").mkdir(parents=True)
+    assert cli.main(["passive", str(slow_arm), "-o", str(tmp_path / "out")]) == 2
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["report.html"]
 
 
 ARM = ([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])

@@ -231,8 +231,9 @@ def identify(
     out: MaybeFolder = None,
     method: Annotated[Method, typer.Option(help="All joints at once with physical constraints, or one after the other.")] = Method.joint,
     with_: Annotated[
-        str, typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects to fit at every joint besides those of the model.")
-    ] = "",
+        str | None,
+        typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects that are fitted at every joint besides the model's."),
+    ] = None,
     cutoff_hz: Annotated[float | None, typer.Option(help="Cutoff of the common low-pass [Hz]; chosen from the data when absent.")] = None,
     motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
     level: Annotated[float, typer.Option(help="Probability of the intervals, 0.5 to 1.")] = 0.95,
@@ -240,7 +241,8 @@ def identify(
 ) -> int:
     """Identify body segment and joint parameters, each with an interval and what decided it.
 
-    Exit status 1 when the solver did not quite get there, or when the result cannot be true of this arm and these sensors.
+    Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, or when
+    speeds are noise to a good part.
     """
     from . import results, words
     from .dataset import load_dataset
@@ -248,14 +250,20 @@ def identify(
 
     folder = _folder(out, json)
     data = load_dataset(dataset)
-    kinds = _listed(with_)
     with console.progress("identifying"):
-        result = run_identification(data, method=method.value, with_effects=kinds, cutoff=cutoff_hz, motion=motion.value, level=level)
+        result = run_identification(
+            data,
+            method=method.value,
+            with_effects=() if with_ is None else with_,
+            cutoff=cutoff_hz,
+            motion=motion.value,
+            level=level,
+        )
     plain = results.identified_data(result, _command(context))
     written = results.write_identified(result, plain, folder) if folder else []
     console.warn([*data.warnings, *result.contradictions, *result.misfits])
     present(lambda: plain, json, lambda: words.identified(plain, written))
-    return 0 if result.status == "solved" and not result.contradictions else 1
+    return 0 if result.is_sound else 1
 
 
 @app.command()
@@ -291,6 +299,7 @@ def simulate(
     folder = _folder(out, json)
     arm = load_model(model)
     measured = None if trial is None else _single_trial(trial, arm.n_joints)
+    console.warn(arm.warnings)
     drive = measured if movement is None else load_movement(movement, arm.n_joints)
     with console.progress("simulating"):
         result = run_simulation(
@@ -318,6 +327,8 @@ def passive(
     json: JsonFile = None,
 ) -> int:
     """Compute passive joint moments of slow movements: elastic mean and hysteresis against the angle.
+
+    Of the model only the rigid arm counts, none of its springs, friction or other effects.
 
     Exit status 1 when no joint moved long enough in both directions.
     """
@@ -413,7 +424,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except typer.Exit as end:
         return end.exit_code
     except BadInput as error:
-        return _refuse(str(error))
+        return _refuse(str(_of_option(error)))
     except ArmrsError as error:
         print(f"armrs: {one_line(error)}", file=sys.stderr)
         return 1
@@ -432,6 +443,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def run() -> None:
     """Entry point of the command `armrs`."""
     sys.exit(main())
+
+
+_OPTIONS = {
+    "with_effects": "--with", "cutoff": "--cutoff-hz", "rate": "--rate-hz", "duration": "--duration-s",
+    **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "integrator", "level", "method", "motion")},
+}  # fmt: skip
+"""What the command line calls an argument of a function."""
+
+
+def _of_option(error: BadInput) -> BadInput:
+    """Return a refusal with the name that the argument has on the command line."""
+    if error.file is not None or error.place not in _OPTIONS:
+        return error
+    return BadInput(_OPTIONS[error.place], error.found, error.allowed, hint=error.hint)
 
 
 def _refuse(line: str) -> int:

@@ -66,12 +66,16 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     sources = [description.trial_path(entry) for entry in description.entries]
     targets = [out / name for name in names]
     files.not_an_input([*targets, out / FILE, out / "model.toml"], [*sources, description.path, description.model_path])
-    jobs = [_job(*pair) for pair in zip(sources, targets, strict=True)]
-    written = [_write(job) for job in jobs]
-    files.write_text(out / "model.toml", description.model_path.read_text(encoding="utf-8"), kind=".toml")
+    model = description.model_path.read_text(encoding="utf-8")
     entries = [replace(entry, file=name) for entry, name in zip(description.entries, names, strict=True)]
-    files.write_text(out / FILE, description_text(description, "model.toml", entries), kind=".toml")
-    return [*written, out / "model.toml", out / FILE]
+
+    def write(part: Path) -> list[Path]:
+        written = [_write(_job(source, part / name)) for source, name in zip(sources, names, strict=True)]
+        files.write_text(part / "model.toml", model, kind=".toml")
+        files.write_text(part / FILE, description_text(description, "model.toml", entries), kind=".toml")
+        return [*written, part / "model.toml", part / FILE]
+
+    return files.write_whole(out, write)
 
 
 def read_table(path: Path) -> Any:

@@ -245,7 +245,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         if item.segment > model.n_joints:
             raise BadInput("[[added]], segment", item.segment, f"1 to {model.n_joints}", file=description.path)
     trials: list[Trial] = []
-    warnings: list[str] = []
+    warnings = list(model.warnings)
     for entry in description.entries:
         path = description.trial_path(entry)
         try:
@@ -369,7 +369,7 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     Returns
     -------
     Path
-        The `dataset.toml` written; it is written last, so that it never names a trial that is not there.
+        The `dataset.toml` written. Everything is written or nothing.
 
     Notes
     -----
@@ -384,14 +384,18 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     inputs = [] if dataset.folder is None else [dataset.folder / FILE, *(dataset.folder / t.file for t in dataset.trials)]
     inputs += [dataset.model_path] if dataset.model_path else []
     files.not_an_input([out / FILE, out / "model.toml", *(out / name for name in names)], inputs)
-    for trial, name in zip(dataset.trials, names, strict=True):
-        table = trial_columns(trial, dataset.force_on)
-        write_samples(out / name, list(table), list(table.values()))
-    dataset.model.write(out / "model.toml")
     entries = [Entry(name, t.configuration, t.repeat, t.role) for t, name in zip(dataset.trials, names, strict=True)]
     content = description_text(dataset, "model.toml", entries)
-    files.write_text(out / FILE, content, kind=".toml")
-    return out / FILE
+
+    def write(part: Path) -> list[Path]:
+        for trial, name in zip(dataset.trials, names, strict=True):
+            table = trial_columns(trial, dataset.force_on)
+            write_samples(part / name, list(table), list(table.values()))
+        dataset.model.write(part / "model.toml")
+        files.write_text(part / FILE, content, kind=".toml")
+        return [*(part / name for name in names), part / "model.toml", part / FILE]
+
+    return files.write_whole(out, write)[-1]
 
 
 def output_names(names: list[str], suffix: str | None) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -130,7 +131,27 @@ def run_demo(
     say : callable
         Called with what is being done.
     """
-    out = files.output_folder(folder)
+    results_of: list[Demonstration] = []
+
+    def write(out: Path) -> list[Path]:
+        made = _demonstrate(out, command, say)
+        results_of.append(made)
+        return list(made.files)
+
+    written = files.write_whole(folder, write)
+    made = results_of[0]
+    home = written[0].parent
+    dataset = made.identified.dataset.replace(folder=home, model_path=home / "model.toml")
+    return Demonstration(
+        truth=made.truth,
+        identified=dataclasses.replace(made.identified, dataset=dataset),
+        without_friction=dataclasses.replace(made.without_friction, dataset=dataset),
+        passive=dataclasses.replace(made.passive, dataset=dataset),
+        files=tuple(written),
+    )
+
+
+def _demonstrate(out: Path, command: str | None, say: Callable[[str], None]) -> Demonstration:
     truth = true_model()
     say("simulating the experiment")
     description = write_dataset(measure(truth), out / "data")

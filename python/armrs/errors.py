@@ -6,6 +6,9 @@ import difflib
 import os
 from collections.abc import Iterable
 
+_ALIKE = 0.5
+"""Least similarity of names, from 0 to 1, at which one is suggested for the other."""
+
 
 class ArmrsError(Exception):
     """Anything armrs refuses or cannot finish. The command line ends with status 1."""
@@ -86,19 +89,20 @@ def one_line(text: object) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that looks most like `name`, or None when nothing is known."""
+    """Return the known name that looks most like `name`, or None when none is like it."""
     known = sorted(known)
     lower = {k.lower(): k for k in reversed(known)}
-    match = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.0)
+    match = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=_ALIKE)
     return lower[match[0]] if match else None
 
 
 def unknown_name(place: str, name: str, known: Iterable[str], *, what: str = "key") -> BadInput:
     """Build the refusal of a name that is not known; it says the nearest known one."""
     known = sorted(known)
+    near = nearest(name, known)
     return BadInput(
         place,
         Text(f"unknown {what} {show(name)}"),
         ", ".join(known) if known else f"no {what}",
-        hint=f"nearest known: {nearest(name, known)}" if known else None,
+        hint=f"nearest known: {near}" if near else None,
     )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,58 @@ def replacing(path: PathLike) -> Iterator[Path]:
         raise _unwritable(path, error) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_whole(folder: PathLike, write: Callable[[Path], list[Path]]) -> list[Path]:
+    """Let several files be written below a folder, all of them or none.
+
+    Parameters
+    ----------
+    folder : path
+        Need not exist yet.
+    write : callable
+        Writes below the folder it is given, and returns the files written. That folder is a temporary one; when all is written and
+        nothing of another kind would be replaced, it becomes `folder`, or where that exists its files are moved there.
+
+    Returns
+    -------
+    list of Path
+        The files, where they are now.
+    """
+    target = output_folder(folder)
+    # Inside or beside, so that moving a file only changes its name.
+    near = target if target.exists() else target.resolve().parent
+    try:
+        near.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{target.resolve().name}.", suffix=".part", dir=near))
+    except FileExistsError:
+        raise BadInput("file", Text("Not a directory"), "a place that can be written", file=folder) from None
+    except (OSError, ValueError) as error:
+        raise _unwritable(folder, error) from None
+    try:
+        written = [path.relative_to(temporary) for path in write(temporary)]
+        for name in written:
+            may_replace(target / name, name.suffix)
+        _move(temporary, target)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return [target / name for name in written]
+
+
+def _move(temporary: Path, target: Path) -> None:
+    """Bring everything below one folder to another of the same file system."""
+    if not target.exists():
+        temporary.chmod(0o777 & ~_umask())
+        temporary.rename(target)
+        return
+    for path in sorted(temporary.rglob("*")):
+        place = target / path.relative_to(temporary)
+        if path.is_dir():
+            place.mkdir(exist_ok=True)
+        else:
+            path.replace(place)
 
 
 def write_text(path: PathLike, content: str, *, kind: str) -> None:
@@ -122,9 +175,13 @@ def _mode(target: Path) -> int:
     try:
         return target.stat().st_mode & 0o777
     except OSError:
-        umask = os.umask(0)
-        os.umask(umask)
-        return 0o666 & ~umask
+        return 0o666 & ~_umask()
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def _unwritable(path: PathLike, error: Exception) -> BadInput:

@@ -18,6 +18,8 @@ from .errors import BadInput, Text, unknown_name
 
 CHANNELS = ("Fy", "Fz", "Mx")
 MOST_SEGMENTS = 6
+LARGE_INERTIA = 3.0
+"""In mass · length². A point mass at the far end has 1, a rod a twelfth; more than this is probably another unit."""
 
 
 @dataclass(frozen=True)
@@ -237,6 +239,16 @@ class Model:
             segment_uncertainty=checks.number(
                 "[arm], segment_uncertainty", self.segment_uncertainty, least=0.0, most=1.0, hint="5 % is 0.05"
             ),
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is hardly an arm, a line each."""
+        return tuple(
+            f"model: inertia {s.inertia:g} kg m² of segment {s.name!r} is {s.inertia / (s.mass * s.length**2):.3g} times mass · length², "
+            f"a mass at the far end has 1: is it in kg cm², or about another point?"
+            for s in self.segments
+            if s.inertia > LARGE_INERTIA * s.mass * s.length**2
         )
 
     @property

@@ -186,6 +186,8 @@ def _identified(data: Mapping[str, Any]) -> str:
     out += heading("Parameters")
     out += _decided(data["parameters"])
     out += table(tables.estimates(data["parameters"], joints, level), [e["decided_by"] for e in data["parameters"]])
+    if data["warnings"]:
+        out += heading("Take care") + bullets(data["warnings"])
     lines = words.cannot_tell(data)
     if lines:
         out += heading("What cannot be told apart") + bullets(lines)
@@ -206,7 +208,7 @@ def _decided(items: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _simulated(data: Mapping[str, Any]) -> str:
-    return heading("The run") + table(tables.run(data))
+    return heading("The run") + table(tables.run(data)) + bullets(data.get("assumed", ()))
 
 
 def _passive(data: Mapping[str, Any]) -> str:

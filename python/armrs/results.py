@@ -15,6 +15,7 @@ from .dataset import Dataset
 from .identification import Estimate, Identified
 from .moments import PassiveMoments
 from .quantities import value_in
+from .rig import NO_CONTACT
 from .samples import write_samples
 from .simulation import Simulated
 from .trial import Trial
@@ -72,11 +73,15 @@ def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> 
 
     `data` is that of `identified_data`; the list of figures is added to it. Returns the files, the report last.
     """
-    model = folder / "identified.toml"
-    files.not_an_input([model], [result.dataset.model_path] if result.dataset.model_path else [])
+    name = "identified.toml"
+    files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
     drawn = figures.identified(result, data)
-    result.model.write(model)
-    return [model, *write_result(folder, "identified", data, drawn)]
+
+    def write(out: Path) -> list[Path]:
+        result.model.write(out / name)
+        return [out / name, *write_result(out, "identified", data, drawn)]
+
+    return files.write_whole(folder, write)
 
 
 def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figures.Drawn]) -> list[Path]:
@@ -108,6 +113,7 @@ def simulated_data(result: Simulated, name: str, command: str | None = None) -> 
         "duration_s": result.t[-1],
         "samples": len(result.t),
         "digest": result.digest,
+        "assumed": _assumed(result),
         "largest_force_N": force[at],
         "largest_force_at_s": result.t[at],
         "largest_speed_rad_s": np.abs(result.qd).max(),
@@ -118,6 +124,19 @@ def simulated_data(result: Simulated, name: str, command: str | None = None) -> 
         },
         "made_by": origin(command),
     }
+
+
+def _assumed(result: Simulated) -> list[str]:
+    """Return what a run of an arm that is led took for granted because its model does not say it, a sentence each."""
+    lines: list[str] = []
+    if result.columns.get("handle") is None:
+        return lines
+    if result.model.contact is None and result.settings["coupling"] == "compliant":
+        (stiffness, _), (damping, _) = NO_CONTACT
+        lines.append(f"The model has no [contact]: {stiffness:g} N/m and {damping:g} N s/m along y and z were taken.")
+    if result.model.robot is None:
+        lines.append("The model has no [robot]: its angles were not computed, and whether it reaches the path was not checked.")
+    return lines
 
 
 def simulated_columns(result: Simulated) -> dict[str, np.ndarray]:
@@ -158,12 +177,16 @@ def write_simulated(
     result: Simulated, data: dict[str, Any], folder: Path, *, suffix: str = ".csv", trial: Trial | None = None
 ) -> list[Path]:
     """Write all samples, `simulated.json`, a figure and `report.html` below a folder; return the files, the report last."""
-    samples = folder / f"simulated{suffix}"
+    name = f"simulated{suffix}"
     table = simulated_columns(result)
     drawn = figures.simulated(result, trial)
-    write_samples(samples, list(table), list(table.values()))
-    data["file"] = samples.name
-    return [samples, *write_result(folder, "simulated", data, drawn)]
+    data["file"] = name
+
+    def write(out: Path) -> list[Path]:
+        write_samples(out / name, list(table), list(table.values()))
+        return [out / name, *write_result(out, "simulated", data, drawn)]
+
+    return files.write_whole(folder, write)
 
 
 def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str, Any]:
@@ -189,4 +212,4 @@ def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str
 def write_passive(result: PassiveMoments, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write `passive.json`, figures and `report.html` below a folder; return the files, the report last."""
     drawn = figures.passive(result)
-    return write_result(folder, "passive", data, drawn)
+    return files.write_whole(folder, lambda out: write_result(out, "passive", data, drawn))

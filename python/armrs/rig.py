@@ -9,7 +9,7 @@ from .catalogue import catalogue
 from .model import Effect, Model
 
 _CHANNELS = {"Fy": 0, "Fz": 1, "Mx": 2}
-_NO_CONTACT = ((10_000.0, 10_000.0), (25.0, 25.0))
+NO_CONTACT = ((10_000.0, 10_000.0), (25.0, 25.0))
 """Stiffness [N/m] and damping [N s/m] of the thesis' contact, where a model says nothing."""
 
 
@@ -48,7 +48,7 @@ def arm(model: Model) -> _armrs.Arm:
 def rig(model: Model, effects: Iterable[Effect] | None = None) -> _armrs.Rig:
     """Return a model with all its effects, or with the effects given, ready for the core."""
     listed = all_effects(model) if effects is None else list(effects)
-    contact = _NO_CONTACT if model.contact is None else (model.contact.stiffness, model.contact.damping)
+    contact = NO_CONTACT if model.contact is None else (model.contact.stiffness, model.contact.damping)
     robot = None if model.robot is None else (model.robot.lengths, model.robot.base, model.robot.elbow)
     return _armrs.Rig(arm(model), [_entry(e) for e in listed], contact, robot)
 

@@ -18,8 +18,10 @@ from .trial import Trial
 
 DEFAULT_DT = 0.25e-3
 """Step of the simulation [s]."""
+_MOST_STEPS = 10**9
 DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
+_MOST_STEPS = 10**9
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +199,8 @@ def simulate(
     steps = 1.0 / (rate * dt)
     if abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
         raise BadInput("dt", dt, f"a whole part of the interval between samples, {1.0 / rate:g} s")
+    if duration is not None:
+        _check_duration(duration, dt, rate)
     led = driven(drive, coupling)
     if isinstance(drive, Trial) and start is None:
         first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
@@ -232,6 +236,15 @@ def simulate(
             "coupling": coupling,
         },
     )
+
+
+def _check_duration(duration: float, dt: float, rate: float) -> None:
+    """Refuse a length of a run that is no whole number of steps, or holds no sample interval."""
+    if not (np.isfinite(duration) and 1.0 / rate <= duration < _MOST_STEPS * dt):
+        raise BadInput("duration", duration, f"{1.0 / rate:g} s (one interval between samples) to {_MOST_STEPS * dt:g} s")
+    steps = duration / dt
+    if abs(steps - round(steps)) > 1e-9 * steps:
+        raise BadInput("duration", duration, f"a whole number of steps of {dt:g} s", hint=f"nearest: {round(steps) * dt:.10g} s")
 
 
 def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:

@@ -14,6 +14,10 @@ from .errors import BadInput, Text
 from .samples import Samples, read_samples
 
 FEWEST_SAMPLES = 16
+BRIDGED = 0.05
+"""A larger share of bridged samples is said."""
+SAME_RATE = 0.01
+"""Time stamps that depart from the stated rate by more than this are said."""
 _TURN = 2.0 * np.pi
 
 
@@ -191,7 +195,7 @@ def read_trial(
     grid, resampled = _grid(t, sample_rate, warnings)
     channels = {name: resample.onto_grid(t, values, grid) for name, values in original.items()}
     gaps = tuple((name, *gap) for name, channel in channels.items() for gap in channel.gaps)
-    warnings += _gap_lines(gaps)
+    warnings += _gap_lines(gaps) + _bridged_lines(channels)
     on_grid = {name: channel.values for name, channel in channels.items()}
     sign = 1.0 if force_on == "arm" else -1.0
     trial = Trial(
@@ -263,7 +267,7 @@ def _check_time(t: np.ndarray, samples: Samples) -> None:
 def _grid(t: np.ndarray, sample_rate: float | None, warnings: list[str]) -> tuple[np.ndarray, bool]:
     """Return the uniform grid, and whether the samples have to be brought onto it."""
     rate = 1.0 / resample.usual_step(t)
-    if sample_rate is not None and not 0.9 < rate / sample_rate < 1.1:
+    if sample_rate is not None and abs(rate / sample_rate - 1.0) > SAME_RATE:
         if not 1 / 900 < rate / sample_rate < 900:
             raise BadInput("time", Text(f"{rate:g} samples a second"), f"about sample_rate = {sample_rate:g} Hz", hint="milliseconds?")
         warnings.append(f"time stamps give {rate:.6g} Hz, sample_rate says {sample_rate:g} Hz: the time stamps are used")
@@ -296,3 +300,13 @@ def _gap_lines(gaps: tuple[tuple[str, float, float], ...]) -> list[str]:
         more = f" and {len(own) - 1} more" if len(own) > 1 else ""
         lines.append(f"column {name} has no samples from {first}{more}: left out")
     return lines
+
+
+def _bridged_lines(channels: Mapping[str, resample.Channel]) -> list[str]:
+    """Return one line a column of which a good part was bridged."""
+    shares = {name: float(np.mean(c.bridged)) for name, c in channels.items() if not name.startswith("emg_")}
+    return [
+        f"column {name}: {share:.0%} of the samples were missing and are bridged; they count as measured: intervals promise too much"
+        for name, share in shares.items()
+        if share > BRIDGED
+    ]

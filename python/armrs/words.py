@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "
     "The mean of both directions is its elastic part, half their difference its dissipative part. The mean also holds what is wrong with "
-    "the masses of the model."
+    "the masses of the model. Of the model only the rigid arm counts: what its springs, friction and other effects would add is in what is "
+    "shown, not taken off it."
 )
 
 
@@ -40,6 +41,8 @@ def _identified(result: Mapping[str, Any]) -> str:
     if "bound" in by:
         counts.append(f"{by.count('bound')} on a physical limit")
     ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
+    if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
+        ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
     return (
         f"The movements determine {result['rank']} of {result['unknowns']} unknowns. "
         f"Of the {len(by)} parameters listed {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
@@ -130,6 +133,8 @@ def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what a run came to."""
     _head(result)
     show("", tables.run(result))
+    for line in result.get("assumed", ()):
+        print(line)
     files_written(written)
 
 
@@ -137,6 +142,7 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print passive moments."""
     _head(result)
     show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
+    print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
     files_written(written)
 
 
