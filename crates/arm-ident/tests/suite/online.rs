@@ -160,6 +160,7 @@ fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
         torque: None,
         valid: vec![true; handle.len()],
         handle: Some(handle),
+        speed: None,
     };
     let heavy = truth.segments().map(|s| Segment {
         mass: 1.1 * s.mass,
@@ -390,6 +391,7 @@ fn dfki() -> Option<(Model<2>, Trial<2>)> {
         moment_on_arm: None,
         torque: Some(pair(5)),
         handle: None,
+        speed: None,
         valid: vec![true; even.len()],
     };
     let segment = |length, mass, com, inertia| Segment {
