@@ -47,11 +47,12 @@ $(STAMPS)/dev: pyproject.toml | $(STAMPS)/build
 # ---- Rust
 rust: $(STAMPS)/rust
 
-$(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/check_bits.sh | $(STAMPS)/venv
+$(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/check_bits.sh scripts/capi_header.sh | $(STAMPS)/venv
 	cargo fmt --all --check
 	scripts/check_no_std.sh
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	cargo test --quiet --no-fail-fast
+	scripts/capi_header.sh --check
 	scripts/check_bits.sh
 	@touch $@
 

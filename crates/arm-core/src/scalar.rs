@@ -170,6 +170,11 @@ impl Scalar for f32 {
         condition(f64::from(self))
     }
     #[inline]
+    fn is_finite(self) -> bool {
+        // Not through double precision, which small processors compute in software.
+        Self::is_finite(self)
+    }
+    #[inline]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {
         f(f64::from(self)) as f32
     }

@@ -128,7 +128,7 @@ fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
         ..Channel::white(0.2)
     }; 2];
     sensors.robot = [Channel {
-        range: 6.283,
+        range: core::f64::consts::TAU,
         bits: Some(20),
         ..Channel::IDEAL
     }; 2];
@@ -323,7 +323,8 @@ fn faults_of_the_data_do_no_harm() {
         }
         s
     };
-    let all: [(&str, &dyn Fn(Stream) -> Stream, f64); 7] = [
+    type Spoil<'a> = &'a dyn Fn(Stream) -> Stream;
+    let all: [(&str, Spoil, f64); 7] = [
         ("one sample in ten dropped", &dropped, 1.0),
         ("nothing for 5 s", &paused, 1.0),
         ("at rest for 30 s", &rested, 0.1),

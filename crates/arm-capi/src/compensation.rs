@@ -1,0 +1,79 @@
+//! The torque that carries an arm that was identified elsewhere.
+
+use arm_core::Compensation;
+
+use crate::arm::armrs_arm;
+use crate::held::{Held, held};
+use crate::motion::{armrs_motion, array};
+use crate::status::{armrs_status, ended, given, place};
+use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_real};
+
+/// An identified arm and the covariance of its unknowns.
+#[repr(C)]
+pub struct armrs_compensation {
+    tag: u64,
+    words: [u64; ARMRS_COMPENSATION_WORDS],
+}
+
+/// Size of an `armrs_compensation`.
+#[cfg(not(feature = "single"))]
+pub const ARMRS_COMPENSATION_WORDS: usize = 480;
+/// Size of an `armrs_compensation`.
+#[cfg(feature = "single")]
+pub const ARMRS_COMPENSATION_WORDS: usize = 264;
+
+type Core = Compensation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
+
+held!(armrs_compensation holds Core, b"compe0.1");
+
+/// Makes it from the values of the unknowns of an arm and their covariance, of which the lower triangle is read. What is known
+/// exactly, and unknowns that are not used, have zeros there.
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_compensation_init(
+    compensation: *mut armrs_compensation,
+    arm: *const armrs_arm,
+    values: *const [armrs_real; ARMRS_UNKNOWNS],
+    covariance: *const [[armrs_real; ARMRS_UNKNOWNS]; ARMRS_UNKNOWNS],
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (compensation, arm) = unsafe { (place(compensation)?, given(arm)?) };
+        // SAFETY: as promised by the caller.
+        let (values, covariance) = unsafe { (given(values)?, given(covariance)?) };
+        let equation = arm.inner()?.equation;
+        compensation.keep(&Compensation::new(equation, *values, covariance)?);
+        Ok(())
+    };
+    ended(run())
+}
+
+/// Torques that carry the arm: its weight, and what its effects resist with at the speeds of `motion`; accelerations are not
+/// read, and effects with a state are taken at rest. `sd`, if not null: their standard deviations [N m].
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_compensation_carry(
+    compensation: *const armrs_compensation,
+    motion: *const armrs_motion,
+    torque: *mut [armrs_real; ARMRS_JOINTS],
+    sd: *mut [armrs_real; ARMRS_JOINTS],
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (compensation, motion) = unsafe { (given(compensation)?, given(motion)?) };
+        // SAFETY: as promised by the caller.
+        let (torque, sd) = unsafe { (place(torque)?, sd.as_mut()) };
+        let core = compensation.inner()?;
+        let carry = core.carry(&motion.core(), &[0.0; ARMRS_EFFECTS]);
+        *torque = array(&carry.torque);
+        if let Some(sd) = sd {
+            *sd = array(&carry.sd);
+        }
+        Ok(())
+    };
+    ended(run())
+}

@@ -1,0 +1,77 @@
+//! The C interface of `arm-core` for firmware. `include/armrs.h` is generated from it by cbindgen.
+//!
+//! Every function returns an [`armrs_status`] and writes its result through a pointer; nothing is allocated, nothing is
+//! kept between calls but in the structs that the caller owns. Structs that hold a state are opaque storage of fixed size,
+//! are made by their `_init` function, and are refused before. The only `unsafe` code of the firmware side lives here: it
+//! turns pointers into references and storage into state.
+//!
+//! One library serves one scalar and one arm: `armrs_real` is `double`, or `float` with the feature `single`; arms have three
+//! joints, or two with `two-joints`. In C the macros `ARMRS_SINGLE` and `ARMRS_TWO_JOINTS` say the same to the header.
+#![no_std]
+
+#[cfg(not(any(target_os = "none", target_os = "unknown")))]
+extern crate std;
+
+mod arm;
+mod compensation;
+mod estimator;
+mod held;
+mod monitor;
+mod motion;
+mod robot;
+mod status;
+
+pub use arm::*;
+pub use compensation::*;
+pub use estimator::*;
+pub use monitor::*;
+pub use motion::*;
+pub use robot::*;
+pub use status::armrs_status;
+
+/// The number that the library computes with.
+#[cfg(not(feature = "single"))]
+pub type armrs_real = f64;
+/// The number that the library computes with.
+#[cfg(feature = "single")]
+pub type armrs_real = f32;
+
+/// Number of joints of an arm.
+#[cfg(not(feature = "two-joints"))]
+pub const ARMRS_JOINTS: usize = 3;
+/// Number of joints of an arm.
+#[cfg(feature = "two-joints")]
+pub const ARMRS_JOINTS: usize = 2;
+
+/// Most effects of an arm.
+pub const ARMRS_EFFECTS: usize = 12;
+/// Most unknowns of an estimator: a first and a second moment for each joint, then the linear parameters of the effects.
+pub const ARMRS_UNKNOWNS: usize = 18;
+/// Channels that a monitor watches.
+pub const ARMRS_CHANNELS: usize = 16;
+/// Most waypoints of a path.
+pub const ARMRS_WAYPOINTS: usize = 16;
+
+/// Where no operating system ends a program there is nothing to unwind to. The function called here exists nowhere: if any
+/// panic can be reached, the firmware does not link, and that is the proof that none can.
+#[cfg(any(target_os = "none", target_os = "unknown"))]
+#[panic_handler]
+fn unreachable(_: &core::panic::PanicInfo<'_>) -> ! {
+    unsafe extern "C" {
+        fn armrs_panic_path_is_reachable() -> !;
+    }
+    // SAFETY: never executed, see above.
+    unsafe { armrs_panic_path_is_reachable() }
+}
+
+/// Panics beyond the end of the table: the proof must see it.
+///
+/// # Safety
+/// `table` points to four numbers.
+#[cfg(feature = "panic-control")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_panic_control(table: *const armrs_real, index: usize) -> armrs_real {
+    // SAFETY: as promised by the caller.
+    let table = unsafe { core::slice::from_raw_parts(table, 4) };
+    table[index]
+}

@@ -1,0 +1,204 @@
+//! The safety monitor.
+
+use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason};
+
+use crate::held::{Held, held};
+use crate::status::{ARMRS_OUT_OF_RANGE, ARMRS_STOPPED, armrs_status, ended, given, place};
+use crate::{ARMRS_CHANNELS, armrs_real};
+
+/// What a channel measures.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum armrs_quantity {
+    /// Angle [rad].
+    ARMRS_ANGLE = 0,
+    /// Speed [rad/s].
+    ARMRS_SPEED = 1,
+    /// Acceleration [rad/s^2].
+    ARMRS_ACCELERATION = 2,
+    /// Force [N] or torque [N m].
+    ARMRS_FORCE = 3,
+    /// Power into the arm [W].
+    ARMRS_POWER = 4,
+}
+
+/// What one channel must not do.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct armrs_channel {
+    /// What it measures, an `armrs_quantity`.
+    pub quantity: u32,
+    /// Smallest value allowed; may be infinite.
+    pub min: armrs_real,
+    /// Largest value allowed; may be infinite.
+    pub max: armrs_real,
+    /// How long the value may stay the same to the last bit while motion is commanded [us]; 0 for ever.
+    pub frozen_after: u64,
+}
+
+/// What a monitor sees of one control period.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct armrs_observation {
+    /// The controller's clock [us].
+    pub now: u64,
+    /// When the values were measured, by the same clock [us].
+    pub stamp: u64,
+    /// One value a channel.
+    pub values: [armrs_real; ARMRS_CHANNELS],
+    /// Not 0 where motion is commanded that must change the channel.
+    pub moving: [u8; ARMRS_CHANNELS],
+}
+
+/// Why a device was stopped.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum armrs_reason {
+    /// A value beyond its limit.
+    ARMRS_REASON_LIMIT = 0,
+    /// A value that is NaN or infinite.
+    ARMRS_REASON_NOT_FINITE = 1,
+    /// A value that stayed the same to the last bit; value and limit are times [s].
+    ARMRS_REASON_FROZEN = 2,
+    /// Data older than allowed; value and limit are ages [s].
+    ARMRS_REASON_LATE = 3,
+    /// A clock or a time stamp that ran backwards.
+    ARMRS_REASON_CLOCK = 4,
+}
+
+/// The first thing that was not allowed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct armrs_stop {
+    /// Why.
+    pub reason: armrs_reason,
+    /// The channel, counted from zero; ARMRS_CHANNELS where the time stamp of all was at fault.
+    pub channel: u32,
+    /// The value found.
+    pub value: armrs_real,
+    /// The limit that it broke.
+    pub limit: armrs_real,
+    /// The controller's clock [us].
+    pub at: u64,
+}
+
+/// A monitor and its stop.
+#[repr(C)]
+pub struct armrs_monitor {
+    tag: u64,
+    words: [u64; ARMRS_MONITOR_WORDS],
+}
+
+/// Size of an `armrs_monitor`.
+pub const ARMRS_MONITOR_WORDS: usize = 144;
+
+type Core = Monitor<armrs_real, ARMRS_CHANNELS>;
+
+held!(armrs_monitor holds Core, b"monit0.1");
+
+/// Makes a monitor of `count` channels, at most ARMRS_CHANNELS; the others are not watched, but their values must be finite.
+/// `oldest`: greatest age of the data that is allowed [us].
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_monitor_init(
+    monitor: *mut armrs_monitor,
+    channels: *const armrs_channel,
+    count: usize,
+    oldest: u64,
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let monitor = unsafe { place(monitor)? };
+        if count > ARMRS_CHANNELS {
+            return Err(ARMRS_OUT_OF_RANGE);
+        }
+        let open = Channel::magnitude(Quantity::Force, armrs_real::INFINITY);
+        let mut kept = [open; ARMRS_CHANNELS];
+        for (i, channel) in kept.iter_mut().take(count).enumerate() {
+            // SAFETY: there are `count` channels.
+            let given = unsafe { given(channels.wrapping_add(i))? };
+            *channel = Channel {
+                quantity: quantity(given.quantity)?,
+                min: given.min,
+                max: given.max,
+                frozen_after: (given.frozen_after > 0).then_some(given.frozen_after),
+            };
+        }
+        monitor.keep(&Monitor::new(kept, oldest)?);
+        Ok(())
+    };
+    ended(run())
+}
+
+/// A number from outside may be no quantity at all, so that it is not taken as the enum.
+fn quantity(number: u32) -> Result<Quantity, armrs_status> {
+    const ALL: [(armrs_quantity, Quantity); 5] = [
+        (armrs_quantity::ARMRS_ANGLE, Quantity::Angle),
+        (armrs_quantity::ARMRS_SPEED, Quantity::Speed),
+        (armrs_quantity::ARMRS_ACCELERATION, Quantity::Acceleration),
+        (armrs_quantity::ARMRS_FORCE, Quantity::Force),
+        (armrs_quantity::ARMRS_POWER, Quantity::Power),
+    ];
+    let found = ALL.iter().find(|(c, _)| *c as u32 == number);
+    found.map(|(_, core)| *core).ok_or(ARMRS_OUT_OF_RANGE)
+}
+
+/// Looks at one control period. ARMRS_STOPPED from the first fault on until `armrs_monitor_reset`; `stop`, if not null, then
+/// says what it was.
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_monitor_check(
+    monitor: *mut armrs_monitor,
+    observation: *const armrs_observation,
+    stop: *mut armrs_stop,
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (monitor, seen, stop) =
+            unsafe { (place(monitor)?, given(observation)?, stop.as_mut()) };
+        let seen = Observation {
+            now: seen.now,
+            stamp: seen.stamp,
+            values: seen.values,
+            moving: seen.moving.map(|m| m != 0),
+        };
+        let Err(found) = monitor.inner_mut()?.check(&seen) else {
+            return Ok(());
+        };
+        if let Some(stop) = stop {
+            *stop = armrs_stop {
+                reason: match found.reason {
+                    Reason::Limit => armrs_reason::ARMRS_REASON_LIMIT,
+                    Reason::NotFinite => armrs_reason::ARMRS_REASON_NOT_FINITE,
+                    Reason::Frozen => armrs_reason::ARMRS_REASON_FROZEN,
+                    Reason::Late => armrs_reason::ARMRS_REASON_LATE,
+                    Reason::Clock => armrs_reason::ARMRS_REASON_CLOCK,
+                },
+                channel: found.channel.unwrap_or(ARMRS_CHANNELS) as u32,
+                value: found.value,
+                limit: found.limit,
+                at: found.at,
+            };
+        }
+        Err(ARMRS_STOPPED)
+    };
+    ended(run())
+}
+
+/// Lets a stopped device start again.
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_monitor_reset(monitor: *mut armrs_monitor) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        unsafe { place(monitor)? }.inner_mut()?.reset();
+        Ok(())
+    };
+    ended(run())
+}

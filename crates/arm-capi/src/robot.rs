@@ -1,0 +1,108 @@
+//! The two-link robot that leads the hand.
+
+use core::ffi::c_int;
+
+use arm_core::{Elbow, Joints, Robot};
+
+use crate::armrs_real;
+use crate::held::{Held, held};
+use crate::status::{armrs_status, ended, given, place};
+
+/// A robot of two links.
+#[repr(C)]
+pub struct armrs_robot {
+    tag: u64,
+    words: [u64; ARMRS_ROBOT_WORDS],
+}
+
+/// Size of an `armrs_robot`.
+pub const ARMRS_ROBOT_WORDS: usize = 5;
+
+held!(armrs_robot holds Robot<armrs_real>, b"robot0.1");
+
+/// Makes a robot from two lengths and the position of its first joint [m]; `elbow_up`: on which side the elbow is, seen on
+/// the line from base to handle.
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_robot_init(
+    robot: *mut armrs_robot,
+    lengths: *const [armrs_real; 2],
+    base: *const [armrs_real; 2],
+    elbow_up: c_int,
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (robot, lengths, base) = unsafe { (place(robot)?, given(lengths)?, given(base)?) };
+        let elbow = if elbow_up == 0 {
+            Elbow::Down
+        } else {
+            Elbow::Up
+        };
+        robot.keep(&Robot::new(*lengths, *base, elbow)?);
+        Ok(())
+    };
+    ended(run())
+}
+
+/// Position of the handle at two joint angles [m].
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_robot_handle(
+    robot: *const armrs_robot,
+    q: *const [armrs_real; 2],
+    handle: *mut [armrs_real; 2],
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (robot, q, handle) = unsafe { (given(robot)?, given(q)?, place(handle)?) };
+        *handle = robot.inner()?.handle(&Joints::<_, 2>::new(q[0], q[1]));
+        Ok(())
+    };
+    ended(run())
+}
+
+/// Joint angles that hold the handle at a point [rad].
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_robot_angles(
+    robot: *const armrs_robot,
+    handle: *const [armrs_real; 2],
+    q: *mut [armrs_real; 2],
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (robot, handle, q) = unsafe { (given(robot)?, given(handle)?, place(q)?) };
+        *q = robot.inner()?.angles(*handle)?.into();
+        Ok(())
+    };
+    ended(run())
+}
+
+/// Joint speeds that move the handle [rad/s]; not finite at full stretch.
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_robot_speeds(
+    robot: *const armrs_robot,
+    q: *const [armrs_real; 2],
+    velocity: *const [armrs_real; 2],
+    speeds: *mut [armrs_real; 2],
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (robot, q) = unsafe { (given(robot)?, given(q)?) };
+        // SAFETY: as promised by the caller.
+        let (velocity, speeds) = unsafe { (given(velocity)?, place(speeds)?) };
+        let q = Joints::<_, 2>::new(q[0], q[1]);
+        *speeds = robot.inner()?.speeds(&q, *velocity).into();
+        Ok(())
+    };
+    ended(run())
+}
