@@ -3,6 +3,7 @@
 #   make demo    build, run the main job on built-in data, print where the report is
 #   make test    every check: formatting, lints, Rust and Python tests, types, examples
 #   make bench   speed
+#   make hidden  the gap workflow against hidden effects: some hours
 #   make clean   remove what make has made
 PYTHON ?= python3
 VENV   := .venv
@@ -17,7 +18,7 @@ export PIP_QUIET := 1
 # The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test bench clean build format rust python
+.PHONY: demo test bench hidden clean build format rust python
 .DELETE_ON_ERROR:
 
 demo: build
@@ -58,20 +59,32 @@ $(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/check_bits.sh scripts/ca
 
 # ---- Python
 python: $(STAMPS)/build $(STAMPS)/dev
-	$(BIN)/ruff format --check --quiet python tests scripts examples
-	$(BIN)/ruff check --quiet python tests scripts examples
+	$(BIN)/ruff format --check --quiet python tests scripts examples bench
+	$(BIN)/ruff check --quiet python tests scripts examples bench
 	$(BIN)/mypy --no-error-summary
 	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
 	$(BIN)/python -m pytest --quiet
 
 format: $(STAMPS)/dev
 	cargo fmt --all
-	$(BIN)/ruff format python tests scripts examples
-	$(BIN)/ruff check --fix python tests scripts examples
+	$(BIN)/ruff format python tests scripts examples bench
+	$(BIN)/ruff check --fix python tests scripts examples bench
 
 bench: build
 	cargo bench --quiet
 	$(BIN)/python scripts/bench_import.py
+
+# ---- the judge of the gap workflow. Seeds from 100000 on are scored, and only here; those below are for development.
+HIDDEN   := out/hidden
+GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
+
+hidden: build
+	$(GENERATE) --family null --seed 100000 --count $(or $(HIDDEN_NULL),204)
+	$(GENERATE) --family single --seed 110000 --count $(or $(HIDDEN_SINGLE),128)
+	$(GENERATE) --family double --seed 120000 --count $(or $(HIDDEN_DOUBLE),24)
+	$(GENERATE) --family triple --seed 130000 --count $(or $(HIDDEN_TRIPLE),24)
+	$(GENERATE) --family outside --seed 140000 --count $(or $(HIDDEN_OUTSIDE),28)
+	$(BIN)/python bench/hidden/score.py $(HIDDEN)
 
 clean:
 	rm -rf $(VENV) out

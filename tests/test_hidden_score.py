@@ -1,0 +1,189 @@
+"""The score of the hidden-effect cases, on made-up answers in the form of `armrs gap --json`."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+SCRIPT = Path(__file__).parents[1] / "bench" / "hidden" / "score.py"
+
+
+@pytest.fixture(scope="module")
+def score() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("hidden_score", SCRIPT)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def effect(kind: str, joint: int | None = None, channel: str | None = None, **parameters: float) -> dict[str, Any]:
+    """A hidden effect as in truth.json."""
+    exact = {name: {"value": value, "exact": True} for name, value in parameters.items()}
+    return {"kind": kind, "joint": joint, "channel": channel, "trial": None, "parameters": exact}
+
+
+def named(kind: str, joint: int | None = None, channel: str | None = None, alternatives: Any = (), **parameters: Any) -> dict[str, Any]:
+    """A named effect as in gap.json; parameters are (value, std)."""
+    estimates = {name: {"value": value, "std": std, "unit": "N m"} for name, (value, std) in parameters.items()}
+    return {"kind": kind, "joint": joint, "channel": channel, "parameters": estimates, "alternatives": list(alternatives)}
+
+
+def truth(*effects: dict[str, Any], family: str = "single", strength: str | None = "strong", null: str | None = None) -> dict[str, Any]:
+    return {
+        "seed": 1, "family": family, "strength": strength, "null": null, "joints": 2, "friction": "sticks",
+        "noise": {"memory": 0.9}, "effects": list(effects),
+    }  # fmt: skip
+
+
+def answer(*effects: dict[str, Any], verdict: str | None = None, gap: dict[str, Any] | None = None) -> dict[str, Any]:
+    return {"verdict": verdict or ("explained" if effects else "nothing_missing"), "effects": list(effects), "gap": gap or {}}
+
+
+COULOMB = effect("coulomb", 2, torque=0.16)
+
+
+def test_the_right_name_with_the_right_joint_and_nothing_else(score: ModuleType) -> None:
+    line = score.judge(truth(COULOMB), answer(named("coulomb", 2, torque=(0.161, 0.006))))
+    assert line["right"] and line["detected"] and line["missed"] == line["spurious"] == 0
+    assert line["covered"] == {"coulomb 2 torque": True}
+    assert line["errors"]["coulomb 2 torque"] == pytest.approx(0.00625)
+
+
+@pytest.mark.parametrize(
+    ("effects", "missed", "spurious"),
+    [
+        ([named("coulomb", 1)], 1, 1),
+        ([named("stribeck", 2)], 1, 1),
+        ([named("coulomb", 2), named("viscous", 2)], 0, 1),
+        ([named("coulomb", 2), named("coulomb", 2)], 0, 1),
+        ([], 1, 0),
+    ],
+)
+def test_what_is_not_the_right_name(score: ModuleType, effects: list[dict[str, Any]], missed: int, spurious: int) -> None:
+    line = score.judge(truth(COULOMB), answer(*effects))
+    assert not line["right"] and (line["missed"], line["spurious"]) == (missed, spurious)
+
+
+def test_an_alternative_counts_as_stated_but_not_as_named(score: ModuleType) -> None:
+    other = {"kind": "coulomb", "joint": 2, "why": "not separable", "separating_movement": "faster"}
+    line = score.judge(truth(COULOMB), answer(named("stribeck", 2, alternatives=[other])))
+    assert line["among_alternatives"] and not line["right"]
+    wrong_joint = score.judge(truth(COULOMB), answer(named("stribeck", 2, alternatives=[{**other, "joint": 1}])))
+    assert not wrong_joint["among_alternatives"]
+
+
+def test_two_effects_need_both(score: ModuleType) -> None:
+    both = truth(COULOMB, effect("force_bias", channel="Fz", bias=2.0), family="double")
+    assert score.judge(both, answer(named("force_bias", channel="Fz"), named("coulomb", 2)))["right"]
+    half = score.judge(both, answer(named("coulomb", 2), named("force_bias", channel="Fy")))
+    assert (half["right"], half["missed"], half["spurious"]) == (False, 1, 1)
+
+
+def test_a_burst_is_in_its_trial(score: ModuleType) -> None:
+    burst = effect("voluntary", 1) | {"trial": "trials/slow_1.csv"}
+    assert score.judge(truth(burst), answer(named("voluntary", 1)))["right"]
+    assert score.judge(truth(burst), answer(named("voluntary", 1) | {"trial": "trials/slow_1.csv"}))["right"]
+    assert not score.judge(truth(burst), answer(named("voluntary", 1) | {"trial": "trials/slow_2.csv"}))["right"]
+
+
+def test_the_gap_is_closed_from_the_calibrated_base(score: ModuleType) -> None:
+    channel = {"before": 9.0, "calibrated": 2.0, "after": 1.1, "floor": 1.0}
+    assert score.closure({"Fy_N": channel}) == pytest.approx(0.9)
+    # A channel at its floor has nothing to close, whatever `before` was; nor has one without numbers.
+    at_floor = {"before": 9.0, "calibrated": 1.05, "after": 1.0, "floor": 1.0}
+    unknown = {"before": None, "calibrated": None, "after": None, "floor": None}
+    assert score.closure({"Fy_N": channel, "Fz_N": at_floor, "q1_rad": unknown}) == pytest.approx(0.9)
+    assert score.closure({"Fz_N": at_floor}) is None
+    # Channels of other units count by their floors: (0.9 + 0) / (1 + 1).
+    stays = {"before": 0.02, "calibrated": 0.002, "after": 0.002, "floor": 0.001}
+    assert score.closure({"Fy_N": channel, "q1_rad": stays}) == pytest.approx(0.45)
+
+
+def test_intervals(score: ModuleType) -> None:
+    assert score.covered(COULOMB, named("coulomb", 2, torque=(0.17, 0.004))) == {"torque": False}
+    given = named("coulomb", 2)
+    given["parameters"] = {"torque": {"value": 0.17, "std": 0.004, "interval": [0.15, 0.19]}}
+    assert score.covered(COULOMB, given) == {"torque": True}
+    withheld = named("coulomb", 2)
+    withheld["parameters"] = {"torque": {"value": 0.17, "std": None}}
+    assert score.covered(COULOMB, withheld) == {}
+    of_a_size = effect("stribeck", 2, torque=0.2)
+    of_a_size["parameters"]["torque"]["exact"] = False
+    assert score.covered(of_a_size, named("stribeck", 2, torque=(0.1, 0.001))) == {}
+
+
+CASES: list[tuple[dict[str, Any], dict[str, Any] | None]] = [
+    (truth(family="null", strength=None, null="white"), answer()),
+    (truth(family="null", strength=None, null="white"), answer(named("force_bias", channel="Fy"))),
+    (truth(COULOMB), answer(named("coulomb", 2, torque=(0.161, 0.006)), gap={"Fy_N": {"calibrated": 2.0, "after": 1.05, "floor": 1.0}})),
+    (truth(COULOMB, strength="medium"), answer(named("stribeck", 2))),
+    (truth(effect("magnetic_detent", 1), family="outside", strength=None), answer(verdict="unexplained")),
+    (truth(COULOMB), None),
+]
+
+
+@pytest.fixture
+def scored(tmp_path: Path) -> Path:
+    """A folder of sessions with answers, the last of which failed."""
+    for k, (hidden, said) in enumerate(CASES, start=1):
+        folder = tmp_path / f"s{k}"
+        folder.mkdir()
+        (folder / "truth.json").write_text(json.dumps(hidden), encoding="utf-8")
+        if said is not None:
+            (folder / "gap.json").write_text(json.dumps(said), encoding="utf-8")
+        outcome = {"seconds": 10.0 * k, "error": None if said is not None else "status 2: no"}
+        (folder / "outcome.json").write_text(json.dumps(outcome), encoding="utf-8")
+    manifest = {"sessions": [{"folder": f"s{k}", "seed": k} for k in range(1, len(CASES) + 1)]}
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    return tmp_path
+
+
+def test_tables(score: ModuleType, scored: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert score.main([str(scored), "--only-score"]) == 1
+    printed = capsys.readouterr().out
+    assert "| false alarms over nulls: ≤ 2 % | 50.0 % | **no** |" in printed
+    # What failed was not named.
+    assert "| strong effects named, nothing else: ≥ 95 % | 50.0 % | **no** |" in printed
+    assert "| outside the catalogue “unexplained”: ≥ 80 % | 100.0 % | yes |" in printed
+    assert "| gap closed by ≥ 90 % wherever the naming is right: all | 100.0 % | yes |" in printed
+    assert "| coulomb 2 | stribeck 2 | 1 | s4 |" in printed
+    assert "| nothing | force_bias Fy | 1 | s2 |" in printed
+    assert "| coulomb 2 | failed: status 2: no | 1 | s6 |" in printed
+    assert "| coulomb | 50 % (1/2) | 0 % (0/1) |" in printed
+    lines = [json.loads(line) for line in (scored / "scores.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert [line["session"] for line in lines] == ["s1", "s2", "s3", "s4", "s5", "s6"]
+
+
+def test_only_what_has_no_answer_is_run(score: ModuleType, scored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (scored / "s3" / "outcome.json").unlink()
+    ran: list[str] = []
+
+    def workflow(folder: Path, timeout: float) -> dict[str, Any]:
+        ran.append(folder.name)
+        return {"seconds": 1.0, "error": None}
+
+    monkeypatch.setattr(score, "workflow", workflow)
+    score.main([str(scored)])
+    assert ran == ["s3"]
+
+
+def test_a_command_that_fails_is_recorded(score: ModuleType, scored: Path) -> None:
+    outcome = score.workflow(scored / "s1", 60.0)  # there is no data folder
+    assert outcome["error"].startswith("status 2: ")
+    assert not (scored / "s1" / "gap.json").exists()
+
+
+def test_an_answer_in_another_form_is_an_error(score: ModuleType, scored: Path) -> None:
+    (scored / "s3" / "gap.json").write_text('{"verdict": "explained"}', encoding="utf-8")
+    assert "gap.json is not what it should be" in score.record(scored / "s3")["error"]
+
+
+def test_a_folder_without_sessions_is_refused(score: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert score.main([str(tmp_path)]) == 2
+    assert "manifest.json" in capsys.readouterr().err
