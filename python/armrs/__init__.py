@@ -44,6 +44,11 @@ if TYPE_CHECKING:
     from .motions import convert_markers as convert_markers
     from .motions import convert_motion as convert_motion
     from .motions import read_markers as read_markers
+    from .planning import Instruments as Instruments
+    from .planning import Limits as Limits
+    from .planning import Plan as Plan
+    from .planning import forecast as forecast
+    from .planning import plan as plan
     from .report import write_report as write_report
     from .simulation import Channel as Channel
     from .simulation import Movement as Movement
@@ -66,6 +71,7 @@ _HOMES = {
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
     "moments": ("PassiveCurve", "PassiveMoments", "passive_moments"),
     "motions": ("convert_markers", "convert_motion", "read_markers"),
+    "planning": ("Instruments", "Limits", "Plan", "forecast", "plan"),
     "report": ("write_report",),
     "simulation": ("Channel", "Movement", "Sensors", "Simulated", "load_movement", "simulate"),
     "trial": ("Trial",),

@@ -11,7 +11,9 @@ __all__ = [
     "__version__",
     "build_profile",
     "control",
+    "design",
     "effects",
+    "forecast",
     "identify",
     "literature",
     "low_pass_both_ways",
@@ -62,7 +64,9 @@ def control(
     settings: Mapping[str, Any],
     watch: Mapping[str, Any],
 ) -> dict[str, Any]: ...
+def design(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]: ...
 def effects() -> list[dict[str, Any]]: ...
+def forecast(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], tasks: Sequence[Mapping[str, Any]]) -> dict[str, Any]: ...
 def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...
 def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[dict[str, Any]]: ...
 def simulate(

@@ -348,6 +348,46 @@ def passive(
 
 
 @app.command()
+def plan(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml: the arm as it is believed to be, and the robot.")],
+    angles_deg: Annotated[str, typer.Option(metavar="LOW:HIGH,…", help="Range of each joint [deg], first joint first.")],
+    out: MaybeFolder = None,
+    with_: Annotated[
+        str, typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects to be fitted besides those of the model.")
+    ] = "",
+    speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint [rad/s].")] = 2.0,
+    acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint [rad/s²].")] = 8.0,
+    force_n: Annotated[float, typer.Option(help="Largest force on the arm [N].")] = 60.0,
+    duration_s: Annotated[float, typer.Option(help="Longest trial [s].")] = 20.0,
+    repeats: Annotated[int, typer.Option(help="Trials of each movement.")] = 5,
+    compare: Annotated[Path | None, typer.Option(metavar="FILE", help="Movement file to compare the plan with.")] = None,
+    evaluations: Annotated[int, typer.Option(help="Movements to try.")] = 300,
+    seed: Annotated[int, typer.Option(help="Seed of the search.")] = 1,
+    json: JsonFile = None,
+) -> int:
+    """Propose movements that make the parameters identifiable, and say before the experiment how well each will be known.
+
+    Exit status 1 when a parameter will stay uncertain by more than half its value.
+    """
+    from . import planning, words
+    from .model import load_model
+    from .simulation import load_movement
+
+    folder = _folder(out, json)
+    arm = load_model(model)
+    limits = planning.Limits(planning.angles_of(angles_deg), speed_rad_s, acceleration_rad_s2, force_n, duration_s)
+    other = None if compare is None else load_movement(compare, arm.n_joints)
+    kinds = _listed(with_)
+    with console.progress("planning"):
+        found = planning.plan(arm, limits, repeats=repeats, with_effects=kinds, evaluations=evaluations, seed=seed)
+        beside = None if other is None else planning.forecast(arm, [other], repeats=repeats, with_effects=kinds)
+    plain = planning.plan_data(found, beside)
+    written = planning.write_plan(found, plain, folder) if folder else []
+    present(lambda: plain, json, lambda: words.planned(plain, written))
+    return 0 if found.worst <= 0.5 else 1
+
+
+@app.command()
 def record(
     experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="EXPERIMENT.toml: subject, robot, sensors, movements.")],
     out: OutFolder,

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _armrs
 from .catalogue import catalogue
-from .dataset import Dataset, load_dataset
+from .dataset import Dataset, Tolerance, load_dataset
 from .errors import BadInput, Text, unknown_name
 from .model import Effect, Joint, Model, Segment
 from .rig import all_effects, rig
@@ -216,22 +216,8 @@ def identify(
     model = dataset.model
     if method == "cascade":
         _cascade_can(with_effects, motion)
-    effects = [*all_effects(model), *_added(model, with_effects)]
-    fitted = [e.kind in _joint_kinds() for e in effects]
-    tolerance = dataset.tolerance
-    settings = {
-        "method": method,
-        "fitted": fitted,
-        "segment_uncertainty": model.segment_uncertainty,
-        "angle_offset": np.radians(tolerance.angle_offset_deg),
-        "force_bias": tolerance.force_bias_N,
-        "force_gain": tolerance.force_gain,
-        "time_delay": tolerance.time_delay_s,
-        "handle_placement": tolerance.handle_placement_m,
-        "cutoff": cutoff,
-        "motion": motion,
-        "level": level,
-    }
+    effects, fitted = effects_of(model, with_effects)
+    settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
     for trial in dataset.trials:
         if trial.force_on_arm is None and trial.tau is None:
             raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
@@ -287,6 +273,29 @@ def _left_out(method: str, effects: Sequence[Effect]) -> tuple[str, ...]:
     """Return what the method leaves out of the model, a line each."""
     rotors = [e.joint for e in effects if e.kind == "motor_inertia"] if method == "cascade" else []
     return tuple(f"the cascade takes no inertia into account, and so not the motor_inertia of joint {joint}" for joint in rotors)
+
+
+def effects_of(model: Model, with_effects: Sequence[str]) -> tuple[list[Effect], list[bool]]:
+    """Return the effects of a model with those wanted besides, and which of them are fitted."""
+    effects = [*all_effects(model), *_added(model, with_effects)]
+    return effects, [e.kind in _joint_kinds() for e in effects]
+
+
+def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dict[str, Any]:
+    """Return what the core has to know besides the data; method and level are the usual ones."""
+    return {
+        "method": "joint",
+        "fitted": fitted,
+        "segment_uncertainty": model.segment_uncertainty,
+        "angle_offset": np.radians(tolerance.angle_offset_deg),
+        "force_bias": tolerance.force_bias_N,
+        "force_gain": tolerance.force_gain,
+        "time_delay": tolerance.time_delay_s,
+        "handle_placement": tolerance.handle_placement_m,
+        "cutoff": None,
+        "motion": "auto",
+        "level": 0.95,
+    }
 
 
 _BEYOND = 5.0

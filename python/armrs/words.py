@@ -195,3 +195,22 @@ def recorded(result: Mapping[str, Any]) -> None:
         rows.append((trial["configuration"], trial["repeat"], f"{1e3 * trial['tracking_error_rad']:.3g}", end))
     console.table(["configuration", "repeat", "robot off by [mrad]", "end"], rows)
     print("\n" + "\n".join(result["files"][:3]))
+
+
+def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print a plan and what it will show."""
+    other = result.get("compared")
+    rows = []
+    for k, p in enumerate(result["predictions"]):
+        label = p["name"] if p["joint"] is None else f"{p['kind']} {p['joint']} {p['name']}"
+        row = [label, p["value"], p["std"], p["std_of_data"], p["unit"], f"{100 * p['relative']:.2g} %"]
+        rows.append(row if other is None else [*row, f"{100 * other['predictions'][k]['relative']:.2g} %"])
+    head = ["parameter", "value", "std to expect", "std of the data", "unit", "relative"]
+    console.table(head if other is None else [*head, "compared"], rows)
+    print(
+        f"\n{len(result['movements'])} movements, {result['duration_s']:.3g} s with all repeats; force on the arm up to "
+        f"{result['largest_force_N']:.3g} N, joints up to {result['largest_speed_rad_s']:.3g} rad/s; "
+        f"worst relative deviation {100 * result['worst_relative_std']:.2g} %"
+        + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
+    )
+    print("\n".join(str(path) for path in written))

@@ -72,6 +72,14 @@ pub enum IdentError {
         /// How the solver ended.
         status: crate::outcome::Status,
     },
+    /// No movement that was tried respects what is allowed.
+    #[error(
+        "none of {evaluations} movements respects the limits of force, speed and duration: widen them, or use fewer waypoints"
+    )]
+    NoPlan {
+        /// Movements tried.
+        evaluations: usize,
+    },
     /// The simulated arm moves elsewhere than the measured one.
     #[error(
         "the simulated arm differs from the measured one by {found} rad in joint {joint}, expected at most {allowed} rad: do the robot's base, lengths and elbow fit?"

@@ -9,7 +9,7 @@
 //! - [`coloured`], [`long_run`], [`covariance`], [`student`]: residuals that are not white, and intervals that know it
 //!
 //! The upper half is the arm: [`trial`] and [`unknown`] say what is known, [`motion`] and [`simulated`] give the movement, [`equation`] the rows,
-//! [`condition`] filters and whitens them, [`constraint`] says what is physical, [`joint`] solves, [`estimate`] is the result.
+//! [`condition`] filters and whitens them, [`constraint`] says what is physical, [`joint`] solves, [`estimate`] is the result. [`design`] says before an experiment what it will show.
 //!
 //! Everything is `f64`, has a fixed order of operations and takes its transcendental functions from `libm`: the same input gives the same bits on
 //! every platform.
@@ -19,6 +19,7 @@ pub mod cascade;
 pub mod coloured;
 pub mod condition;
 pub mod constraint;
+pub mod design;
 pub mod equation;
 pub mod estimate;
 pub mod joint;

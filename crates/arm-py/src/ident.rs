@@ -48,6 +48,19 @@ pub struct Settings {
     level: f64,
 }
 
+impl Settings {
+    /// What the calibration promises.
+    pub fn tolerance(&self) -> Tolerance {
+        Tolerance {
+            angle_offset: self.angle_offset,
+            force_bias: self.force_bias,
+            force_gain: self.force_gain,
+            time_delay: self.time_delay,
+            handle_placement: self.handle_placement,
+        }
+    }
+}
+
 pub fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
     let joints = |name, a| {
         Ok::<_, PyErr>(
@@ -173,13 +186,7 @@ pub fn identify<'py>(
                 "simulated" => MotionSource::Simulated,
                 other => return Err(bad_input("motion", other, "auto, measured or simulated")),
             },
-            tolerance: Tolerance {
-                angle_offset: settings.angle_offset,
-                force_bias: settings.force_bias,
-                force_gain: settings.force_gain,
-                time_delay: settings.time_delay,
-                handle_placement: settings.handle_placement,
-            },
+            tolerance: settings.tolerance(),
             level: settings.level,
         };
         let cascade = arm_ident::cascade::Options {

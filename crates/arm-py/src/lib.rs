@@ -6,6 +6,7 @@ mod convert;
 mod errors;
 mod ident;
 mod lab;
+mod plan;
 mod rig;
 mod signal;
 mod sim;
@@ -28,6 +29,8 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;
+    m.add_function(wrap_pyfunction!(plan::forecast_py, m)?)?;
+    m.add_function(wrap_pyfunction!(plan::design_py, m)?)?;
     m.add_function(wrap_pyfunction!(lab::literature, m)?)?;
     m.add_function(wrap_pyfunction!(signal::smooth, m)?)?;
     m.add_function(wrap_pyfunction!(signal::low_pass_both_ways, m)?)?;

@@ -52,6 +52,7 @@ pub use experiment::{
     simulate_with,
 };
 pub use movement::{JointMotion, Movement};
+pub use noise::Normal;
 pub use path::{Handle, HandlePath};
 #[cfg(feature = "rapier")]
 pub use rapier::{RapierSettings, simulate_rapier};

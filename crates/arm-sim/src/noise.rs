@@ -6,13 +6,15 @@ use rand_chacha::rand_core::{RngCore, SeedableRng};
 /// Independent numbers of the standard normal distribution: ChaCha8 (Bernstein 2008) through the transform of Box and
 /// Muller 1958, with the logarithm and the circular functions of `libm`.
 #[derive(Clone, Debug)]
-pub(crate) struct Normal {
+pub struct Normal {
     random: ChaCha8Rng,
     /// The second number of a pair.
     kept: Option<f64>,
 }
 
 impl Normal {
+    /// Numbers of a seed and a stream.
+    ///
     /// * `stream` - numbers of different streams of one seed are independent
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -20,6 +22,8 @@ impl Normal {
         Self { random, kept: None }
     }
 
+    /// The next number.
+    #[expect(clippy::should_implement_trait, reason = "it never ends")]
     pub fn next(&mut self) -> f64 {
         if let Some(kept) = self.kept.take() {
             return kept;

@@ -1,0 +1,196 @@
+//! Plans: what movements will show, and movements that show much.
+
+use arm_core::{Chain, Joints, Shape};
+use arm_ident::design::{Accuracy, Allowed, Forecast, Question, Task, design, forecast};
+use numpy::{PyReadonlyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::arm::{AnyChain, each_length};
+use crate::convert::rows;
+use crate::errors::{bad_input, identification};
+use crate::ident::{Settings, model};
+use crate::rig::Rig;
+
+/// What the sensors do.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Sensing {
+    rate: f64,
+    cutoff: f64,
+    force: f64,
+    angle: f64,
+}
+
+/// One movement and how often it is made.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Planned<'py> {
+    waypoints: PyReadonlyArray2<'py, f64>,
+    speed: f64,
+    acceleration: f64,
+    shape: String,
+    pause: f64,
+    repeats: usize,
+}
+
+/// What a plan must respect, and how long to search.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Bounds {
+    angle: Vec<[f64; 2]>,
+    speed: f64,
+    acceleration: f64,
+    force: f64,
+    duration: f64,
+    speeds: Vec<f64>,
+    waypoints: usize,
+    repeats: usize,
+    evaluations: usize,
+    seed: u64,
+}
+
+fn question<const N: usize>(
+    chain: &Chain<f64, N>,
+    rig: &Rig,
+    (settings, sensing): (&Settings, &Sensing),
+) -> PyResult<Question<N>> {
+    Ok(Question {
+        model: model(chain, rig, settings)?,
+        robot: rig.robot,
+        tolerance: settings.tolerance(),
+        accuracy: Accuracy {
+            rate: sensing.rate,
+            cutoff: sensing.cutoff,
+            force: sensing.force,
+            angle: sensing.angle,
+        },
+    })
+}
+
+/// How well movements will show each parameter; see `armrs.forecast`.
+#[pyfunction]
+#[pyo3(name = "forecast")]
+pub fn forecast_py<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    settings: Settings,
+    sensing: Sensing,
+    tasks: Vec<Planned<'py>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (settings, sensing, tasks): (&Settings, &Sensing, &[Planned<'py>]),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let question = question(chain, rig, (settings, sensing))?;
+        let tasks = tasks
+            .iter()
+            .map(|t| {
+                let waypoints = rows::<N>("waypoints", &t.waypoints)?;
+                Ok(Task {
+                    waypoints: waypoints.into_iter().map(Joints::from).collect(),
+                    speed: t.speed,
+                    acceleration: t.acceleration,
+                    shape: match t.shape.as_str() {
+                        "trapezoid" => Shape::Trapezoid,
+                        "smooth" => Shape::Smooth,
+                        other => return Err(bad_input("shape", other, "trapezoid or smooth")),
+                    },
+                    pause: t.pause,
+                    repeats: t.repeats,
+                })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        let found = py
+            .detach(|| forecast(&question, &tasks))
+            .map_err(identification)?;
+        plain(py, &found)
+    }
+    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &tasks)))
+}
+
+/// Movements that show every parameter well; see `armrs.plan`.
+#[pyfunction]
+#[pyo3(name = "design")]
+pub fn design_py<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    settings: Settings,
+    sensing: Sensing,
+    bounds: Bounds,
+) -> PyResult<Bound<'py, PyDict>> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (settings, sensing, bounds): (&Settings, &Sensing, &Bounds),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let question = question(chain, rig, (settings, sensing))?;
+        let angle = <[[f64; 2]; N]>::try_from(bounds.angle.clone()).map_err(|given| {
+            bad_input(
+                "angles",
+                format!("{} ranges", given.len()),
+                &format!("{N}, one a joint"),
+            )
+        })?;
+        let allowed = Allowed {
+            angle,
+            speed: bounds.speed,
+            acceleration: bounds.acceleration,
+            force: bounds.force,
+            duration: bounds.duration,
+            speeds: bounds.speeds.clone(),
+            waypoints: bounds.waypoints,
+            repeats: bounds.repeats,
+            evaluations: bounds.evaluations,
+            seed: bounds.seed,
+        };
+        let (tasks, found) = py
+            .detach(|| design(&question, &allowed, || {}))
+            .map_err(identification)?;
+        let out = plain(py, &found)?;
+        let list = PyList::empty(py);
+        for task in &tasks {
+            let item = PyDict::new(py);
+            let flat: Vec<f64> = task
+                .waypoints
+                .iter()
+                .flat_map(|q| q.iter().copied())
+                .collect();
+            let shape = (task.waypoints.len(), N);
+            let table = flat.to_pyarray(py).call_method1("reshape", (shape,))?;
+            item.set_item("waypoints", table)?;
+            item.set_item("speed", task.speed)?;
+            item.set_item("acceleration", task.acceleration)?;
+            list.append(item)?;
+        }
+        out.set_item("tasks", list)?;
+        Ok(out)
+    }
+    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &bounds)))
+}
+
+fn plain<'py>(py: Python<'py>, found: &Forecast) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    let list = PyList::empty(py);
+    for p in &found.predicted {
+        let item = PyDict::new(py);
+        item.set_item("name", &p.name)?;
+        item.set_item("unit", p.unit.replace('·', " "))?;
+        item.set_item("effect", p.effect)?;
+        item.set_item("value", p.value)?;
+        item.set_item("std", p.std)?;
+        item.set_item("std_of_data", p.std_of_data)?;
+        item.set_item("relative", p.relative())?;
+        list.append(item)?;
+    }
+    out.set_item("predicted", list)?;
+    out.set_item("worst", found.worst())?;
+    out.set_item("force", found.force)?;
+    out.set_item("speed", found.speed)?;
+    out.set_item("duration", found.duration)?;
+    out.set_item("durations", found.durations.clone())?;
+    Ok(out)
+}

@@ -1,0 +1,345 @@
+"""Before an experiment: how well movements will show each parameter, and movements that show them well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import _armrs, checks, files, tomlfile
+from .dataset import Tolerance
+from .errors import BadInput, Text
+from .identification import core_settings, effects_of
+from .model import Model
+from .rig import rig
+from .simulation import Movement
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What the sensors of the experiment will do.
+
+    Attributes
+    ----------
+    rate : float
+        Samples a second [Hz].
+    cutoff : float
+        Cutoff of the low-pass of the identification [Hz].
+    force : float
+        Standard deviation of a single force sample [N].
+    angle : float
+        Standard deviation of a single angle sample [rad].
+    tolerance : Tolerance
+        What the calibration promises.
+    """
+
+    rate: float = 50.0
+    cutoff: float = 5.0
+    force: float = 0.2
+    angle: float = float(np.radians(0.1))
+    tolerance: Tolerance = field(default_factory=Tolerance)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a planned movement must respect.
+
+    Attributes
+    ----------
+    angles : tuple of (float, float)
+        Smallest and largest angle of each joint [rad].
+    speed, acceleration : float
+        Largest of any joint [rad/s, rad/s²].
+    force : float
+        Largest force on the arm [N].
+    duration : float
+        Longest trial [s].
+    """
+
+    angles: tuple[tuple[float, float], ...]
+    speed: float = 2.0
+    acceleration: float = 8.0
+    force: float = 60.0
+    duration: float = 20.0
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """How well one parameter will be known.
+
+    Attributes
+    ----------
+    name, kind : str
+        As identification gives them.
+    joint : int or None
+        From 1.
+    value : float
+        As it is believed before the experiment.
+    std : float
+        Standard deviation to be expected, with what is known beforehand.
+    std_of_data : float
+        The same from the data alone, within the calibration as promised.
+    relative : float
+        The latter relative to the value; a parameter of an effect that is small counts as 0.05.
+    unit : str
+    """
+
+    name: str
+    kind: str
+    joint: int | None
+    value: float
+    std: float
+    std_of_data: float
+    relative: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Movements, and what they will show.
+
+    Attributes
+    ----------
+    movements : tuple of Movement
+    repeats : int
+        Trials of each.
+    predictions : tuple of Prediction
+    worst : float
+        The worst relative standard deviation from the data alone.
+    force, speed : float
+        Largest force on the arm [N] and largest speed of a joint [rad/s].
+    duration : float
+        Of all trials together [s].
+    model : Model
+    """
+
+    movements: tuple[Movement, ...]
+    repeats: int
+    predictions: tuple[Prediction, ...]
+    worst: float
+    force: float
+    speed: float
+    duration: float
+    model: Model = field(repr=False)
+
+    def __repr__(self) -> str:
+        return f"Plan({len(self.movements)} movements, {self.duration:.4g} s; {'; '.join(map(str, self.predictions))})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data with units in the names."""
+        return {
+            "movements": [
+                {
+                    "waypoints_deg": np.degrees(m.waypoints),
+                    "speed_rad_s": m.speed,
+                    "acceleration_rad_s2": m.acceleration,
+                    "pause_s": m.pause,
+                    "shape": m.shape,
+                    "repeats": self.repeats,
+                }
+                for m in self.movements
+            ],
+            "predictions": [dict(vars(p)) for p in self.predictions],
+            "worst_relative_std": self.worst,
+            "largest_force_N": self.force,
+            "largest_speed_rad_s": self.speed,
+            "duration_s": self.duration,
+        }
+
+    def to_toml(self) -> str:
+        """Return the movements as tables of `EXPERIMENT.toml`."""
+        blocks = []
+        for number, entry in enumerate(self.to_dict()["movements"], start=1):
+            table = {"configuration": f"planned {number}", **entry, "waypoints_deg": np.round(entry["waypoints_deg"], 3).tolist()}
+            blocks.append("\n".join(["[[movement]]", *tomlfile.lines(table), ""]))
+        return "\n".join(blocks)
+
+
+def forecast(
+    model: Model,
+    movements: Sequence[Movement],
+    *,
+    repeats: int = 5,
+    with_effects: Sequence[str] = (),
+    instruments: Instruments = Instruments(),
+) -> Plan:
+    """Say before an experiment how well movements will show the parameters of an arm.
+
+    Parameters
+    ----------
+    model : Model
+        The arm as it is believed to be.
+    movements : sequence of Movement
+    repeats : int
+        Trials of each movement.
+    with_effects : sequence of str
+        Kinds of joint effects that will be fitted at every joint besides those of the model, as for `identify`.
+    instruments : Instruments
+
+    Raises
+    ------
+    BadInput
+        For a movement that the robot cannot make and settings out of range.
+    IdentificationError
+        When nothing can be said.
+
+    Notes
+    -----
+    The closed chain is simulated, noise of the sensors is carried through the rows of the regression and the prior of the
+    model, as `identify` would have them. Nothing is measured: what the model lacks is not in it.
+    """
+    asked = _Question(model, with_effects, instruments, repeats)
+    tasks = [_task(m, model, repeats) for m in movements]
+    if not tasks:
+        raise BadInput("movements", Text("none"), "at least one")
+    return asked.plan(tuple(movements), _armrs.forecast(asked.rig, asked.settings, asked.sensing, tasks))
+
+
+def plan(
+    model: Model,
+    limits: Limits,
+    *,
+    speeds: Sequence[float] = (1.0, 0.3),
+    waypoints: int = 6,
+    repeats: int = 5,
+    with_effects: Sequence[str] = (),
+    instruments: Instruments = Instruments(),
+    evaluations: int = 300,
+    seed: int = 1,
+) -> Plan:
+    """Propose movements that make every parameter of an arm known well.
+
+    Parameters
+    ----------
+    model : Model
+        The arm as it is believed to be. Its robot, where there is one, has to reach every place of the path.
+    limits : Limits
+        Of joints, speed, acceleration, force and duration.
+    speeds : sequence of float
+        One movement for each, at this share of the largest speed and acceleration.
+    waypoints : int
+        Of each movement, besides the return to the first.
+    repeats, with_effects, instruments
+        As in `forecast`.
+    evaluations : int
+        Movements that are tried.
+    seed : int
+        Of the search; the same seed proposes the same movements.
+
+    Raises
+    ------
+    BadInput
+        For settings out of range.
+    IdentificationError
+        When no movement that was tried respects the limits.
+    """
+    asked = _Question(model, with_effects, instruments, repeats)
+    n = model.n_joints
+    if len(limits.angles) != n:
+        raise BadInput("angles", Text(f"{len(limits.angles)} ranges"), f"{n}, one a joint")
+    angles = []
+    for j, ends in enumerate(limits.angles, start=1):
+        low, high = checks.pair(f"angles of joint {j}", ends, least=-4 * np.pi, most=4 * np.pi, unit="rad", hint="looks like degrees")
+        if not low < high:
+            raise BadInput(f"angles of joint {j}", Text(f"{low:g} to {high:g} rad"), "the smaller angle first")
+        angles.append([low, high])
+    if not speeds:
+        raise BadInput("speeds", Text("none"), "at least one share")
+    bounds = {
+        "angle": angles,
+        "speed": checks.number("speed", limits.speed, above=0.0, most=100.0, unit="rad/s"),
+        "acceleration": checks.number("acceleration", limits.acceleration, above=0.0, most=1e4, unit="rad/s²"),
+        "force": checks.number("force", limits.force, above=0.0, unit="N"),
+        "duration": checks.number("duration", limits.duration, above=0.0, most=600.0, unit="s"),
+        "speeds": [checks.number("speeds", v, above=0.0, most=1.0) for v in speeds],
+        "waypoints": checks.whole("waypoints", waypoints, least=2, most=100),
+        "repeats": repeats,
+        "evaluations": checks.whole("evaluations", evaluations, least=1, most=100_000),
+        "seed": checks.whole("seed", seed, least=0),
+    }
+    raw = _armrs.design(asked.rig, asked.settings, asked.sensing, bounds)
+    found = tuple(Movement(t["waypoints"], speed=t["speed"], acceleration=t["acceleration"], shape="smooth") for t in raw["tasks"])
+    return asked.plan(found, raw)
+
+
+def angles_of(text: str) -> tuple[tuple[float, float], ...]:
+    """Return the ranges of joints [rad] written in degrees as `LOW:HIGH,LOW:HIGH`."""
+    ranges = []
+    for part in text.split(","):
+        ends = part.split(":")
+        try:
+            low, high = (float(np.radians(float(end))) for end in ends)
+        except ValueError:
+            raise BadInput("--angles-deg", part, "LOW:HIGH in degrees for each joint, such as -80:-10,20:110") from None
+        ranges.append((low, high))
+    return tuple(ranges)
+
+
+def plan_data(found: Plan, beside: Plan | None = None) -> dict[str, Any]:
+    """Return a plan as it is written to JSON, with the forecast of another movement to compare with."""
+    data = {"verb": "plan", **found.to_dict()}
+    if beside is not None:
+        data["compared"] = beside.to_dict() | {"worst_ratio": beside.worst / found.worst}
+    return data
+
+
+def write_plan(found: Plan, data: dict[str, Any], folder: Path) -> list[Path]:
+    """Write `plan.toml`, whose tables belong into an EXPERIMENT.toml, a movement file for each movement, and `plan.json`."""
+    written = [folder / "plan.toml"]
+    files.write_text(written[0], found.to_toml(), kind=".toml")
+    for number, entry in enumerate(data["movements"], start=1):
+        table = {key: value for key, value in entry.items() if key != "repeats"}
+        table["waypoints_deg"] = np.round(table["waypoints_deg"], 3).tolist()
+        written.append(folder / f"movement-{number}.toml")
+        files.write_text(written[-1], "\n".join(["[movement]", *tomlfile.lines(table), ""]), kind=".toml")
+    written.append(folder / "plan.json")
+    files.write_json(written[-1], data)
+    return written
+
+
+class _Question:
+    """What forecast and plan ask of the core."""
+
+    def __init__(self, model: Model, with_effects: Sequence[str], instruments: Instruments, repeats: int) -> None:
+        for name, most in (("rate", 10_000.0), ("cutoff", 0.4 * instruments.rate), ("force", 1e3), ("angle", 1.0)):
+            checks.number(name, getattr(instruments, name), above=0.0, most=most)
+        self.model, self.repeats = model, checks.whole("repeats", repeats, least=1, most=10_000)
+        self.effects, fitted = effects_of(model, with_effects)
+        self.rig = rig(model, self.effects)
+        self.settings = core_settings(model, fitted, instruments.tolerance)
+        self.sensing = {name: getattr(instruments, name) for name in ("rate", "cutoff", "force", "angle")}
+
+    def plan(self, movements: tuple[Movement, ...], raw: dict[str, Any]) -> Plan:
+        """Return what the core found."""
+        fitted = [e for e, fit in zip(self.effects, self.settings["fitted"], strict=True) if fit]
+        predictions = []
+        for p in raw["predicted"]:
+            effect = None if p["effect"] is None else fitted[p["effect"]]
+            predictions.append(
+                Prediction(
+                    name=p["name"],
+                    kind="combination" if effect is None else effect.kind,
+                    joint=None if effect is None else effect.joint,
+                    **{key: p[key] for key in ("value", "std", "std_of_data", "relative", "unit")},
+                )
+            )
+        return Plan(
+            movements=movements,
+            repeats=self.repeats,
+            predictions=tuple(predictions),
+            model=self.model,
+            **{key: raw[key] for key in ("worst", "force", "speed", "duration")},
+        )
+
+
+def _task(movement: Movement, model: Model, repeats: int) -> dict[str, Any]:
+    if movement.waypoints.shape[1] != model.n_joints:
+        raise BadInput("waypoints", f"rows of {movement.waypoints.shape[1]} angles", f"rows of {model.n_joints}")
+    shared = ("speed", "acceleration", "shape", "pause")
+    return {"waypoints": np.array(movement.waypoints), "repeats": repeats} | {name: getattr(movement, name) for name in shared}

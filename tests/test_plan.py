@@ -1,0 +1,104 @@
+"""Plans: forecasts that hold, movements that respect what is allowed, and refusals."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import BadInput, IdentificationError, Limits, Movement
+from armrs.cli import main
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+import check_plan
+
+LIMITS = check_plan.LIMITS
+
+
+def test_the_same_seed_gives_the_same_plan_within_what_is_allowed() -> None:
+    arm = check_plan.truth()
+    first, again = (armrs.plan(arm, LIMITS, evaluations=20) for _ in range(2))
+    assert [m.waypoints.tolist() for m in first.movements] == [m.waypoints.tolist() for m in again.movements]
+    assert first.force <= LIMITS.force and first.speed <= 1.1 * LIMITS.speed
+    for movement in first.movements:
+        for j, (low, high) in enumerate(LIMITS.angles):
+            assert movement.waypoints[:, j].min() >= low and movement.waypoints[:, j].max() <= high
+        run = armrs.simulate(arm, movement)
+        assert np.hypot(*run.force_on_arm.T).max() <= 1.01 * LIMITS.force
+        assert run.t[-1] <= LIMITS.duration
+
+
+def test_more_trials_narrow_what_noise_alone_widens() -> None:
+    arm = check_plan.truth()
+    exact = armrs.Tolerance(0.0, 0.0, 0.0, 0.0, 0.0)
+    few, many = (armrs.forecast(arm, [check_plan.THESIS], repeats=n, instruments=armrs.Instruments(tolerance=exact)) for n in (4, 16))
+    for a, b in zip(few.predictions, many.predictions, strict=True):
+        assert a.std_of_data / b.std_of_data == pytest.approx(2.0, rel=1e-3), a.name
+
+
+def test_a_plan_beats_the_movement_of_the_thesis_tenfold() -> None:
+    arm = check_plan.truth()
+    planned = armrs.plan(arm, LIMITS, evaluations=60, instruments=armrs.Instruments(tolerance=check_plan.TOLERANCE))
+    repeats = round(planned.duration / 2.7)  # the same time for both
+    thesis = armrs.forecast(arm, [check_plan.THESIS], repeats=repeats, instruments=armrs.Instruments(tolerance=check_plan.TOLERANCE))
+    assert thesis.duration == pytest.approx(planned.duration, rel=0.05)
+    assert thesis.worst > 10.0 * planned.worst
+
+
+def test_what_is_planned_comes_out() -> None:
+    """Second moments within 5 %, first moments within 2 %, and predictions of the right size; scripts/check_plan.py does it 200 times."""
+    planned, _, rows = check_plan.compare(8, 60)
+    for name, value, predicted, scatter, bias in rows:
+        assert 0.4 < scatter / predicted < 2.0, name  # eight repetitions tell a deviation to 25 %
+        if "*" in name:
+            allowed = 0.05 if name.startswith("I") else 0.02
+            assert abs(bias) + 2.0 * scatter < allowed * value, name
+    assert planned.worst < 0.05
+
+
+def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    check_plan.truth().write(tmp_path / "model.toml")
+    compared = "[movement]\nwaypoints_deg = [[-60, 50], [-48.6, 61.5], [-60, 50]]\nspeed_rad_s = 0.2\n"
+    (tmp_path / "thesis.toml").write_text(compared, encoding="utf-8")
+    options = ["--angles-deg=-80:-10,20:110", "--evaluations", "15", "--compare", str(tmp_path / "thesis.toml")]
+    assert main(["plan", str(tmp_path / "model.toml"), *options, "-o", str(tmp_path / "out")]) == 0
+    assert "times better than the movement compared" in capsys.readouterr().out
+    data = json.loads((tmp_path / "out/plan.json").read_text())
+    assert len(data["predictions"]) == len(data["compared"]["predictions"]) == 8
+    movement = armrs.load_movement(tmp_path / "out/movement-2.toml", 2)
+    assert movement.waypoints.shape == (7, 2)
+    experiment = f'model = "../model.toml"\n{(tmp_path / "out/plan.toml").read_text()}'
+    (tmp_path / "out/e.toml").write_text(experiment, encoding="utf-8")
+    from armrs.experiment import load_experiment
+
+    assert [r.configuration for r in load_experiment(tmp_path / "out/e.toml").runs] == ["planned 1", "planned 2"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--angles-deg=-80:-10"], "angles: found 1 ranges, allowed 2, one a joint"),
+        (["--angles-deg=-80,20:110"], "--angles-deg: found '-80', allowed LOW:HIGH in degrees"),
+        (["--angles-deg=-10:-80,20:110"], "angles of joint 1: found -0.174533 to -1.39626 rad, allowed the smaller angle first"),
+        (["--angles-deg=-80:-10,20:110", "--speed-rad-s", "nan"], "speed: found nan"),
+        (["--angles-deg=-80:-10,20:110", "--repeats", "0"], "repeats: found 0"),
+        (["--angles-deg=-80:-10,20:110", "--with", "frition"], "nearest known"),
+    ],
+)
+def test_refuses(tmp_path: Path, options: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    check_plan.truth().write(tmp_path / "model.toml")
+    assert main(["plan", str(tmp_path / "model.toml"), *options, "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_limits_that_nothing_respects_are_said() -> None:
+    with pytest.raises(IdentificationError, match="respects the limits"):
+        armrs.plan(check_plan.truth(), Limits(LIMITS.angles, force=1.0), evaluations=3)
+    with pytest.raises((BadInput, IdentificationError), match=r"reach|robot's base"):
+        armrs.forecast(check_plan.truth(), [Movement(np.radians([[60.0, 0.0], [80.0, 0.0]]))])
