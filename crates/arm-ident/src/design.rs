@@ -263,6 +263,7 @@ fn simulated<const N: usize>(
         moment_on_arm: None,
         torque: None,
         handle: Some(pairs(&recording.handle)),
+        speed: None,
         valid: vec![true; recording.len()],
     };
     let motion = Kinematics {
