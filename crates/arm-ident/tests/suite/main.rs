@@ -12,6 +12,7 @@ mod long_run;
 mod noise;
 mod online;
 mod program;
+mod quasi_static;
 mod rank;
 mod student;
 mod svd;

@@ -1,0 +1,56 @@
+//! The streamed cascade on static samples of a known arm, which a force at the tip holds.
+
+use super::noise::Noise;
+use super::synthetic::wrong;
+use arm_core::{Chain, Joints, Plane, Pose, gravity, jacobian, models};
+use arm_ident::quasi_static::Stream;
+
+const SAMPLES: usize = 3000;
+
+/// Poses of a bent arm at rest, and the force at the tip that holds it: `F = J⁻ᵀ G`.
+fn samples(chain: &Chain<f64, 2>) -> (Vec<Joints<f64, 2>>, Vec<Plane<f64>>) {
+    let mut noise = Noise::new(7);
+    (0..SAMPLES)
+        .map(|_| {
+            let q = Joints::from([-0.6 + 0.3 * noise.normal(), 1.1 + 0.2 * noise.normal()]);
+            let pose = Pose::new(&q);
+            let inverse = jacobian(chain, &pose).transpose().try_inverse();
+            let force = inverse.expect("the arm is bent") * gravity(chain, &pose);
+            (q, [force[0], force[1]])
+        })
+        .unzip()
+}
+
+#[test]
+fn the_stream_finds_the_first_moments_from_a_wrong_start() {
+    let truth = models::mechanical_arm();
+    let (q, force) = samples(&truth);
+    let model = wrong(&truth, [[1.1, 0.95, 1.0], [0.92, 1.06, 1.0]], 0.1);
+    let mut stream = Stream::new(&model.chain);
+    stream.push(&q, &force).expect("finite samples");
+    let condensed = stream.finish();
+    assert_eq!(condensed.samples(), SAMPLES);
+    let found = condensed.solve(&model, 3.0).expect("a solution");
+    for (found, truth) in found.first_moments.iter().zip(truth.first_moments()) {
+        assert!((found - truth).abs() < 1e-6 * truth, "{found}, not {truth}");
+    }
+    assert!(found.residual_rms.iter().all(|&rms| rms < 1e-6));
+}
+
+#[test]
+fn the_stream_is_the_same_however_it_is_cut() {
+    let truth = models::mechanical_arm();
+    let (q, force) = samples(&truth);
+    let model = wrong(&truth, [[1.1, 0.95, 1.0], [0.92, 1.06, 1.0]], 0.1);
+    let solve = |cut: usize| {
+        let mut stream = Stream::new(&model.chain);
+        for (q, force) in q.chunks(cut).zip(force.chunks(cut)) {
+            stream.push(q, force).expect("finite samples");
+        }
+        stream.finish().solve(&model, 3.0).expect("a solution")
+    };
+    let (whole, pieces) = (solve(SAMPLES), solve(37));
+    for (a, b) in whole.first_moments.iter().zip(&pieces.first_moments) {
+        assert!((a - b).abs() < 1e-9, "{a} and {b}");
+    }
+}
