@@ -95,6 +95,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "an effect of no joint": ((*IDENTIFY, "--with", "backlash"), nothing, "--with: found unknown joint effect 'backlash'"),
     "no effect at all": ((*IDENTIFY, "--with", ","), nothing, "--with: found ',', allowed kinds of effects with commas between them"),
     "an empty effect": ((*IDENTIFY, "--with", ""), nothing, "--with: found ''"),
+    "nothing to find": (IDENTIFY, lambda f: f.edit("model.toml", "segment_uncertainty = 0.1", "segment_uncertainty = 0.0 #"), "model.toml: [arm], segment_uncertainty: found 0.0, allowed above 0, or an effect to fit"),
     "unknown method": ((*IDENTIFY, "--method", "best"), nothing, "'best' is not one of"),
     "level of one": ((*IDENTIFY, "--level", "1"), nothing, "--level: found 1.0"),
     "level that is no number": ((*IDENTIFY, "--level", "nan"), nothing, "--level: found nan"),

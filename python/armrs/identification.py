@@ -217,6 +217,8 @@ def identify(
     if method == "cascade":
         _cascade_can(with_effects, motion)
     effects, fitted = effects_of(model, with_effects)
+    if not model.segment_uncertainty and not any(fitted):
+        raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
     settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
     for trial in dataset.trials:
         if trial.force_on_arm is None and trial.tau is None:
