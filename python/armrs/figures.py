@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import plotting, tables
+from .dependence import Dependence
 from .identification import Explained, Identified
 from .moments import PassiveMoments
 from .simulation import Simulated
@@ -177,7 +178,24 @@ def passive(result: PassiveMoments) -> list[Drawn]:
                 "of both directions. Bands are one standard deviation over the repeats."
             )
             drawn.append(Drawn(f"passive-{slug(configuration)}", f"Passive moments of the movement {configuration}", text, figure))
+        drawn += [_dependence(result, d, names) for d in result.dependence]
     return drawn
+
+
+def _dependence(result: PassiveMoments, fitted: Dependence, names: Sequence[str]) -> Drawn:
+    """Draw elastic moments of one joint in all configurations, and what was fitted to them."""
+    figure = plotting.figure(6.4, 4.2)
+    ax = figure.subplots()
+    own = sorted((c for c in result.curves if c.joint == fitted.joint), key=lambda c: float(c.held[:, fitted.adjacent - 1].mean()))
+    for number, curve in enumerate(own):
+        held = float(curve.held[:, fitted.adjacent - 1].mean())
+        colour = plotting.shade(number / max(len(own) - 1, 1))
+        ax.plot(np.degrees(curve.angle), curve.elastic, ".", color=colour, label=f"{names[fitted.adjacent - 1]} at {np.degrees(held):.0f}°")
+        ax.plot(np.degrees(curve.angle), fitted.at(curve.angle, held), "-", color=colour)
+    ax.set(title=names[fitted.joint - 1], xlabel="joint angle [°]", ylabel="elastic moment [N m]")
+    ax.legend(fontsize="small")
+    text = "Points are elastic means over the repeats of each configuration, lines the fitted double exponential with slope and coupling."
+    return Drawn(f"dependence-{fitted.joint}", f"{names[fitted.joint - 1]}: own and adjacent angle", text, figure)
 
 
 def direction_of_motion(before: Sequence[Part], after: Sequence[Part], joints: Sequence[str]) -> Drawn:

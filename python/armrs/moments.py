@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _armrs
+from . import _armrs, dependence, relaxed, uncertainty
 from .dataset import Dataset, load_dataset
 from .errors import BadInput, Text
 from .rig import arm
@@ -25,8 +25,13 @@ MOVING = 0.25
 """A joint moves when its speed is above this part of its usual speed in the trial."""
 MARGIN = 0.35
 """The low-pass mixes what lies within this time, in periods of its cutoff."""
-SLOW = 0.1
-"""Largest share of inertial torques at which a movement counts as slow."""
+LEVEL = 0.95
+"""Probability of the intervals, and one minus the level of the tests."""
+
+
+_COLUMNS = (
+    "rising", "falling", "elastic", "elastic_std", "elastic_systematic", "half_width", "half_width_std", "half_width_systematic",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +46,11 @@ class TrialMoments:
     moment : ndarray, shape (n, n_joints)
         Torque with which each joint resists [N m].
     inertial : ndarray, shape (n, n_joints)
-        What the neglected inertial torques would be [N m].
+        Inertial torques by the model, taken off the moment [N m].
     direction : ndarray of int, shape (n, n_joints)
         1 where the angle grows, -1 where it shrinks, 0 at rest.
+    force : ndarray, shape (n, 2), or None
+        Low-passed force on the arm [N].
     """
 
     trial: Trial
@@ -52,6 +59,7 @@ class TrialMoments:
     moment: np.ndarray
     inertial: np.ndarray
     direction: np.ndarray
+    force: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +81,13 @@ class PassiveCurve:
     half_width, half_width_std : ndarray
         Half the difference of both directions: the dissipative part [N m].
     inertial_share : float
-        Root mean square of the neglected inertial torque, relative to that of the moment.
+        Root mean square of the inertial torque that was taken off, relative to that of the moment.
+    elastic_repeats, half_width_repeats : ndarray, shape (repeats, k)
+        The same of every repeat [N m].
+    held : ndarray, shape (repeats, n_joints)
+        Mean angle of every joint in every repeat [rad].
+    elastic_systematic, half_width_systematic : ndarray
+        Standard deviations from the declared uncertainty of masses, lengths, angles and forces, the same error in all repeats [N m].
     """
 
     configuration: str
@@ -87,6 +101,26 @@ class PassiveCurve:
     half_width: np.ndarray
     half_width_std: np.ndarray
     inertial_share: float
+    elastic_repeats: np.ndarray = field(repr=False)
+    half_width_repeats: np.ndarray = field(repr=False)
+    held: np.ndarray = field(repr=False)
+    elastic_systematic: np.ndarray
+    half_width_systematic: np.ndarray
+
+    def interval(self, part: str) -> tuple[float, float]:
+        """Return the interval of the mean over angles of `elastic` or `half_width`, from the scatter of the repeats [N m].
+
+        Student's t over the repeats, on angles that all of them cover. Errors that are the same in all repeats are not in it.
+        """
+        from scipy.stats import t as student
+
+        repeats = getattr(self, f"{part}_repeats")
+        there = np.isfinite(repeats).all(axis=0)
+        if len(repeats) < 2 or not there.any():
+            return (float("nan"), float("nan"))
+        means = repeats[:, there].mean(axis=1)
+        half = float(student.ppf(0.5 + 0.5 * LEVEL, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)))
+        return (float(means.mean()) - half, float(means.mean()) + half)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with units in the names."""
@@ -98,8 +132,11 @@ class PassiveCurve:
             "inertial_share": self.inertial_share,
             "half_width_mean_Nm": float(np.mean(self.half_width[there])),
             "elastic_mean_Nm": float(np.mean(self.elastic[there])),
+            "half_width_interval_Nm": list(self.interval("half_width")),
+            "elastic_interval_Nm": list(self.interval("elastic")),
+            "held_deg": np.degrees(self.held.mean(axis=0)),
             "angle_deg": np.degrees(self.angle),
-            **{f"{n}_Nm": getattr(self, n) for n in ("rising", "falling", "elastic", "elastic_std", "half_width", "half_width_std")},
+            **{f"{n}_Nm": getattr(self, n) for n in _COLUMNS},
         }
 
 
@@ -116,6 +153,10 @@ class PassiveMoments:
         Cutoff of the low-pass [Hz].
     warnings : tuple of str
     dataset : Dataset
+    dependence : tuple of Dependence
+        For every joint that moved while an adjacent one was held at different angles: the elastic moment as a function of both.
+    checks : tuple of Check
+        Whether the muscles were silent and the movement slow.
     """
 
     trials: tuple[TrialMoments, ...]
@@ -123,6 +164,8 @@ class PassiveMoments:
     cutoff: float
     warnings: tuple[str, ...]
     dataset: Dataset = field(repr=False)
+    dependence: tuple[dependence.Dependence, ...] = ()
+    checks: tuple[relaxed.Check, ...] = ()
 
     def __repr__(self) -> str:
         parts = [f"joint {c.joint} in {c.configuration!r}: ±{np.nanmean(c.half_width):.3g} N m" for c in self.curves]
@@ -134,8 +177,9 @@ def passive_moments(
 ) -> PassiveMoments:
     """Compute the passive moment of every joint in slow movements, and its elastic and dissipative parts.
 
-    `tau_p = J(q)^T F_on_arm - G(q)`, plus joint torques where they were measured: equation 3.18 of the thesis with the force on the arm.
-    Inertial torques are neglected; a warning says where that is not right. Only the rigid arm of the model counts, none of its effects.
+    `tau_p = J(q)^T F_on_arm - G(q) - B(q) qdd - C(q, qd) qd`, plus joint torques where they were measured: equation 3.18 of the thesis
+    with the force on the arm. The thesis neglects inertial torques; here they are taken off by the model, and a check says where they are
+    not small. Only the rigid arm of the model counts, with what was worn, and none of its effects.
 
     Parameters
     ----------
@@ -163,7 +207,7 @@ def passive_moments(
     for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
         repeats = [m for m in trials if m.trial.configuration == configuration]
         for joint in range(dataset.model.n_joints):
-            curve = _curve(repeats, joint, int(bins))
+            curve = _curve(dataset, repeats, joint, int(bins))
             if curve is not None:
                 curves.append(curve)
             elif any(_moves(m.q[:, joint]) for m in repeats):
@@ -171,7 +215,10 @@ def passive_moments(
                     f"{configuration}: joint {joint + 1} moved, but not long enough in both directions over the same angles for a low-pass "
                     f"at {cutoff:g} Hz: left out"
                 )
-    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset)
+    checks = (relaxed.muscles_silent(dataset.trials), relaxed.slow_enough([(c.configuration, c.joint, c.inertial_share) for c in curves]))
+    if checks[0].passed is False:
+        warnings.append(checks[0].text)
+    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, _dependence(curves), checks)
 
 
 def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
@@ -179,6 +226,7 @@ def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
         raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
     chain, n = arm(dataset.model_of(trial.configuration)), dataset.model.n_joints
     q, qd, moment, inertial = (np.full((len(trial), n), np.nan) for _ in range(4))
+    seen = None if trial.force_on_arm is None else np.full((len(trial), 2), np.nan)
     for piece in trial.pieces():
         if piece.stop - piece.start < FEWEST_SAMPLES:
             continue
@@ -188,13 +236,15 @@ def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
         if trial.force_on_arm is not None:
             force = _armrs.smooth(np.ascontiguousarray(trial.force_on_arm[piece]), trial.rate, cutoff)[0]
             torque = torque + chain.static_torque(angle, force)
+            if seen is not None:
+                seen[piece] = force
         if trial.moment_on_arm is not None:  # it turns every joint alike
             torque = torque + _armrs.smooth(np.ascontiguousarray(trial.moment_on_arm[piece, None]), trial.rate, cutoff)[0]
         if trial.tau is not None:
             torque = torque + _armrs.smooth(np.ascontiguousarray(trial.tau[piece]), trial.rate, cutoff)[0]
-        q[piece], qd[piece], moment[piece] = angle, speed, torque
         inertial[piece] = chain.inverse_dynamics(angle, speed, acceleration) - gravity
-    return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)))
+        q[piece], qd[piece], moment[piece] = angle, speed, torque - inertial[piece]
+    return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)), seen)
 
 
 def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
@@ -225,15 +275,16 @@ def _deep_inside(own: np.ndarray, margin: int) -> np.ndarray:
     return np.convolve(own, np.ones(window), mode="same") > window - 0.5 if window <= len(own) else np.zeros(len(own), dtype=bool)
 
 
-def _curve(repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCurve | None:
+def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCurve | None:
     moving = [m.direction[:, joint] != 0 for m in repeats]
     samples = [m.q[keep, joint] for m, keep in zip(repeats, moving, strict=True)]
     angles = np.concatenate(samples)
     if angles.size == 0:
         return None
     edges = np.linspace(angles.min(), angles.max(), bins + 1)
-    rising, falling = (np.array([_binned(m, joint, sign, edges) for m in repeats]) for sign in (1, -1))
+    rising, falling = (np.array([_binned(m, m.moment[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
     elastic, half_width = 0.5 * (rising + falling), 0.5 * (rising - falling)
+    systematic = _systematic(dataset, repeats[0], joint, edges)
     if not np.isfinite(elastic).any():
         return None
     kept = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
@@ -250,15 +301,58 @@ def _curve(repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCur
         half_width=_mean(half_width),
         half_width_std=_deviation(half_width),
         inertial_share=float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2))),
+        elastic_repeats=elastic,
+        half_width_repeats=half_width,
+        held=np.array([np.nanmean(m.q, axis=0) for m in repeats]),
+        elastic_systematic=systematic[0],
+        half_width_systematic=systematic[1],
     )
 
 
-def _binned(moments: TrialMoments, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
-    """Return the mean moment in each bin of one direction; NaN where there are no samples."""
+def _systematic(dataset: Dataset, moments: TrialMoments, joint: int, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return deviations of elastic mean and half width from errors that all samples share; NaN where there are no samples."""
+    model = dataset.model_of(moments.trial.configuration)
+    there = np.isfinite(moments.q).all(axis=1) & (moments.direction[:, joint] != 0)
+    parts = np.full((len(uncertainty.Deviations.of(dataset).vector(model.n_joints)), len(moments.q)), np.nan)
+    force = None if moments.force is None else moments.force[there]
+    if there.any():
+        parts[:, there] = uncertainty.sensitivity(model, moments.q[there], force, uncertainty.Deviations.of(dataset))[:, :, joint]
+    rising, falling = (np.array([_binned(moments, part, joint, sign, edges) for part in parts]) for sign in (1, -1))
+    return uncertainty.by_jacobian(0.5 * (rising + falling)), uncertainty.by_jacobian(0.5 * (rising - falling))
+
+
+def _dependence(curves: Sequence[PassiveCurve]) -> tuple[dependence.Dependence, ...]:
+    """Fit every joint that moved in several configurations against the joint next to it, the one before where there are two."""
+    found = []
+    for joint in sorted({c.joint for c in curves}):
+        own = [c for c in curves if c.joint == joint and _led_by(c)]
+        n = own[0].held.shape[1] if own else 1
+        adjacent = joint - 1 if joint > 1 else joint + 1
+        if not own or n == 1:
+            continue
+        courses = []
+        for curve in own:
+            for elastic, held in zip(curve.elastic_repeats, curve.held, strict=True):
+                there = np.isfinite(elastic)
+                if there.sum() >= 4:
+                    courses.append(dependence.Course(curve.angle[there], elastic[there], float(held[adjacent - 1])))
+        fitted = dependence.fit(courses, joint, adjacent, LEVEL)
+        if fitted is not None:
+            found.append(fitted)
+    return tuple(found)
+
+
+def _led_by(curve: PassiveCurve) -> bool:
+    """Whether the joint moves far enough to tell a shape."""
+    return bool(np.ptp(curve.angle) > dependence.LEAST_HELD)
+
+
+def _binned(moments: TrialMoments, values: np.ndarray, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
+    """Return the mean of values, one a sample, in each angle bin of one direction; NaN where there are no samples."""
     own = moments.direction[:, joint] == sign
     place = np.clip(np.searchsorted(edges, moments.q[own, joint], side="right") - 1, 0, len(edges) - 2)
     count = np.bincount(place, minlength=len(edges) - 1)
-    total = np.bincount(place, weights=moments.moment[own, joint], minlength=len(edges) - 1)
+    total = np.bincount(place, weights=values[own], minlength=len(edges) - 1)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
@@ -280,7 +374,7 @@ def _deviation(values: np.ndarray) -> np.ndarray:
 def _not_slow(curves: Sequence[PassiveCurve]) -> tuple[str, ...]:
     return tuple(
         f"{c.configuration}: not slow for joint {c.joint}: inertial torques are {100 * c.inertial_share:.0f} % of the passive moment, "
-        f"more than {100 * SLOW:.0f} %"
+        f"more than {100 * relaxed.SLOW:.0f} %"
         for c in curves
-        if c.inertial_share > SLOW
+        if c.inertial_share > relaxed.SLOW
     )

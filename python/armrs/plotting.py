@@ -323,3 +323,10 @@ def _broken(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return t, values
     wide = np.flatnonzero(np.diff(t) > 2.5 * np.median(np.diff(t))) + 1
     return np.insert(t, wide, np.nan), np.insert(values, wide, np.nan)
+
+
+def shade(share: float) -> Any:
+    """Return a colour for a place in an order, 0 to 1, that also tells in grey."""
+    import matplotlib
+
+    return matplotlib.colormaps["viridis"](0.85 * share)

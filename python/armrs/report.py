@@ -214,6 +214,9 @@ def _simulated(data: Mapping[str, Any]) -> str:
 def _passive(data: Mapping[str, Any]) -> str:
     out = heading("Data set") + bullets(words.data_lines(data["data"]))
     out += heading("Passive moments") + paragraph(words.PASSIVE_MEANING, "soft") + table(tables.passive(data))
+    if data.get("dependence"):
+        out += heading("Own and adjacent angle") + paragraph(words.DEPENDENCE_MEANING, "soft") + table(tables.dependence(data))
+    out += heading("Assumptions") + bullets(c["text"] for c in data.get("checks", ()))
     return out + (heading("Take care") + bullets(data["warnings"]) if data["warnings"] else "")
 
 

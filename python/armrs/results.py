@@ -13,7 +13,7 @@ import numpy as np
 from . import _armrs, figures, files, report
 from .dataset import Dataset
 from .identification import Estimate, Identified
-from .moments import PassiveMoments
+from .moments import LEVEL, PassiveMoments
 from .quantities import value_in
 from .rig import NO_CONTACT
 from .samples import write_samples
@@ -204,6 +204,11 @@ def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str
         "data": data_of(result.dataset),
         "cutoff_Hz": result.cutoff,
         "curves": curves,
+        "dependence": [
+            d.to_dict() | {"joint_name": joints[d.joint - 1], "adjacent_name": joints[d.adjacent - 1]} for d in result.dependence
+        ],
+        "checks": [{"name": c.name, "passed": c.passed, "text": c.text} for c in result.checks],
+        "level": LEVEL,
         "warnings": list(result.warnings),
         "made_by": origin(command),
     }

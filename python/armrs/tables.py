@@ -162,6 +162,35 @@ def passive(data: Mapping[str, Any]) -> Table:
     return Table(head, rows, left=2)
 
 
+def dependence(data: Mapping[str, Any]) -> Table:
+    """Return how passive moments depend on the adjacent angle."""
+    rows = []
+    for d in data["dependence"]:
+        by_name = {c["name"]: c for c in d["coefficients"]}
+        rows.append(
+            [
+                f"{d['joint']} {d['joint_name']}",
+                f"{d['adjacent']} {d['adjacent_name']}",
+                *(f"{by_name[n]['value']:.3g} ± {by_name[n]['std']:.2g}" for n in ("upper", "lower", "stiffness", "coupling")),
+                f"{d['steepness_1_rad']:g}",
+                f"{d['p_value']:.2g}",
+                "yes" if d["coupled"] else "no",
+            ]
+        )
+    head = [
+        "joint",
+        "adjacent",
+        "upper [N m]",
+        "lower [N m]",
+        "stiffness [N m/rad]",
+        "coupling [N m/rad]",
+        "steepness [1/rad]",
+        "p",
+        "coupled",
+    ]
+    return Table(head, rows, left=2)
+
+
 def comparison(data: Mapping[str, Any]) -> Table:
     """Return identified values beside known ones, and beside the relative errors that the thesis reports."""
     rows = [

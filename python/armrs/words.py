@@ -18,6 +18,11 @@ PASSIVE_MEANING = (
     "shown, not taken off it."
 )
 
+DEPENDENCE_MEANING = (
+    "The elastic moment of a joint as a double exponential of its angle (upper and lower: its size at both ends of what was measured), "
+    "a slope, and a coupling: how much it changes with the adjacent angle. The coupling is tested against a model without it, over trials."
+)
+
 
 def name(result: Mapping[str, Any]) -> str:
     """Return what a result is about."""
@@ -142,6 +147,10 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print passive moments."""
     _head(result)
     show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
+    if result["dependence"]:
+        show("Elastic moment against own and adjacent angle", tables.dependence(result))
+    for check in result["checks"]:
+        print(check["text"])
     print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
     files_written(written)
 

@@ -1,0 +1,163 @@
+"""Check passive moments by repetition, in the ten configurations of the thesis with its orthosis.
+
+    python scripts/check_passive.py [runs]
+
+Hidden elastic and dissipative moments of a virtual subject beside what comes back, how often the intervals hold them, and how often a
+coupling is found that is there, or is not, with trials that scatter as in tables 4.1 and 4.2. Shared by tests/test_passive_moments.py.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+
+import armrs
+from armrs import Dataset, Effect, Joint, Model, Movement, Sensors, Simulated, Subject, Tolerance, Trial, moments
+from armrs.dataset import Added
+from armrs.experiment import literature_arm
+from armrs.model import Contact, Robot
+
+SHOULDER_HELD = (-68.0, -40.0, -16.0, 10.0, 36.0)
+ELBOW_HELD = (27.0, 40.0, 50.0, 60.0, 70.0)
+ELBOW_STD = (0.7, 1.1, 1.0, 0.4, 1.1)
+"""Largest deviations over six trials, table 4.1 [N m]."""
+SHOULDER_STD = (4.4, 3.6, 2.7, 3.0, 2.2)
+"""The same of the shoulder, table 4.2 [N m]."""
+REPEATS = 6
+WORN = ((1, 0.200, 0.231), (2, 0.191, 0.066))
+"""The orthosis: segment, mass [kg], distance from the segment's proximal joint [m]; the upper part is 0.091 m above the elbow."""
+
+
+def subject(coupling: float) -> Model:
+    """Return the subject of the thesis with passive joints; `coupling` is that of a spring over both [N m/rad]."""
+    segments, _ = literature_arm(Subject(77.0, 1.80, "male"), [0.322, 0.30])
+    effects = [Effect("end_range", 2, parameters={"upper_moment": 1.2, "lower_moment": 0.8, "steepness": 4.0, "upper": 1.5, "lower": 0.4})]
+    if coupling:
+        effects.append(Effect("biarticular", 2, parameters={"stiffness": coupling, "ratio": 1.0, "rest": 0.7}))
+    return Model(
+        segments,
+        (Joint("shoulder", stiffness=3.0, rest=-0.8, coulomb=0.4), Joint("elbow", stiffness=0.8, rest=0.9, coulomb=0.25)),
+        segment_uncertainty=0.05,
+        robot=Robot((0.6, 0.6), (1.05, -0.1)),
+        contact=Contact((10_000.0, 10_000.0), (25.0, 25.0)),
+        effects=tuple(effects),
+    )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Configuration:
+    """One configuration, simulated once: repeats differ by sensors and by tone."""
+
+    name: str
+    joint: int
+    std: float
+    run: Simulated
+
+
+def configurations(coupling: float) -> list[Configuration]:
+    """Simulate the ten configurations, in those of the shoulder with the orthosis on."""
+    arm, found = subject(coupling), []
+    worn = arm
+    for segment, mass, at in WORN:
+        worn = worn.with_mass(segment, mass, at)
+    for held, std in zip(SHOULDER_HELD, ELBOW_STD, strict=True):
+        path = np.radians([[held, 25.0], [held, 85.0], [held, 25.0]])
+        run = armrs.simulate(arm, Movement(path, speed=0.3, acceleration=0.6, shape="smooth"), rate=50.0)
+        found.append(Configuration(f"shoulder held at {held:g}", 2, std, run))
+    for held, std in zip(ELBOW_HELD, SHOULDER_STD, strict=True):
+        path = np.radians([[-65.0, held], [-15.0, held], [-65.0, held]])
+        run = armrs.simulate(worn, Movement(path, speed=0.2, acceleration=0.6, shape="smooth"), rate=50.0)
+        found.append(Configuration(f"elbow held at {held:g}", 1, std, run))
+    return found
+
+
+def session(known: list[Configuration], seed: int, scatter: float, coupling: float) -> Dataset:
+    """Return six trials of every configuration; `scatter` times the thesis' deviations is the tone of a trial, held by the robot."""
+    draw, sensors, trials = np.random.default_rng(seed), Sensors.realistic(), []
+    bare = subject(coupling)
+    arm = armrs.Arm(*([getattr(s, name) for s in bare.segments] for name in ("length", "mass", "com", "inertia")))
+    for c in known:
+        jacobian = arm.jacobian(c.run.q)
+        for repeat in range(1, REPEATS + 1):
+            tone = np.zeros(2)
+            tone[c.joint - 1] = scatter * c.std * draw.standard_normal()
+            force = (
+                c.run.force_on_arm + np.linalg.solve(jacobian.transpose(0, 2, 1), np.broadcast_to(tone, c.run.q.shape)[..., None])[..., 0]
+            )
+            step = 2.0 * sensors.force.range / 2**12
+            read = np.round((force + 0.2 * draw.standard_normal(force.shape)) / step) * step
+            q = c.run.q + sensors.angle.deviation * draw.standard_normal(c.run.q.shape)
+            trials.append(Trial(f"{c.name} {repeat}.csv", c.name, repeat, "fit", c.run.t, q, read))
+    names = tuple(c.name for c in known if c.joint == 1)
+    return Dataset(
+        "virtual subject",
+        bare.replace(joints=(Joint("shoulder"), Joint("elbow")), effects=()),
+        tuple(trials),
+        "robot",
+        tolerance=Tolerance(),
+        synthetic=True,
+        added=tuple(Added(*item, configurations=names) for item in WORN),
+    )
+
+
+def true_curve(c: Configuration, curve: moments.PassiveCurve) -> tuple[np.ndarray, np.ndarray]:
+    """Return the hidden elastic and dissipative moments at the angles of a curve, from the torques of the simulation [N m]."""
+    j = c.joint - 1
+    total = c.run.columns["torque.resisting"][:, j]
+    rising, falling = (
+        np.interp(curve.angle, *_sorted(c.run.q[own, j], total[own])) for own in (c.run.qd[:, j] > 0.05, c.run.qd[:, j] < -0.05)
+    )
+    return 0.5 * (rising + falling), 0.5 * (rising - falling)
+
+
+def _sorted(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    order = np.argsort(x)
+    return x[order], y[order]
+
+
+def recovered(known: list[Configuration], runs: int, scatter: float, coupling: float) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
+    """Yield configuration, part, and of each run the relative error (root mean square over angles) and whether its interval holds."""
+    held: dict[tuple[str, str], list[tuple[float, bool]]] = {}
+    for seed in range(runs):
+        result = moments.passive_moments(session(known, seed, scatter, coupling))
+        for c in known:
+            curve = next(k for k in result.curves if k.configuration == c.name and k.joint == c.joint)
+            for part, true in zip(("elastic", "half_width"), true_curve(c, curve), strict=True):
+                there = np.isfinite(getattr(curve, f"{part}_repeats")).all(axis=0)
+                error = np.sqrt(np.mean((getattr(curve, part) - true)[there] ** 2) / np.mean(true[there] ** 2))
+                low, high = curve.interval(part)
+                held.setdefault((c.name, part), []).append((float(error), bool(low <= true[there].mean() <= high)))
+    for (name, part), values in held.items():
+        errors, inside = zip(*values, strict=True)
+        yield name, part, np.array(errors), np.array(inside)
+
+
+def coupled(coupling: float, runs: int, joint: int = 2) -> tuple[float, np.ndarray]:
+    """Return how often a coupling is found at a joint with the thesis' scatter, and the couplings found [N m/rad]."""
+    known = configurations(coupling)
+    own = [c for c in known if c.joint == joint]
+    found = [
+        next(d for d in moments.passive_moments(session(own, 10_000 + seed, 1.0, coupling)).dependence if d.joint == joint)
+        for seed in range(runs)
+    ]
+    return float(np.mean([d.coupled for d in found])), np.array([d["coupling"].value for d in found])
+
+
+def main() -> None:
+    """Print the checks."""
+    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    for scatter in (0.0, 1.0):
+        print(f"tone of {scatter:g} times the thesis' deviations")
+        for name, part, errors, inside in recovered(configurations(1.0), runs, scatter, 1.0):
+            spread = f"{100 * np.median(errors):5.1f} %, 95 % of runs below {100 * np.quantile(errors, 0.95):6.1f} %"
+            print(f"  {name:22} {part:11} error {spread}; interval holds {100 * inside.mean():5.1f} %")
+    for coupling in (0.0, 1.0):
+        share, values = coupled(coupling, runs)
+        print(f"coupling {coupling:g} N m/rad at the elbow: found in {100 * share:.1f} %; {values.mean():.3f} ± {values.std():.3f} N m/rad")
+
+
+if __name__ == "__main__":
+    main()
