@@ -237,19 +237,31 @@ def identify(
     cutoff_hz: Annotated[float | None, typer.Option(help="Cutoff of the common low-pass [Hz]; chosen from the data when absent.")] = None,
     motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
     level: Annotated[float, typer.Option(help="Probability of the intervals, 0.5 to 1.")] = 0.95,
+    history: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Add the result to the history of this subject, a file of SQLite, and show it.")
+    ] = None,
+    date: Annotated[
+        str | None, typer.Option(metavar="YYYY-MM-DD", help="Date of the session; that in the data set's name, or today, when absent.")
+    ] = None,
     json: JsonFile = None,
 ) -> int:
     """Identify body segment and joint parameters, each with an interval and what decided it.
 
     Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, or when
-    speeds are noise to a good part.
+    speeds are noise to a good part. Such a result is not added to a history.
     """
+    from . import history as sessions
     from . import results, words
     from .dataset import load_dataset
     from .identification import identify as run_identification
 
     folder = _folder(out, json)
     data = load_dataset(dataset)
+    if history is None and date is not None:
+        raise BadInput("--date", date, "--date together with --history")
+    day = sessions.session_date(data.name, date)
+    if history is not None:
+        sessions.check(history, data.model.n_joints)
     with console.progress("identifying"):
         result = run_identification(
             data,
@@ -260,8 +272,12 @@ def identify(
             level=level,
         )
     plain = results.identified_data(result, _command(context))
+    if history is not None and result.is_sound:
+        plain["history"] = [course.to_dict() for course in sessions.add(history, result, day)]
     written = results.write_identified(result, plain, folder) if folder else []
     console.warn([*data.warnings, *result.contradictions, *result.misfits])
+    if history is not None and not result.is_sound:
+        console.warn([f"{history}: not added to the history, since the result is not sound"])
     present(lambda: plain, json, lambda: words.identified(plain, written))
     return 0 if result.is_sound else 1
 

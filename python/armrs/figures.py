@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import plotting, tables
-from .dependence import Dependence
+from .dependence import LEAST_HELD, Dependence
 from .identification import Explained, Identified
 from .moments import PassiveMoments
 from .simulation import Simulated
@@ -67,6 +67,27 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
         "value open it is that of the model as given, moved only as far as the combinations that are measured ask for."
     )
     return Drawn("parameters", "Parameters with intervals", text, figure)
+
+
+def history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
+    """Draw every parameter over sessions, with twice its standard deviation."""
+    columns = min(3, max(1, len(courses)))
+    rows = max(1, -(-len(courses) // columns))
+    with plotting.style():
+        figure = plotting.figure(3.6 * columns, 2.4 * rows)
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        for ax, course in zip(axes, courses, strict=False):
+            place = np.arange(len(course["dates"]))
+            colour = plotting.ORANGE if course["changed"] else plotting.BLUE
+            ax.errorbar(place, course["values"], 2.0 * np.asarray(course["stds"]), fmt="o-", color=colour, capsize=3)
+            ax.set_xticks(place, [date[2:] for date in course["dates"]], rotation=45, fontsize="small")
+            name = course["name"] if course["joint"] is None else f"{course['kind']} {course['joint']} {course['name']}"
+            ax.set(title=f"{name}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
+            ax.title.set_fontsize("small")
+        for ax in axes[len(courses) :]:
+            ax.set_axis_off()
+    text = "Parameters that the data decided, over the sessions; bars are twice the standard deviation. An orange one differs in the last session."
+    return Drawn("history", "Over the sessions", text, figure)
 
 
 def _named(item: Mapping[str, Any], joints: Sequence[str]) -> str:
@@ -186,7 +207,8 @@ def _dependence(result: PassiveMoments, fitted: Dependence, names: Sequence[str]
     """Draw elastic moments of one joint in all configurations, and what was fitted to them."""
     figure = plotting.figure(6.4, 4.2)
     ax = figure.subplots()
-    own = sorted((c for c in result.curves if c.joint == fitted.joint), key=lambda c: float(c.held[:, fitted.adjacent - 1].mean()))
+    moved = [c for c in result.curves if c.joint == fitted.joint and np.ptp(c.angle) > LEAST_HELD]
+    own = sorted(moved, key=lambda c: float(c.held[:, fitted.adjacent - 1].mean()))
     for number, curve in enumerate(own):
         held = float(curve.held[:, fitted.adjacent - 1].mean())
         colour = plotting.shade(number / max(len(own) - 1, 1))

@@ -76,6 +76,8 @@ def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> 
     name = "identified.toml"
     files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
     drawn = figures.identified(result, data)
+    if "history" in data:
+        drawn.append(figures.history(data["history"]))
 
     def write(out: Path) -> list[Path]:
         result.model.write(out / name)

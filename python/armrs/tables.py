@@ -191,6 +191,26 @@ def dependence(data: Mapping[str, Any]) -> Table:
     return Table(head, rows, left=2)
 
 
+def history(courses: Sequence[Mapping[str, Any]]) -> Table:
+    """Return every parameter over sessions: the last value, and how it differs from those before."""
+    rows = []
+    for c in courses:
+        label = c["name"] if c["joint"] is None else f"{c['kind']} {c['joint']} {c['name']}"
+        several = len(c["dates"]) > 1
+        rows.append(
+            [
+                label,
+                c["unit"],
+                len(c["dates"]),
+                f"{c['values'][-1]:.4g} ± {c['stds'][-1]:.2g}",
+                f"{c['change']:+.2g} ± {c['change_std']:.2g}" if several else "–",
+                f"{c['p_value']:.2g}" if several else "–",
+                ("yes" if c["changed"] else "no") if several else "–",
+            ]
+        )
+    return Table(["parameter", "unit", "sessions", "last", "change", "p (Holm)", "changed"], rows, left=2)
+
+
 def comparison(data: Mapping[str, Any]) -> Table:
     """Return identified values beside known ones, and beside the relative errors that the thesis reports."""
     rows = [

@@ -120,6 +120,8 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         print("\n".join(f"  {line}" for line in lines))
     if not data["test"]["trials"]:
         print("No test trials: nothing was checked on data that the fit has not seen.")
+    if "history" in result:
+        show("Over the sessions, what the data decided in the last one", tables.history(result["history"]))
     files_written(written)
 
 

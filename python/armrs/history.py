@@ -1,0 +1,243 @@
+"""Results of one subject over sessions: a file of SQLite, a test of change, and a plot."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import re
+import sqlite3
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import BadInput, Text
+from .identification import Estimate, Identified
+
+APPLICATION = 0x61726D73
+"""Mark of our files: "arms" in ASCII."""
+LEVEL = 0.95
+"""One minus the probability of calling any parameter changed when none is."""
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS session (
+    id INTEGER PRIMARY KEY, name TEXT NOT NULL, date TEXT NOT NULL, method TEXT NOT NULL, joints INTEGER NOT NULL,
+    UNIQUE (name, date, method)
+);
+CREATE TABLE IF NOT EXISTS estimate (
+    session INTEGER NOT NULL REFERENCES session (id) ON DELETE CASCADE,
+    name TEXT NOT NULL, kind TEXT NOT NULL, joint INTEGER NOT NULL, value REAL NOT NULL, std REAL NOT NULL, unit TEXT NOT NULL,
+    decided_by TEXT NOT NULL,
+    PRIMARY KEY (session, name, kind, joint)
+);
+"""
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One parameter over sessions that measured it.
+
+    Attributes
+    ----------
+    name, kind : str
+    joint : int or None
+        From 1; None where it belongs to no single joint.
+    unit : str
+    dates : tuple of str
+        ISO dates, in order.
+    values, stds : ndarray, shape (n_sessions,)
+    change, change_std : float
+        The last value less the mean of those before, weighted by certainty; NaN for a single session.
+    p_value : float
+        Of so large a change by chance, over all parameters followed (Holm 1979); NaN for a single session.
+    """
+
+    name: str
+    kind: str
+    joint: int | None
+    unit: str
+    dates: tuple[str, ...]
+    values: np.ndarray
+    stds: np.ndarray
+    change: float
+    change_std: float
+    p_value: float
+
+    @property
+    def changed(self) -> bool:
+        """Whether the last session differs from those before."""
+        return self.p_value < 1.0 - LEVEL
+
+    @property
+    def label(self) -> str:
+        """Name for people."""
+        return self.name if self.joint is None or self.kind in ("segment", "combination") else f"{self.kind} {self.joint} {self.name}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "joint": self.joint,
+            "unit": self.unit,
+            "dates": list(self.dates),
+            "values": self.values,
+            "stds": self.stds,
+            "change": self.change,
+            "change_std": self.change_std,
+            "p_value": self.p_value,
+            "changed": self.changed,
+        }
+
+
+def session_date(name: str, given: str | None = None) -> str:
+    """Return the date of a session: as given, or in the name of the data set, or today.
+
+    Raises
+    ------
+    BadInput
+        For a date that is none.
+    """
+    if given is None:
+        found = _DATE.search(name)
+        given = found[0] if found else datetime.date.today().isoformat()
+    try:
+        return datetime.date.fromisoformat(given).isoformat()
+    except ValueError:
+        raise BadInput("--date", given, "a date such as 2026-03-14") from None
+
+
+def check(path: str | os.PathLike[str], joints: int) -> None:
+    """Refuse a history file that cannot be added to, before any work is done."""
+    file = Path(path)
+    if file.is_dir():
+        raise BadInput("--history", Text("a folder"), "the name of a file", file=file)
+    if file.exists():
+        with closing(_open(file)) as connection:
+            _same_arm(connection, joints, file)
+
+
+def add(path: str | os.PathLike[str], result: Identified, date: str) -> tuple[Course, ...]:
+    """Add a result to the history of its subject, and return the history.
+
+    Parameters
+    ----------
+    path : path
+        File of SQLite, made when it does not exist; one subject a file.
+    result : Identified
+        The same session (name of the data set, date, method) takes the place of its former result.
+    date : str
+        ISO date of the session.
+
+    Raises
+    ------
+    BadInput
+        For a file of another kind or of another arm.
+    """
+    file = Path(path)
+    check(file, result.dataset.model.n_joints)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    estimates = {(e.name, e.kind, e.joint or 0): e for e in (*result.parameters, *result.combinations)}
+    try:
+        with closing(_open(file)) as connection, connection:
+            connection.executescript(f"PRAGMA application_id = {APPLICATION}; {_SCHEMA}")
+            key = (result.dataset.name, date, result.method)
+            connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
+            made = connection.execute(
+                "INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints)
+            )
+            rows = [(made.lastrowid, *k, e.value, e.std, e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)]
+            connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
+    except sqlite3.Error as error:
+        raise BadInput("--history", Text(str(error)), "a history that can be written", file=file) from None
+    return read(file, result.method)
+
+
+def read(path: str | os.PathLike[str], method: str = "joint") -> tuple[Course, ...]:
+    """Return every parameter that the data decided in the last session, over all sessions in which they did."""
+    file = Path(path)
+    try:
+        with closing(_open(file)) as connection:
+            rows = connection.execute(
+                "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std FROM estimate e JOIN session s ON s.id = e.session "
+                "WHERE s.method = ? AND e.decided_by = 'data' ORDER BY s.date, s.id, e.rowid",
+                (method,),
+            ).fetchall()
+    except sqlite3.Error as error:
+        raise BadInput("--history", Text(str(error)), "a history that armrs wrote", file=file) from None
+    by_parameter: dict[tuple[str, str, int, str], list[tuple[str, float, float]]] = {}
+    for *key, date, value, std in rows:
+        by_parameter.setdefault((key[0], key[1], key[2], key[3]), []).append((date, value, std))
+    last = max((row[4] for row in rows), default="")
+    followed = {key: points for key, points in by_parameter.items() if points[-1][0] == last}
+    tests = [_change(points) for points in followed.values()]
+    adjusted = _holm([p for *_, p in tests])
+    return tuple(
+        Course(
+            name=name,
+            kind=kind,
+            joint=joint or None,
+            unit=unit,
+            dates=tuple(p[0] for p in points),
+            values=np.array([p[1] for p in points]),
+            stds=np.array([p[2] for p in points]),
+            change=change,
+            change_std=std,
+            p_value=p_value,
+        )
+        for ((name, kind, joint, unit), points), (change, std, _), p_value in zip(followed.items(), tests, adjusted, strict=True)
+    )
+
+
+def _open(file: Path) -> sqlite3.Connection:
+    """Open a history, or refuse what is none."""
+    try:
+        connection = sqlite3.connect(file)
+        connection.execute("PRAGMA foreign_keys = ON")
+        tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+        mark = connection.execute("PRAGMA application_id").fetchone()[0]
+    except sqlite3.Error as error:
+        raise BadInput("--history", Text(str(error)), "a history that armrs wrote, or a new file", file=file) from None
+    if tables and mark != APPLICATION:
+        connection.close()
+        raise BadInput("--history", Text("a database of another program"), "a history that armrs wrote, or a new file", file=file)
+    return connection
+
+
+def _same_arm(connection: sqlite3.Connection, joints: int, file: Path) -> None:
+    if not connection.execute("SELECT count(*) FROM sqlite_master WHERE name = 'session'").fetchone()[0]:
+        return
+    other = connection.execute("SELECT joints FROM session WHERE joints != ?", (joints,)).fetchone()
+    if other is not None:
+        raise BadInput("--history", Text(f"the history of an arm of {other[0]} joints"), f"one of {joints}: one subject a file", file=file)
+
+
+def _usable(estimate: Estimate) -> bool:
+    return bool(np.isfinite(estimate.value) and np.isfinite(estimate.std))
+
+
+def _change(points: Sequence[tuple[str, float, float]]) -> tuple[float, float, float]:
+    """Return the last value less the weighted mean of those before, its deviation, and the two-sided probability."""
+    from scipy.stats import norm
+
+    if len(points) < 2:
+        return (np.nan, np.nan, np.nan)
+    values, stds = np.array([p[1] for p in points]), np.array([max(p[2], 1e-300) for p in points])
+    weights = (stds[:-1].min() / stds[:-1]) ** 2
+    mean = float(np.sum(weights * values[:-1]) / np.sum(weights))
+    mean_std = float(stds[:-1].min() / np.sqrt(np.sum(weights)))
+    change, std = float(values[-1]) - mean, float(np.hypot(stds[-1], mean_std))
+    return change, std, float(2.0 * norm.sf(abs(change) / std))
+
+
+def _holm(p_values: Sequence[float]) -> list[float]:
+    """Return probabilities over all tests together (Holm 1979); NaN stays."""
+    order = [int(k) for k in np.argsort(p_values) if np.isfinite(p_values[k])]
+    adjusted, largest = [float("nan")] * len(p_values), 0.0
+    for place, k in enumerate(order):
+        largest = max(largest, min(1.0, (len(order) - place) * p_values[k]))
+        adjusted[k] = largest
+    return adjusted

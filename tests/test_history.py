@@ -1,0 +1,105 @@
+"""Results over sessions: kept, tested, drawn, and files that are refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import BadInput, Identified
+from armrs import history as sessions
+from armrs.cli import main
+
+
+@pytest.fixture(scope="module")
+def identified(slow_arm: Path) -> Identified:
+    return armrs.identify(armrs.load_dataset(slow_arm), with_effects=["coulomb"])
+
+
+def moved(result: Identified, by: dict[str, float]) -> Identified:
+    """The same result with some values changed, by name."""
+    shifted = [
+        tuple(dataclasses.replace(e, value=e.value + by.get(e.name, 0.0)) for e in part)
+        for part in (result.parameters, result.combinations)
+    ]
+    return dataclasses.replace(result, parameters=shifted[0], combinations=shifted[1])
+
+
+def test_a_change_is_found_and_the_rest_is_not(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "subject.sqlite"
+    std = next(e.std for e in identified.combinations if e.name == "m2*l2")
+    for k, date in enumerate(("2026-01-05", "2026-02-03", "2026-03-04")):
+        courses = sessions.add(file, moved(identified, {"m2*l2": 0.2 * k * std}), date)
+        assert not any(c.changed for c in courses)
+    courses = sessions.add(file, moved(identified, {"m2*l2": 8.0 * std}), "2026-04-02")
+    assert [c.label for c in courses if c.changed] == ["m2*l2"]
+    course = next(c for c in courses if c.name == "m2*l2")
+    assert course.dates == ("2026-01-05", "2026-02-03", "2026-03-04", "2026-04-02")
+    # Three equal deviations: their mean is surer by the root of three.
+    assert course.change == pytest.approx((8.0 - 0.2) * std) and course.change_std == pytest.approx(std * np.sqrt(4.0 / 3.0))
+
+
+def test_no_more_than_one_in_twenty_is_called_changed() -> None:
+    draw = np.random.default_rng(8)
+    false = 0
+    for _ in range(400):
+        p_values = [sessions._change([("d", draw.standard_normal(), 1.0) for _ in range(3)])[2] for _ in range(8)]
+        false += min(sessions._holm(p_values)) < 0.05
+    assert false / 400 < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 400)
+
+
+def test_the_same_session_replaces_itself_and_order_is_by_date(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "subject.sqlite"
+    sessions.add(file, identified, "2026-03-01")
+    sessions.add(file, identified, "2026-03-01")
+    courses = sessions.add(file, identified, "2026-01-01")
+    assert all(c.dates == ("2026-01-01", "2026-03-01") and c.change == 0.0 for c in courses)
+
+
+def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "s.sqlite"
+    for date in ("2026-01-01", "2026-02-01"):
+        out = ["-o", str(tmp_path / "out"), "--json", str(tmp_path / "r.json")]
+        assert main(["identify", str(slow_arm), "--with", "coulomb", "--history", str(file), "--date", date, *out]) == 0
+    assert "Over the sessions" in capsys.readouterr().out
+    history = json.loads((tmp_path / "r.json").read_text())["history"]
+    assert {"m2*l2", "torque"} <= {h["name"] for h in history} and all(h["dates"] == ["2026-01-01", "2026-02-01"] for h in history)
+    assert (tmp_path / "out/figures/history.png").stat().st_size > 10_000
+
+
+def test_the_date_is_in_the_name_or_today() -> None:
+    assert sessions.session_date("S1 2026-03-14") == "2026-03-14"
+    assert sessions.session_date("S1 2026-03-14", "2025-01-02") == "2025-01-02"
+    assert len(sessions.session_date("S1")) == 10
+    with pytest.raises(BadInput, match=r"--date: found '2026-02-30', allowed a date such as"):
+        sessions.session_date("S1", "2026-02-30")
+
+
+def test_refuses_other_files(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "text.sqlite").write_text("no database, but long enough to look like one " * 30)
+    with sqlite3.connect(tmp_path / "other.sqlite") as other:
+        other.execute("CREATE TABLE x (y)")
+    other.close()
+    with sqlite3.connect(tmp_path / "three.sqlite") as three:
+        three.executescript(f"PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA}")
+        three.execute("INSERT INTO session (name, date, method, joints) VALUES ('a', '2026-01-01', 'joint', 3)")
+    three.close()
+    cases = {
+        "text.sqlite": "found file is not a database",
+        "other.sqlite": "found a database of another program",
+        "three.sqlite": "found the history of an arm of 3 joints, allowed one of 2",
+        ".": "found a folder",
+    }
+    for name, message in cases.items():
+        before = (tmp_path / name).read_bytes() if name != "." else b""
+        assert main(["identify", str(slow_arm), "--history", str(tmp_path / name), "-o", str(tmp_path / "out")]) == 2
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1, error
+        assert name == "." or (tmp_path / name).read_bytes() == before
+    assert main(["identify", str(slow_arm), "--date", "2026-01-01"]) == 2
+    assert not (tmp_path / "out").exists()
