@@ -33,32 +33,32 @@
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_arm`.
-#define ARMRS_ARM_WORDS 160
+#define ARMRS_ARM_WORDS 176
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_arm`.
-#define ARMRS_ARM_WORDS 96
+#define ARMRS_ARM_WORDS 112
 #endif
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_compensation`.
-#define ARMRS_COMPENSATION_WORDS 480
+#define ARMRS_COMPENSATION_WORDS 512
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_compensation`.
-#define ARMRS_COMPENSATION_WORDS 264
+#define ARMRS_COMPENSATION_WORDS 288
 #endif
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_estimator`.
-#define ARMRS_ESTIMATOR_WORDS 1280
+#define ARMRS_ESTIMATOR_WORDS 1344
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_estimator`.
-#define ARMRS_ESTIMATOR_WORDS 704
+#define ARMRS_ESTIMATOR_WORDS 736
 #endif
 
 // Size of an `armrs_monitor`.
@@ -66,12 +66,12 @@
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_path`.
-#define ARMRS_PATH_WORDS 60
+#define ARMRS_PATH_WORDS 164
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_path`.
-#define ARMRS_PATH_WORDS 32
+#define ARMRS_PATH_WORDS 84
 #endif
 
 // Size of an `armrs_robot`.
@@ -140,6 +140,20 @@ typedef enum armrs_reason {
   // A clock or a time stamp that ran backwards.
   ARMRS_REASON_CLOCK = 4,
 } armrs_reason;
+
+// What a channel measures.
+typedef enum armrs_quantity {
+  // Angle [rad].
+  ARMRS_ANGLE = 0,
+  // Speed [rad/s].
+  ARMRS_SPEED = 1,
+  // Acceleration [rad/s^2].
+  ARMRS_ACCELERATION = 2,
+  // Force [N] or torque [N m].
+  ARMRS_FORCE = 3,
+  // Power into the arm [W].
+  ARMRS_POWER = 4,
+} armrs_quantity;
 
 #if !defined(ARMRS_SINGLE)
 // The number that the library computes with.

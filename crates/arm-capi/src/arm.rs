@@ -1,8 +1,9 @@
 //! The arm: its kinematics, dynamics and effects.
 
 use core::ffi::{CStr, c_char};
+use core::mem::MaybeUninit;
 
-use arm_core::effect::{Effect, KINDS, Kind, resisting_torque};
+use arm_core::effect::{Effect, KINDS, Kind, Motion, resisting_torque};
 use arm_core::{
     Chain, Equation, Load, Pose, Segment, forward_dynamics, gravity, inverse_dynamics, jacobian,
     joint_force, static_torque, tip,
@@ -10,7 +11,9 @@ use arm_core::{
 
 use crate::held::{Held, held};
 use crate::motion::{armrs_motion, array, joints};
-use crate::status::{ARMRS_OUT_OF_RANGE, ARMRS_UNKNOWN, armrs_status, ended, given, place};
+use crate::status::{
+    ARMRS_NULL, ARMRS_OUT_OF_RANGE, ARMRS_UNKNOWN, armrs_status, ended, given, place,
+};
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_real};
 
 /// One rigid segment.
@@ -55,15 +58,15 @@ pub struct armrs_load {
 #[repr(C)]
 pub struct armrs_arm {
     tag: u64,
-    words: [u64; ARMRS_ARM_WORDS],
+    words: [MaybeUninit<u64>; ARMRS_ARM_WORDS],
 }
 
 /// Size of an `armrs_arm`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_ARM_WORDS: usize = 160;
+pub const ARMRS_ARM_WORDS: usize = 176;
 /// Size of an `armrs_arm`.
 #[cfg(feature = "single")]
-pub const ARMRS_ARM_WORDS: usize = 96;
+pub const ARMRS_ARM_WORDS: usize = 112;
 
 pub(crate) type Core = Equation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 
@@ -87,10 +90,13 @@ pub unsafe extern "C" fn armrs_effect_named(
     effect: *mut armrs_effect,
 ) -> armrs_status {
     let run = || {
-        // SAFETY: as promised by the caller.
-        let (first, effect) = unsafe { (given(name)?, place(effect)?) };
+        if name.is_null() {
+            return Err(ARMRS_NULL);
+        }
         // SAFETY: it is not null, and ends with zero.
-        let name = unsafe { CStr::from_ptr(first) }.to_bytes();
+        let name = unsafe { CStr::from_ptr(name) }.to_bytes();
+        // SAFETY: as promised by the caller.
+        let effect = unsafe { place(effect)? };
         let mut found = KINDS.iter().enumerate();
         let (number, kind) = found
             .find(|(_, kind)| kind.info().kind.as_bytes() == name)
@@ -260,7 +266,9 @@ pub unsafe extern "C" fn armrs_resistance(
         let force = unsafe { force_on_arm.as_ref() }
             .copied()
             .unwrap_or_default();
-        *torque = array(&resistance(arm.inner()?, motion, force));
+        let seen = motion.core();
+        let found = resistance(arm.inner()?, &Pose::new(&seen.q), &seen, force);
+        *torque = array(&found);
         Ok(())
     };
     ended(run())
@@ -268,11 +276,12 @@ pub unsafe extern "C" fn armrs_resistance(
 
 fn resistance(
     arm: &Kept,
-    motion: &armrs_motion,
+    pose: &Pose<armrs_real, ARMRS_JOINTS>,
+    seen: &Motion<armrs_real, ARMRS_JOINTS>,
     force: [armrs_real; 2],
 ) -> arm_core::Joints<armrs_real, ARMRS_JOINTS> {
-    let (chain, seen) = (arm.equation.chain(), motion.core());
-    let bearing = joint_force(chain, &Pose::new(&seen.q), (&seen.qd, &seen.qdd), force);
+    let chain = arm.equation.chain();
+    let bearing = joint_force(chain, pose, (&seen.qd, &seen.qdd), force);
     let seen = seen.with_joint_force(&bearing);
     resisting_torque(arm.equation.effects(), &seen, &arm.memory)
 }
@@ -297,7 +306,7 @@ pub unsafe extern "C" fn armrs_inverse_dynamics(
         let (chain, seen) = (arm.equation.chain(), motion.core());
         let pose = Pose::new(&seen.q);
         let moving = inverse_dynamics(chain, &pose, &seen.qd, &seen.qdd);
-        let resisting = resistance(arm, motion, load.force_on_arm);
+        let resisting = resistance(arm, &pose, &seen, load.force_on_arm);
         let pushed = static_torque(chain, &pose, load.force_on_arm, load.moment_on_arm);
         *torque = core::array::from_fn(|j| moving[j] + resisting[j] - pushed[j]);
         Ok(())
@@ -325,14 +334,14 @@ pub unsafe extern "C" fn armrs_forward_dynamics(
             qdd: [0.0; ARMRS_JOINTS],
             ..*motion
         };
-        let resisting = resistance(arm, &still, load.force_on_arm);
         let seen = still.core();
+        let pose = Pose::new(&seen.q);
+        let resisting = resistance(arm, &pose, &seen, load.force_on_arm);
         let net = Load {
             torque: joints(&core::array::from_fn(|j| load.torque[j] - resisting[j])),
             force_on_arm: load.force_on_arm,
             moment_on_arm: load.moment_on_arm,
         };
-        let pose = Pose::new(&seen.q);
         let found = forward_dynamics(arm.equation.chain(), &pose, &seen.qd, &net);
         *acceleration = array(&found);
         Ok(())

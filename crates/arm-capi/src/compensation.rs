@@ -1,5 +1,7 @@
 //! The torque that carries an arm that was identified elsewhere.
 
+use core::mem::MaybeUninit;
+
 use arm_core::Compensation;
 
 use crate::arm::armrs_arm;
@@ -12,15 +14,15 @@ use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_real};
 #[repr(C)]
 pub struct armrs_compensation {
     tag: u64,
-    words: [u64; ARMRS_COMPENSATION_WORDS],
+    words: [MaybeUninit<u64>; ARMRS_COMPENSATION_WORDS],
 }
 
 /// Size of an `armrs_compensation`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_COMPENSATION_WORDS: usize = 480;
+pub const ARMRS_COMPENSATION_WORDS: usize = 512;
 /// Size of an `armrs_compensation`.
 #[cfg(feature = "single")]
-pub const ARMRS_COMPENSATION_WORDS: usize = 264;
+pub const ARMRS_COMPENSATION_WORDS: usize = 288;
 
 type Core = Compensation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 

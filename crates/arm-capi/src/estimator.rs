@@ -1,5 +1,7 @@
 //! Identification while the arm moves.
 
+use core::mem::MaybeUninit;
+
 use arm_core::Measured;
 use arm_core::estimator::{Decision, Estimator, Fault, Heed, Sample, Settings};
 
@@ -112,15 +114,15 @@ pub struct armrs_estimate {
 #[repr(C)]
 pub struct armrs_estimator {
     tag: u64,
-    words: [u64; ARMRS_ESTIMATOR_WORDS],
+    words: [MaybeUninit<u64>; ARMRS_ESTIMATOR_WORDS],
 }
 
 /// Size of an `armrs_estimator`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_ESTIMATOR_WORDS: usize = 1280;
+pub const ARMRS_ESTIMATOR_WORDS: usize = 1344;
 /// Size of an `armrs_estimator`.
 #[cfg(feature = "single")]
-pub const ARMRS_ESTIMATOR_WORDS: usize = 704;
+pub const ARMRS_ESTIMATOR_WORDS: usize = 736;
 
 type Core = Estimator<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 

@@ -1,5 +1,7 @@
 //! The safety monitor.
 
+use core::mem::MaybeUninit;
+
 use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason};
 
 use crate::held::{Held, held};
@@ -86,7 +88,7 @@ pub struct armrs_stop {
 #[repr(C)]
 pub struct armrs_monitor {
     tag: u64,
-    words: [u64; ARMRS_MONITOR_WORDS],
+    words: [MaybeUninit<u64>; ARMRS_MONITOR_WORDS],
 }
 
 /// Size of an `armrs_monitor`.

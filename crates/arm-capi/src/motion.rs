@@ -1,9 +1,10 @@
 //! Movements: a sample of one, and paths through waypoints.
 
 use core::ffi::c_int;
+use core::mem::MaybeUninit;
 
 use arm_core::effect::Motion;
-use arm_core::{Joints, Limits, Path, Shape};
+use arm_core::{Joints, Limits, Path, Route, Shape};
 
 use crate::held::{Held, held};
 use crate::status::{ARMRS_OUT_OF_RANGE, armrs_status, ended, given, place};
@@ -53,34 +54,19 @@ pub struct armrs_limits {
 #[repr(C)]
 pub struct armrs_path {
     tag: u64,
-    words: [u64; ARMRS_PATH_WORDS],
+    words: [MaybeUninit<u64>; ARMRS_PATH_WORDS],
 }
 
 /// Size of an `armrs_path`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_PATH_WORDS: usize = 60;
+pub const ARMRS_PATH_WORDS: usize = 164;
 /// Size of an `armrs_path`.
 #[cfg(feature = "single")]
-pub const ARMRS_PATH_WORDS: usize = 32;
+pub const ARMRS_PATH_WORDS: usize = 84;
 
-/// What an `armrs_path` keeps.
-#[derive(Clone, Copy)]
-pub struct Waypoints {
-    points: [Joints<armrs_real, ARMRS_JOINTS>; ARMRS_WAYPOINTS],
-    count: usize,
-    limits: [Limits<armrs_real>; ARMRS_JOINTS],
-    shape: Shape,
-    pause: armrs_real,
-}
+type Core = Route<armrs_real, ARMRS_JOINTS, ARMRS_WAYPOINTS>;
 
-held!(armrs_path holds Waypoints, b"path 0.1");
-
-impl Waypoints {
-    fn path(&self) -> Result<Path<'_, armrs_real, ARMRS_JOINTS>, armrs_status> {
-        let points = self.points.get(..self.count).ok_or(ARMRS_OUT_OF_RANGE)?;
-        Ok(Path::new(self.shape, points, self.limits, self.pause)?)
-    }
-}
+held!(armrs_path holds Core, b"path 0.1");
 
 /// Makes a path.
 ///
@@ -101,29 +87,22 @@ pub unsafe extern "C" fn armrs_path_init(
     let run = || {
         // SAFETY: as promised by the caller.
         let (path, limits) = unsafe { (place(path)?, given(limits)?) };
-        let mut kept = Waypoints {
-            points: [joints(&[0.0; ARMRS_JOINTS]); ARMRS_WAYPOINTS],
-            count,
-            limits: limits.map(|l| Limits {
-                speed: l.speed,
-                acceleration: l.acceleration,
-            }),
-            shape: if smooth == 0 {
-                Shape::Trapezoid
-            } else {
-                Shape::Smooth
-            },
-            pause,
-        };
-        if count > ARMRS_WAYPOINTS {
-            return Err(ARMRS_OUT_OF_RANGE);
-        }
-        for (i, point) in kept.points.iter_mut().take(count).enumerate() {
+        let mut points = [joints(&[0.0; ARMRS_JOINTS]); ARMRS_WAYPOINTS];
+        let used = points.get_mut(..count).ok_or(ARMRS_OUT_OF_RANGE)?;
+        for (i, point) in used.iter_mut().enumerate() {
             // SAFETY: there are `count` waypoints.
             *point = joints(unsafe { given(waypoints.wrapping_add(i))? });
         }
-        kept.path()?;
-        path.keep(&kept);
+        let limits = limits.map(|l| Limits {
+            speed: l.speed,
+            acceleration: l.acceleration,
+        });
+        let shape = if smooth == 0 {
+            Shape::Trapezoid
+        } else {
+            Shape::Smooth
+        };
+        path.keep(&Route::new(&Path::new(shape, used, limits, pause)?)?);
         Ok(())
     };
     ended(run())
@@ -141,7 +120,7 @@ pub unsafe extern "C" fn armrs_path_duration(
     let run = || {
         // SAFETY: as promised by the caller.
         let (path, duration) = unsafe { (given(path)?, place(duration)?) };
-        *duration = path.inner()?.path()?.duration();
+        *duration = path.inner()?.duration();
         Ok(())
     };
     ended(run())
@@ -160,7 +139,7 @@ pub unsafe extern "C" fn armrs_path_at(
     let run = || {
         // SAFETY: as promised by the caller.
         let (path, motion) = unsafe { (given(path)?, place(motion)?) };
-        let found = path.inner()?.path()?.at(time);
+        let found = path.inner()?.at(time);
         *motion = armrs_motion {
             time,
             q: array(&found.q),

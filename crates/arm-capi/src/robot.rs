@@ -1,6 +1,7 @@
 //! The two-link robot that leads the hand.
 
 use core::ffi::c_int;
+use core::mem::MaybeUninit;
 
 use arm_core::{Elbow, Joints, Robot};
 
@@ -12,7 +13,7 @@ use crate::status::{armrs_status, ended, given, place};
 #[repr(C)]
 pub struct armrs_robot {
     tag: u64,
-    words: [u64; ARMRS_ROBOT_WORDS],
+    words: [MaybeUninit<u64>; ARMRS_ROBOT_WORDS],
 }
 
 /// Size of an `armrs_robot`.

@@ -42,6 +42,8 @@ const OPEN: f64 = 10.0;
 pub struct Equation<T, const N: usize, const P: usize, const E: usize> {
     chain: Chain<T, N>,
     effects: [Effect<T>; E],
+    /// How many parameters of each effect are unknowns: the leading ones, see [`Info`](crate::effect::Info).
+    linear: [usize; E],
     used: usize,
 }
 
@@ -83,9 +85,11 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     /// [`Invalid`] for an effect that does not suit the arm, and for more unknowns than `P`.
     pub fn new(chain: Chain<T, N>, effects: [Effect<T>; E]) -> Result<Self, Invalid> {
         let mut used = 2 * N;
-        for effect in effects.iter().filter(|e| e.on) {
+        let mut leading = [0; E];
+        for (effect, count) in effects.iter().zip(&mut leading).filter(|(e, _)| e.on) {
             effect.validate(N)?;
-            used += linear(effect).count();
+            *count = linear(effect).count();
+            used += *count;
         }
         if used > P {
             return Err(Invalid::OutOfRange {
@@ -99,6 +103,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         Ok(Self {
             chain,
             effects,
+            linear: leading,
             used,
         })
     }
@@ -282,44 +287,33 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
 
     fn add_effects(&self, motion: &Motion<T, N>, memory: &[T; E], rows: &mut Needed<T, N, P>) {
         let mut column = 2 * N;
-        for (effect, &state) in self.effects.iter().zip(memory).filter(|(e, _)| e.on) {
+        let effects = self.effects.iter().zip(&self.linear).zip(memory);
+        for ((effect, &count), &state) in effects.filter(|((e, _), _)| e.on) {
             let local = motion.local(effect.index, state);
-            let mut add = |joint: usize, share: T, gradient: Option<&[T]>, torque: T| {
-                if joint >= N {
-                    return;
-                }
-                match gradient {
-                    None => rows.known[joint] += share * torque,
-                    Some(values) => {
-                        let places = rows.columns[joint].iter_mut().skip(column);
-                        for (place, &value) in places.zip(values) {
-                            *place += share * value;
-                        }
-                    }
-                }
-            };
-            let parameters = effect.kind.info().parameters;
-            let count = parameters.iter().filter(|p| p.linear).count();
-            let share = effect.proximal_share();
             let crosses = effect.kind.crosses() && effect.index > 0;
+            let share = effect.proximal_share();
             if count == 0 {
                 let torque = effect.torque(&local);
-                add(effect.index, T::ONE, None, torque);
-                if crosses {
-                    add(effect.index - 1, share, None, torque);
+                if let Some(known) = rows.known.get_mut(effect.index) {
+                    *known += torque;
+                }
+                if crosses && let Some(known) = rows.known.get_mut(effect.index - 1) {
+                    *known += share * torque;
                 }
                 continue;
             }
             let gradient = effect.gradient(&local);
-            let mut packed = [T::ZERO; crate::effect::MAX_PARAMETERS];
-            let chosen = gradient.iter().zip(parameters).filter(|(_, p)| p.linear);
-            for (place, (&value, _)) in packed.iter_mut().zip(chosen) {
-                *place = value;
-            }
-            let values = packed.get(..count);
-            add(effect.index, T::ONE, values, T::ZERO);
+            let mut add = |joint: usize, share: T| {
+                if let Some(row) = rows.columns.get_mut(joint) {
+                    let places = row.iter_mut().skip(column).take(count);
+                    for (place, &value) in places.zip(&gradient) {
+                        *place = share * value;
+                    }
+                }
+            };
+            add(effect.index, T::ONE);
             if crosses {
-                add(effect.index - 1, share, values, T::ZERO);
+                add(effect.index - 1, share);
             }
             column += count;
         }

@@ -62,7 +62,7 @@ pub use regressor::{Regressor, regressor};
 pub use robot::{Elbow, Robot};
 pub use scalar::{Real, Scalar};
 pub use setup::{Reading, Setup};
-pub use trajectory::{Limits, Path, Profile, Sample, Shape};
+pub use trajectory::{Limits, Path, Profile, Route, Sample, Shape};
 
 /// A value for each joint or link: angles, speeds, torques.
 pub type Joints<T, const N: usize> = nalgebra::SVector<T, N>;

@@ -265,38 +265,42 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     fn frozen_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
         let mut unchanged = [seen.stamp; C];
         let mut found = None;
-        if let Some(last) = &self.last {
-            let values = seen.values.iter().zip(&last.values);
-            let rows = unchanged.iter_mut().zip(&last.unchanged).zip(seen.moving);
-            let all = rows.zip(values).zip(&self.channels).enumerate();
-            for (index, (((row, moving), (new, old)), channel)) in all {
-                let (since, before) = row;
-                if !(moving && new == old) {
-                    continue;
-                }
-                *since = *before;
-                let time = seen.stamp.saturating_sub(*before);
-                if let Some(limit) = channel.frozen_after
-                    && time > limit
-                    && found.is_none()
-                {
-                    found = Some(Stop {
-                        reason: Reason::Frozen,
-                        channel: Some(index),
-                        value: seconds(time),
-                        limit: seconds(limit),
-                        at: seen.now,
-                    });
-                }
+        let Some(last) = &self.last else {
+            self.last = Some(Seen::of(seen, unchanged));
+            return None;
+        };
+        for index in 0..C {
+            let Some(limit) = self.channels[index].frozen_after else {
+                continue;
+            };
+            if !seen.moving[index] || seen.values[index] != last.values[index] {
+                continue;
+            }
+            unchanged[index] = last.unchanged[index];
+            let time = seen.stamp.saturating_sub(unchanged[index]);
+            if time > limit && found.is_none() {
+                found = Some(Stop {
+                    reason: Reason::Frozen,
+                    channel: Some(index),
+                    value: seconds(time),
+                    limit: seconds(limit),
+                    at: seen.now,
+                });
             }
         }
-        self.last = Some(Seen {
+        self.last = Some(Seen::of(seen, unchanged));
+        found
+    }
+}
+
+impl<T: Real, const C: usize> Seen<T, C> {
+    fn of(seen: &Observation<T, C>, unchanged: [u64; C]) -> Self {
+        Self {
             now: seen.now,
             stamp: seen.stamp,
             values: seen.values,
             unchanged,
-        });
-        found
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::check::{at_least_zero, finite, positive};
 use crate::effect::Motion;
+use crate::scalar::Real;
 use crate::{Invalid, Joints, Scalar};
 
 /// What a motion must not exceed.
@@ -286,18 +287,106 @@ impl<'a, T: Scalar, const N: usize> Path<'a, T, N> {
         let rest = Joints::<T, N>::repeat(T::ZERO);
         let first = self.waypoints.first().copied().unwrap_or(rest);
         let mut motion = Motion::new(time, first, rest);
-        for (start, part, [from, to]) in self.parts() {
-            let s = part.at(time - start);
-            // A weighted mean: exact in both waypoints.
-            let left = T::ONE - s.position;
-            let choose = |then: T, otherwise: T| T::if_less(time, start, otherwise, then);
+        for (start, part, ends) in self.parts() {
+            let here = along(time, time - start, &part, ends);
             for i in 0..N {
-                let way = to[i] - from[i];
-                motion.q[i] = choose(left * from[i] + s.position * to[i], motion.q[i]);
-                motion.qd[i] = choose(s.velocity * way, motion.qd[i]);
-                motion.qdd[i] = choose(s.acceleration * way, motion.qdd[i]);
+                let choose = |then: T, otherwise: T| T::if_less(time, start, otherwise, then);
+                motion.q[i] = choose(here.q[i], motion.q[i]);
+                motion.qd[i] = choose(here.qd[i], motion.qd[i]);
+                motion.qdd[i] = choose(here.qdd[i], motion.qdd[i]);
             }
         }
         motion
+    }
+}
+
+/// The motion on the way from one waypoint to the next, `since` its start.
+#[inline]
+fn along<T: Scalar, const N: usize>(
+    time: T,
+    since: T,
+    part: &Profile<T>,
+    [from, to]: [&Joints<T, N>; 2],
+) -> Motion<T, N> {
+    let s = part.at(since);
+    // A weighted mean: exact in both waypoints.
+    let left = T::ONE - s.position;
+    let mut motion = Motion::new(time, *from, *from);
+    for i in 0..N {
+        let way = to[i] - from[i];
+        motion.q[i] = left * from[i] + s.position * to[i];
+        motion.qd[i] = s.velocity * way;
+        motion.qdd[i] = s.acceleration * way;
+    }
+    motion
+}
+
+/// A [`Path`] of at most `W` waypoints that is kept with all that was computed of it; the motion has the same bits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Route<T, const N: usize, const W: usize> {
+    waypoints: [Joints<T, N>; W],
+    /// From each waypoint but the last to the next: when it starts, and how it passes.
+    parts: [(T, Profile<T>); W],
+    count: usize,
+}
+
+impl<T: Real, const N: usize, const W: usize> Route<T, N, W> {
+    /// A route along a path.
+    ///
+    /// # Errors
+    /// [`Invalid`] for more than `W` waypoints.
+    pub fn new(path: &Path<'_, T, N>) -> Result<Self, Invalid> {
+        let (given, first) = (path.waypoints.len(), path.waypoints.first());
+        let first = first.copied().filter(|_| given <= W);
+        let Some(first) = first else {
+            return Err(Invalid::OutOfRange {
+                name: "number of waypoints",
+                index: 0,
+                found: given as f64,
+                min: 1.0,
+                max: W as f64,
+            });
+        };
+        let rest = Profile::quickest(path.shape, T::ZERO, T::ZERO, T::ZERO);
+        let mut route = Self {
+            waypoints: [first; W],
+            parts: [(T::ZERO, rest); W],
+            count: given - 1,
+        };
+        for (place, waypoint) in route.waypoints.iter_mut().zip(path.waypoints) {
+            *place = *waypoint;
+        }
+        for (place, (start, part, _)) in route.parts.iter_mut().zip(path.parts()) {
+            *place = (start, part);
+        }
+        Ok(route)
+    }
+
+    fn legs(&self) -> impl Iterator<Item = (&(T, Profile<T>), [&Joints<T, N>; 2])> {
+        let next = self.waypoints.iter().skip(1);
+        let ends = self.waypoints.iter().zip(next).map(|(a, b)| [a, b]);
+        self.parts.iter().take(self.count).zip(ends)
+    }
+
+    /// Time from the first to the last waypoint \[s\].
+    pub fn duration(&self) -> T {
+        let last = self.legs().last();
+        last.map_or(T::ZERO, |((start, part), _)| *start + part.duration())
+    }
+
+    /// The motion at a time \[s\], as of [`Path::at`].
+    pub fn at(&self, time: T) -> Motion<T, N> {
+        let rest = Joints::<T, N>::repeat(T::ZERO);
+        let begun = self
+            .legs()
+            .take_while(|((start, _), _)| *start <= time)
+            .last();
+        match begun {
+            Some(((start, part), ends)) => along(time, time - *start, part, ends),
+            None => {
+                let first = self.waypoints.first().copied().unwrap_or(rest);
+                Motion::new(time, first, rest)
+            }
+        }
     }
 }

@@ -118,7 +118,7 @@ pub struct Info {
     pub formula: &'static str,
     /// Where the formula comes from.
     pub reference: &'static str,
-    /// Its parameters.
+    /// Its parameters; those in which the torque is linear come first.
     pub parameters: &'static [Parameter],
     /// Whether it carries a state of its own, advanced with the simulation.
     pub memory: bool,

@@ -20,9 +20,27 @@ pub enum Fault {
 /// A second-order low-pass of two integrators (trapezoidal state-variable filter: Zavalishin 2012, chapter 4), with the
 /// derivatives of what it lets through. Butterworth: no overshoot in frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct LowPass<T> {
+pub(super) struct Cutoff<T> {
     /// Frequency-warped cutoff, `tan(π f/f_s)`.
-    g: T,
+    pub g: T,
+    damping: T,
+    scale: T,
+}
+
+impl<T: Real> Cutoff<T> {
+    pub fn new(g: T) -> Self {
+        let damping = T::of(core::f64::consts::SQRT_2);
+        Self {
+            g,
+            damping,
+            scale: T::ONE / (T::ONE + g * (g + damping)),
+        }
+    }
+}
+
+/// The two integrators.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LowPass<T> {
     first: T,
     second: T,
 }
@@ -36,33 +54,25 @@ pub(super) struct Smooth<T> {
 }
 
 impl<T: Real> LowPass<T> {
-    pub fn new(g: T) -> Self {
+    /// At rest at a value.
+    fn at(value: T) -> Self {
         Self {
-            g,
             first: T::ZERO,
-            second: T::ZERO,
+            second: value,
         }
     }
 
-    /// At rest at a value.
-    pub fn reset(&mut self, value: T) {
-        self.first = T::ZERO;
-        self.second = value;
-    }
-
     #[inline]
-    pub fn step(&mut self, input: T) -> Smooth<T> {
-        let damping = T::of(core::f64::consts::SQRT_2);
+    fn step(&mut self, input: T, cutoff: &Cutoff<T>) -> Smooth<T> {
         let error = input - self.second;
-        let scale = T::ONE / (T::ONE + self.g * (self.g + damping));
-        let band = scale * (self.first + self.g * error);
-        let low = self.second + self.g * band;
+        let band = cutoff.scale * (self.first + cutoff.g * error);
+        let low = self.second + cutoff.g * band;
         self.first = band + band - self.first;
         self.second = low + low - self.second;
         Smooth {
             value: low,
             rate: band,
-            rate_of_rate: input - damping * band - low,
+            rate_of_rate: input - cutoff.damping * band - low,
         }
     }
 }
@@ -70,8 +80,6 @@ impl<T: Real> LowPass<T> {
 /// A sensor channel: checks, then two low-passes in a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Channel<T> {
-    /// Farthest that a value can move in one period.
-    farthest: T,
     /// Last value that came, good or not.
     raw: T,
     /// Last value that was used, measured or bridged.
@@ -88,16 +96,15 @@ pub(super) struct Channel<T> {
 }
 
 impl<T: Real> Channel<T> {
-    pub fn new(g: T, farthest: T) -> Self {
+    pub fn new() -> Self {
         Self {
-            farthest,
             raw: T::ZERO,
             last: T::ZERO,
             trend: T::ZERO,
             bridged: 0,
             unchanged: 0,
             alive: false,
-            filter: [LowPass::new(g); 2],
+            filter: [LowPass::at(T::ZERO); 2],
         }
     }
 
@@ -111,17 +118,21 @@ impl<T: Real> Channel<T> {
         self.trend = T::ZERO;
         self.bridged = 0;
         self.unchanged = 0;
-        for filter in &mut self.filter {
-            filter.reset(value);
-        }
+        self.filter = [LowPass::at(value); 2];
         true
     }
 
     /// What is wrong with the next value.
     ///
+    /// * `farthest` - that a value can move in one period
     /// * `frozen_after` - periods in which the bits may stay the same; `None` while the arm rests
     #[inline]
-    pub fn fault(&mut self, value: Option<T>, frozen_after: Option<u32>) -> Option<Fault> {
+    pub fn fault(
+        &mut self,
+        value: Option<T>,
+        farthest: T,
+        frozen_after: Option<u32>,
+    ) -> Option<Fault> {
         let Some(value) = value else {
             return Some(Fault::Missing);
         };
@@ -139,13 +150,17 @@ impl<T: Real> Channel<T> {
         if frozen_after.is_some_and(|limit| self.unchanged > limit) {
             return Some(Fault::Frozen);
         }
+        let moved = (value - self.last).abs();
+        if moved <= farthest {
+            return None;
+        }
         let periods = T::of(f64::from(self.bridged + 1));
-        ((value - self.last).abs() > self.farthest * periods).then_some(Fault::Spike)
+        (moved > farthest * periods).then_some(Fault::Spike)
     }
 
     /// Takes a good value, or bridges the lack of one by going on as before.
     #[inline]
-    pub fn step(&mut self, value: Option<T>) -> Smooth<T> {
+    pub fn step(&mut self, value: Option<T>, cutoff: &Cutoff<T>) -> Smooth<T> {
         match value {
             Some(value) => {
                 self.last = value;
@@ -157,9 +172,9 @@ impl<T: Real> Channel<T> {
             }
         }
         let [first, second] = &mut self.filter;
-        let smooth = first.step(self.last);
-        self.trend = (first.g + first.g) * smooth.rate;
-        second.step(smooth.value)
+        let smooth = first.step(self.last, cutoff);
+        self.trend = (cutoff.g + cutoff.g) * smooth.rate;
+        second.step(smooth.value, cutoff)
     }
 
     pub fn bridged(&self) -> u32 {

@@ -101,8 +101,8 @@ const MEASURED: f64 = 0.9;
 const LONG: f64 = 100.0;
 /// Largest correlation between neighbouring windows that is believed.
 const MOST_CORRELATED: f64 = 0.9;
-/// Samples over which the usual size of the unexplained torque is averaged.
-const USUAL: f64 = 200.0;
+/// Rows over which the usual size of the unexplained torque is averaged.
+const USUAL: f64 = 50.0;
 
 /// What is left to do with a full window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,6 +115,8 @@ enum Work {
     Forget,
     /// To take in the row of a joint.
     Row(usize),
+    /// To prepare what the bounds change.
+    Copy,
     /// To solve; once more for each unknown that is fixed to a bound.
     Solve,
     /// To say how certain an unknown is.
@@ -135,6 +137,8 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     running: bool,
     settling: u32,
     moving: bool,
+    /// Periods since the last row.
+    since_row: u32,
     memory: [T; E],
     /// Usual size of the torque that the estimate does not explain \[N m\].
     usual: Option<[T; N]>,
@@ -168,7 +172,6 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             prior.validate(index)?;
         }
         let tuning = Tuning::new(settings, P)?;
-        let [angle, load] = tuning.farthest;
         let information = Information::independent(priors.iter().map(|p| (p.mean, p.sd)));
         let estimates = priors.map(|p| Estimate {
             value: p.mean.max(p.min).min(p.max),
@@ -178,12 +181,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         Ok(Self {
             equation,
             priors,
-            joints: [angle, angle, load].map(|far| [Channel::new(tuning.g, far); N]),
-            hand: [Channel::new(tuning.g, load); 3],
+            joints: [[Channel::new(); N]; 3],
+            hand: [Channel::new(); 3],
             tuning,
             running: false,
             settling: 0,
             moving: false,
+            since_row: 0,
             memory: [T::ZERO; E],
             usual: None,
             window: Window::EMPTY,
@@ -243,13 +247,20 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
 
     /// One control period; `None` where a sample is missing.
     ///
-    /// Takes the same time whatever the data are, to within the units of work in [`Estimator`]'s description.
+    /// Filters the sample; then either builds a row from it or does one piece of the work that the last window left, so that
+    /// no period takes much longer than another. A long cutoff period needs few rows: see [`Settings::cutoff`].
     pub fn update(&mut self, sample: Option<&Sample<T, N>>) -> Heed {
-        for _ in 0..self.tuning.pace_of_work {
-            self.work();
+        let sensed = self.sense(sample);
+        self.since_row = self.since_row.saturating_add(1);
+        let due = self.since_row >= self.tuning.stride && sensed.is_ok();
+        // A row and the work on the last window take turns, so that no period has both.
+        if self.tuning.stride == 1 || !due {
+            for _ in 0..self.tuning.pace_of_work {
+                self.work();
+            }
         }
-        let fault = match self.sense(sample) {
-            Ok((motion, measured)) => return self.learn(&motion, &measured),
+        let fault = match sensed {
+            Ok((motion, measured)) => return self.learn(&motion, &measured, due),
             Err(heed) => heed,
         };
         if fault == Heed::Refused(Fault::Frozen) {
@@ -273,20 +284,22 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
         let frozen_after = self.moving.then_some(self.tuning.frozen_after);
         let mut fault = None;
-        let mut pass = |channel: &mut Channel<T>, value: Option<T>| {
-            let found = channel.fault(value, frozen_after);
+        let [turn, load] = self.tuning.farthest;
+        let mut pass = |channel: &mut Channel<T>, value: Option<T>, farthest: T| {
+            let found = channel.fault(value, farthest, frozen_after);
             fault = fault.or(found);
-            channel.step(if found.is_some() { None } else { value })
+            let good = if found.is_some() { None } else { value };
+            channel.step(good, &self.tuning.cutoff)
         };
         let smooth: [[Smooth<T>; N]; 3] = from_fn(|kind| {
+            let farthest = if kind < 2 { turn } else { load };
             from_fn(|j| {
-                pass(
-                    &mut self.joints[kind][j],
-                    sample.map(|s| of_joint(s, kind, j)),
-                )
+                let value = sample.map(|s| of_joint(s, kind, j));
+                pass(&mut self.joints[kind][j], value, farthest)
             })
         });
-        let hand = from_fn::<_, 3, _>(|c| pass(&mut self.hand[c], sample.map(|s| of_hand(s, c))));
+        let hand =
+            from_fn::<_, 3, _>(|c| pass(&mut self.hand[c], sample.map(|s| of_hand(s, c)), load));
         let all = self.joints.iter().flatten().chain(&self.hand);
         if all.map(Channel::bridged).fold(0, Ord::max) > self.tuning.longest_gap {
             self.running = false;
@@ -341,12 +354,17 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         Heed::Settling
     }
 
-    /// Adds a sample to the window.
+    /// Adds a sample to the window, where one is due.
     ///
     /// At rest it is added as well, for to leave out slow samples would favour one side of every reversal; what counts is
     /// whether the arm moved at any time in the window.
-    fn learn(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> Heed {
-        let heed = self.weigh(motion, measured);
+    fn learn(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>, due: bool) -> Heed {
+        let heed = if due {
+            self.since_row = 0;
+            self.weigh(motion, measured)
+        } else {
+            Heed::Taken
+        };
         self.window.moved |= self.moving;
         self.age();
         match heed {
@@ -362,8 +380,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let usual = self.usual.get_or_insert(rest);
         let mut expected = true;
         for j in 0..N {
-            let floor = T::ONE / self.tuning.weight[j];
-            let most = self.tuning.gate * usual[j].max(floor);
+            let most = self.tuning.gate * usual[j].max(self.tuning.noise[j]);
             expected &= rest[j] <= most;
             // What is refused counts as much as what could just be taken: a change that lasts is soon believed.
             usual[j] += (rest[j].min(most) - usual[j]) * T::of(1.0 / USUAL);
@@ -403,16 +420,19 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 Work::Row(0)
             }
             Work::Row(j) => {
-                if let Some((row, value)) = self.full.mean(j, &self.tuning) {
-                    self.information.absorb(row, value);
+                if let Some((row, value, weight)) = self.full.mean(j, &self.tuning) {
+                    self.information.absorb(&row, value, weight);
                 }
                 if j + 1 < N {
                     Work::Row(j + 1)
                 } else {
-                    self.bounded = self.information;
-                    self.fixed = [false; P];
-                    Work::Solve
+                    Work::Copy
                 }
+            }
+            Work::Copy => {
+                self.bounded = self.information;
+                self.fixed = [false; P];
+                Work::Solve
             }
             Work::Solve => self.solve(),
             Work::Deviation(unknown) => {
@@ -429,12 +449,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     fn forget(&mut self) {
         self.information.fade(self.tuning.fade);
         let mut row = [T::ZERO; P];
-        if let (Some(place), Some(prior)) =
-            (row.get_mut(self.prior_row), self.priors.get(self.prior_row))
-        {
-            let weight = self.tuning.refresh / prior.sd;
-            *place = weight;
-            self.information.absorb(row, weight * prior.mean);
+        let prior = self.priors.get(self.prior_row);
+        if let Some((place, prior)) = row.get_mut(self.prior_row).zip(prior) {
+            *place = T::ONE;
+            let weight = self.tuning.refresh / prior.sd.squared();
+            self.information.absorb(&row, prior.mean, weight);
         }
         self.prior_row = if self.prior_row + 1 < P {
             self.prior_row + 1
@@ -451,7 +470,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         for i in 0..P {
             let prior = &self.priors[i];
             let within = values[i].max(prior.min).min(prior.max);
-            let outside = (values[i] - within).abs() * self.bounded.sharpness(i);
+            let outside = (values[i] - within).squared() * self.bounded.sharpness(i);
             if outside > most && !self.fixed[i] {
                 most = outside;
                 worst = Some((i, within));
@@ -480,13 +499,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.windows = (self.windows + T::ONE).min(T::of(LONG));
         let (mut square, mut product, mut count) = (T::ZERO, T::ZERO, T::ZERO);
         for j in 0..N {
-            let Some((row, value)) = self.full.mean(j, &self.tuning) else {
+            let Some((row, value, weight)) = self.full.mean(j, &self.tuning) else {
                 self.last_residual[j] = None;
                 continue;
             };
             let rest = row.iter().zip(&values).fold(value, |r, (&c, &x)| r - c * x);
-            square += rest.squared();
-            product += rest * self.last_residual[j].unwrap_or(T::ZERO);
+            square += weight * rest.squared();
+            product += weight * rest * self.last_residual[j].unwrap_or(T::ZERO);
             count += T::ONE;
             self.last_residual[j] = Some(rest);
         }

@@ -1,8 +1,9 @@
 //! How an estimator works, and what follows from it for one control period.
 
+use super::channel::Cutoff;
+use crate::Invalid;
 use crate::check::{finite, positive};
 use crate::scalar::Real;
-use crate::{Invalid, Scalar};
 
 /// How an estimator works.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,15 +53,20 @@ impl<T: Real, const N: usize> Settings<T, N> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tuning<T, const N: usize> {
     pub period: T,
-    /// `tan(π f/f_s)` of the low-pass.
-    pub g: T,
+    /// The low-pass of every channel.
+    pub cutoff: Cutoff<T>,
     /// One over the low-pass's own time, `2 g/period` \[1/s\].
     pub pace: T,
     /// Periods in a window.
     pub window: u32,
-    /// Good samples of a joint that a window needs.
+    /// Periods from one row to the next.
+    pub stride: u32,
+    /// Rows of a joint in a full window.
+    pub rows: u32,
+    /// Rows of a joint that a window needs.
     pub enough: u32,
-    /// One over the noise of one joint's average.
+    /// Noise of each joint's average, and one over its square.
+    pub noise: [T; N],
     pub weight: [T; N],
     pub dead_band: T,
     pub gate: T,
@@ -75,9 +81,9 @@ pub(super) struct Tuning<T, const N: usize> {
     pub quarantine: u32,
     /// Units of work in each period.
     pub pace_of_work: u32,
-    /// Factor of what was learned, for each window; one to forget nothing.
+    /// Factor of the weight of what was learned, for each window; one to forget nothing.
     pub fade: T,
-    /// Weight with which one prior row comes back for each window.
+    /// Share of its weight with which one prior row comes back for each window.
     pub refresh: T,
 }
 
@@ -85,8 +91,12 @@ pub(super) struct Tuning<T, const N: usize> {
 const LONGEST_GAP: f64 = 0.02;
 /// Time after which restarted filters have settled, in periods of their cutoff.
 const SETTLING: f64 = 1.5;
+/// Rows in a period of the low-pass' cutoff. What it lets through changes so slowly that more would say the same again.
+const ROWS_PER_PERIOD: f64 = 20.0;
 /// Share of its samples that a window needs.
 const ENOUGH: f64 = 0.5;
+/// Rows that a window has at least, where the sampling allows.
+const FEWEST_ROWS: u32 = 20;
 
 impl<T: Real, const N: usize> Tuning<T, N> {
     /// * `unknowns` - how many there are: the work to be spread over a window
@@ -117,20 +127,34 @@ impl<T: Real, const N: usize> Tuning<T, N> {
         }
         in_range("dead band", s.dead_band.to_f64(), 0.0, f64::MAX)?;
 
-        let (sin, cos) = Scalar::sin_cos(core::f64::consts::PI * cutoff * period);
+        let (sin, cos) = (T::of(core::f64::consts::PI * cutoff * period)).sin_cos();
         let g = sin / cos;
-        let length = libm::round(window / period) as u32;
+        let length = periods(window / period);
+        let stride = (libm::round(1.0 / (ROWS_PER_PERIOD * cutoff * period)) as u32)
+            .min(length / FEWEST_ROWS)
+            .max(1);
+        let rows = length / stride;
         let quarantine = periods(s.frozen_after.to_f64() / period).min(length / 2);
         // Rows, forgetting, a copy, a publication, and at most every unknown to its bound and its deviation.
         let work = (N + 3 + 2 * unknowns) as u32;
+        // Done in the periods that have no row, if there are such.
+        let free = length - quarantine;
+        let free = if stride > 1 {
+            free - free.div_ceil(stride)
+        } else {
+            free
+        };
         let forgotten = libm::exp(-window / s.forgetting.to_f64());
         Ok(Self {
             period: s.period,
-            g: T::of(g),
-            pace: T::of(2.0 * g / period),
+            cutoff: Cutoff::new(g),
+            pace: (g + g) / s.period,
             window: length,
-            enough: (libm::ceil(ENOUGH * f64::from(length)) as u32).max(1),
-            weight: s.noise.map(|noise| T::ONE / noise),
+            stride,
+            rows,
+            enough: periods(ENOUGH * f64::from(rows)).max(1),
+            noise: s.noise,
+            weight: s.noise.map(|noise| T::ONE / noise.squared()),
             dead_band: s.dead_band,
             gate: s.gate,
             farthest: [s.fastest * s.period, s.steepest * s.period],
@@ -138,10 +162,10 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             longest_gap: periods(LONGEST_GAP / period).max(2),
             settling: periods(SETTLING / (cutoff * period)),
             quarantine,
-            pace_of_work: work.div_ceil((length - quarantine).max(1)),
-            fade: T::of(libm::sqrt(forgotten)),
+            pace_of_work: work.div_ceil(free.max(1)),
+            fade: T::of(forgotten),
             // One of the unknowns in turn, so that each comes back at the pace at which it fades.
-            refresh: T::of(libm::sqrt((1.0 - forgotten) * unknowns as f64)),
+            refresh: T::of((1.0 - forgotten) * unknowns as f64),
         })
     }
 }

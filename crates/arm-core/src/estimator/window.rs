@@ -36,17 +36,18 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
         }
     }
 
-    /// The mean row of a joint in units of its noise; `None` with too few samples.
+    /// The mean row of a joint and its value, and their weight: one over the variance. `None` with too few rows.
     ///
-    /// A window with gaps counts less, as a mean of fewer samples does.
-    pub fn mean(&self, joint: usize, tuning: &Tuning<T, N>) -> Option<([T; P], T)> {
+    /// A window with gaps counts less, as a mean of fewer rows does.
+    pub fn mean(&self, joint: usize, tuning: &Tuning<T, N>) -> Option<([T; P], T, T)> {
         let count = *self.counts.get(joint)?;
         if count < tuning.enough {
             return None;
         }
         let (columns, value) = (self.columns.get(joint)?, *self.values.get(joint)?);
-        let [count, length] = [count, tuning.window].map(|n| T::of(f64::from(n)));
-        let factor = *tuning.weight.get(joint)? / (count * length).sqrt();
-        Some((columns.map(|c| c * factor), value * factor))
+        let [count, full] = [count, tuning.rows].map(|n| T::of(f64::from(n)));
+        let share = T::ONE / count;
+        let weight = *tuning.weight.get(joint)? * count / full;
+        Some((columns.map(|c| c * share), value * share, weight))
     }
 }

@@ -407,3 +407,11 @@ fn an_index_beyond_the_arm_does_nothing() {
         }
     }
 }
+
+#[test]
+fn linear_parameters_come_first() {
+    for kind in KINDS {
+        let linear: Vec<bool> = kind.info().parameters.iter().map(|p| p.linear).collect();
+        assert!(linear.is_sorted_by(|a, b| a >= b), "{kind:?}: {linear:?}");
+    }
+}

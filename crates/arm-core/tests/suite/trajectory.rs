@@ -1,6 +1,6 @@
 //! Profiles and waypoints: exact ends, limits, symmetry, derivatives, joints that move together.
 
-use arm_core::{Invalid, Joints, Lanes, Limits, Path, Profile, Sample, Scalar, Shape};
+use arm_core::{Invalid, Joints, Lanes, Limits, Path, Profile, Route, Sample, Scalar, Shape};
 
 use crate::common::Random;
 
@@ -318,4 +318,24 @@ fn refused_motions() {
     let mut wrong = limits();
     wrong[2].speed = 0.0;
     assert!(text(path(&points, wrong, 0.0)).contains("speed limit 3"));
+}
+
+#[test]
+fn a_route_has_the_bits_of_its_path() {
+    let mut random = Random(77);
+    let waypoints: [Joints<f64, 3>; 5] = core::array::from_fn(|_| random.joints(1.0));
+    let limits = [Limits {
+        speed: 0.7,
+        acceleration: 3.0,
+    }; 3];
+    for shape in [Shape::Trapezoid, Shape::Smooth] {
+        let path = Path::new(shape, &waypoints, limits, 0.2).expect("a path");
+        let route = Route::<f64, 3, 8>::new(&path).expect("room for five");
+        assert_eq!(route.duration(), path.duration());
+        for k in -10..1000 {
+            let t = f64::from(k) * path.duration() / 900.0;
+            assert_eq!(route.at(t), path.at(t), "at {t}");
+        }
+        assert!(Route::<f64, 3, 4>::new(&path).is_err());
+    }
 }
