@@ -86,7 +86,10 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
             ax.title.set_fontsize("small")
         for ax in axes[len(courses) :]:
             ax.set_axis_off()
-    text = "Parameters that the data decided, over the sessions; bars are twice the standard deviation. An orange one differs in the last session."
+    text = (
+        "Parameters that the data decided, over the sessions; bars are twice the standard deviation. "
+        "An orange one differs in the last session."
+    )
     return Drawn("history", "Over the sessions", text, figure)
 
 
