@@ -40,6 +40,17 @@ impl<T: Scalar> Contact<T> {
         })
     }
 
+    /// Time derivative of [`Contact::force_on_arm`] \[N/s\], where the contact neither closes nor opens.
+    ///
+    /// * `gap_change` - second time derivative of the gap \[m/s²\]
+    pub fn force_rate(&self, gap: Plane<T>, gap_rate: Plane<T>, gap_change: Plane<T>) -> Plane<T> {
+        core::array::from_fn(|i| {
+            let touching = T::if_less(self.play[i], gap[i].abs(), T::ONE, T::ZERO);
+            let touching = T::if_less(T::ZERO, self.play[i], touching, T::ONE);
+            touching * (self.stiffness[i] * gap_rate[i] + self.damping[i] * gap_change[i])
+        })
+    }
+
     /// Energy held by the springs \[J\].
     pub fn energy(&self, gap: Plane<T>) -> T {
         let mut energy = T::ZERO;

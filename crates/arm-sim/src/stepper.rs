@@ -6,7 +6,7 @@ use arm_core::{Joints, Plane, Pose, Setup};
 use crate::experiment::altered;
 use crate::model::{Input, Link, Model, State};
 use crate::native::diverged;
-use crate::prepare::assemble;
+use crate::prepare::{add_ripple, assemble};
 use crate::step::{Inputs, Memory, step};
 use crate::{Handle, Integrator, SimulationError, stability, start};
 
@@ -50,19 +50,25 @@ impl<const N: usize> Default for Outside<N> {
     }
 }
 
-impl<const N: usize> Outside<N> {
-    fn input(&self, time: f64, later: f64) -> Input<f64, N> {
-        let since = self.age + later;
-        Input {
-            time,
-            handle: Handle {
-                position: [0, 1].map(|i| self.position[i] + self.velocity[i] * since),
-                velocity: self.velocity,
-                acceleration: [0.0; 2],
-            },
-            torque: self.torque,
-        }
-    }
+/// What drives the arm at a time, `later` after the inputs were set \[s\]; ripple included.
+#[inline]
+fn input<const N: usize>(
+    setup: &Setup<f64, N>,
+    outside: &Outside<N>,
+    (time, later): (f64, f64),
+) -> Input<f64, N> {
+    let since = outside.age + later;
+    let mut input = Input {
+        time,
+        handle: Handle {
+            position: [0, 1].map(|i| outside.position[i] + outside.velocity[i] * since),
+            velocity: outside.velocity,
+            acceleration: [0.0; 2],
+        },
+        torque: outside.torque,
+    };
+    add_ripple(&mut input, setup);
+    input
 }
 
 /// A state with everything that the future depends on but the inputs.
@@ -95,6 +101,8 @@ pub struct Seen<const N: usize> {
     pub qdd: Joints<f64, N>,
     /// Force on the arm at its tip \[N\].
     pub force_on_arm: Plane<f64>,
+    /// Time derivative of that force, with the inputs going on as they are \[N/s\].
+    pub force_rate: Plane<f64>,
     /// Time derivative of the works \[W\].
     pub power: [f64; 4],
 }
@@ -102,7 +110,7 @@ pub struct Seen<const N: usize> {
 /// An arm that is advanced by communication steps through one of its ports.
 ///
 /// It makes the steps of [`simulate`](crate::simulate): with the same inputs at the same inner steps both have the same bits.
-/// What the rig says of the robot itself (ripple) has no place here, since the robot is what the port is connected to.
+/// A ripple of the robot comes on top of the handle that the motion port is given, as encoders do not see it either.
 ///
 /// ```
 /// use arm_sim::{Outside, Port, Stepper, models};
@@ -119,6 +127,7 @@ pub struct Seen<const N: usize> {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Stepper<const N: usize> {
+    setup: Setup<f64, N>,
     model: Model<f64, N>,
     port: Port,
     dt: f64,
@@ -172,6 +181,7 @@ impl<const N: usize> Stepper<N> {
             work: before.work,
         };
         Ok(Self {
+            setup,
             model,
             port,
             dt,
@@ -200,7 +210,8 @@ impl<const N: usize> Stepper<N> {
                 allowed: "a finite number of seconds",
             });
         }
-        let (q, qd) = start::given(&self.model, &Outside::default().input(0.0, 0.0), (&q, &qd))?;
+        let at = self.input(&Outside::default());
+        let (q, qd) = start::given(&self.model, &at, (&q, &qd))?;
         stability::check(&self.model, (Integrator::Rk4, self.dt), &q)?;
         self.state = State {
             q,
@@ -222,7 +233,7 @@ impl<const N: usize> Stepper<N> {
         near: &Joints<f64, N>,
     ) -> Result<Joints<f64, N>, SimulationError> {
         self.apply(outside);
-        start::equilibrium(&self.model, &outside.input(0.0, 0.0), near)
+        start::equilibrium(&self.model, &self.input(outside), near)
     }
 
     /// Which port this is.
@@ -284,11 +295,12 @@ impl<const N: usize> Stepper<N> {
         } else {
             (self.time(), 0)
         };
-        let input = |half: u64| {
+        let setup = &self.setup;
+        let input_at = |half: u64| {
             let time = from + 0.5 * (first + half) as f64 * h;
-            outside.input(time, 0.5 * half as f64 * h)
+            input(setup, outside, (time, 0.5 * half as f64 * h))
         };
-        let now = input(0);
+        let now = input_at(0);
         let mut inputs = Inputs {
             start: now,
             middle: now,
@@ -296,8 +308,8 @@ impl<const N: usize> Stepper<N> {
         };
         for done in 1..=count {
             inputs.start = inputs.end;
-            inputs.middle = input(2 * done - 1);
-            inputs.end = input(2 * done);
+            inputs.middle = input_at(2 * done - 1);
+            inputs.end = input_at(2 * done);
             let at = (&mut self.state, &mut self.memory);
             step(&self.model, Integrator::Rk4, h, &inputs, at);
             if let Some(joint) = diverged(&self.state) {
@@ -323,14 +335,28 @@ impl<const N: usize> Stepper<N> {
         self.apply(outside);
         let State { q, qd, .. } = &self.state;
         let pose = Pose::new(q);
-        let input = outside.input(self.time(), 0.0);
+        let input = self.input(outside);
         let outcome = self.model.evaluate(&input, q, qd, &self.memory.state);
+        let tip = self.model.tip(q, &pose);
+        let tip_velocity = self.model.tip_velocity(qd, &pose);
+        let tip_acceleration = self.model.tip_acceleration(&self.state, &outcome.qdd);
+        let handle = &input.handle;
+        let less = |a: Plane<f64>, b: Plane<f64>| [a[0] - b[0], a[1] - b[1]];
+        let force_rate = match &self.model.link {
+            Link::Compliant(contact) => contact.force_rate(
+                less(handle.position, tip),
+                less(handle.velocity, tip_velocity),
+                less(handle.acceleration, tip_acceleration),
+            ),
+            _ => [0.0; 2],
+        };
         Seen {
-            tip: self.model.tip(q, &pose),
-            tip_velocity: self.model.tip_velocity(qd, &pose),
-            tip_acceleration: self.model.tip_acceleration(&self.state, &outcome.qdd),
+            tip,
+            tip_velocity,
+            tip_acceleration,
             qdd: outcome.qdd,
             force_on_arm: outcome.force_on_arm,
+            force_rate,
             power: outcome.power,
         }
     }
@@ -341,7 +367,7 @@ impl<const N: usize> Stepper<N> {
         self.apply(outside);
         let State { q, qd, .. } = &self.state;
         let pose = Pose::new(q);
-        let input = outside.input(self.time(), 0.0);
+        let input = self.input(outside);
         let (force, _) = self.model.contact(&input, q, qd, &pose);
         (
             self.model.tip(q, &pose),
@@ -353,7 +379,7 @@ impl<const N: usize> Stepper<N> {
     /// Kinetic and potential energy, and the energy in the springs of the contact \[J\].
     pub fn energy(&self, outside: &Outside<N>) -> [f64; 3] {
         let State { q, qd, .. } = &self.state;
-        let handle = outside.input(0.0, 0.0).handle.position;
+        let handle = self.input(outside).handle.position;
         self.model.energy(&Pose::new(q), (q, qd), handle)
     }
 
@@ -381,6 +407,11 @@ impl<const N: usize> Stepper<N> {
         };
         self.memory.state.copy_from_slice(&snapshot.memory);
         (self.origin, self.ticks) = (snapshot.origin, snapshot.ticks);
+    }
+
+    /// What drives the arm now.
+    fn input(&self, outside: &Outside<N>) -> Input<f64, N> {
+        input(&self.setup, outside, (self.time(), 0.0))
     }
 
     fn apply(&mut self, outside: &Outside<N>) {

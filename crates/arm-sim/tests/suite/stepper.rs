@@ -11,12 +11,9 @@ const DT: f64 = 0.25e-3;
 /// Error of the fourth-order integrator over these runs \[J\].
 const ENERGY: f64 = 1e-6;
 
-/// The rig with effects of every kind that a run computes differently, without what belongs to the robot.
+/// The rig with effects of every kind that a run computes differently.
 fn rig() -> Experiment<3> {
     let mut experiment = models::reference().unwrap();
-    experiment
-        .effects
-        .retain(|e| !matches!(e.kind, Kind::RobotRipple | Kind::Backlash));
     experiment.duration = 0.6;
     experiment.output_interval = None;
     experiment
@@ -231,4 +228,41 @@ fn advancing_does_not_allocate() {
         }
     });
     assert_eq!(counted.count_total, 0);
+}
+
+#[test]
+fn rates_are_those_of_the_values() {
+    let experiment = rig();
+    for port in [Port::Force, Port::Motion] {
+        let mut arm = stepper(&experiment, port);
+        let mut outside = Outside {
+            force_on_arm: [4.0, 9.0],
+            position: [0.36, -0.31],
+            velocity: [0.1, 0.05],
+            ..Outside::default()
+        };
+        // Away from the first instant, at which memories and contact are not yet in step.
+        arm.advance(&outside, 0.1).unwrap();
+        outside.age = 0.1;
+        let (before, energy) = (arm.clone().seen(&outside), *arm.work());
+        // A forward difference is off by half a step times the second derivative.
+        let h = 1e-7;
+        let mut later = arm.clone();
+        later.advance(&outside, h).unwrap();
+        let (qd, q) = (later.qd() - arm.qd(), later.q() - arm.q());
+        outside.age += h;
+        let after = later.seen(&outside);
+        assert!((q / h - arm.qd()).amax() < h * before.qdd.amax());
+        assert!((qd / h - before.qdd).amax() < 1e-2 * before.qdd.amax());
+        for axis in 0..2 {
+            let rate = (after.tip_velocity[axis] - before.tip_velocity[axis]) / h;
+            assert!((rate - before.tip_acceleration[axis]).abs() < 1e-2 * before.qdd.amax());
+            let rate = (after.force_on_arm[axis] - before.force_on_arm[axis]) / h;
+            assert!((rate - before.force_rate[axis]).abs() < 1e-2 * (1.0 + rate.abs()));
+        }
+        for k in 0..4 {
+            let rate = (later.work()[k] - energy[k]) / h;
+            assert!((rate - before.power[k]).abs() < 1e-4 * (1.0 + rate.abs()));
+        }
+    }
 }
