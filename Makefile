@@ -37,7 +37,8 @@ $(STAMPS)/venv:
 	$(BIN)/python -m pip install "maturin>=1.9,<2"
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/build: $(PACKAGE) | $(STAMPS)/venv
+$(STAMPS)/build: $(PACKAGE) scripts/fmu_library.py | $(STAMPS)/venv
+	$(BIN)/python scripts/fmu_library.py
 	$(BIN)/maturin develop --release
 	@touch $@
 

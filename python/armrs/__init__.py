@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from .errors import BadInput as BadInput
     from .errors import IdentificationError as IdentificationError
     from .errors import SimulationError as SimulationError
+    from .errors import SlaveError as SlaveError
+    from .fmu.check import check_fmu as check_fmu
+    from .fmu.export import export_fmu as export_fmu
     from .identification import Estimate as Estimate
     from .identification import Identified as Identified
     from .identification import identify as identify
@@ -64,7 +67,9 @@ _HOMES = {
     "conversion": ("convert",),
     "dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
     "demo": ("Demonstration", "run_demo"),
-    "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
+    "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
+    "fmu.check": ("check_fmu",),
+    "fmu.export": ("export_fmu",),
     "identification": ("Estimate", "Identified", "identify"),
     "laboratory": ("Recorded", "record"),
     "markers": ("Markers", "PlanarMotion", "planar_motion"),

@@ -25,6 +25,9 @@ from .errors import ArmrsError, BadInput, Text, one_line, unknown_name
 if TYPE_CHECKING:
     from .trial import Trial
 
+fmu = typer.Typer(
+    name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.", no_args_is_help=True
+)
 app = typer.Typer(name="armrs", add_completion=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
 
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is standard output.")]
@@ -81,6 +84,13 @@ class Coupling(str, enum.Enum):
 
     compliant = "compliant"
     rigid = "rigid"
+
+
+class Port(str, enum.Enum):
+    """Ports through which an arm is coupled to other simulators."""
+
+    force = "force"
+    motion = "motion"
 
 
 class Motion(str, enum.Enum):
@@ -435,6 +445,86 @@ def report(
 
     folder = files.output_folder(out)
     print(write_report(sources, folder / "report.html"))
+
+
+app.add_typer(fmu)
+
+
+@fmu.command("export")
+def fmu_export(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="The FMU to write; MODEL.fmu when absent.")] = None,
+    version: Annotated[int, typer.Option("--fmi", min=2, max=3, help="Version of the standard, 2 or 3.")] = 3,
+    port: Annotated[Port, typer.Option(help="Force on the arm in, or motion of the robot's handle in.")] = Port.force,
+    start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; zero when absent.")] = "",
+    rest: Annotated[bool, typer.Option("--rest", help="Start in equilibrium near these angles.")] = False,
+    dt: Annotated[float, typer.Option(help="Inner step [s].")] = 0.25e-3,
+    json: JsonFile = None,
+) -> None:
+    """Export an arm as a functional mock-up unit for co-simulation: no compiler is needed.
+
+    The same model gives the same bytes. Personal values travel inside and are protected by the token of the description.
+    """
+    from .cosim.slave import Slave
+    from .fmu.export import export_fmu
+
+    _folder(None, json)
+    target = out if out is not None else Path(model.with_suffix(".fmu").name)
+    start = _angles("--start-deg", start_deg)
+    slave = Slave(model, port=port.value, start=start, rest=rest, step=dt, name=model.stem)
+    written = export_fmu(slave, target, fmi=version)
+    data = {"verb": "fmu export", "file": written, "fmi": version, "port": port.value, "token": slave.token}
+    present(lambda: data, json, lambda: print(written))
+
+
+@fmu.command("info")
+def fmu_info(
+    file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
+    json: JsonFile = None,
+) -> None:
+    """Print what an FMU says of itself: capabilities, variables, units."""
+    from .fmu.info import about, info_words
+
+    _folder(None, json)
+    data = about(file)
+    present(lambda: data, json, lambda: info_words(data))
+
+
+@fmu.command("check")
+def fmu_check(
+    file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
+    json: JsonFile = None,
+) -> int:
+    """Check an FMU: file, description and library against the standard and against one another.
+
+    The library is loaded and makes a step, in a process of its own. Exit status 1 when something is wrong.
+    """
+    import dataclasses
+
+    from .fmu.check import check_fmu
+
+    _folder(None, json)
+    with console.progress("checking"):
+        found = check_fmu(file)
+    wrong = sum(f.level == "error" for f in found)
+
+    def human() -> None:
+        for finding in found:
+            print(finding)
+        print(f"{file.name}: {wrong} wrong" if wrong else f"{file.name}: nothing wrong found")
+
+    present(lambda: {"verb": "fmu check", "file": file, "findings": [dataclasses.asdict(f) for f in found]}, json, human)
+    return 1 if wrong else 0
+
+
+def _angles(option: str, text: str) -> list[float] | None:
+    """Read angles in degrees, separated by commas, as radians."""
+    if not text.strip():
+        return None
+    try:
+        return [math.radians(float(part)) for part in text.split(",")]
+    except ValueError:
+        raise BadInput(option, text, "numbers separated by commas") from None
 
 
 def _single_trial(path: Path, n_joints: int) -> Trial:

@@ -73,6 +73,34 @@ class SimulationError(ArmrsError):
     """A simulation that stopped: it names the step and the joint."""
 
 
+class SlaveError(ArmrsError):
+    """A call that a co-simulation slave did not do.
+
+    Parameters
+    ----------
+    function : str
+        The call, named as in FMI 3.0.
+    status : int
+        `armrs.cosim.Status`: discard (2), error (3) or fatal (4).
+    message : str
+        What the slave says.
+    """
+
+    def __init__(self, function: str, status: int, message: str) -> None:
+        super().__init__(function, status, message)
+        self.function = function
+        self.status = status
+        self.message = message
+
+    def __str__(self) -> str:
+        word = {2: "discarded", 3: "error", 4: "fatal error"}.get(self.status, f"status {self.status}")
+        return one_line(f"{self.function}: {word}: {self.message}")
+
+
+class CoupledError(ArmrsError):
+    """A co-simulation whose numbers are no result: it diverged, creates energy, or its iteration did not converge."""
+
+
 class Text(str):
     """A description of what was found, printed as it is and not as a quoted value."""
 

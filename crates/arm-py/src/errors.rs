@@ -77,6 +77,20 @@ pub fn identification(error: IdentError) -> PyErr {
     }
 }
 
+/// A call that a co-simulation slave did not do, as `SlaveError`.
+pub fn slave(function: &str, refused: arm_cosim::Refused) -> PyErr {
+    Python::attach(|py| {
+        let made = py.import("armrs.errors").and_then(|errors| {
+            let arguments = (function, refused.status as i32, refused.message);
+            errors.getattr("SlaveError")?.call1(arguments)
+        });
+        match made {
+            Ok(error) => PyErr::from_value(error),
+            Err(error) => error,
+        }
+    })
+}
+
 /// An error of the tree in `armrs.errors` with a text.
 fn in_python(class: &str, text: &str) -> PyErr {
     Python::attach(|py| {

@@ -3,6 +3,7 @@
 mod arm;
 mod catalogue;
 mod convert;
+mod cosim;
 mod errors;
 mod ident;
 mod lab;
@@ -26,6 +27,8 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     )?;
     m.add_class::<arm::Arm>()?;
     m.add_class::<rig::Rig>()?;
+    m.add_class::<cosim::ArmSlave>()?;
+    m.add_class::<cosim::ArmState>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;

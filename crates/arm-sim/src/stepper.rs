@@ -241,6 +241,11 @@ impl<const N: usize> Stepper<N> {
         self.port
     }
 
+    /// Number of effects, and so of states of effects in a snapshot.
+    pub fn memories(&self) -> usize {
+        self.memory.state.len()
+    }
+
     /// Joint angles \[rad\].
     pub fn q(&self) -> &Joints<f64, N> {
         &self.state.q

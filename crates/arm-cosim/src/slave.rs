@@ -1,0 +1,454 @@
+//! The life cycle of a co-simulation slave: which call is allowed when, and what each does.
+
+use arm_sim::SimulationError;
+
+use crate::plant::{Plant, plant};
+use crate::spec::ArmSpec;
+use crate::state::SlaveState;
+use crate::status::{Refused, Status};
+use crate::variables::{Causality, Initial, Variable, fits, put, token, variables};
+
+/// Where a slave is in its life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mode {
+    /// Made, or reset.
+    Instantiated = 0,
+    /// Start values are set, outputs can be looked at.
+    Initialization = 1,
+    /// Between communication steps.
+    Step = 2,
+    /// At the end.
+    Terminated = 3,
+    /// After an error: it can be read, reset, brought back to a state and freed.
+    Failed = 4,
+}
+
+impl Mode {
+    /// The mode as the standard calls it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Instantiated => "instantiated",
+            Self::Initialization => "in initialization mode",
+            Self::Step => "in step mode",
+            Self::Terminated => "terminated",
+            Self::Failed => "in error",
+        }
+    }
+
+    pub(crate) fn numbered(number: u64) -> Option<Self> {
+        let all = [
+            Self::Instantiated,
+            Self::Initialization,
+            Self::Step,
+            Self::Terminated,
+            Self::Failed,
+        ];
+        usize::try_from(number)
+            .ok()
+            .and_then(|n| all.get(n).copied())
+    }
+}
+
+/// How far apart the importer's time and ours may be, relative to the larger of 1 s and the time.
+const SAME_TIME: f64 = 1e-9;
+
+/// An arm as a co-simulation slave.
+///
+/// Every call ends as the standard has it: an [`Error`](Status::Error) leads to [`Mode::Failed`], a
+/// [`Discard`](Status::Discard) leaves the slave as it was. Setting several values happens wholly or not at all.
+pub struct Slave {
+    spec: ArmSpec,
+    table: Vec<Variable>,
+    token: String,
+    mode: Mode,
+    values: Vec<f64>,
+    plant: Box<dyn Plant>,
+    /// Whether parameters or start values were set since the plant was made.
+    stale: bool,
+    start: f64,
+    stop: f64,
+}
+
+impl Slave {
+    /// An instantiated slave.
+    ///
+    /// # Errors
+    /// [`Refused`] for an arm that the core refuses.
+    pub fn new(spec: ArmSpec) -> Result<Self, Refused> {
+        let table = variables(&spec)?;
+        let token = token(&spec)?;
+        let values = table.iter().map(|v| v.start.unwrap_or(0.0)).collect();
+        let mut slave = Self {
+            plant: plant(&spec)?,
+            spec,
+            table,
+            token,
+            mode: Mode::Instantiated,
+            values,
+            stale: true,
+            start: 0.0,
+            stop: f64::INFINITY,
+        };
+        slave.prepare()?;
+        Ok(slave)
+    }
+
+    /// The arm as it was given; parameters that were set since are not in it.
+    pub fn spec(&self) -> &ArmSpec {
+        &self.spec
+    }
+
+    /// Its variables; the place in the table is the value reference.
+    pub fn variables(&self) -> &[Variable] {
+        &self.table
+    }
+
+    /// What protects it: see [`token`].
+    pub fn token(&self) -> &str {
+        &self.token
+    }
+
+    /// Where it is in its life.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Time \[s\].
+    pub fn time(&self) -> f64 {
+        match self.mode {
+            Mode::Instantiated | Mode::Initialization => self.start,
+            Mode::Step | Mode::Terminated | Mode::Failed => self.plant.time(),
+        }
+    }
+
+    /// Value reference of a variable.
+    pub fn reference(&self, name: &str) -> Option<u32> {
+        let at = self.table.iter().position(|v| v.name == name)?;
+        u32::try_from(at).ok()
+    }
+
+    /// Begins the initialization at a time \[s\]; later steps may not go beyond `stop`.
+    ///
+    /// # Errors
+    /// [`Refused`] in another mode, and for times that are not finite or not in order.
+    pub fn enter_initialization_mode(
+        &mut self,
+        start: f64,
+        stop: Option<f64>,
+    ) -> Result<(), Refused> {
+        self.only_in("enter the initialization", &[Mode::Instantiated])?;
+        let stop = stop.unwrap_or(f64::INFINITY);
+        if !start.is_finite() {
+            return self.failed(format!(
+                "the start time is {start}, allowed is a finite number of seconds"
+            ));
+        }
+        if stop.is_nan() || stop < start {
+            return self.failed(format!(
+                "the stop time is {stop} s, allowed is at least the start time, {start} s"
+            ));
+        }
+        (self.start, self.stop) = (start, stop);
+        (self.mode, self.stale) = (Mode::Initialization, true);
+        Ok(())
+    }
+
+    /// Ends the initialization: parameters and start values are taken.
+    ///
+    /// # Errors
+    /// [`Refused`] in another mode, and for values that the core refuses together.
+    pub fn exit_initialization_mode(&mut self) -> Result<(), Refused> {
+        self.only_in("leave the initialization", &[Mode::Initialization])?;
+        if let Err(refused) = self.prepare() {
+            return self.failed(refused.message);
+        }
+        self.mode = Mode::Step;
+        Ok(())
+    }
+
+    /// Sets variables by value reference, all or none.
+    ///
+    /// # Errors
+    /// [`Status::Error`] for a reference that is not known, or not to be set now; [`Status::Discard`] for a value that is
+    /// not finite or out of range.
+    pub fn set(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refused> {
+        self.only_in(
+            "set variables",
+            &[Mode::Instantiated, Mode::Initialization, Mode::Step],
+        )?;
+        if references.len() != values.len() {
+            return self.failed(format!(
+                "{} values for {} variables",
+                values.len(),
+                references.len()
+            ));
+        }
+        for (&reference, &value) in references.iter().zip(values) {
+            let Some(variable) = self.table.get(reference as usize) else {
+                return self.failed(format!("no variable has the value reference {reference}"));
+            };
+            if !settable(variable, self.mode) {
+                let (name, causality) = (&variable.name, variable.causality.name());
+                let message = format!(
+                    "{name} ({causality}) cannot be set when the slave is {}",
+                    self.mode.name()
+                );
+                return self.failed(message);
+            }
+            if !fits(variable, value) {
+                let Variable {
+                    name,
+                    unit,
+                    range: (min, max),
+                    ..
+                } = variable;
+                return Err(Refused::discard(format!(
+                    "{name} is {value}, allowed is a finite number, {min} to {max} {unit}"
+                )));
+            }
+        }
+        for (&reference, &value) in references.iter().zip(values) {
+            let at = reference as usize;
+            self.values[at] = value;
+            let variable = &self.table[at];
+            if variable.causality == Causality::Input {
+                self.plant.set_input(variable.quantity, value);
+            } else {
+                self.stale = true;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads variables by value reference, in every mode.
+    ///
+    /// # Errors
+    /// [`Refused`] for a reference that is not known, and before the first step for parameters that the core refuses together.
+    pub fn get(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refused> {
+        if references.len() != values.len() {
+            return self.failed(format!(
+                "room for {} values of {} variables",
+                values.len(),
+                references.len()
+            ));
+        }
+        for (&reference, value) in references.iter().zip(values) {
+            *value = self.value(reference)?;
+        }
+        Ok(())
+    }
+
+    fn value(&mut self, reference: u32) -> Result<f64, Refused> {
+        let at = reference as usize;
+        let Some(variable) = self.table.get(at) else {
+            return self.failed(format!("no variable has the value reference {reference}"));
+        };
+        let moving =
+            matches!(self.mode, Mode::Step | Mode::Terminated | Mode::Failed) && !self.stale;
+        match (variable.causality, variable.initial) {
+            (Causality::Independent, _) => Ok(self.time()),
+            (Causality::Output, Some(Initial::Exact)) if !moving => Ok(self.values[at]),
+            (Causality::Output, _) => {
+                let quantity = variable.quantity;
+                self.prepared()?;
+                Ok(self.plant.output(quantity))
+            }
+            (Causality::Input | Causality::Parameter | Causality::Local, _) => Ok(self.values[at]),
+        }
+    }
+
+    /// First time derivatives of outputs, with the inputs going on as they are.
+    ///
+    /// # Errors
+    /// [`Refused`] outside the step mode, for variables that are no outputs, and for other orders than 1.
+    pub fn output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), Refused> {
+        self.only_in("read derivatives", &[Mode::Step, Mode::Terminated])?;
+        if references.len() != values.len() || references.len() != orders.len() {
+            return self.failed(
+                "references, orders and values of derivatives differ in number".to_owned(),
+            );
+        }
+        for ((&reference, &order), value) in references.iter().zip(orders).zip(values) {
+            let variable = self.table.get(reference as usize);
+            let Some(quantity) = variable
+                .filter(|v| v.causality == Causality::Output)
+                .map(|v| v.quantity)
+            else {
+                return self.failed(format!(
+                    "the value reference {reference} is not that of an output"
+                ));
+            };
+            if order != 1 {
+                return self.failed(format!(
+                    "the order of a derivative is {order}, allowed is 1"
+                ));
+            }
+            *value = self.plant.derivative(quantity);
+        }
+        Ok(())
+    }
+
+    /// Makes one communication step from `time` \[s\], which must be where the slave stands.
+    ///
+    /// # Errors
+    /// [`Status::Error`] for a time or a step that is not allowed; [`Status::Discard`] when the state ceases to be finite:
+    /// the slave is then as before the step.
+    pub fn do_step(&mut self, time: f64, step: f64) -> Result<(), Refused> {
+        self.only_in("make a step", &[Mode::Step])?;
+        let own = self.plant.time();
+        let near = |a: f64, b: f64| (a - b).abs() <= SAME_TIME * b.abs().max(1.0);
+        if !near(time, own) {
+            return self.failed(format!(
+                "a step from {time} s was asked for, the slave is at {own} s"
+            ));
+        }
+        let end = time + step;
+        if end > self.stop && !near(end, self.stop) {
+            return self.failed(format!(
+                "a step to {end} s was asked for, the run ends at {} s",
+                self.stop
+            ));
+        }
+        match self.plant.advance(step) {
+            Ok(()) => Ok(()),
+            Err(error @ SimulationError::Diverged { .. }) => {
+                Err(Refused::discard(error.to_string()))
+            }
+            Err(error) => self.failed(error.to_string()),
+        }
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    /// [`Refused`] outside the step mode.
+    pub fn terminate(&mut self) -> Result<(), Refused> {
+        self.only_in("terminate", &[Mode::Step])?;
+        self.mode = Mode::Terminated;
+        Ok(())
+    }
+
+    /// Goes back to how the slave was made.
+    ///
+    /// # Errors
+    /// None for a slave that was made.
+    pub fn reset(&mut self) -> Result<(), Refused> {
+        for (value, variable) in self.values.iter_mut().zip(&self.table) {
+            *value = variable.start.unwrap_or(0.0);
+        }
+        (self.start, self.stop) = (0.0, f64::INFINITY);
+        (self.mode, self.stale) = (Mode::Instantiated, true);
+        self.prepare()
+    }
+
+    /// The state, to come back to it; possible in every mode.
+    pub fn state(&self) -> SlaveState {
+        SlaveState {
+            mode: self.mode,
+            stale: self.stale,
+            span: (self.start, self.stop),
+            values: self.values.clone(),
+            plant: self.plant.save(),
+            token: self.token.clone(),
+        }
+    }
+
+    /// Comes back to a state; possible in every mode.
+    ///
+    /// # Errors
+    /// [`Refused`] for a state of another arm or version; the slave is then as before.
+    pub fn set_state(&mut self, state: &SlaveState) -> Result<(), Refused> {
+        if state.token != self.token || state.values.len() != self.values.len() {
+            let (found, allowed) = (&state.token, &self.token);
+            return Err(Refused::error(format!(
+                "the state belongs to {found}, this slave is {allowed}"
+            )));
+        }
+        let parameters = self.table.iter().zip(self.values.iter().zip(&state.values));
+        let same = parameters
+            .filter(|(v, _)| v.causality == Causality::Parameter)
+            .all(|(_, (a, b))| a.to_bits() == b.to_bits());
+        let before = std::mem::replace(&mut self.values, state.values.clone());
+        if (!same || self.stale)
+            && let Err(refused) = self.remake()
+        {
+            self.values = before;
+            return Err(refused);
+        }
+        self.give_inputs();
+        if !self.plant.load(&state.plant) {
+            self.values = before;
+            return Err(Refused::error("the state does not fit this arm"));
+        }
+        (self.start, self.stop) = state.span;
+        (self.mode, self.stale) = (state.mode, state.stale);
+        Ok(())
+    }
+
+    /// Makes the plant from the values, unless that is done.
+    fn prepared(&mut self) -> Result<(), Refused> {
+        if self.stale { self.prepare() } else { Ok(()) }
+    }
+
+    fn prepare(&mut self) -> Result<(), Refused> {
+        let spec = self.remake()?;
+        self.give_inputs();
+        self.plant.start(&spec, self.start)?;
+        self.stale = false;
+        Ok(())
+    }
+
+    /// A plant with the parameters and inputs as they are set.
+    fn remake(&mut self) -> Result<ArmSpec, Refused> {
+        let mut spec = self.spec.clone();
+        for (variable, &value) in self.table.iter().zip(&self.values) {
+            if variable.start.is_some() {
+                put(&mut spec, variable.quantity, value);
+            }
+        }
+        self.plant = plant(&spec)?;
+        Ok(spec)
+    }
+
+    fn give_inputs(&mut self) {
+        for (variable, &value) in self.table.iter().zip(&self.values) {
+            if variable.causality == Causality::Input {
+                self.plant.set_input(variable.quantity, value);
+            }
+        }
+    }
+
+    fn only_in(&mut self, what: &str, modes: &[Mode]) -> Result<(), Refused> {
+        if modes.contains(&self.mode) {
+            return Ok(());
+        }
+        self.failed(format!(
+            "cannot {what} when the slave is {}",
+            self.mode.name()
+        ))
+    }
+
+    fn failed<T>(&mut self, message: String) -> Result<T, Refused> {
+        self.mode = Mode::Failed;
+        Err(Refused {
+            status: Status::Error,
+            message,
+        })
+    }
+}
+
+fn settable(variable: &Variable, mode: Mode) -> bool {
+    let before = matches!(mode, Mode::Instantiated | Mode::Initialization);
+    match variable.causality {
+        Causality::Input => true,
+        Causality::Parameter => before,
+        Causality::Output => before && variable.initial == Some(Initial::Exact),
+        Causality::Independent | Causality::Local => false,
+    }
+}

@@ -1,0 +1,346 @@
+//! FMI 2.0: all functions of `fmi2Functions.h`, those of co-simulation with life, the others refused with a message.
+
+use std::ffi::{CString, c_char, c_int, c_void};
+
+use crate::instance::{self, Handle, Instance, Log, guarded, unsupported, with};
+use crate::pointers::{error, give, read, text, write};
+use crate::refused::{refused, without_variables};
+use crate::resources;
+
+/// `fmi2CoSimulation`.
+const CO_SIMULATION: c_int = 1;
+/// `fmi2LastSuccessfulTime`.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
+/// `fmi2Terminated`.
+const TERMINATED: c_int = 3;
+
+/// The callbacks of an importer; only the logger and its environment are used.
+#[repr(C)]
+pub struct Callbacks {
+    /// Takes messages in the way of `printf`.
+    pub logger: Option<
+        unsafe extern "C" fn(Handle, *const c_char, c_int, *const c_char, *const c_char, ...),
+    >,
+    /// Not used.
+    pub allocate: *const c_void,
+    /// Not used.
+    pub free: *const c_void,
+    /// Not used.
+    pub step_finished: *const c_void,
+    /// Handed back to the logger.
+    pub environment: Handle,
+}
+
+/// Sizes of the types.
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+    c"default".as_ptr()
+}
+
+/// The version of the standard.
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetVersion() -> *const c_char {
+    c"2.0".as_ptr()
+}
+
+/// Switches the log of events on or off; errors are always logged.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetDebugLogging(
+    instance: Handle,
+    on: c_int,
+    n: usize,
+    categories: *const *const c_char,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        with(instance, "fmi2SetDebugLogging", |i| {
+            let names = read(categories, n)?
+                .iter()
+                .filter_map(|c| text(*c))
+                .collect::<Vec<_>>();
+            i.set_logging(on != 0, &names)
+        })
+    }
+}
+
+/// Makes an instance of the arm in the resources; null when it is refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Instantiate(
+    name: *const c_char,
+    kind: c_int,
+    guid: *const c_char,
+    resource_location: *const c_char,
+    callbacks: *const Callbacks,
+    _visible: c_int,
+    logging: c_int,
+) -> Handle {
+    // SAFETY: see `pointers`.
+    let (name, guid, uri) = unsafe { (text(name), text(guid), text(resource_location)) };
+    // SAFETY: null, or valid as the importer promises.
+    let callbacks = unsafe { callbacks.as_ref() };
+    let log = Log::Two {
+        message: callbacks.and_then(|c| c.logger),
+        environment: callbacks.map_or(std::ptr::null_mut(), |c| c.environment),
+        instance: CString::new(name.unwrap_or_default()).unwrap_or_default(),
+    };
+    Instance::handle(log, logging != 0, || {
+        if kind != CO_SIMULATION {
+            return Err(error(
+                "model exchange was asked for, this FMU is for co-simulation",
+            ));
+        }
+        let folder = uri.map(|uri| resources::path_of_uri(&uri)).transpose()?;
+        resources::open(folder, guid)
+    })
+}
+
+/// Frees an instance; null is nothing to free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2FreeInstance(instance: Handle) {
+    // SAFETY: see `pointers`.
+    unsafe { instance::free(instance) }
+}
+
+/// Takes start and stop time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetupExperiment(
+    instance: Handle,
+    _tolerance_defined: c_int,
+    _tolerance: f64,
+    start: f64,
+    stop_defined: c_int,
+    stop: f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        with(instance, "fmi2SetupExperiment", |i| {
+            i.experiment = (start, (stop_defined != 0).then_some(stop));
+            Ok(())
+        })
+    }
+}
+
+/// Begins the initialization.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2EnterInitializationMode(instance: Handle) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        with(instance, "fmi2EnterInitializationMode", |i| {
+            let (start, stop) = i.experiment;
+            i.slave.enter_initialization_mode(start, stop)
+        })
+    }
+}
+
+/// Ends the initialization.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2ExitInitializationMode(instance: Handle) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2ExitInitializationMode", |s| {
+            s.exit_initialization_mode()
+        })
+    }
+}
+
+/// Ends the run.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Terminate(instance: Handle) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { guarded(instance, "fmi2Terminate", |s| s.terminate()) }
+}
+
+/// Goes back to how the instance was made.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Reset(instance: Handle) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        with(instance, "fmi2Reset", |i| {
+            i.experiment = (0.0, None);
+            i.slave.reset()
+        })
+    }
+}
+
+/// Reads variables.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetReal(
+    instance: Handle,
+    references: *const u32,
+    n: usize,
+    values: *mut f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2GetReal", |s| {
+            s.get(read(references, n)?, write(values, n)?)
+        })
+    }
+}
+
+/// Sets variables, all or none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetReal(
+    instance: Handle,
+    references: *const u32,
+    n: usize,
+    values: *const f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2SetReal", |s| {
+            s.set(read(references, n)?, read(values, n)?)
+        })
+    }
+}
+
+/// Makes a communication step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2DoStep(
+    instance: Handle,
+    time: f64,
+    step: f64,
+    _no_set_state_before: c_int,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { guarded(instance, "fmi2DoStep", |s| s.do_step(time, step)) }
+}
+
+/// Reads first time derivatives of outputs.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+    instance: Handle,
+    references: *const u32,
+    n: usize,
+    orders: *const c_int,
+    values: *mut f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2GetRealOutputDerivatives", |s| {
+            s.output_derivatives(read(references, n)?, read(orders, n)?, write(values, n)?)
+        })
+    }
+}
+
+/// Tells up to when the last step went.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealStatus(
+    instance: Handle,
+    kind: c_int,
+    value: *mut f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2GetRealStatus", |s| match kind {
+            LAST_SUCCESSFUL_TIME => {
+                give(value, s.time());
+                Ok(())
+            }
+            _ => Err(error("only the last successful time is a number")),
+        })
+    }
+}
+
+/// Tells whether the slave wants to end: it never does.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetBooleanStatus(
+    instance: Handle,
+    kind: c_int,
+    value: *mut c_int,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2GetBooleanStatus", |_| match kind {
+            TERMINATED => {
+                give(value, 0);
+                Ok(())
+            }
+            _ => Err(error("only the end of the run is true or false")),
+        })
+    }
+}
+
+/// Keeps the state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetFMUstate(instance: Handle, state: *mut *mut c_void) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::get_state(instance, "fmi2GetFMUstate", state) }
+}
+
+/// Goes back to a state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetFMUstate(instance: Handle, state: *mut c_void) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::set_state(instance, "fmi2SetFMUstate", state) }
+}
+
+/// Frees a state; null is nothing to free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2FreeFMUstate(instance: Handle, state: *mut *mut c_void) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::free_state(instance, "fmi2FreeFMUstate", state) }
+}
+
+/// Tells how many bytes a state takes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
+    instance: Handle,
+    state: *mut c_void,
+    size: *mut usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::state_size(instance, "fmi2SerializedFMUstateSize", state, size) }
+}
+
+/// Writes a state as bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SerializeFMUstate(
+    instance: Handle,
+    state: *mut c_void,
+    bytes: *mut u8,
+    size: usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::serialize(instance, "fmi2SerializeFMUstate", state, (bytes, size)) }
+}
+
+/// Makes a state from bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
+    instance: Handle,
+    bytes: *const u8,
+    size: usize,
+    state: *mut *mut c_void,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::deserialize(instance, "fmi2DeSerializeFMUstate", (bytes, size), state) }
+}
+
+without_variables! {
+    fmi2GetInteger(*mut c_int);
+    fmi2GetBoolean(*mut c_int);
+    fmi2GetString(*mut *const c_char);
+    fmi2SetInteger(*const c_int);
+    fmi2SetBoolean(*const c_int);
+    fmi2SetString(*const *const c_char);
+    fmi2GetDirectionalDerivative(*const u32, usize, *const f64, *mut f64);
+    fmi2SetRealInputDerivatives(*const c_int, *const f64);
+}
+
+refused! {
+    fmi2EnterEventMode();
+    fmi2NewDiscreteStates(*mut c_void);
+    fmi2EnterContinuousTimeMode();
+    fmi2CompletedIntegratorStep(c_int, *mut c_int, *mut c_int);
+    fmi2SetTime(f64);
+    fmi2SetContinuousStates(*const f64, usize);
+    fmi2GetDerivatives(*mut f64, usize);
+    fmi2GetEventIndicators(*mut f64, usize);
+    fmi2GetContinuousStates(*mut f64, usize);
+    fmi2GetNominalsOfContinuousStates(*mut f64, usize);
+    fmi2CancelStep();
+    fmi2GetStatus(c_int, *mut c_int);
+    fmi2GetIntegerStatus(c_int, *mut c_int);
+    fmi2GetStringStatus(c_int, *mut *const c_char);
+}

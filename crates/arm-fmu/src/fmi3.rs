@@ -1,0 +1,369 @@
+//! FMI 3.0: all functions of `fmi3Functions.h`, those of co-simulation with life, the others refused with a message.
+
+use std::ffi::{c_char, c_int, c_void};
+use std::path::PathBuf;
+
+use arm_cosim::Status;
+
+use crate::instance::{self, ERRORS, Handle, Instance, Log, guarded, unsupported, with};
+use crate::pointers::{error, give, read, text, write};
+use crate::refused::{refused, without_variables};
+use crate::resources;
+
+type Message = Option<unsafe extern "C" fn(Handle, c_int, *const c_char, *const c_char)>;
+/// A callback that is never called.
+type Unused = *const c_void;
+
+/// The version of the standard.
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi3GetVersion() -> *const c_char {
+    c"3.0".as_ptr()
+}
+
+/// Switches the log of events on or off; errors are always logged.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3SetDebugLogging(
+    instance: Handle,
+    on: u8,
+    n: usize,
+    categories: *const *const c_char,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        with(instance, "fmi3SetDebugLogging", |i| {
+            let names = read(categories, n)?
+                .iter()
+                .filter_map(|c| text(*c))
+                .collect::<Vec<_>>();
+            i.set_logging(on != 0, &names)
+        })
+    }
+}
+
+/// Makes an instance of the arm in the resources; null when it is refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
+    _name: *const c_char,
+    token: *const c_char,
+    resource_path: *const c_char,
+    _visible: u8,
+    logging: u8,
+    event_mode_used: u8,
+    _early_return_allowed: u8,
+    _intermediate: *const u32,
+    n_intermediate: usize,
+    environment: Handle,
+    message: Message,
+    _intermediate_update: Unused,
+) -> Handle {
+    let log = Log::Three {
+        message,
+        environment,
+    };
+    // SAFETY: see `pointers`.
+    let (token, folder) = unsafe { (text(token), text(resource_path)) };
+    Instance::handle(log, logging != 0, || {
+        if event_mode_used != 0 {
+            return Err(error("event mode was asked for, this FMU has none"));
+        }
+        if n_intermediate > 0 {
+            return Err(error(
+                "intermediate update was asked for, this FMU has none",
+            ));
+        }
+        resources::open(folder.map(PathBuf::from), token)
+    })
+}
+
+fn no_instance(kind: &str, environment: Handle, message: Message) -> Handle {
+    let log = Log::Three {
+        message,
+        environment,
+    };
+    log.tell(
+        Status::Error,
+        ERRORS,
+        &format!("{kind} was asked for, this FMU is for co-simulation"),
+    );
+    std::ptr::null_mut()
+}
+
+/// Refused: this FMU is for co-simulation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3InstantiateModelExchange(
+    _name: *const c_char,
+    _token: *const c_char,
+    _resource_path: *const c_char,
+    _visible: u8,
+    _logging: u8,
+    environment: Handle,
+    message: Message,
+) -> Handle {
+    no_instance("model exchange", environment, message)
+}
+
+/// Refused: this FMU is for co-simulation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
+    _name: *const c_char,
+    _token: *const c_char,
+    _resource_path: *const c_char,
+    _visible: u8,
+    _logging: u8,
+    environment: Handle,
+    message: Message,
+    _clock_update: Unused,
+    _lock: Unused,
+    _unlock: Unused,
+) -> Handle {
+    no_instance("scheduled execution", environment, message)
+}
+
+/// Frees an instance; null is nothing to free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3FreeInstance(instance: Handle) {
+    // SAFETY: see `pointers`.
+    unsafe { instance::free(instance) }
+}
+
+/// Begins the initialization.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3EnterInitializationMode(
+    instance: Handle,
+    _tolerance_defined: u8,
+    _tolerance: f64,
+    start: f64,
+    stop_defined: u8,
+    stop: f64,
+) -> c_int {
+    let stop = (stop_defined != 0).then_some(stop);
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3EnterInitializationMode", |s| {
+            s.enter_initialization_mode(start, stop)
+        })
+    }
+}
+
+/// Ends the initialization.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3ExitInitializationMode(instance: Handle) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3ExitInitializationMode", |s| {
+            s.exit_initialization_mode()
+        })
+    }
+}
+
+/// Ends the run.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3Terminate(instance: Handle) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { guarded(instance, "fmi3Terminate", |s| s.terminate()) }
+}
+
+/// Goes back to how the instance was made.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3Reset(instance: Handle) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { guarded(instance, "fmi3Reset", |s| s.reset()) }
+}
+
+/// Reads variables.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetFloat64(
+    instance: Handle,
+    references: *const u32,
+    n: usize,
+    values: *mut f64,
+    n_values: usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3GetFloat64", |s| {
+            s.get(read(references, n)?, write(values, n_values)?)
+        })
+    }
+}
+
+/// Sets variables, all or none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3SetFloat64(
+    instance: Handle,
+    references: *const u32,
+    n: usize,
+    values: *const f64,
+    n_values: usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3SetFloat64", |s| {
+            s.set(read(references, n)?, read(values, n_values)?)
+        })
+    }
+}
+
+/// Makes a communication step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3DoStep(
+    instance: Handle,
+    time: f64,
+    step: f64,
+    _no_set_state_before: u8,
+    event_handling_needed: *mut u8,
+    terminate: *mut u8,
+    early_return: *mut u8,
+    last_successful_time: *mut f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3DoStep", |s| {
+            let done = s.do_step(time, step);
+            for flag in [event_handling_needed, terminate, early_return] {
+                give(flag, 0);
+            }
+            give(last_successful_time, s.time());
+            done
+        })
+    }
+}
+
+/// Reads first time derivatives of outputs.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetOutputDerivatives(
+    instance: Handle,
+    references: *const u32,
+    n: usize,
+    orders: *const i32,
+    values: *mut f64,
+    n_values: usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3GetOutputDerivatives", |s| {
+            s.output_derivatives(
+                read(references, n)?,
+                read(orders, n)?,
+                write(values, n_values)?,
+            )
+        })
+    }
+}
+
+/// Keeps the state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetFMUState(instance: Handle, state: *mut *mut c_void) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::get_state(instance, "fmi3GetFMUState", state) }
+}
+
+/// Goes back to a state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3SetFMUState(instance: Handle, state: *mut c_void) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::set_state(instance, "fmi3SetFMUState", state) }
+}
+
+/// Frees a state; null is nothing to free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3FreeFMUState(instance: Handle, state: *mut *mut c_void) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::free_state(instance, "fmi3FreeFMUState", state) }
+}
+
+/// Tells how many bytes a state takes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3SerializedFMUStateSize(
+    instance: Handle,
+    state: *mut c_void,
+    size: *mut usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::state_size(instance, "fmi3SerializedFMUStateSize", state, size) }
+}
+
+/// Writes a state as bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3SerializeFMUState(
+    instance: Handle,
+    state: *mut c_void,
+    bytes: *mut u8,
+    size: usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::serialize(instance, "fmi3SerializeFMUState", state, (bytes, size)) }
+}
+
+/// Makes a state from bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3DeserializeFMUState(
+    instance: Handle,
+    bytes: *const u8,
+    size: usize,
+    state: *mut *mut c_void,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe { instance::deserialize(instance, "fmi3DeserializeFMUState", (bytes, size), state) }
+}
+
+without_variables! {
+    fmi3GetFloat32(*mut f32, usize);
+    fmi3GetInt8(*mut i8, usize);
+    fmi3GetUInt8(*mut u8, usize);
+    fmi3GetInt16(*mut i16, usize);
+    fmi3GetUInt16(*mut u16, usize);
+    fmi3GetInt32(*mut i32, usize);
+    fmi3GetUInt32(*mut u32, usize);
+    fmi3GetInt64(*mut i64, usize);
+    fmi3GetUInt64(*mut u64, usize);
+    fmi3GetBoolean(*mut u8, usize);
+    fmi3GetString(*mut *const c_char, usize);
+    fmi3GetBinary(*mut usize, *mut *const u8, usize);
+    fmi3GetClock(*mut u8);
+    fmi3SetFloat32(*const f32, usize);
+    fmi3SetInt8(*const i8, usize);
+    fmi3SetUInt8(*const u8, usize);
+    fmi3SetInt16(*const i16, usize);
+    fmi3SetUInt16(*const u16, usize);
+    fmi3SetInt32(*const i32, usize);
+    fmi3SetUInt32(*const u32, usize);
+    fmi3SetInt64(*const i64, usize);
+    fmi3SetUInt64(*const u64, usize);
+    fmi3SetBoolean(*const u8, usize);
+    fmi3SetString(*const *const c_char, usize);
+    fmi3SetBinary(*const usize, *const *const u8, usize);
+    fmi3SetClock(*const u8);
+    fmi3GetDirectionalDerivative(*const u32, usize, *const f64, usize, *mut f64, usize);
+    fmi3GetAdjointDerivative(*const u32, usize, *const f64, usize, *mut f64, usize);
+    fmi3GetIntervalDecimal(*mut f64, *mut c_int);
+    fmi3GetIntervalFraction(*mut u64, *mut u64, *mut c_int);
+    fmi3GetShiftDecimal(*mut f64);
+    fmi3GetShiftFraction(*mut u64, *mut u64);
+    fmi3SetIntervalDecimal(*const f64);
+    fmi3SetIntervalFraction(*const u64, *const u64);
+    fmi3SetShiftDecimal(*const f64);
+    fmi3SetShiftFraction(*const u64, *const u64);
+}
+
+refused! {
+    fmi3EnterEventMode();
+    fmi3GetNumberOfVariableDependencies(u32, *mut usize);
+    fmi3GetVariableDependencies(u32, *mut usize, *mut u32, *mut usize, *mut c_int, usize);
+    fmi3EnterConfigurationMode();
+    fmi3ExitConfigurationMode();
+    fmi3EvaluateDiscreteStates();
+    fmi3UpdateDiscreteStates(*mut u8, *mut u8, *mut u8, *mut u8, *mut u8, *mut f64);
+    fmi3EnterContinuousTimeMode();
+    fmi3CompletedIntegratorStep(u8, *mut u8, *mut u8);
+    fmi3SetTime(f64);
+    fmi3SetContinuousStates(*const f64, usize);
+    fmi3GetContinuousStateDerivatives(*mut f64, usize);
+    fmi3GetEventIndicators(*mut f64, usize);
+    fmi3GetContinuousStates(*mut f64, usize);
+    fmi3GetNominalsOfContinuousStates(*mut f64, usize);
+    fmi3GetNumberOfEventIndicators(*mut usize);
+    fmi3GetNumberOfContinuousStates(*mut usize);
+    fmi3EnterStepMode();
+    fmi3ActivateModelPartition(u32, f64);
+}

@@ -1,0 +1,20 @@
+//! The arm as a functional mock-up unit: the C interfaces of FMI 2.0 and 3.0 for co-simulation.
+//!
+//! Everything that computes, and every rule of the standards, is in [`arm_cosim`]; here are pointers, strings and logs. This
+//! is the only crate of an FMU with `unsafe`. No call unwinds into the importer: a panic ends as `Fatal`, and the instance
+//! refuses everything but to be freed; others are not touched.
+
+#![allow(non_snake_case, reason = "names of the standards")]
+#![allow(
+    clippy::missing_safety_doc,
+    reason = "the contract is that of the standards, see `pointers`"
+)]
+
+pub mod fmi2;
+pub mod fmi3;
+mod instance;
+mod pointers;
+mod refused;
+mod resources;
+
+pub use instance::{Handle, guarded};

@@ -1,0 +1,64 @@
+//! What comes from C. The importer promises what the standards say: pointers are null or valid for the number of elements
+//! given with them, strings end with a zero byte, and an instance is used by one thread at a time and not after it was freed.
+
+use std::ffi::{CStr, c_char};
+
+use arm_cosim::{Refused, Status};
+
+/// A refusal as an error.
+pub fn error(message: impl Into<String>) -> Refused {
+    Refused {
+        status: Status::Error,
+        message: message.into(),
+    }
+}
+
+/// An array of `n` elements; empty arrays may be null.
+///
+/// # Safety
+/// See the module.
+pub unsafe fn read<'a, T>(start: *const T, n: usize) -> Result<&'a [T], Refused> {
+    match (start.is_null(), n) {
+        (_, 0) => Ok(&[]),
+        (true, _) => Err(error("a null pointer was given for an array")),
+        // SAFETY: not null, and valid for `n` elements as the importer promises.
+        (false, _) => Ok(unsafe { std::slice::from_raw_parts(start, n) }),
+    }
+}
+
+/// An array of `n` elements to be written.
+///
+/// # Safety
+/// See the module.
+pub unsafe fn write<'a, T>(start: *mut T, n: usize) -> Result<&'a mut [T], Refused> {
+    match (start.is_null(), n) {
+        (_, 0) => Ok(&mut []),
+        (true, _) => Err(error("a null pointer was given for an array")),
+        // SAFETY: not null, and valid for `n` elements as the importer promises.
+        (false, _) => Ok(unsafe { std::slice::from_raw_parts_mut(start, n) }),
+    }
+}
+
+/// Writes one value where the importer wants to have it; nowhere when it gives no place.
+///
+/// # Safety
+/// See the module.
+pub unsafe fn give<T>(place: *mut T, value: T) {
+    if !place.is_null() {
+        // SAFETY: not null, and valid as the importer promises.
+        unsafe { place.write(value) }
+    }
+}
+
+/// A text; nothing for a null pointer. Bytes that are not UTF-8 are replaced.
+///
+/// # Safety
+/// See the module.
+pub unsafe fn text(start: *const c_char) -> Option<String> {
+    if start.is_null() {
+        return None;
+    }
+    // SAFETY: not null, and ended by a zero byte as the importer promises.
+    let text = unsafe { CStr::from_ptr(start) };
+    Some(text.to_string_lossy().into_owned())
+}

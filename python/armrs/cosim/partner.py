@@ -1,0 +1,163 @@
+"""What a master needs of everything that it couples: our own slave, an imported FMU, a wall."""
+
+from __future__ import annotations
+
+import abc
+import enum
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+
+class Status(enum.IntEnum):
+    """How a call ends, with the numbers of the FMI standards."""
+
+    OK = 0
+    WARNING = 1
+    DISCARD = 2
+    ERROR = 3
+    FATAL = 4
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """What a communication step gave.
+
+    Attributes
+    ----------
+    status : Status
+        OK or WARNING when it was made, DISCARD when it was not and the slave is as before.
+    last_successful_time : float
+        Up to when the slave came [s].
+    event, terminate, early_return : bool
+        What the slave asks for, as in FMI 3.0.
+    message : str
+        What it says of a discarded step.
+    """
+
+    status: Status
+    last_successful_time: float
+    event: bool = False
+    terminate: bool = False
+    early_return: bool = False
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of a slave, in the words of FMI 3.0.
+
+    Attributes
+    ----------
+    name : str
+    reference : int
+        Value reference.
+    causality, variability : str
+    initial : str, optional
+        "exact", "approx" or "calculated".
+    type : str
+        Type of FMI 3.0; "Float64" for everything that can be connected.
+    unit : str, optional
+    exponents : tuple of int, optional
+        Powers of kg, m, s and rad; None when the unit is not described.
+    scale : float
+        Factor to the unit in base units.
+    start, min, max : optional
+    nominal : float
+    description : str
+    """
+
+    name: str
+    reference: int
+    causality: str
+    variability: str
+    initial: str | None = None
+    type: str = "Float64"
+    unit: str | None = None
+    exponents: tuple[int, ...] | None = None
+    scale: float = 1.0
+    start: float | int | bool | str | None = None
+    min: float | None = None
+    max: float | None = None
+    nominal: float = 1.0
+    description: str = field(default="", repr=False)
+
+
+class Partner(abc.ABC):
+    """A slave, wherever it runs.
+
+    Calls that are not done raise `SlaveError`; a step that is discarded says so in its result.
+
+    Attributes
+    ----------
+    name : str
+    variables : mapping of str to Variable
+    can_rollback : bool
+        Whether it can come back to a state.
+    internal_step : float, optional
+        Step inside [s], where it has a fixed one.
+    can_vary_step : bool
+        Whether communication steps may differ.
+    """
+
+    name: str
+    variables: Mapping[str, Variable]
+    can_rollback: bool
+    internal_step: float | None = None
+    can_vary_step: bool = True
+
+    @abc.abstractmethod
+    def enter_initialization_mode(self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None) -> None:
+        """Begin the initialization at a time [s]."""
+
+    @abc.abstractmethod
+    def exit_initialization_mode(self) -> None:
+        """End the initialization."""
+
+    @abc.abstractmethod
+    def set(self, names: Sequence[str] | str, values: Any) -> None:
+        """Set variables by name, all or none."""
+
+    @abc.abstractmethod
+    def get(self, names: Sequence[str] | str) -> np.ndarray:
+        """Return variables by name, shape (len(names),)."""
+
+    @abc.abstractmethod
+    def do_step(self, time: float, step: float) -> StepResult:
+        """Make a communication step from a time [s], of a length [s]."""
+
+    @abc.abstractmethod
+    def get_state(self) -> Any:
+        """Return the state, to come back to it."""
+
+    @abc.abstractmethod
+    def set_state(self, state: Any) -> None:
+        """Come back to a state."""
+
+    def free_state(self, state: Any) -> None:  # noqa: B027 (only what lives outside Python has anything to free)
+        """Give a state back that is not needed any more."""
+
+    @abc.abstractmethod
+    def terminate(self) -> None:
+        """End the run."""
+
+    @abc.abstractmethod
+    def reset(self) -> None:
+        """Go back to how the slave was made."""
+
+    def free(self) -> None:  # noqa: B027
+        """Give back what the slave holds; it is not used any more."""
+
+    def __enter__(self) -> Partner:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.free()
+
+
+def listed(names: Sequence[str] | str) -> list[str]:
+    """Return one name or several as a list."""
+    return [names] if isinstance(names, str) else list(names)

@@ -1,0 +1,50 @@
+"""What an FMU says of itself, as plain data and in words."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from .. import console
+from .description import archive, read_description
+
+
+def about(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return what an FMU says of itself, as it is written to JSON."""
+    description = read_description(path)
+    with archive(path) as files:
+        platforms = sorted({name.split("/")[1] for name in files.namelist() if name.startswith("binaries/") and name.count("/") > 1})
+    keys = ("name", "causality", "variability", "type", "unit", "start", "min", "max", "description")
+    return {
+        "verb": "fmu info",
+        "file": os.fspath(path),
+        "fmi_version": description.version,
+        "model": description.model_name,
+        "description": description.text,
+        "tool": description.tool,
+        "token": description.token,
+        "platforms": platforms,
+        "capabilities": {key: value for key, value in description.flags.items() if key != "modelIdentifier"},
+        "experiment": description.experiment,
+        "variables": [{key: getattr(v, key) for key in keys} for v in description.variables],
+    }
+
+
+def info_words(data: dict[str, Any]) -> None:
+    """Print what `about` returns."""
+    lines = {
+        "model": data["model"],
+        "FMI": data["fmi_version"],
+        "made by": data["tool"] or "unknown",
+        "token": data["token"],
+        "machines": ", ".join(data["platforms"]) or "none",
+        **data["capabilities"],
+    }
+    width = max(map(len, lines))
+    for name, value in lines.items():
+        print(f"{name.ljust(width)}  {value}")
+    if data["description"]:
+        print(f"\n{data['description']}")
+    print()
+    rows = [(v["name"], v["causality"], v["unit"] or "-", "-" if v["start"] is None else str(v["start"])) for v in data["variables"]]
+    console.table(("variable", "causality", "unit", "start"), rows, left=4)
