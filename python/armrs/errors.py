@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Iterable
+from typing import Any
 
 _ALIKE = 0.5
 """Least similarity of names, from 0 to 1, at which one is suggested for the other."""
@@ -98,7 +99,15 @@ class SlaveError(ArmrsError):
 
 
 class CoupledError(ArmrsError):
-    """A co-simulation whose numbers are no result: it diverged, creates energy, or its iteration did not converge."""
+    """A co-simulation whose numbers are no result: it diverged, creates energy, or its iteration did not converge.
+
+    Attributes
+    ----------
+    run : Coupled, optional
+        The run as far as it went, for diagnosis.
+    """
+
+    run: Any = None
 
 
 class Text(str):

@@ -8,6 +8,7 @@ import platform
 import shutil
 import sys
 import tempfile
+import weakref
 from collections.abc import Sequence
 from ctypes import byref, c_bool, c_char_p, c_double, c_float, c_int, c_size_t, c_void_p
 from pathlib import Path
@@ -154,27 +155,26 @@ class ImportedSlave(Partner):
         self.can_vary_step = self.description.flag("canHandleVariableCommunicationStepSize")
         step = self.description.flags.get("fixedInternalStepSize")
         self.internal_step = float(step) if step else None
-        self._folder: Path | None = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
-        self._handle: int | None = None
+        folder = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
         try:
-            unpack(path, self._folder)
-            self.library = Library(library_path(self._folder, self.description, path), self.fmi)
-            resources = self._folder / "resources"
+            unpack(path, folder)
+            self.library = Library(library_path(folder, self.description, path), self.fmi)
+            resources = folder / "resources"
             resources.mkdir(exist_ok=True)
-            self._handle = self.library.instantiate(self.name, self.description.token, resources, logging=logging)
-            if not self._handle:
+            handle = self.library.instantiate(self.name, self.description.token, resources, logging=logging)
+            if not handle:
                 raise SlaveError("instantiate", Status.ERROR, f"{self.path.name}: {self.library.last_message()}")
         except BaseException:
-            self.free()
+            shutil.rmtree(folder, ignore_errors=True)
             raise
+        self._handle: int | None = handle
+        # Also at the end of the process, while there still is an interpreter that a library may need.
+        self._release = weakref.finalize(self, _release, self.library, handle, folder)
 
     @property
     def fmi(self) -> int:
         """Major version of the standard: 2 or 3."""
         return self.description.fmi
-
-    def __del__(self) -> None:
-        self.free()
 
     def enter_initialization_mode(self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None) -> None:
         """Begin the initialization."""
@@ -283,12 +283,8 @@ class ImportedSlave(Partner):
 
     def free(self) -> None:
         """Free the instance and remove the temporary folder."""
-        handle, self._handle = getattr(self, "_handle", None), None
-        if handle:
-            self.library.function("FreeInstance", None)(c_void_p(handle))
-        folder, self._folder = getattr(self, "_folder", None), None
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
+        self._handle = None
+        self._release()
 
     @property
     def _s(self) -> str:
@@ -324,6 +320,11 @@ class ImportedSlave(Partner):
     def _references(self, names: list[str], places: Sequence[int]) -> tuple[Any, c_size_t]:
         references = [self.variables[names[k]].reference for k in places]
         return (ctypes.c_uint32 * len(references))(*references), c_size_t(len(references))
+
+
+def _release(library: Library, handle: int, folder: Path) -> None:
+    library.function("FreeInstance", None)(c_void_p(handle))
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def library_path(folder: Path, description: Description, file: str | os.PathLike[str]) -> Path:

@@ -1,0 +1,420 @@
+"""The master: steps the slaves of a system together, and says whether what comes out may be believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInput, CoupledError, SlaveError, Text
+from .partner import Partner, Status
+from .system import Connection, System
+
+MOST_CREATED = 0.02
+"""Largest magnitude of the energy that the coupling may have created, against the largest that went through, before a run is unstable."""
+MOST_IN_STEPS = 0.1
+"""The same of the magnitudes summed over steps."""
+WORTH_A_WARNING = 0.005
+_LITTLE = 1e-6
+"""Energy below which a share says nothing [J]."""
+_ITERATIONS = 25
+
+
+@dataclass(frozen=True)
+class ConnectionReport:
+    """What a connection did.
+
+    Attributes
+    ----------
+    connection : Connection
+    unit : str
+    residual_max, residual_rms : float
+        Input that was held during a step less the mean of the output at both of its ends, in the unit of the input; for an iterated
+        coupling less the value it should have been.
+    energy_exchanged : float, optional
+        Largest magnitude of the work that went through since the start [J]; None without a dual variable.
+    energy_created : float, optional
+        What the target received more than the source gave [J].
+    """
+
+    connection: Connection
+    unit: str
+    residual_max: float
+    residual_rms: float
+    energy_exchanged: float | None
+    energy_created: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Coupled:
+    """A run of a system.
+
+    Attributes
+    ----------
+    system : System
+    verdict : {"good", "unstable", "diverged", "not converged"}
+        Only a good run is a result.
+    why : str
+        One line on the verdict.
+    t : ndarray, shape (n,)
+        Communication points [s].
+    columns : dict of str to ndarray, shape (n,)
+        Every output, by slave and variable.
+    used, residual : ndarray, shape (n - 1, connections)
+        Inputs that were held in each step, and what they were off.
+    created : ndarray, shape (n, connections)
+        Energy that the coupling has created since the start [J]; NaN without a dual variable.
+    connections : tuple of ConnectionReport
+    evaluations : float
+        Steps of all slaves together for each communication step.
+    warnings : tuple of str
+    """
+
+    system: System
+    verdict: str
+    why: str
+    t: np.ndarray
+    columns: dict[str, np.ndarray] = field(repr=False)
+    used: np.ndarray = field(repr=False)
+    residual: np.ndarray = field(repr=False)
+    created: np.ndarray = field(repr=False)
+    connections: tuple[ConnectionReport, ...] = field(repr=False)
+    evaluations: float
+    warnings: tuple[str, ...]
+
+
+def run_system(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
+    """Run a system from zero to its duration.
+
+    Parameters
+    ----------
+    system : System
+    progress : callable, optional
+        Called with the number of communication steps made since the last call.
+
+    Returns
+    -------
+    Coupled
+
+    Raises
+    ------
+    CoupledError
+        When the run is no result: it diverged, the coupling creates energy, or the iteration did not converge. Its attribute `run` is the
+        run as far as it went, for diagnosis.
+    BadInput
+        When the algorithm asks for what a slave cannot do.
+    SlaveError
+        When a slave refuses a call.
+    """
+    run = _Run(system)
+    run.initialize()
+    run.steps(progress)
+    result = run.result()
+    if result.verdict != "good":
+        error = CoupledError(f"{result.verdict}: {result.why}")
+        error.run = result
+        raise error
+    return result
+
+
+class _Failed(Exception):
+    """A step that could not be made."""
+
+
+class _Run:
+    """One run: what the slaves are given, what they give, and what is kept of it."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.slaves: list[Partner] = list(system.slaves.values())
+        order = {name: i for i, name in enumerate(system.slaves)}
+        connections = system.connections
+        self.source = np.array([order[c.source[0]] for c in connections], dtype=int)
+        self.target = np.array([order[c.target[0]] for c in connections], dtype=int)
+        self.factor = np.array([c.factor for c in connections])
+        variables = [system.slaves[c.target[0]].variables[c.target[1]] for c in connections]
+        self.nominal = np.array([abs(v.nominal) or 1.0 for v in variables])
+        self.within = np.array([c.within for c in connections])
+        self.into = [np.flatnonzero(self.target == i) for i in range(len(self.slaves))]
+        self.out_of = [np.flatnonzero(self.source == i) for i in range(len(self.slaves))]
+        self.input_names = [[connections[k].target[1] for k in places] for places in self.into]
+        self.output_names = [[connections[k].source[1] for k in places] for places in self.out_of]
+        self.dual_of = [k for k, c in enumerate(connections) if c.dual is not None]
+        # What goes back from a later slave to an earlier one, or to itself: only there the iteration has something to find.
+        self.torn = np.flatnonzero((self.source >= self.target) & (self.within != "start"))
+        self.y = np.zeros(len(connections))
+        self.before = self.y.copy()
+        self.jacobian: np.ndarray | None = None
+        self.evaluations = 0
+        self.times: list[float] = []
+        self.rows: list[np.ndarray] = []
+        self.duals: list[np.ndarray] = []
+        self.outputs: list[np.ndarray] = []
+        self.used: list[np.ndarray] = []
+        self.stopped: tuple[str, str] | None = None
+        self.recorded = [[v.name for v in s.variables.values() if v.causality == "output" and v.type == "Float64"] for s in self.slaves]
+        self._check()
+
+    def _check(self) -> None:
+        system = self.system
+        count = system.duration / system.step
+        for slave in self.slaves:
+            whole = abs(count - round(count)) < 1e-6
+            if not (slave.can_vary_step or whole):
+                allowed = f"a whole number of steps of {system.step:g} s, for {slave.name} cannot vary its step"
+                raise BadInput("[system], duration_s", system.duration, allowed)
+        if system.algorithm != "iterated" or not len(self.torn):
+            return
+        for slave in self.slaves[self._loop]:
+            if not slave.can_rollback:
+                found = Text(f"iterated, and {slave.name} cannot go back to a state (canGetAndSetFMUState is not true)")
+                raise BadInput("[system], algorithm", found, "jacobi or gauss-seidel, or a partner that can")
+
+    @property
+    def _loop(self) -> slice:
+        """The slaves that take part in the iteration."""
+        return slice(int(self.target[self.torn].min()), int(self.source[self.torn].max()) + 1)
+
+    def initialize(self) -> None:
+        """Set start values, exchange outputs in initialization mode until all have what they need, and begin."""
+        system = self.system
+        for slave in self.slaves:
+            given = system.starts.get(slave.name, {})
+            if given:
+                slave.set(list(given), list(given.values()))
+            slave.enter_initialization_mode(0.0, system.duration)
+        for _ in self.slaves:
+            for i in range(len(self.slaves)):
+                self._give(i, self.y)
+                self._take(i)
+        for slave in self.slaves:
+            slave.exit_initialization_mode()
+        for i in range(len(self.slaves)):
+            self._take(i)
+        self.before = self.y.copy()
+        self._record(0.0)
+
+    def steps(self, progress: Callable[[int], None]) -> None:
+        """Make every step, or stop where one cannot be made."""
+        system = self.system
+        count = max(1, math.ceil(system.duration / system.step - 1e-6))
+        make = {"jacobi": self._jacobi, "gauss-seidel": self._gauss_seidel, "iterated": self._iterated}[system.algorithm]
+        for k in range(count):
+            time = k * system.step
+            # Products, so that time does not drift; the last step is cut to the end.
+            end = min((k + 1) * system.step, system.duration)
+            start = self.y.copy()
+            try:
+                self.used.append(make(time, end - time))
+            except _Failed as failed:
+                self.stopped = ("diverged", str(failed))
+                return
+            if not np.isfinite(self.y).all():
+                bad = system.connections[int(np.flatnonzero(~np.isfinite(self.y))[0])].label
+                self.stopped = ("diverged", f"{bad} is not finite at {end:.6g} s")
+                self.used.pop()
+                return
+            self.before = start
+            self._record(end)
+            if self.stopped is not None:
+                return
+            progress(1)
+        for slave in self.slaves:
+            slave.terminate()
+
+    # ---- algorithms: each returns what the inputs were held at
+    def _jacobi(self, time: float, step: float) -> np.ndarray:
+        used = self.y.copy()
+        for i in range(len(self.slaves)):
+            self._give(i, used)
+            self._advance(i, time, step)
+        for i in range(len(self.slaves)):
+            self._take(i)
+        return used
+
+    def _gauss_seidel(self, time: float, step: float) -> np.ndarray:
+        start = self.y.copy()
+        used = start.copy()
+        self._sweep(range(len(self.slaves)), (start, used), (time, step))
+        return used
+
+    def _iterated(self, time: float, step: float) -> np.ndarray:
+        start = self.y.copy()
+        used = start.copy()
+        loop = range(len(self.slaves))[self._loop] if len(self.torn) else range(0)
+        self._sweep(range(loop.start), (start, used), (time, step))
+        states = [self.slaves[i].get_state() for i in loop]
+        fresh = True
+
+        def residual(guess: np.ndarray) -> np.ndarray:
+            """Make the step with a guess of what comes back at its end, and return what came back less the guess."""
+            nonlocal fresh
+            if not fresh:
+                for i, state in zip(loop, states, strict=True):
+                    self.slaves[i].set_state(state)
+            fresh = False
+            self.y[self.torn] = guess
+            self._sweep(loop, (start, used), (time, step))
+            left: np.ndarray = self.y[self.torn] - guess
+            return left
+
+        try:
+            if len(self.torn):
+                self._solve(residual, 2.0 * start[self.torn] - self.before[self.torn], time)
+        finally:
+            for i, state in zip(loop, states, strict=True):
+                self.slaves[i].free_state(state)
+        self._sweep(range(loop.stop, len(self.slaves)), (start, used), (time, step))
+        return used
+
+    def _sweep(self, slaves: range, values: tuple[np.ndarray, np.ndarray], span: tuple[float, float]) -> None:
+        """Step slaves one after the other, each with what those before it give at the end of the step."""
+        start, used = values
+        for i in slaves:
+            held = {"start": start, "mean": 0.5 * (start + self.y), "end": self.y}
+            for k in self.into[i]:
+                used[k] = held[str(self.within[k])][k]
+            self._give(i, used)
+            self._advance(i, *span)
+            self._take(i)
+
+    def _solve(self, residual: Callable[[np.ndarray], np.ndarray], guess: np.ndarray, time: float) -> None:
+        """Find the outputs at the end of a step by Newton's method; the Jacobian is kept from step to step after Broyden (1965)."""
+        nominal = self.nominal[self.torn]
+
+        def done(r: np.ndarray, z: np.ndarray) -> bool:
+            return bool(np.all(np.abs(r) <= self.system.tolerance * np.maximum(nominal, np.abs(z))))
+
+        r = residual(guess)
+        for attempt in range(2):
+            if done(r, guess):
+                return
+            if self.jacobian is None or attempt:
+                self.jacobian = _differences(residual, guess, r, 1e-4 * np.maximum(nominal, np.abs(guess)))
+                r = residual(guess)
+            for _ in range(_ITERATIONS):
+                change = np.linalg.lstsq(self.jacobian, -r, rcond=None)[0]
+                if not np.isfinite(change).all() or not change.any():
+                    break
+                guess = guess + change
+                new = residual(guess)
+                self.jacobian = self.jacobian + np.outer(new - r - self.jacobian @ change, change) / (change @ change)
+                r = new
+                if done(r, guess):
+                    return
+        worst = int(np.argmax(np.abs(r) / nominal))
+        label = self.system.connections[int(self.torn[worst])].label
+        self.stopped = ("not converged", f"at {time:.6g} s the iteration leaves {abs(r[worst]):.3g} in {label}")
+
+    # ---- one slave
+    def _give(self, i: int, values: np.ndarray) -> None:
+        if self.input_names[i]:
+            try:
+                self.slaves[i].set(self.input_names[i], values[self.into[i]])
+            except SlaveError as error:
+                if error.status != Status.DISCARD:
+                    raise
+                raise _Failed(f"{self.slaves[i].name}: {error.message}") from None
+
+    def _take(self, i: int) -> None:
+        if self.output_names[i]:
+            places = self.out_of[i]
+            self.y[places] = self.factor[places] * self.slaves[i].get(self.output_names[i])
+
+    def _advance(self, i: int, time: float, step: float) -> None:
+        self.evaluations += 1
+        done = self.slaves[i].do_step(time, step)
+        if done.status == Status.DISCARD:
+            reached = f", it came to {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
+            raise _Failed(f"{self.slaves[i].name} discards the step from {time:.6g} s{reached}: {done.message}")
+
+    # ---- what is kept
+    def _record(self, time: float) -> None:
+        self.times.append(time)
+        self.rows.append(self.y.copy())
+        connections = self.system.connections
+        self.duals.append(
+            np.array([self.slaves[self.target[k]].get(str(connections[k].dual))[0] for k in self.dual_of] if self.dual_of else [])
+        )
+        self.outputs.append(np.concatenate([s.get(names) for s, names in zip(self.slaves, self.recorded, strict=True)]))
+
+    def result(self) -> Coupled:
+        """Return the run with its verdict."""
+        n, count = len(self.used), len(self.system.connections)
+        t = np.array(self.times)
+        y, used = np.array(self.rows).reshape(-1, count), np.array(self.used).reshape(n, count)
+        t, y = t[: n + 1], y[: n + 1]
+        step = np.diff(t)[:, None]
+        mean = 0.5 * (y[1:] + y[:-1])
+        iterated = self.system.algorithm == "iterated"
+        should = {"start": mean, "mean": mean, "end": y[1:] if iterated else mean}
+        residual = np.stack([used[:, k] - should[str(w)][:, k] for k, w in enumerate(self.within)], axis=1) if count else used
+        created = np.full((n + 1, count), np.nan)
+        exchanged = np.full((n + 1, count), np.nan)
+        duals = np.array(self.duals)[: n + 1]
+        for j, k in enumerate(self.dual_of):
+            dual = self.system.connections[k].sign * 0.5 * (duals[1:, j] + duals[:-1, j]) * step[:, 0]
+            created[:, k] = np.append(0.0, np.cumsum((used[:, k] - mean[:, k]) * dual))
+            exchanged[:, k] = np.append(0.0, np.cumsum(mean[:, k] * dual))
+        verdict, why, warnings = self._judge(created, exchanged)
+        names = [f"{s.name}.{name}" for s, listing in zip(self.slaves, self.recorded, strict=True) for name in listing]
+        outputs = np.array(self.outputs)[: n + 1]
+        return Coupled(
+            system=self.system,
+            verdict=verdict,
+            why=why,
+            t=t,
+            columns={name: outputs[:, j] for j, name in enumerate(names)},
+            used=used,
+            residual=residual,
+            created=created,
+            connections=tuple(self._report(k, residual, created, exchanged) for k in range(count)),
+            evaluations=self.evaluations / max(n, 1),
+            warnings=(*self.system.warnings, *warnings),
+        )
+
+    def _judge(self, created: np.ndarray, exchanged: np.ndarray) -> tuple[str, str, list[str]]:
+        if self.stopped is not None:
+            return *self.stopped, []
+        if not self.dual_of:
+            return "good", "no energy balance: no connection has a dual variable", []
+        warnings = []
+        for i in dict.fromkeys(self.target[self.dual_of].tolist()):
+            # What enters one slave is judged together: y and z of one handle.
+            places = [k for k in self.dual_of if self.target[k] == i]
+            made, went = (np.nansum(energy[:, places], axis=1) for energy in (created, exchanged))
+            most, through = float(np.max(np.abs(made))), max(float(np.max(np.abs(went))), _LITTLE)
+            steps_made, steps_went = (float(np.sum(np.abs(np.diff(energy)))) for energy in (made, went))
+            text = f"the coupling creates {most:.3g} J at {self.slaves[i].name}, through which {through:.3g} J go"
+            # A coupling far beyond its limit throws energy about in both directions: then the sum over steps tells.
+            if most > MOST_CREATED * through or steps_made > MOST_IN_STEPS * max(steps_went, _LITTLE):
+                return "unstable", f"{text}; take a shorter step, the iterated algorithm, or the motion port", []
+            if most > WORTH_A_WARNING * through:
+                warnings.append(text)
+        return "good", "the energy that the coupling creates is small", warnings
+
+    def _report(self, k: int, residual: np.ndarray, created: np.ndarray, exchanged: np.ndarray) -> ConnectionReport:
+        connection = self.system.connections[k]
+        off = residual[:, k] if len(residual) else np.zeros(1)
+        has_dual = connection.dual is not None
+        return ConnectionReport(
+            connection=connection,
+            unit=self.system.slaves[connection.target[0]].variables[connection.target[1]].unit or "",
+            residual_max=float(np.max(np.abs(off))),
+            residual_rms=float(np.sqrt(np.mean(off**2))),
+            energy_exchanged=float(np.max(np.abs(exchanged[:, k]))) if has_dual else None,
+            energy_created=float(created[-1, k]) if has_dual else None,
+        )
+
+
+def _differences(residual: Callable[[np.ndarray], np.ndarray], at: np.ndarray, r: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """Return the Jacobian of a residual by forward differences."""
+    columns: list[Any] = []
+    for k, size in enumerate(by):
+        moved = at.copy()
+        moved[k] += size
+        columns.append((residual(moved) - r) / size)
+    return np.array(columns).T

@@ -1,0 +1,296 @@
+"""SYSTEM.toml: which slaves are coupled, how, and for how long."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import checks, tomlfile
+from ..errors import BadInput, Text, unknown_name
+from .imported import ImportedSlave
+from .partner import Partner, Variable
+from .slave import Slave
+from .wall import Wall
+
+ALGORITHMS = ("jacobi", "gauss-seidel", "iterated")
+WITHIN = ("start", "mean", "end")
+_FORCES = ((1, 1, -2), (1, 2, -2))
+"""Powers of kg, m and s of forces and torques."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One output that drives one input.
+
+    Attributes
+    ----------
+    source, target : (str, str)
+        Names of slave and variable.
+    within : {"start", "mean", "end"}
+        Which value of the output holds during a step, where the algorithm lets choose.
+    dual : str, optional
+        Variable of the target slave that makes a power with this input: a velocity for a force.
+    sign : float
+        +1 when input times dual is power into the target slave, −1 when it is power out of it.
+    factor : float
+        From the unit of the output to that of the input.
+    """
+
+    source: tuple[str, str]
+    target: tuple[str, str]
+    within: str
+    dual: str | None = None
+    sign: float = 1.0
+    factor: float = 1.0
+
+    @property
+    def label(self) -> str:
+        """Both ends, for people."""
+        return f"{'.'.join(self.source)} -> {'.'.join(self.target)}"
+
+
+@dataclass(frozen=True)
+class System:
+    """Slaves, connections and how they are run.
+
+    Attributes
+    ----------
+    slaves : dict of str to Partner
+        In the order in which they are stepped.
+    connections : tuple of Connection
+    starts : dict of str to dict
+        Values to be set before the initialization, by slave.
+    algorithm : {"jacobi", "gauss-seidel", "iterated"}
+    step, duration : float
+        Communication step and length of the run [s].
+    tolerance : float
+        What the iteration may leave at the interface, relative to the larger of nominal and present value.
+    warnings : tuple of str
+    """
+
+    slaves: dict[str, Partner]
+    connections: tuple[Connection, ...]
+    starts: dict[str, dict[str, Any]] = field(default_factory=dict)
+    algorithm: str = "gauss-seidel"
+    step: float = 1e-3
+    duration: float = 1.0
+    tolerance: float = 1e-6
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def unconnected(self) -> list[str]:
+        """Inputs that nothing drives; they keep their start values."""
+        driven = {c.target for c in self.connections}
+        return [
+            f"{name}.{v.name}"
+            for name, slave in self.slaves.items()
+            for v in slave.variables.values()
+            if v.causality == "input" and (name, v.name) not in driven
+        ]
+
+    def free(self) -> None:
+        """Free every slave."""
+        for slave in self.slaves.values():
+            slave.free()
+
+
+def couple(
+    slaves: Iterable[Partner],
+    connections: Iterable[tuple[str, str] | Mapping[str, Any]],
+    *,
+    algorithm: str = "gauss-seidel",
+    step: float = 1e-3,
+    duration: float = 1.0,
+    tolerance: float = 1e-6,
+    starts: Mapping[str, Mapping[str, Any]] | None = None,
+) -> System:
+    """Make a system of slaves and connections, and check that they fit together.
+
+    Parameters
+    ----------
+    slaves : iterable of Partner
+        Stepped in this order.
+    connections : iterable
+        Pairs `("robot.F", "arm.handle.F")`, or tables with the keys of `[[connection]]`. A name without index stands for all of its
+        indices.
+    algorithm, step, duration, tolerance
+        As in `System`.
+    starts : mapping, optional
+        Values to be set before the initialization, by slave and variable.
+
+    Raises
+    ------
+    BadInput
+        For names that are not known, units that do not match, an input that is driven twice.
+    """
+    named: dict[str, Partner] = {}
+    for slave in slaves:
+        if slave.name in named:
+            raise BadInput("[[slave]], name", slave.name, "a name for each slave")
+        named[slave.name] = slave
+    warnings: list[str] = []
+    joined: list[Connection] = []
+    for number, item in enumerate(connections, start=1):
+        table = dict(item) if isinstance(item, Mapping) else {"from": item[0], "to": item[1]}
+        try:
+            joined += _connections(table, named, warnings)
+        except BadInput as error:
+            raise error.within(place=f"[[connection]] {number}") from None
+    seen: set[tuple[str, str]] = set()
+    for connection in joined:
+        if connection.target in seen:
+            raise BadInput("[[connection]]", Text(f"two connections to {'.'.join(connection.target)}"), "one for each input")
+        seen.add(connection.target)
+    step = checks.number("[system], step_s", step, above=0.0, unit="s")
+    return System(
+        slaves=named,
+        connections=tuple(joined),
+        starts={name: dict(values) for name, values in (starts or {}).items()},
+        algorithm=checks.choice("[system], algorithm", algorithm, ALGORITHMS),
+        step=step,
+        duration=checks.number("[system], duration_s", duration, least=step, unit="s", hint="at least one step"),
+        tolerance=checks.number("[system], tolerance", tolerance, above=0.0, most=0.1),
+        warnings=tuple(warnings),
+    )
+
+
+def load_system(path: str | os.PathLike[str]) -> System:
+    """Read SYSTEM.toml and make its slaves; paths in it are relative to it.
+
+    Raises
+    ------
+    BadInput
+        Names the file, the key, the value found and the value allowed.
+    """
+    document = tomlfile.read(path)
+    made: list[Partner] = []
+    try:
+        checks.keys("", document, required=["system", "slave"], optional=["connection"])
+        settings = checks.table("[system]", document["system"])
+        checks.keys("[system]", settings, required=["step_s", "duration_s"], optional=["algorithm", "tolerance"])
+        starts = {}
+        for number, table in enumerate(checks.tables("slave", document["slave"]), start=1):
+            try:
+                made.append(_slave(table, Path(path).parent))
+            except BadInput as error:
+                raise error if error.file else error.within(place=f"[[slave]] {number}") from None
+            starts[made[-1].name] = checks.table("start", table.get("start", {}))
+        settings = {key.removesuffix("_s"): value for key, value in settings.items()}
+        return couple(made, checks.tables("connection", document.get("connection", [])), starts=starts, **settings)
+    except BaseException as error:
+        for slave in made:
+            slave.free()
+        if isinstance(error, BadInput) and error.file is None:
+            raise error.within(file=path) from None
+        raise
+
+
+def _slave(table: dict[str, Any], folder: Path) -> Partner:
+    kinds = [kind for kind in ("model", "fmu", "wall") if kind in table]
+    if len(kinds) != 1:
+        raise BadInput("model, fmu, wall", Text(" and ".join(kinds) or "none of them"), "one of them")
+    kind = kinds[0]
+    if kind == "wall":
+        checks.keys("", table, required=["wall", "name"], optional=["start"])
+        wall = checks.table("wall", table["wall"])
+        checks.keys("wall", wall, required=["axis", "position_m", "stiffness"], optional=["damping"])
+        return Wall(wall["axis"], wall["position_m"], wall["stiffness"], wall.get("damping", 0.0), name=checks.text("name", table["name"]))
+    path = folder / checks.text(kind, table[kind])
+    if kind == "fmu":
+        checks.keys("", table, required=["fmu"], optional=["name", "start"])
+        return ImportedSlave(path, name=table.get("name"))
+    optional = ["name", "port", "start", "start_deg", "rest", "inner_step_s", "handle_m"]
+    checks.keys("", table, required=["model"], optional=optional)
+    degrees = table.get("start_deg")
+    if degrees is not None:
+        degrees = [np.radians(checks.number(f"start_deg[{k}]", item)) for k, item in enumerate(degrees)]
+    settings = {"step": table["inner_step_s"]} if "inner_step_s" in table else {}
+    return Slave(
+        path,
+        port=table.get("port", "force"),
+        start=degrees,
+        rest=checks.flag("rest", table.get("rest", False)),
+        handle=table.get("handle_m"),
+        name=table.get("name"),
+        **settings,
+    )
+
+
+def _connections(table: dict[str, Any], slaves: dict[str, Partner], warnings: list[str]) -> list[Connection]:
+    checks.keys("", table, required=["from", "to"], optional=["within", "dual"])
+    sources = _ends("from", table["from"], slaves)
+    targets = _ends("to", table["to"], slaves)
+    if len(sources) != len(targets):
+        found = Text(f"{len(sources)} outputs and {len(targets)} inputs")
+        raise BadInput("from, to", found, "as many outputs as inputs")
+    return [_connection(table, ends, slaves, warnings) for ends in zip(sources, targets, strict=True)]
+
+
+def _connection(
+    table: dict[str, Any], ends: tuple[tuple[str, str], tuple[str, str]], slaves: dict[str, Partner], warnings: list[str]
+) -> Connection:
+    source, target = ends
+    output, given = (slaves[name].variables[variable] for name, variable in ends)
+    if output.causality == "input":
+        raise BadInput("from", Text(f"{'.'.join(source)}, an input"), "an output")
+    if given.causality != "input":
+        raise BadInput("to", Text(f"{'.'.join(target)}, {given.causality}"), "an input")
+    for end, variable in zip(ends, (output, given), strict=True):
+        if variable.type != "Float64":
+            raise BadInput("from, to", Text(f"{'.'.join(end)} of type {variable.type}"), "numbers of 64 bit")
+    label = f"{'.'.join(source)} -> {'.'.join(target)}"
+    if output.exponents is None or given.exponents is None:
+        warnings.append(f"{label}: units not checked, one of them is not described")
+    # Not every tool counts the radian as a base unit.
+    elif (*output.exponents[:3], *output.exponents[4:]) != (*given.exponents[:3], *given.exponents[4:]):
+        raise BadInput("from, to", Text(f"{label}, in {output.unit} and {given.unit}"), "the same dimension at both ends")
+    dual, sign = _dual(table.get("dual"), target, slaves)
+    within = table.get("within")
+    within = _within(target, given, slaves) if within is None else checks.choice("within", within, WITHIN)
+    return Connection(source, target, within, dual, sign, output.scale / given.scale)
+
+
+def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str, str]]:
+    """Return the variables that a name stands for: itself, or all of its indices."""
+    text = checks.text(key, value)
+    name, _, variable = text.partition(".")
+    if name not in slaves:
+        raise unknown_name(key, name, slaves, what="slave")
+    known = slaves[name].variables
+    if variable in known:
+        return [(name, variable)]
+    indexed = [v for v in known if re.fullmatch(rf"{re.escape(variable)}\[\d+\]", v)]
+    if not indexed:
+        raise unknown_name(key, variable, known, what=f"variable of {name}")
+    return [(name, v) for v in indexed]
+
+
+def _within(target: tuple[str, str], variable: Variable, slaves: dict[str, Partner]) -> str:
+    """Return which value of an output an input takes, where nothing is said."""
+    if target[1].startswith(("robot.r[", "robot.v[")) and "contact.F[1]" in slaves[target[0]].variables:
+        # The motion port goes on from the start by itself, best with the mean velocity.
+        return "start" if target[1].startswith("robot.r[") else "mean"
+    if variable.exponents is not None and tuple(variable.exponents[:3]) in _FORCES:
+        return "mean"
+    return "end"
+
+
+def _dual(given: object, target: tuple[str, str], slaves: dict[str, Partner]) -> tuple[str | None, float]:
+    """Return what makes a power with an input, for the ports of an arm without being told."""
+    known = slaves[target[0]].variables
+    if given is not None:
+        name = checks.text("dual", given)
+        if name not in known:
+            raise unknown_name("dual", name, known, what=f"variable of {target[0]}")
+        return name, 1.0
+    for stem, dual, sign in (("handle.F", "handle.v", 1.0), ("robot.v", "contact.F", -1.0)):
+        match = re.fullmatch(rf"{re.escape(stem)}(\[\d+\])", target[1])
+        if match and f"{dual}{match[1]}" in known:
+            return f"{dual}{match[1]}", sign
+    return None, 1.0
