@@ -23,8 +23,8 @@ LEAST_RANGE = np.radians(2.0)
 """A joint that moves less than this counts as held [rad]."""
 MOVING = 0.25
 """A joint moves when its speed is above this part of its usual speed in the trial."""
-MARGIN = 0.35
-"""The low-pass mixes what lies within this time, in periods of its cutoff."""
+MARGIN = 0.43
+"""The low-pass mixes what lies within this time, in periods of its cutoff; there the ringing after a reversal averages to nothing."""
 LEVEL = 0.95
 """Probability of the intervals, and one minus the level of the tests."""
 
