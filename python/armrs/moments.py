@@ -24,7 +24,9 @@ LEAST_RANGE = np.radians(2.0)
 MOVING = 0.25
 """A joint moves when its speed is above this part of its usual speed in the trial."""
 MARGIN = 0.43
-"""The low-pass mixes what lies within this time, in periods of its cutoff; there the ringing after a reversal averages to nothing."""
+"""The low-pass mixes what lies within this time, in periods of its cutoff."""
+RESTING = 0.02
+"""A joint rests when its speed is below this part of its usual speed in the trial."""
 LEVEL = 0.95
 """Probability of the intervals, and one minus the level of the tests."""
 
@@ -51,6 +53,8 @@ class TrialMoments:
         1 where the angle grows, -1 where it shrinks, 0 at rest.
     force : ndarray, shape (n, 2), or None
         Low-passed force on the arm [N].
+    sign : ndarray, shape (n, n_joints)
+        Low-passed sign of the speed: how much of a dissipative moment is left in `moment` near reversals.
     """
 
     trial: Trial
@@ -59,7 +63,8 @@ class TrialMoments:
     moment: np.ndarray
     inertial: np.ndarray
     direction: np.ndarray
-    force: np.ndarray | None = None
+    force: np.ndarray | None
+    sign: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +230,7 @@ def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
     if trial.force_on_arm is None and trial.tau is None:
         raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
     chain, n = arm(dataset.model_of(trial.configuration)), dataset.model.n_joints
-    q, qd, moment, inertial = (np.full((len(trial), n), np.nan) for _ in range(4))
+    q, qd, moment, inertial, sign = (np.full((len(trial), n), np.nan) for _ in range(5))
     seen = None if trial.force_on_arm is None else np.full((len(trial), 2), np.nan)
     for piece in trial.pieces():
         if piece.stop - piece.start < FEWEST_SAMPLES:
@@ -244,7 +249,10 @@ def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
             torque = torque + _armrs.smooth(np.ascontiguousarray(trial.tau[piece]), trial.rate, cutoff)[0]
         inertial[piece] = chain.inverse_dynamics(angle, speed, acceleration) - gravity
         q[piece], qd[piece], moment[piece] = angle, speed, torque - inertial[piece]
-    return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)), seen)
+        usual = RESTING * np.percentile(np.abs(speed), 90.0, axis=0)
+        moving = np.where(np.abs(speed) > usual, np.sign(speed), 0.0)
+        sign[piece] = _armrs.smooth(np.ascontiguousarray(moving), trial.rate, cutoff)[0]
+    return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)), seen, sign)
 
 
 def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
@@ -283,7 +291,10 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
         return None
     edges = np.linspace(angles.min(), angles.max(), bins + 1)
     rising, falling = (np.array([_binned(m, m.moment[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
-    elastic, half_width = 0.5 * (rising + falling), 0.5 * (rising - falling)
+    # A friction that turns with the speed went through the same low-pass as its sign did.
+    ups, downs = (np.array([_binned(m, m.sign[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
+    half_width = (rising - falling) / (ups - downs)
+    elastic = 0.5 * (rising + falling - half_width * (ups + downs))
     systematic = _systematic(dataset, repeats[0], joint, edges)
     if not np.isfinite(elastic).any():
         return None
