@@ -517,6 +517,43 @@ def fmu_check(
     return 1 if wrong else 0
 
 
+@fmu.command("run")
+def fmu_run(
+    context: typer.Context,
+    system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],
+    out: MaybeFolder = None,
+    to: Annotated[Format, typer.Option("--to", help="Format of the samples written.")] = Format.csv,
+    json: JsonFile = None,
+) -> int:
+    """Couple arms, FMUs of any tool and walls, and say whether the numbers may be believed.
+
+    Exit status 1 when the run is no result: it diverged, the coupling creates energy, or the iteration did not converge. Then only the
+    diagnosis is written, and no samples.
+    """
+    from . import words
+    from .cosim.master import run_system
+    from .cosim.outcome import coupled_data, write_coupled
+    from .cosim.system import load_system
+    from .errors import CoupledError
+
+    folder = _folder(out, json)
+    loaded = load_system(system)
+    try:
+        with console.progress("coupling", total=loaded.count) as advance:
+            run = run_system(loaded, progress=advance)
+    except CoupledError as error:
+        run = error.run
+    finally:
+        loaded.free()
+    plain = coupled_data(run, system.name, _command(context))
+    written = write_coupled(run, plain, folder, suffix=f".{to.value}") if folder else []
+    console.warn(run.warnings)
+    if run.verdict != "good":
+        console.warn([f"{run.verdict}, no result: {run.why}"])
+    present(lambda: plain, json, lambda: words.coupled(plain, written))
+    return 0 if run.verdict == "good" else 1
+
+
 def _angles(option: str, text: str) -> list[float] | None:
     """Read angles in degrees, separated by commas, as radians."""
     if not text.strip():

@@ -49,7 +49,13 @@ code { font: .88rem/1.5 ui-monospace, "Cascadia Mono", Menlo, Consolas, monospac
 @media print { main { max-width: none; padding: 0; } figure, table { break-inside: avoid; } }
 """
 
-KINDS = {"identify": "Identification", "simulate": "Simulation", "passive": "Passive joint moments", "demo": "Demonstration"}
+KINDS = {
+    "identify": "Identification",
+    "simulate": "Simulation",
+    "passive": "Passive joint moments",
+    "demo": "Demonstration",
+    "fmu run": "Co-simulation",
+}
 """What a report can be made of: the `verb` of a result, and its title."""
 
 
@@ -168,7 +174,7 @@ def _class(kind: str) -> str:
 
 
 def _result(data: Mapping[str, Any], folder: Path) -> str:
-    sections = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo}
+    sections = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
     figures = "".join(picture(entry, folder) for entry in data.get("figures", []))
     drawn = heading("Figures") + figures if figures else ""
     head = f"<h1>{escape(KINDS[data['verb']])}: {escape(words.name(data))}</h1>\n"
@@ -209,6 +215,13 @@ def _decided(items: Sequence[Mapping[str, Any]]) -> str:
 
 def _simulated(data: Mapping[str, Any]) -> str:
     return heading("The run") + table(tables.run(data)) + bullets(data.get("assumed", ()))
+
+
+def _coupled(data: Mapping[str, Any]) -> str:
+    out = heading("The run") + table(tables.coupling(data)) + heading("Connections") + table(tables.connections(data))
+    if data["not_connected"]:
+        out += heading("Not connected") + bullets(data["not_connected"])
+    return out + (heading("Take care") + bullets(data["warnings"]) if data["warnings"] else "")
 
 
 def _passive(data: Mapping[str, Any]) -> str:

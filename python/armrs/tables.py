@@ -134,6 +134,25 @@ def run(data: Mapping[str, Any]) -> Table:
     return Table(["quantity", "value"], rows, left=2)
 
 
+def coupling(data: Mapping[str, Any]) -> Table:
+    """Return how a system was run."""
+    slaves = ", ".join(slave["name"] for slave in data["slaves"])
+    rows = [
+        ["slaves", slaves],
+        ["algorithm", f"{data['algorithm']}, communication step {1e3 * data['step_s']:.4g} ms"],
+        ["time", f"{data['duration_s']:.6g} of {data['asked_s']:.6g} s, {data['samples']} communication points"],
+        ["work", f"{data['steps_of_slaves_a_step']:.3g} steps of a slave for each communication step"],
+    ]
+    return Table(["quantity", "value"], rows, left=2)
+
+
+def connections(data: Mapping[str, Any]) -> Table:
+    """Return what each connection did: how far inputs were off, and the energy that went through and was created."""
+    keys = ("residual_max", "residual_rms", "unit", "energy_exchanged_J", "energy_created_J")
+    rows = [[f"{c['from']} -> {c['to']}", c["within"], *(c[key] for key in keys)] for c in data["connections"]]
+    return Table(["connection", "held", "off, most", "rms", "unit", "went through [J]", "created [J]"], rows, left=2)
+
+
 def passive(data: Mapping[str, Any]) -> Table:
     """Return the passive moment of every configuration and joint, averaged over the bins."""
     rows = [

@@ -36,7 +36,7 @@ def is_synthetic(result: Mapping[str, Any]) -> bool:
 
 def verdict(result: Mapping[str, Any]) -> str:
     """Return a result in a sentence or two."""
-    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo}
+    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
     return sentences[result["verb"]](result)
 
 
@@ -59,6 +59,12 @@ def _simulated(result: Mapping[str, Any]) -> str:
         f"{result['duration_s']:.4g} s simulated; the force on the arm reaches {result['largest_force_N']:.4g} N. "
         f"Energy is accounted for to {result['energy']['error_J']:.2g} J."
     )
+
+
+def _coupled(result: Mapping[str, Any]) -> str:
+    good = {"good": f"{result['duration_s']:.4g} s coupled; {result['why']}."}
+    no_result = f"{result['verdict'].upper()}, no result: {result['why']}."
+    return good.get(result["verdict"], no_result)
 
 
 def _passive(result: Mapping[str, Any]) -> str:
@@ -142,6 +148,16 @@ def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     show("", tables.run(result))
     for line in result.get("assumed", ()):
         print(line)
+    files_written(written)
+
+
+def coupled(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what a co-simulation came to."""
+    _head(result)
+    show("", tables.coupling(result))
+    show("Connections", tables.connections(result))
+    for name in result["not_connected"]:
+        print(f"not connected: {name}")
     files_written(written)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -160,9 +159,9 @@ class _Run:
 
     def _check(self) -> None:
         system = self.system
-        count = system.duration / system.step
+        steps = system.duration / system.step
+        whole = abs(steps - round(steps)) < 1e-6
         for slave in self.slaves:
-            whole = abs(count - round(count)) < 1e-6
             if not (slave.can_vary_step or whole):
                 allowed = f"a whole number of steps of {system.step:g} s, for {slave.name} cannot vary its step"
                 raise BadInput("[system], duration_s", system.duration, allowed)
@@ -200,9 +199,8 @@ class _Run:
     def steps(self, progress: Callable[[int], None]) -> None:
         """Make every step, or stop where one cannot be made."""
         system = self.system
-        count = max(1, math.ceil(system.duration / system.step - 1e-6))
         make = {"jacobi": self._jacobi, "gauss-seidel": self._gauss_seidel, "iterated": self._iterated}[system.algorithm]
-        for k in range(count):
+        for k in range(system.count):
             time = k * system.step
             # Products, so that time does not drift; the last step is cut to the end.
             end = min((k + 1) * system.step, system.duration)
@@ -345,7 +343,7 @@ class _Run:
         """Return the run with its verdict."""
         n, count = len(self.used), len(self.system.connections)
         t = np.array(self.times)
-        y, used = np.array(self.rows).reshape(-1, count), np.array(self.used).reshape(n, count)
+        y, used = np.array(self.rows).reshape(len(self.rows), count), np.array(self.used).reshape(n, count)
         t, y = t[: n + 1], y[: n + 1]
         step = np.diff(t)[:, None]
         mean = 0.5 * (y[1:] + y[:-1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterable, Mapping
@@ -93,6 +94,11 @@ class System:
             for v in slave.variables.values()
             if v.causality == "input" and (name, v.name) not in driven
         ]
+
+    @property
+    def count(self) -> int:
+        """Number of communication steps, the last perhaps a shorter one."""
+        return max(1, math.ceil(self.duration / self.step - 1e-6))
 
     def free(self) -> None:
         """Free every slave."""

@@ -16,7 +16,7 @@ _NEWTON, _METRE, _SPEED = (1, 1, -2, 0), (0, 1, 0, 0), (0, 1, -1, 0)
 
 
 class Wall(Partner):
-    """A wall that pushes the arm's handle back with spring and damper, and never pulls.
+    """A wall that pushes the arm's handle back: `x (stiffness + damping · ẋ)` at a depth x, and never pulls (Hunt and Crossley 1975).
 
     Inputs `r[1]`, `r[2]` [m] and `v[1]`, `v[2]` [m/s] of the handle; outputs `F[1]`, `F[2]` [N], the force of the wall on the arm.
 
@@ -29,7 +29,7 @@ class Wall(Partner):
     stiffness : float
         [N/m]
     damping : float
-        [N s/m]
+        For each metre of depth, so that the force does not jump where contact begins [N s/m²].
     """
 
     can_rollback = True
@@ -40,7 +40,7 @@ class Wall(Partner):
         self._axis, self._sign = _AXES[axis[-1]], -1.0 if axis.startswith("-") else 1.0
         self._position = checks.number("position", position, unit="m")
         self._stiffness = checks.number("stiffness", stiffness, least=0.0, unit="N/m")
-        self._damping = checks.number("damping", damping, least=0.0, unit="N s/m")
+        self._damping = checks.number("damping", damping, least=0.0, unit="N s/m²")
         self._values = {f"{stem}[{k}]": 0.0 for stem in ("r", "v") for k in (1, 2)}
         inputs = [("r", "m", _METRE), ("v", "m/s", _SPEED)]
         rows = [(f"{stem}[{k}]", "input", unit, powers) for stem, unit, powers in inputs for k in (1, 2)]
@@ -98,5 +98,5 @@ class Wall(Partner):
     def _force(self) -> float:
         into = self._sign * (self._values[f"r[{self._axis + 1}]"] - self._position)
         speed = self._sign * self._values[f"v[{self._axis + 1}]"]
-        push = max(0.0, self._stiffness * into + self._damping * speed) if into > 0.0 else 0.0
+        push = max(0.0, into * (self._stiffness + self._damping * speed)) if into > 0.0 else 0.0
         return -self._sign * push

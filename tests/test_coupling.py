@@ -1,0 +1,318 @@
+"""The master: coupled runs against monolithic ones, and runs that are no result."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armrs import Contact, Joint, Model, _armrs, cli
+from armrs.cosim import Partner, Slave
+from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.master import Coupled, run_system
+from armrs.cosim.system import couple, load_system
+from armrs.cosim.wall import Wall
+from armrs.errors import BadInput, CoupledError, SlaveError
+from armrs.fmu.export import export_fmu
+from armrs.model import Segment, load_model
+from armrs.rig import rig
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+NEAR = np.radians([-60.0, 50.0])
+WAY, RAMP, DURATION = -0.1, 0.25, 2.0
+FORCE = [
+    ("robot.F_y", "arm.handle.F[1]"),
+    ("robot.F_z", "arm.handle.F[2]"),
+    ("arm.handle.r[1]", "robot.r_y"),
+    ("arm.handle.r[2]", "robot.r_z"),
+    ("arm.handle.v[1]", "robot.v_y"),
+    ("arm.handle.v[2]", "robot.v_z"),
+]
+MOTION = [
+    ("robot.p_y", "arm.robot.r[1]"),
+    ("robot.p_z", "arm.robot.r[2]"),
+    ("robot.u_y", "arm.robot.v[1]"),
+    ("robot.u_z", "arm.robot.v[2]"),
+]
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot that leads the hand 0.1 m back and forth, with the contact spring of the thesis, made by PythonFMU."""
+    pytest.importorskip("pythonfmu")
+    folder = tmp_path_factory.mktemp("robot")
+    source = EXAMPLES / "python" / "cosim" / "robot.py"
+    command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(source), "-d", str(folder), "--handle-state"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (folder / "Robot.fmu").exists(), done.stderr
+    return folder / "Robot.fmu"
+
+
+class Rig:
+    """The arm at rest on its spring, and the monolithic run that a coupled one is measured against."""
+
+    def __init__(self) -> None:
+        # The contact of the thesis, undamped; its viscosity 0.2 N m s/rad.
+        self.model = load_model(EXAMPLES / "cosim" / "arm.toml")
+        start = Slave(self.model, port="motion", start=NEAR, rest=True)
+        self.q = start.get(["q[1]", "q[2]"])
+        self.handle = start.get(["robot.r[1]", "robot.r[2]"])
+        self.t = np.arange(0.0, DURATION + 1e-9, 0.25e-3)
+        drive = {"kind": "handle", "times": self.t, "values": np.array([self._at(t) for t in self.t]), "shape": "trapezoid"}
+        drive |= {"speed": 0.0, "acceleration": 0.0, "pause": 0.0, "rigid": False}
+        settings = {"engine": "native", "integrator": "rk4", "dt": 0.25e-3, "duration": DURATION, "output_interval": 1e-3}
+        run = _armrs.simulate(rig(self.model), drive, settings | {"q": list(self.q), "qd": [0.0, 0.0]})
+        self.reference: np.ndarray = run["q"]
+
+    def _at(self, time: float) -> list[float]:
+        half = 0.5 * DURATION
+        back = time > half
+        t, ramp = (time - half if back else time), RAMP * half
+        top = 1.0 / (half - ramp)
+        if t < ramp:
+            s = 0.5 * top / ramp * t * t
+        elif t <= half - ramp:
+            s = top * (t - 0.5 * ramp)
+        else:
+            s = 1.0 - 0.5 * top / ramp * (half - t) ** 2
+        return [float(self.handle[0] + WAY * (1.0 - s if back else s)), float(self.handle[1])]
+
+    def run(self, robot: Path, port: str, algorithm: str, step: float, arm: Partner | None = None) -> Coupled:
+        arm = arm or Slave(self.model, port=port, start=self.q, handle=(self.handle[0], self.handle[1]))
+        with ImportedSlave(robot, name="robot") as partner:
+            starts = {"robot": {"y0": self.handle[0], "z0": self.handle[1], "way": WAY, "ramp": RAMP, "duration": DURATION}}
+            slaves = [arm, partner] if port == "force" else [partner, arm]
+            lines = FORCE if port == "force" else MOTION
+            return run_system(couple(slaves, lines, algorithm=algorithm, step=step, duration=DURATION, starts=starts))
+
+    def error(self, run: Coupled) -> float:
+        """Largest difference of the joint angles [rad]."""
+        at = np.round(run.t / 1e-3).astype(int)
+        q = np.column_stack([run.columns["arm.q[1]"], run.columns["arm.q[2]"]])
+        return float(np.abs(q - self.reference[at]).max())
+
+
+@pytest.fixture(scope="module")
+def arm() -> Rig:
+    return Rig()
+
+
+def test_the_iterated_master_is_near_the_monolithic_run(arm: Rig, robot: Path) -> None:
+    errors = {step: arm.error(arm.run(robot, "force", "iterated", step)) for step in (2e-3, 5e-3, 10e-3)}
+    assert errors[10e-3] < 1e-3
+    # Second order: (10/2)² = 25 between the ends, less where the vibration is hardly resolved any more.
+    assert errors[2e-3] < 1e-4
+    order = np.log(errors[5e-3] / errors[2e-3]) / np.log(2.5)
+    assert 1.7 < order < 2.3
+
+
+def test_the_motion_port_is_nearer_without_going_back(arm: Rig, robot: Path) -> None:
+    errors = {step: arm.error(arm.run(robot, "motion", "gauss-seidel", step)) for step in (2e-3, 5e-3, 10e-3)}
+    assert errors[10e-3] < 1e-4
+    order = np.log(errors[10e-3] / errors[2e-3]) / np.log(5.0)
+    assert 1.7 < order < 2.3
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel"])
+def test_an_explicit_master_at_2_ms_is_called_unstable(arm: Rig, robot: Path, algorithm: str) -> None:
+    with pytest.raises(CoupledError, match=r"unstable: the coupling creates .* J at arm") as refused:
+        arm.run(robot, "force", algorithm, 2e-3)
+    assert refused.value.run.verdict == "unstable"
+    assert arm.error(refused.value.run) > 1.0  # and rightly so
+
+
+def test_our_fmu_couples_with_the_same_bits_as_the_slave_in_python(arm: Rig, robot: Path, tmp_path: Path) -> None:
+    slave = Slave(arm.model, port="force", start=arm.q)
+    ends = [arm.run(robot, "force", "iterated", 0.02, slave).columns["arm.q[1]"].tobytes()]
+    for fmi in (2, 3):
+        path = export_fmu(Slave(arm.model, port="force", start=arm.q), tmp_path / "arm.fmu", fmi=fmi)
+        with ImportedSlave(path, name="arm") as fmu:
+            ends.append(arm.run(robot, "force", "iterated", 0.02, fmu).columns["arm.q[1]"].tobytes())
+    assert ends[0] == ends[1] == ends[2]
+
+
+def test_iterating_needs_partners_that_can_go_back(arm: Rig, robot: Path) -> None:
+    with ImportedSlave(robot, name="robot") as partner:
+        partner.can_rollback = False
+        slave = Slave(arm.model, port="force", start=arm.q)
+        with pytest.raises(BadInput, match="robot cannot go back to a state"):
+            run_system(couple([slave, partner], FORCE, algorithm="iterated", step=0.01, duration=0.1))
+        # Through the motion port nothing comes back, so that there is nothing to iterate.
+        slave = Slave(arm.model, port="motion", start=arm.q)
+        lines = [("robot.p_y", "arm.robot.r[1]"), ("robot.u_y", "arm.robot.v[1]")]
+        starts = {"robot": {"y0": float(slave.get("robot.r[1]")[0])}}
+        assert run_system(couple([partner, slave], lines, algorithm="iterated", step=0.01, duration=0.1, starts=starts)).evaluations == 2.0
+
+
+def test_what_another_tool_made_is_checked_too(robot: Path) -> None:
+    """PythonFMU lists no InitialUnknowns; that is found, and the library is tried all the same."""
+    from armrs.fmu.check import check_fmu
+
+    found = [str(f) for f in check_fmu(robot)]
+    assert any("F_y is calculated at the start and is not listed as InitialUnknown" in f for f in found)
+    assert not any("crash" in f for f in found)
+
+
+# ---- a wall
+def wall_system(algorithm: str, step: float, damping: float = 3000.0) -> Coupled:
+    system = load_system(EXAMPLES / "cosim" / "wall.toml")
+    slaves = [system.slaves["arm"], Wall("y", 0.1, 3000.0, damping)]
+    lines = [("arm.handle.r", "wall.r"), ("arm.handle.v", "wall.v"), ("wall.F", "arm.handle.F")]
+    return run_system(couple(slaves, lines, algorithm=algorithm, step=step, duration=2.0))
+
+
+def test_a_wall_takes_energy_and_gives_none() -> None:
+    run = wall_system("iterated", 2e-3)
+    assert run.columns["wall.F[1]"].min() < -50.0
+    assert run.columns["wall.F[1]"].max() == 0.0
+    work = run.columns["arm.work.port"]
+    assert np.all(work < 1e-6)
+    energy = run.columns["arm.energy"] + run.columns["arm.work.resisted"] - work
+    assert np.ptp(energy) < 1e-6
+
+
+def test_explicit_coupling_with_a_wall_is_refused() -> None:
+    """The textbook instability of haptic rendering: a sampled wall gives back more than it took."""
+    with pytest.raises(CoupledError, match="unstable"):
+        wall_system("jacobi", 10e-3)
+    assert abs(wall_system("iterated", 10e-3).connections[-2].energy_created or 0.0) < 1e-4
+
+
+class Broken(Wall):
+    """A wall that fails in the way that it is told to."""
+
+    def __init__(self, way: str) -> None:
+        super().__init__("y", 10.0, 1.0)
+        self.name, self.way = "wall", way
+
+    def get(self, names: object) -> np.ndarray:
+        values = super().get(names)  # type: ignore[arg-type]
+        bad = {"nan": np.nan, "inf": np.inf, "jump": 100.0 * np.sign(np.sin(1e9 * (self._values["r[1]"] + 0.1)))}
+        return np.full_like(values, bad[self.way]) if self._time > 0.05 else values
+
+
+@pytest.mark.parametrize(
+    ("way", "algorithm", "verdict"),
+    [("nan", "jacobi", "diverged"), ("inf", "gauss-seidel", "diverged"), ("jump", "iterated", "not converged")],
+)
+def test_a_partner_that_fails_is_no_result(way: str, algorithm: str, verdict: str) -> None:
+    slave = load_system(EXAMPLES / "cosim" / "wall.toml").slaves["arm"]
+    lines = [("arm.handle.r", "wall.r"), ("wall.F", "arm.handle.F")]
+    with pytest.raises(CoupledError, match=verdict) as refused:
+        run_system(couple([slave, Broken(way)], lines, algorithm=algorithm, step=0.01, duration=1.0))
+    assert 0.03 < refused.value.run.t[-1] < 0.1
+
+
+def test_a_last_step_that_is_shorter() -> None:
+    slave = load_system(EXAMPLES / "cosim" / "wall.toml").slaves["arm"]
+    run = run_system(couple([slave], [], step=0.03, duration=0.1))
+    np.testing.assert_allclose(run.t, [0.0, 0.03, 0.06, 0.09, 0.1], atol=1e-15)
+
+
+def test_units_are_checked_and_converted() -> None:
+    arm = Model((Segment("a", 0.3, 1.0, 0.1, 0.01),), (Joint("j"),), contact=Contact((1e3, 1e3)))
+    a, b = Slave(arm, name="a"), Slave(arm, port="motion", name="b")
+    with pytest.raises(BadInput, match=r"a.handle.v\[1\] -> b.robot.r\[1\], in m/s and m, allowed the same dimension"):
+        couple([a, b], [("a.handle.v[1]", "b.robot.r[1]")])
+    with pytest.raises(BadInput, match=r"found a.handle.F\[1\], an input, allowed an output"):
+        couple([a, b], [("a.handle.F[1]", "b.robot.r[1]")])
+    with pytest.raises(BadInput, match="two connections to"):
+        couple([a, b], [("a.handle.r", "b.robot.r"), ("a.handle.r[1]", "b.robot.r[1]")])
+    with pytest.raises(BadInput, match="2 outputs and 1 inputs"):
+        couple([a, b], [("a.handle.r", "b.tau")])
+    system = couple([a, b], [("a.handle.r", "b.robot.r"), {"from": "a.handle.v", "to": "b.robot.v", "within": "start"}])
+    assert [c.within for c in system.connections] == ["start"] * 4
+    assert [c.dual for c in system.connections] == [None, None, "contact.F[1]", "contact.F[2]"]
+    assert system.unconnected == ["a.handle.F[1]", "a.handle.F[2]", "a.tau[1]", "b.tau[1]"]
+
+
+# ---- SYSTEM.toml and the command line
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    for name in ("arm.toml", "wall.toml"):
+        (tmp_path / name).write_text((EXAMPLES / "cosim" / name).read_text(encoding="utf-8"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+
+
+def test_run_writes_samples_figures_and_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["fmu", "run", "wall.toml", "-o", "out"]) == 0
+    assert "wall.toml: 2 s coupled" in capsys.readouterr().out
+    data = json.loads(Path("out/coupled.json").read_text(encoding="utf-8"))
+    assert (data["verdict"], data["samples"], data["file"]) == ("good", 1001, "coupled.csv")
+    with Path("out/coupled.csv").open(encoding="utf-8") as file:
+        head, first = next(csv.reader(file)), next(csv.reader(file))
+    assert head[:2] == ["t_s", "arm.q[1]_rad"]
+    assert float(first[1]) == np.radians(-150.0)
+    assert Path("out/figures/interface.png").stat().st_size > 10_000
+    assert "Energy created by the coupling" not in Path("out/report.html").read_text(encoding="utf-8")  # that stands in the picture
+    assert "wall.F[1] -&gt; arm.handle.F[1]" in Path("out/report.html").read_text(encoding="utf-8")
+    assert cli.main(["fmu", "run", "wall.toml", "-o", "parquet", "--to", "parquet"]) == 0
+    assert Path("parquet/coupled.parquet").exists()
+
+
+def test_a_run_that_is_no_result_writes_its_diagnosis_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path("wall.toml").read_text(encoding="utf-8").replace('"iterated"', '"jacobi"').replace("0.002", "0.01")
+    Path("explicit.toml").write_text(text, encoding="utf-8")
+    assert cli.main(["fmu", "run", "explicit.toml", "-o", "out"]) == 1
+    out, err = capsys.readouterr()
+    assert "UNSTABLE, no result: the coupling creates" in out
+    assert "unstable, no result" in err
+    assert not list(Path("out").glob("coupled.csv"))
+    data = json.loads(Path("out/coupled.json").read_text(encoding="utf-8"))
+    assert (data["verdict"], data["file"]) == ("unstable", None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('algorithm = "iterated"', 'algorithm = "newton"', 'algorithm: found \'newton\', allowed "jacobi" or "gauss-seidel" or "iterated"'),
+        ("step_s = 0.002", "step_s = 0.0", "step_s: found 0.0, allowed a finite number > 0 s"),
+        ("step_s = 0.002", "step_s = 5.0", "duration_s"),
+        ("step_s = 0.002", "stepp_s = 0.002", "unknown key"),
+        ('model = "arm.toml"', 'model = "leg.toml"', "leg.toml: file: found No such file"),
+        ('model = "arm.toml"', 'fmu = "arm.toml"', "unknown key 'port', allowed fmu, name, start"),
+        (
+            'model = "arm.toml"\nport = "force"\nstart_deg = [-150.0, 20.0]',
+            'fmu = "arm.toml"',
+            "arm.toml: archive: found File is not a zip file",
+        ),
+        ('model = "arm.toml"', "", "model, fmu, wall: found none of them"),
+        ('port = "force"', 'port = "motor"', "port"),
+        ('axis = "y"', 'axis = "x"', "axis"),
+        ('from = "wall.F"', 'from = "wal.F"', "unknown slave 'wal'"),
+        ('from = "wall.F"', 'from = "wall.G"', "unknown variable of wall 'G'"),
+        ('to = "arm.handle.F"', 'to = "arm.handle.r"', "allowed an input"),
+        ('to = "arm.handle.F"', 'to = "arm.tau"', "in N and N.m, allowed the same dimension"),
+        ('name = "wall"', 'name = "arm"', "a name for each slave"),
+        ("start_deg = [-150.0, 20.0]", "start_deg = [-150.0]", "found 1 values, allowed 2"),
+        ("[system]", "[sytem]", "unknown key"),
+    ],
+)
+def test_a_system_that_does_not_fit_is_refused(folder: Path, old: str, new: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path("wall.toml").read_text(encoding="utf-8")
+    assert old in text
+    Path("wall.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    assert cli.main(["fmu", "run", "wall.toml", "-o", "out"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert message in err
+    assert not Path("out").exists()
+
+
+def test_an_fmu_that_refuses_is_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    export_fmu("arm.toml", "a.fmu")
+    with pytest.raises(SlaveError):
+        raise SlaveError("set", 3, "x")
+    text = Path("wall.toml").read_text(encoding="utf-8").replace('model = "arm.toml"', 'fmu = "a.fmu"').replace('port = "force"', "")
+    Path("fmu.toml").write_text(text.replace("start_deg = [-150.0, 20.0]", '[slave.start]\n"body[1].m" = -1.0'), encoding="utf-8")
+    assert cli.main(["fmu", "run", "fmu.toml"]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "body[1].m is -1, allowed is a finite number, 0 to inf kg" in err
