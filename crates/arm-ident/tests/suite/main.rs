@@ -5,6 +5,7 @@ mod coloured;
 mod condense;
 mod covariance;
 mod derivative;
+mod design;
 mod factor;
 mod filter;
 mod joint;

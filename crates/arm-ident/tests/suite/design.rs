@@ -1,0 +1,138 @@
+//! Forecasts and plans: what follows from more trials, less noise and wider limits, and what no plan may do.
+
+use arm_core::effect::{Effect, Kind};
+use arm_core::{Contact, Joints, Shape, models};
+use arm_ident::IdentError;
+use arm_ident::design::{Accuracy, Allowed, Question, Task, design, forecast};
+use arm_ident::trial::{Model, Tolerance};
+
+fn question(tolerance: Tolerance) -> Question<2> {
+    Question {
+        model: Model {
+            chain: models::mechanical_arm(),
+            segment_uncertainty: 0.1,
+            fitted: vec![
+                Effect::new(Kind::Coulomb, 0).with(&[0.139]),
+                Effect::new(Kind::Coulomb, 1).with(&[0.161]),
+            ],
+            held: Vec::new(),
+            contact: Contact::new([1e4; 2], [25.0; 2]),
+        },
+        robot: None,
+        tolerance,
+        accuracy: Accuracy {
+            rate: 50.0,
+            cutoff: 5.0,
+            force: 0.2,
+            angle: 0.1_f64.to_radians(),
+        },
+    }
+}
+
+const EXACT: Tolerance = Tolerance {
+    angle_offset: 0.0,
+    force_bias: 0.0,
+    force_gain: 0.0,
+    time_delay: 0.0,
+    handle_placement: 0.0,
+};
+
+fn task(repeats: usize) -> Task<2> {
+    let at = |a: f64, b: f64| Joints::<f64, 2>::new(a.to_radians(), b.to_radians());
+    Task {
+        waypoints: vec![at(-60.0, 50.0), at(-30.0, 90.0), at(-60.0, 50.0)],
+        speed: 1.0,
+        acceleration: 4.0,
+        shape: Shape::Smooth,
+        pause: 0.0,
+        repeats,
+    }
+}
+
+fn allowed(evaluations: usize) -> Allowed<2> {
+    Allowed {
+        angle: [[-1.4, -0.2], [0.4, 1.9]],
+        speed: 2.0,
+        acceleration: 8.0,
+        force: 60.0,
+        duration: 15.0,
+        speeds: vec![1.0, 0.3],
+        waypoints: 4,
+        repeats: 5,
+        evaluations,
+        seed: 3,
+    }
+}
+
+#[test]
+fn four_times_the_trials_halve_what_noise_leaves() {
+    let question = question(EXACT);
+    let of = |repeats| forecast(&question, &[task(repeats)]).expect("a forecast");
+    let (few, many) = (of(3), of(12));
+    assert_eq!(few.predicted.len(), 6);
+    for (a, b) in few.predicted.iter().zip(&many.predicted) {
+        let ratio = a.std_of_data / b.std_of_data;
+        assert!((ratio - 2.0).abs() < 1e-3, "{}: {ratio}", a.name);
+        // What is known beforehand never hurts.
+        assert!(a.std <= a.std_of_data * (1.0 + 1e-9), "{}", a.name);
+    }
+    assert!((many.duration / few.duration - 4.0).abs() < 1e-9);
+}
+
+#[test]
+fn deviations_grow_with_the_noise_and_stay_above_the_calibration() {
+    let mut noisy = question(EXACT);
+    noisy.accuracy.force = 0.4;
+    noisy.accuracy.angle *= 2.0;
+    let plain = forecast(&question(EXACT), &[task(5)]).expect("a forecast");
+    let twice = forecast(&noisy, &[task(5)]).expect("a forecast");
+    let promised = forecast(&question(Tolerance::default()), &[task(5)]).expect("a forecast");
+    for ((a, b), c) in plain
+        .predicted
+        .iter()
+        .zip(&twice.predicted)
+        .zip(&promised.predicted)
+    {
+        assert!(
+            (b.std_of_data / a.std_of_data - 2.0).abs() < 1e-3,
+            "{}",
+            a.name
+        );
+        assert!(c.std_of_data >= a.std_of_data, "{}", a.name);
+    }
+    // A gain of 1 % in either axis: no first moment is known better than to 0.7 %.
+    let elbow = &promised.predicted[1];
+    assert!(elbow.std_of_data / elbow.value > 0.007);
+}
+
+#[test]
+fn a_longer_search_is_no_worse_and_the_same_seed_gives_the_same_plan() {
+    let question = question(Tolerance::default());
+    let mut calls = 0;
+    let (tasks, first) = design(&question, &allowed(12), || calls += 1).expect("a plan");
+    assert_eq!(calls, 12);
+    let (again, _) = design(&question, &allowed(12), || {}).expect("a plan");
+    assert_eq!(tasks, again);
+    let (_, longer) = design(&question, &allowed(40), || {}).expect("a plan");
+    assert!(longer.worst() <= 1.05 * first.worst());
+    for (task, speed) in tasks.iter().zip([2.0, 0.6]) {
+        assert_eq!(task.waypoints.len(), 5);
+        assert_eq!(task.waypoints[0], task.waypoints[4]);
+        assert!((task.speed - speed).abs() < 1e-12);
+        for q in &task.waypoints {
+            assert!((-1.4..=-0.2).contains(&q[0]) && (0.4..=1.9).contains(&q[1]));
+        }
+    }
+    assert!(first.force <= 60.0 && first.speed <= 2.2);
+}
+
+#[test]
+fn limits_that_nothing_respects_are_an_error() {
+    let tight = Allowed {
+        force: 0.5,
+        ..allowed(5)
+    };
+    let error = design(&question(Tolerance::default()), &tight, || {}).expect_err("no plan");
+    assert_eq!(error, IdentError::NoPlan { evaluations: 5 });
+    assert!(error.to_string().contains("none of 5 movements"));
+}
