@@ -80,6 +80,7 @@ HIDDEN   := out/hidden
 GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
 
 hidden: build
+	cargo test --quiet --release -p hidden-world
 	$(GENERATE) --family null --seed 100000 --count $(or $(HIDDEN_NULL),204)
 	$(GENERATE) --family single --seed 110000 --count $(or $(HIDDEN_SINGLE),128)
 	$(GENERATE) --family double --seed 120000 --count $(or $(HIDDEN_DOUBLE),24)

@@ -488,7 +488,8 @@ fn movements(posture: &[f64], size: f64, random: &mut Random) -> (Vec<Movement>,
     let slow = pace(0.2, 0.3, smooth);
     let slow_too = pace(0.2, 0.3, smooth);
     let brisk = pace(0.5, 0.8, smooth);
-    let quick = pace(1.0, 1.5, smooth);
+    // With sharp ramps: what depends on the rate of forces shows in them alone.
+    let quick = pace(1.0, 1.5, Profile::Trapezoid);
     let medium = pace(0.4, 0.6, smooth);
     let crawl = pace(0.04, 0.06, Profile::Trapezoid);
 

@@ -12,9 +12,9 @@ use crate::rig::{BasePath, Plane, Rig};
 /// Hertz. So stiff that a gap of a hinge is closed within one step.
 const STIFF: f64 = 1e9;
 /// Sweeps of the solver over all hinges in a step.
-const SWEEPS: usize = 20;
+const SWEEPS: usize = 8;
 /// The same where motors rub or rotors turn, which the hinges have to agree with.
-const SWEEPS_WITH_MOTORS: usize = 60;
+const SWEEPS_WITH_MOTORS: usize = 24;
 
 /// What the bodies do between two steps. Speeds are those of the step that led here: of half a step ago.
 #[derive(Clone, Debug)]

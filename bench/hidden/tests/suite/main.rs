@@ -1,0 +1,5 @@
+//! Tests of the world that hides effects.
+
+mod agreement;
+mod common;
+mod truth;
