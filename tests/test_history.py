@@ -48,9 +48,18 @@ def test_no_more_than_one_in_twenty_is_called_changed() -> None:
     draw = np.random.default_rng(8)
     false = 0
     for _ in range(400):
-        p_values = [sessions._change([("d", draw.standard_normal(), 1.0) for _ in range(3)])[2] for _ in range(8)]
+        p_values = [sessions._change([("d", draw.standard_normal(), 1.0, 0) for _ in range(3)])[2] for _ in range(8)]
         false += min(sessions._holm(p_values)) < 0.05
     assert false / 400 < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 400)
+
+
+def test_sessions_compare_when_the_data_decided_the_same(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "subject.sqlite"
+    bound = tuple(dataclasses.replace(e, decided_by="bound") if (e.name, e.joint) == ("torque", 2) else e for e in identified.parameters)
+    sessions.add(file, dataclasses.replace(identified, parameters=bound), "2026-01-05")
+    courses = sessions.add(file, identified, "2026-02-03")
+    alone = [(c.kind, c.joint) for c in courses if np.isnan(c.change)]
+    assert ("coulomb", 2) in alone and ("coulomb", 1) not in alone and ("combination", None) not in alone
 
 
 def test_the_same_session_replaces_itself_and_order_is_by_date(identified: Identified, tmp_path: Path) -> None:

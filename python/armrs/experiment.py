@@ -74,8 +74,8 @@ class Devices:
         Samples a second of every device.
     force_noise_N, force_range_N, force_bits
         The force sensor: noise, largest magnitude, bits over the whole range.
-    moment_noise_Nm : float
-        Of its moment; the bearing of the handle lets the hand turn freely.
+    moment_noise_Nm : float, optional
+        Of its moment, which the bearing of the handle leaves at zero; without it no moment is recorded.
     marker_noise_m : float
         Of each coordinate of each marker.
     marker_offset_m : float
@@ -94,7 +94,7 @@ class Devices:
     force_noise_N: float = 0.2
     force_range_N: float = 110.0
     force_bits: int = 12
-    moment_noise_Nm: float = 0.01
+    moment_noise_Nm: float | None = None
     marker_noise_m: float = 0.0002
     marker_offset_m: float = 0.0
     marker_gaps: float = 0.0
@@ -391,12 +391,12 @@ def _devices(table: object) -> Devices:
     checks.number(f"{place}, rate_Hz", made.rate_Hz, least=10.0, most=1000.0, unit="Hz")
     checks.number(f"{place}, force_range_N", made.force_range_N, above=0.0, unit="N")
     checks.number(f"{place}, marker_gaps", made.marker_gaps, least=0.0, most=0.5)
-    for name in ("force_noise_N", "moment_noise_Nm", "marker_noise_m", "marker_offset_m", "clock_jitter_s"):
+    for name in ("force_noise_N", "moment_noise_Nm", "marker_noise_m", "marker_offset_m", "brake_noise_Nm", "clock_jitter_s"):
+        if getattr(made, name) is None:
+            continue
         checks.number(f"{place}, {name}", getattr(made, name), least=0.0)
     checks.number(f"{place}, clock_offset_s", made.clock_offset_s, least=-1.0, most=1.0, unit="s")
     checks.number(f"{place}, clock_drift", made.clock_drift, least=-0.01, most=0.01)
-    if made.brake_noise_Nm is not None:
-        checks.number(f"{place}, brake_noise_Nm", made.brake_noise_Nm, least=0.0, unit="N m")
     return made
 
 

@@ -50,7 +50,8 @@ class Course:
         ISO dates, in order.
     values, stds : ndarray, shape (n_sessions,)
     change, change_std : float
-        The last value less the mean of those before, weighted by certainty; NaN for a single session.
+        The last value less the mean of those before, weighted by certainty; NaN where there is none to compare with. Sessions compare
+        when the data decided the same parameters of that joint: where another one sat at a bound, a deviation means less.
     p_value : float
         Of so large a change by chance, over all parameters followed (Holm 1979); NaN for a single session.
     """
@@ -162,18 +163,20 @@ def read(path: str | os.PathLike[str], method: str = "joint") -> tuple[Course, .
     try:
         with closing(_open(file)) as connection:
             rows = connection.execute(
-                "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std FROM estimate e JOIN session s ON s.id = e.session "
+                "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id FROM estimate e JOIN session s ON s.id = e.session "
                 "WHERE s.method = ? AND e.decided_by = 'data' ORDER BY s.date, s.id, e.rowid",
                 (method,),
             ).fetchall()
     except sqlite3.Error as error:
         raise BadInput("--history", Text(str(error)), "a history that armrs wrote", file=file) from None
-    by_parameter: dict[tuple[str, str, int, str], list[tuple[str, float, float]]] = {}
-    for *key, date, value, std in rows:
-        by_parameter.setdefault((key[0], key[1], key[2], key[3]), []).append((date, value, std))
-    last = max((row[4] for row in rows), default="")
-    followed = {key: points for key, points in by_parameter.items() if points[-1][0] == last}
-    tests = [_change(points) for points in followed.values()]
+    by_parameter: dict[tuple[str, str, int, str], list[_Point]] = {}
+    beside: dict[tuple[int, int], set[tuple[str, str]]] = {}
+    for name, kind, joint, unit, date, value, std, session in rows:
+        by_parameter.setdefault((name, kind, joint, unit), []).append((date, value, std, session))
+        beside.setdefault((session, joint), set()).add((name, kind))
+    last = rows[-1][7] if rows else 0
+    followed = {key: points for key, points in by_parameter.items() if points[-1][3] == last}
+    tests = [_change([p for p in points if beside[p[3], key[2]] == beside[last, key[2]]]) for key, points in followed.items()]
     adjusted = _holm([p for *_, p in tests])
     return tuple(
         Course(
@@ -219,7 +222,11 @@ def _usable(estimate: Estimate) -> bool:
     return bool(np.isfinite(estimate.value) and np.isfinite(estimate.std))
 
 
-def _change(points: Sequence[tuple[str, float, float]]) -> tuple[float, float, float]:
+_Point = tuple[str, float, float, int]
+"""Date, value, standard deviation, session."""
+
+
+def _change(points: Sequence[_Point]) -> tuple[float, float, float]:
     """Return the last value less the weighted mean of those before, its deviation, and the two-sided probability."""
     from scipy.stats import norm
 

@@ -212,7 +212,7 @@ class _Session:
             t=stamps,
             q=motion.q,
             force_on_arm=read["force_on_arm"],
-            moment_on_arm=read["moment_on_arm"],
+            moment_on_arm=None if devices.moment_noise_Nm is None else read["moment_on_arm"],
             robot_q=read["robot_q"],
             tau=_brakes(true, stamps, devices, draw),
             emg=_emg(true, stamps, draw) if devices.emg else {},
@@ -248,7 +248,7 @@ def _sensors(devices: Devices) -> Sensors:
     return Sensors(
         rate=devices.rate_Hz,
         force=Channel(devices.force_noise_N, range=devices.force_range_N, bits=devices.force_bits),
-        moment=Channel(devices.moment_noise_Nm),
+        moment=Channel(devices.moment_noise_Nm or 0.0),
         robot=Channel(range=2 * np.pi, bits=24),
     )
 

@@ -129,6 +129,8 @@ def _angles(motion: Motion, coordinates: Sequence[str]) -> Motion:
 def _table_motion(path: Path) -> Motion:
     import pyarrow as pa
 
+    if path.is_dir():
+        raise BadInput("file", Text("a folder"), "one file: data sets are CSV or Parquet")
     if path.suffix.lower() not in SUFFIXES:
         raise BadInput("file", Text(f"suffix {path.suffix!r}"), " or ".join((*SUFFIXES, *MOTION_SUFFIXES, *MARKER_SUFFIXES)))
     table = read_table(path)

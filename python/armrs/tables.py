@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -215,7 +216,7 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
     rows = []
     for c in courses:
         label = c["name"] if c["joint"] is None else f"{c['kind']} {c['joint']} {c['name']}"
-        several = len(c["dates"]) > 1
+        several = c["change"] is not None and math.isfinite(c["change"])
         rows.append(
             [
                 label,
