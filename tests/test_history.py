@@ -23,16 +23,17 @@ def identified(slow_arm: Path) -> Identified:
 
 def moved(result: Identified, by: dict[str, float]) -> Identified:
     """The same result with some values changed, by name."""
-    shifted = [
-        tuple(dataclasses.replace(e, value=e.value + by.get(e.name, 0.0)) for e in part)
-        for part in (result.parameters, result.combinations)
-    ]
+    shifted = [tuple(_shifted(e, by.get(e.name, 0.0)) for e in part) for part in (result.parameters, result.combinations)]
     return dataclasses.replace(result, parameters=shifted[0], combinations=shifted[1])
+
+
+def _shifted(e: armrs.Estimate, by: float) -> armrs.Estimate:
+    return dataclasses.replace(e, value=e.value + by, interval=(e.interval[0] + by, e.interval[1] + by))
 
 
 def test_a_change_is_found_and_the_rest_is_not(identified: Identified, tmp_path: Path) -> None:
     file = tmp_path / "subject.sqlite"
-    std = next(e.std for e in identified.combinations if e.name == "m2*l2")
+    std = next(sessions._deviation(e, 0.95) for e in identified.combinations if e.name == "m2*l2")
     for k, date in enumerate(("2026-01-05", "2026-02-03", "2026-03-04")):
         courses = sessions.add(file, moved(identified, {"m2*l2": 0.2 * k * std}), date)
         assert not any(c.changed for c in courses)

@@ -49,6 +49,7 @@ class Course:
     dates : tuple of str
         ISO dates, in order.
     values, stds : ndarray, shape (n_sessions,)
+        A deviation is the wider half of the interval, in normal quantiles: few trials, which know their own scatter badly, count as few.
     change, change_std : float
         The last value less the mean of those before, weighted by certainty; NaN where there is none to compare with. Sessions compare
         when the data decided the same parameters of that joint: where another one sat at a bound, a deviation means less.
@@ -150,7 +151,9 @@ def add(path: str | os.PathLike[str], result: Identified, date: str) -> tuple[Co
             made = connection.execute(
                 "INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints)
             )
-            rows = [(made.lastrowid, *k, e.value, e.std, e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)]
+            rows = [
+                (made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)
+            ]
             connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
     except sqlite3.Error as error:
         raise BadInput("--history", Text(str(error)), "a history that can be written", file=file) from None
@@ -218,8 +221,15 @@ def _same_arm(connection: sqlite3.Connection, joints: int, file: Path) -> None:
         raise BadInput("--history", Text(f"the history of an arm of {other[0]} joints"), f"one of {joints}: one subject a file", file=file)
 
 
+def _deviation(estimate: Estimate, level: float) -> float:
+    from scipy.stats import norm
+
+    low, high = estimate.interval
+    return float(max(high - estimate.value, estimate.value - low) / norm.ppf(0.5 + 0.5 * level))
+
+
 def _usable(estimate: Estimate) -> bool:
-    return bool(np.isfinite(estimate.value) and np.isfinite(estimate.std))
+    return bool(np.isfinite([estimate.value, *estimate.interval]).all())
 
 
 _Point = tuple[str, float, float, int]

@@ -137,6 +137,7 @@ class PassiveCurve:
             "inertial_share": self.inertial_share,
             "half_width_mean_Nm": float(np.mean(self.half_width[there])),
             "elastic_mean_Nm": float(np.mean(self.elastic[there])),
+            "elastic_std_most_Nm": float(np.max(self.elastic_std[np.isfinite(self.elastic_std)], initial=0.0)),
             "half_width_interval_Nm": list(self.interval("half_width")),
             "elastic_interval_Nm": list(self.interval("elastic")),
             "held_deg": np.degrees(self.held.mean(axis=0)),
