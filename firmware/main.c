@@ -181,7 +181,6 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   armrs_real power = 0;
   for (size_t j = 0; j < ARMRS_JOINTS; j++) {
     sample.q[j] = (armrs_real)sensor->encoder[j] * (TURN / 1048576);
-    sample.lead[j] = sample.q[j];
     seen.values[j] = sample.q[j];
     seen.values[3 + j] = k ? (sample.q[j] - last_q[j]) * (armrs_real)1000 : 0;
     seen.moving[j] = wanted.qd[j] > (armrs_real)0.05 || wanted.qd[j] < (armrs_real)-0.05;
@@ -192,6 +191,7 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   seen.values[7] = load.force_on_arm[1];
   seen.values[8] = power;
   sample.load = load;
+  sample.led = 0;
   status = armrs_monitor_check(&monitor, &seen, &stop);
   if (status != ARMRS_OK) {
     print_count("stopped, reason", (uint32_t)stop.reason);

@@ -255,8 +255,11 @@ typedef struct armrs_estimator {
 typedef struct armrs_sample {
   // Joint angles [rad].
   armrs_real q[ARMRS_JOINTS];
-  // Joint angles from which speeds are taken: the same, or better ones from the robot's encoders or command [rad].
+  // Joint angles from which speeds are taken, where better ones than `q` are known: from the robot's encoders or its
+  // command [rad].
   armrs_real lead[ARMRS_JOINTS];
+  // Not 0 where `lead` is given.
+  uint32_t led;
   // What acts on the arm.
   struct armrs_load load;
 } armrs_sample;

@@ -43,8 +43,11 @@ pub struct armrs_settings {
 pub struct armrs_sample {
     /// Joint angles [rad].
     pub q: [armrs_real; ARMRS_JOINTS],
-    /// Joint angles from which speeds are taken: the same, or better ones from the robot's encoders or command [rad].
+    /// Joint angles from which speeds are taken, where better ones than `q` are known: from the robot's encoders or its
+    /// command [rad].
     pub lead: [armrs_real; ARMRS_JOINTS],
+    /// Not 0 where `lead` is given.
+    pub led: u32,
     /// What acts on the arm.
     pub load: armrs_load,
 }
@@ -209,7 +212,7 @@ pub unsafe extern "C" fn armrs_estimator_update(
             unsafe { (place(estimator)?, sample.as_ref(), heed.as_mut()) };
         let sample = sample.map(|s| Sample {
             q: joints(&s.q),
-            lead: Some(joints(&s.lead)),
+            lead: (s.led != 0).then(|| joints(&s.lead)),
             measured: Measured {
                 torque: joints(&s.load.torque),
                 force_on_arm: s.load.force_on_arm,

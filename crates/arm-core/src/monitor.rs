@@ -236,19 +236,20 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     }
 
     fn value_fault(&self, seen: &Observation<T, C>) -> Option<Stop<T>> {
-        let both = self.channels.iter().zip(seen.values);
-        for (index, (channel, value)) in both.enumerate() {
+        for (index, (channel, value)) in self.channels.iter().zip(seen.values).enumerate() {
+            let finite = value.is_finite();
+            if finite && value >= channel.min && value <= channel.max {
+                continue;
+            }
+            let reason = if finite {
+                Reason::Limit
+            } else {
+                Reason::NotFinite
+            };
             let limit = if value > channel.max {
                 channel.max
             } else {
                 channel.min
-            };
-            let reason = if !value.is_finite() {
-                Reason::NotFinite
-            } else if value > channel.max || value < channel.min {
-                Reason::Limit
-            } else {
-                continue;
             };
             return Some(Stop {
                 reason,

@@ -42,7 +42,7 @@ pub trait Scalar:
     ///
     /// Largest error found against 160-bit arithmetic at 60 000 angles of each range: 1.01 units in the last place within
     /// ±0.8, 1.45 within ±10³, 2.1 within ±10⁵ (absolute 1.5·10⁻¹⁶), beyond which `libm` takes over; in single precision
-    /// 7·10⁻⁸ absolute.
+    /// 7·10⁻⁸ absolute, and NaN beyond 10⁸, where no angle can be told.
     fn sin_cos(self) -> (Self, Self);
     /// Exponential; within 1 unit in the last place of `libm`, zero below −708.
     fn exp(self) -> Self;
@@ -103,6 +103,18 @@ impl Real for f32 {
 #[inline(never)]
 fn far_sin_cos(x: f64) -> (f64, f64) {
     libm::sincos(x)
+}
+
+/// Reduced in double precision. Beyond 10⁸ neighbouring numbers are more than a turn apart: no angle, and NaN.
+#[cold]
+#[inline(never)]
+fn far_sin_cos_single(x: f32) -> (f32, f32) {
+    if x.abs() < 1e8 {
+        let (sin, cos) = turned(reduced_sin_cos(f64::from(x), &DOUBLE));
+        (sin as f32, cos as f32)
+    } else {
+        (f32::NAN, f32::NAN)
+    }
 }
 
 impl Scalar for f64 {
@@ -188,7 +200,7 @@ impl Scalar for f32 {
         if self.abs() <= 4096.0 {
             turned_single(reduced_sin_cos(self, &SINGLE))
         } else {
-            libm::sincosf(self)
+            far_sin_cos_single(self)
         }
     }
     #[inline]

@@ -216,6 +216,7 @@ fn an_estimator_learns_and_a_compensation_carries() {
             let mut sample = armrs_sample {
                 q: motion.q,
                 lead: motion.q,
+                led: 0,
                 load: Default::default(),
             };
             armrs_inverse_dynamics(&arm, &motion, &Default::default(), &mut sample.load.torque);

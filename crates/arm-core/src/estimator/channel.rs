@@ -171,6 +171,14 @@ impl<T: Real> Channel<T> {
                 self.bridged = self.bridged.saturating_add(1);
             }
         }
+        if self.last == T::ZERO && self.filter == [LowPass::at(T::ZERO); 2] {
+            // A sensor that is not there costs nothing.
+            return Smooth {
+                value: T::ZERO,
+                rate: T::ZERO,
+                rate_of_rate: T::ZERO,
+            };
+        }
         let [first, second] = &mut self.filter;
         let smooth = first.step(self.last, cutoff);
         self.trend = (cutoff.g + cutoff.g) * smooth.rate;

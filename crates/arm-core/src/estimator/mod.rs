@@ -135,6 +135,8 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     hand: [Channel<T>; 3],
     /// False until the first good sample, and after a gap.
     running: bool,
+    /// Whether speeds come from angles of their own.
+    led: bool,
     settling: u32,
     moving: bool,
     /// Periods since the last row.
@@ -185,6 +187,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             hand: [Channel::new(); 3],
             tuning,
             running: false,
+            led: false,
             settling: 0,
             moving: false,
             since_row: 0,
@@ -279,7 +282,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         &mut self,
         sample: Option<&Sample<T, N>>,
     ) -> Result<(Motion<T, N>, Measured<T, N>), Heed> {
-        if !self.running {
+        // A lead that comes or goes is another sensor.
+        if !self.running || sample.is_some_and(|s| s.lead.is_some() != self.led) {
             return Err(self.start(sample));
         }
         let frozen_after = self.moving.then_some(self.tuning.frozen_after);
@@ -291,20 +295,23 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             let good = if found.is_some() { None } else { value };
             channel.step(good, &self.tuning.cutoff)
         };
-        let smooth: [[Smooth<T>; N]; 3] = from_fn(|kind| {
+        // Without a better lead the angles lead themselves, and are filtered once.
+        let mut filtered = |kind: usize| -> [Smooth<T>; N] {
             let farthest = if kind < 2 { turn } else { load };
             from_fn(|j| {
                 let value = sample.map(|s| of_joint(s, kind, j));
                 pass(&mut self.joints[kind][j], value, farthest)
             })
-        });
+        };
+        let angle = filtered(0);
+        let lead = if self.led { filtered(1) } else { angle };
+        let torque = filtered(2);
         let hand =
             from_fn::<_, 3, _>(|c| pass(&mut self.hand[c], sample.map(|s| of_hand(s, c)), load));
         let all = self.joints.iter().flatten().chain(&self.hand);
         if all.map(Channel::bridged).fold(0, Ord::max) > self.tuning.longest_gap {
             self.running = false;
         }
-        let [angle, lead, torque] = smooth;
         let pace = self.tuning.pace;
         let mut motion = Motion::new(
             T::ZERO,
@@ -348,6 +355,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             return Heed::Refused(Fault::NotFinite);
         }
         self.running = true;
+        self.led = sample.lead.is_some();
         self.moving = false;
         self.settling = self.tuning.settling;
         self.window = Window::EMPTY;

@@ -144,7 +144,7 @@ impl<T: Real, const N: usize> Tuning<T, N> {
         } else {
             free
         };
-        let forgotten = libm::exp(-window / s.forgetting.to_f64());
+        let forgotten = (-s.window / s.forgetting).exp();
         Ok(Self {
             period: s.period,
             cutoff: Cutoff::new(g),
@@ -163,9 +163,9 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             settling: periods(SETTLING / (cutoff * period)),
             quarantine,
             pace_of_work: work.div_ceil(free.max(1)),
-            fade: T::of(forgotten),
+            fade: forgotten,
             // One of the unknowns in turn, so that each comes back at the pace at which it fades.
-            refresh: T::of((1.0 - forgotten) * unknowns as f64),
+            refresh: (T::ONE - forgotten) * T::of(unknowns as f64),
         })
     }
 }
