@@ -4,6 +4,7 @@
 #   make test    every check: formatting, lints, Rust and Python tests, types, examples
 #   make bench   speed
 #   make hidden  the gap workflow against hidden effects: some hours
+#   make crosscheck  the same bits on other architectures and two microcontrollers; half an hour the first time
 #   make clean   remove what make has made
 PYTHON ?= python3
 VENV   := .venv
@@ -18,7 +19,7 @@ export PIP_QUIET := 1
 # The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test bench hidden clean build format rust python
+.PHONY: demo test bench hidden crosscheck clean build format rust python
 .DELETE_ON_ERROR:
 
 demo: build
@@ -49,13 +50,14 @@ $(STAMPS)/dev: pyproject.toml | $(STAMPS)/build
 # ---- Rust
 rust: $(STAMPS)/rust
 
-$(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/check_bits.sh scripts/capi_header.sh | $(STAMPS)/venv
+$(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/check_bits.sh scripts/capi_header.sh scripts/crosscheck scripts/digests.txt | $(STAMPS)/venv
 	cargo fmt --all --check
 	scripts/check_no_std.sh
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	cargo test --quiet --no-fail-fast
 	scripts/capi_header.sh --check
 	scripts/check_bits.sh
+	scripts/crosscheck --quick
 	@touch $@
 
 # ---- Python
@@ -70,6 +72,9 @@ format: $(STAMPS)/dev
 	cargo fmt --all
 	$(BIN)/ruff format python tests scripts examples bench
 	$(BIN)/ruff check --fix python tests scripts examples bench
+
+crosscheck:
+	scripts/crosscheck
 
 bench: build
 	cargo bench --quiet

@@ -157,8 +157,8 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   armrs_motion wanted;
   armrs_real handle[2], robot_q[2], rows[2][ARMRS_JOINTS];
   armrs_status status = armrs_path_at(&path, (armrs_real)k * PERIOD, &wanted);
-  if (status == ARMRS_OK) status = armrs_tip(&arm, (const armrs_real (*)[ARMRS_JOINTS])&wanted.q, &handle);
-  if (status == ARMRS_OK) status = armrs_jacobian(&arm, (const armrs_real (*)[ARMRS_JOINTS])&wanted.q, &rows);
+  if (status == ARMRS_OK)
+    status = armrs_kinematics(&arm, (const armrs_real (*)[ARMRS_JOINTS])&wanted.q, &handle, &rows);
   if (status == ARMRS_OK) status = armrs_robot_angles(&robot, (const armrs_real (*)[2])&handle, &robot_q);
   if (status != ARMRS_OK) return status;
   count(0, &since);
@@ -205,13 +205,16 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   if (status != ARMRS_OK) return status;
   count(3, &since);
 
+  uint32_t asked = begin;
+  count(5, &asked);
+
   /* What carries it there? */
   armrs_motion still = wanted;
   for (size_t j = 0; j < ARMRS_JOINTS; j++) still.qd[j] = still.qdd[j] = 0;
   status = armrs_estimator_carry(&estimator, &still, (armrs_real (*)[ARMRS_JOINTS])torque,
                                  (armrs_real (*)[ARMRS_JOINTS])sd);
   count(4, &since);
-  count(5, &begin);
+  count(6, &begin);
   digest_values(robot_q, 2);
   return status;
 }
@@ -249,8 +252,9 @@ int application(void) {
   print("digest ");
   print_hex(&digest, sizeof digest);
   print("\n");
-  static const char *const names[6] = {"trajectory", "dynamics", "monitor", "estimator", "compensation", "period"};
-  for (size_t part = 0; part < 6; part++) {
+  static const char *const names[7] = {
+      "trajectory", "dynamics", "monitor", "estimator", "compensation", "period before compensation", "period"};
+  for (size_t part = 0; part < 7; part++) {
     print(names[part]);
     print_count(" most", cost.most[part]);
     print(names[part]);

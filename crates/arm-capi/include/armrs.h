@@ -375,19 +375,15 @@ enum armrs_status armrs_arm_init(struct armrs_arm *arm,
 // The pointers are null or point to what is said.
 enum armrs_status armrs_arm_advance(struct armrs_arm *arm, const struct armrs_motion *motion, armrs_real period);
 
-// Position of the tip at joint angles [m].
+// Where the tip is at joint angles: `point` is its position [m], `rows` the derivative of that to the angles, row y, then row z
+// [m/rad]. Either may be null.
 //
 // # Safety
 // The pointers are null or point to what is said.
-enum armrs_status armrs_tip(const struct armrs_arm *arm, const armrs_real (*q)[ARMRS_JOINTS], armrs_real (*point)[2]);
-
-// Derivative of the tip's position to the joint angles: row y, then row z [m/rad].
-//
-// # Safety
-// The pointers are null or point to what is said.
-enum armrs_status armrs_jacobian(const struct armrs_arm *arm,
-                                 const armrs_real (*q)[ARMRS_JOINTS],
-                                 armrs_real (*rows)[2][ARMRS_JOINTS]);
+enum armrs_status armrs_kinematics(const struct armrs_arm *arm,
+                                   const armrs_real (*q)[ARMRS_JOINTS],
+                                   armrs_real (*point)[2],
+                                   armrs_real (*rows)[2][ARMRS_JOINTS]);
 
 // Torques that hold the arm still against gravity [N m].
 //

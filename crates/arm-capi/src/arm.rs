@@ -188,40 +188,31 @@ pub unsafe extern "C" fn armrs_arm_advance(
     ended(run())
 }
 
-/// Position of the tip at joint angles [m].
+/// Where the tip is at joint angles: `point` is its position [m], `rows` the derivative of that to the angles, row y, then row z
+/// [m/rad]. Either may be null.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn armrs_tip(
+pub unsafe extern "C" fn armrs_kinematics(
     arm: *const armrs_arm,
     q: *const [armrs_real; ARMRS_JOINTS],
     point: *mut [armrs_real; 2],
-) -> armrs_status {
-    let run = || {
-        // SAFETY: as promised by the caller.
-        let (arm, q, point) = unsafe { (given(arm)?, given(q)?, place(point)?) };
-        *point = tip(arm.inner()?.equation.chain(), &Pose::new(&joints(q)));
-        Ok(())
-    };
-    ended(run())
-}
-
-/// Derivative of the tip's position to the joint angles: row y, then row z [m/rad].
-///
-/// # Safety
-/// The pointers are null or point to what is said.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn armrs_jacobian(
-    arm: *const armrs_arm,
-    q: *const [armrs_real; ARMRS_JOINTS],
     rows: *mut [[armrs_real; ARMRS_JOINTS]; 2],
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (arm, q, rows) = unsafe { (given(arm)?, given(q)?, place(rows)?) };
-        let found = jacobian(arm.inner()?.equation.chain(), &Pose::new(&joints(q)));
-        *rows = [0, 1].map(|row| core::array::from_fn(|j| found[(row, j)]));
+        let (arm, q) = unsafe { (given(arm)?, given(q)?) };
+        let (chain, pose) = (arm.inner()?.equation.chain(), Pose::new(&joints(q)));
+        // SAFETY: as promised by the caller.
+        if let Some(point) = unsafe { point.as_mut() } {
+            *point = tip(chain, &pose);
+        }
+        // SAFETY: as promised by the caller.
+        if let Some(rows) = unsafe { rows.as_mut() } {
+            let found = jacobian(chain, &pose);
+            *rows = [0, 1].map(|row| core::array::from_fn(|j| found[(row, j)]));
+        }
         Ok(())
     };
     ended(run())

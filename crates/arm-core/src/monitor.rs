@@ -157,7 +157,7 @@ struct Seen<T, const C: usize> {
     now: u64,
     stamp: u64,
     values: [T; C],
-    /// The stamp from which each channel has not changed under a command to move.
+    /// The stamp from which each channel that can freeze has not changed under a command to move.
     unchanged: [u64; C],
 }
 
@@ -211,8 +211,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     fn fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
         let clock = self.clock_fault(seen);
         let value = self.value_fault(seen);
-        let frozen = self.frozen_fault(seen);
-        clock.or(value).or(frozen)
+        clock.or(value)
     }
 
     fn clock_fault(&self, seen: &Observation<T, C>) -> Option<Stop<T>> {
@@ -235,73 +234,49 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         (age > self.oldest).then(|| stop(Reason::Late, seconds(age)))
     }
 
-    fn value_fault(&self, seen: &Observation<T, C>) -> Option<Stop<T>> {
-        for (index, (channel, value)) in self.channels.iter().zip(seen.values).enumerate() {
-            let finite = value.is_finite();
-            if finite && value >= channel.min && value <= channel.max {
-                continue;
-            }
-            let reason = if finite {
-                Reason::Limit
-            } else {
-                Reason::NotFinite
-            };
-            let limit = if value > channel.max {
-                channel.max
-            } else {
-                channel.min
-            };
-            return Some(Stop {
-                reason,
-                channel: Some(index),
-                value,
-                limit,
-                at: seen.now,
-            });
-        }
-        None
-    }
-
-    /// Remembers the observation and finds the first channel that is frozen. Repeats of one sample count as one.
-    fn frozen_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
-        let mut unchanged = [seen.stamp; C];
+    /// Remembers the observation and finds the first channel that is not as allowed. Repeats of one sample count as one.
+    fn value_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+        let first = self.last.is_none();
+        let last = self.last.get_or_insert(Seen {
+            now: seen.now,
+            stamp: seen.stamp,
+            values: seen.values,
+            unchanged: [seen.stamp; C],
+        });
+        (last.now, last.stamp) = (seen.now, seen.stamp);
         let mut found = None;
-        let Some(last) = &self.last else {
-            self.last = Some(Seen::of(seen, unchanged));
-            return None;
-        };
         for index in 0..C {
-            let Some(limit) = self.channels[index].frozen_after else {
-                continue;
+            let (channel, value) = (&self.channels[index], seen.values[index]);
+            let fault = if !value.is_finite() {
+                Some((Reason::NotFinite, value, channel.min))
+            } else if value > channel.max {
+                Some((Reason::Limit, value, channel.max))
+            } else if value < channel.min {
+                Some((Reason::Limit, value, channel.min))
+            } else if let Some(limit) = channel.frozen_after {
+                let same = !first && seen.moving[index] && value == last.values[index];
+                last.values[index] = value;
+                if !same {
+                    last.unchanged[index] = seen.stamp;
+                }
+                let time = seen.stamp.saturating_sub(last.unchanged[index]);
+                (time > limit).then(|| (Reason::Frozen, seconds(time), seconds(limit)))
+            } else {
+                None
             };
-            if !seen.moving[index] || seen.values[index] != last.values[index] {
-                continue;
-            }
-            unchanged[index] = last.unchanged[index];
-            let time = seen.stamp.saturating_sub(unchanged[index]);
-            if time > limit && found.is_none() {
+            if let Some((reason, value, limit)) = fault
+                && found.is_none()
+            {
                 found = Some(Stop {
-                    reason: Reason::Frozen,
+                    reason,
                     channel: Some(index),
-                    value: seconds(time),
-                    limit: seconds(limit),
+                    value,
+                    limit,
                     at: seen.now,
                 });
             }
         }
-        self.last = Some(Seen::of(seen, unchanged));
         found
-    }
-}
-
-impl<T: Real, const C: usize> Seen<T, C> {
-    fn of(seen: &Observation<T, C>, unchanged: [u64; C]) -> Self {
-        Self {
-            now: seen.now,
-            stamp: seen.stamp,
-            values: seen.values,
-            unchanged,
-        }
     }
 }
 

@@ -58,15 +58,20 @@ fn moving() -> armrs_motion {
 #[test]
 fn an_arm_level_and_at_rest_needs_what_the_head_says() {
     let (arm, mut torque, mut tip) = (arm(), [0.0; ARMRS_JOINTS], [0.0; 2]);
+    let mut rows = [[0.0; ARMRS_JOINTS]; 2];
     let level = [0.0; ARMRS_JOINTS];
     // SAFETY: all pointers are good.
     unsafe {
         assert_eq!(armrs_gravity(&arm, &level, &mut torque), ARMRS_OK);
-        assert_eq!(armrs_tip(&arm, &level, &mut tip), ARMRS_OK);
+        assert_eq!(
+            armrs_kinematics(&arm, &level, &mut tip, &mut rows),
+            ARMRS_OK
+        );
     }
     let last = 1.2 * 9.81 * 0.15;
     assert!((torque[ARMRS_JOINTS - 1] - last).abs() < 1e-5 * last);
     assert!((tip[0] - 0.3 * ARMRS_JOINTS as armrs_real).abs() < 1e-6 && tip[1] == 0.0);
+    assert!((rows[1][0] - tip[0]).abs() < 1e-6 && rows[0][0] == 0.0);
 }
 
 #[test]
