@@ -154,9 +154,11 @@ def main() -> None:
         for name, part, errors, inside in recovered(configurations(1.0), runs, scatter, 1.0):
             spread = f"{100 * np.median(errors):5.1f} %, 95 % of runs below {100 * np.quantile(errors, 0.95):6.1f} %"
             print(f"  {name:22} {part:11} error {spread}; interval holds {100 * inside.mean():5.1f} %")
-    for coupling in (0.0, 1.0):
-        share, values = coupled(coupling, runs)
-        print(f"coupling {coupling:g} N m/rad at the elbow: found in {100 * share:.1f} %; {values.mean():.3f} ± {values.std():.3f} N m/rad")
+    for joint, strengths in ((2, (0.0, 1.0, 1.5)), (1, (0.0, 8.0))):
+        for coupling in strengths:
+            share, values = coupled(coupling, runs, joint)
+            found = f"{values.mean():.3f} ± {values.std():.3f} N m/rad"
+            print(f"coupling {coupling:g} N m/rad, joint {joint}: called so in {100 * share:.1f} %; {found}")
 
 
 if __name__ == "__main__":

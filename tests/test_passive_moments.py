@@ -48,9 +48,26 @@ def test_the_orthosis_counts(session: Dataset, result: moments.PassiveMoments) -
 
 
 def test_a_coupling_is_found_when_it_is_there_and_not_when_it_is_not() -> None:
-    found, values = check_passive.coupled(1.0, 12)
-    assert found == 1.0 and abs(values.mean() - 1.0) < 0.3
+    found, values = check_passive.coupled(1.5, 12)
+    assert found >= 11 / 12 and abs(values.mean() - 1.5) < 0.3
     assert check_passive.coupled(0.0, 12)[0] <= 2 / 12  # 5 % of 12 is 0.6; three or more come in 2 % of the times
+
+
+@pytest.mark.parametrize(
+    ("held", "scatter"), [(check_passive.SHOULDER_HELD, check_passive.ELBOW_STD), (check_passive.ELBOW_HELD, check_passive.SHOULDER_STD)]
+)
+def test_no_coupling_is_made_of_configurations_that_scatter_differently(held: tuple[float, ...], scatter: tuple[float, ...]) -> None:
+    draw = np.random.default_rng(1)
+    q = np.linspace(0.4, 1.5, 6)
+    found = 0
+    for _ in range(300):
+        courses = [
+            Course(q, 0.8 * q + s * draw.standard_normal(), np.radians(a)) for a, s in zip(held, scatter, strict=True) for _ in range(6)
+        ]
+        fitted = fit(courses, 2, 1)
+        assert fitted is not None
+        found += fitted.coupled
+    assert found / 300 < 0.05 + 2.5 * np.sqrt(0.05 * 0.95 / 300)
 
 
 def test_the_shape_comes_back(result: moments.PassiveMoments, known: list[check_passive.Configuration]) -> None:

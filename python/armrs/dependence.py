@@ -147,7 +147,8 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     What differs from trial to trial (tone, the day) shifts whole courses and is far larger than the noise within one.
     So the shape is fitted within trials, each with a level of its own, under bounds; its intervals come from the scatter of the trials'
     scores. The coupling is the slope of those levels against the adjacent angle, over trials: Student's t with as many degrees of freedom
-    as trials less two. The model without coupling is the one with that slope at zero.
+    as trials less two, and a deviation that allows for configurations that scatter more than others. The model without coupling is the
+    one with that slope at zero.
     """
     from scipy.optimize import lsq_linear
     from scipy.stats import t as student
@@ -234,8 +235,11 @@ def _line(x: np.ndarray, y: np.ndarray, level: float) -> tuple[tuple[float, floa
     freedom = len(x) - 2
     slope = float(x @ y / (x @ x))
     mean = float(y.mean())
-    spread = float(np.sqrt(np.sum((y - mean - slope * x) ** 2) / freedom))
-    slope_std, mean_std = spread / float(np.sqrt(x @ x)), spread / float(np.sqrt(len(x)))
+    rest = y - mean - slope * x
+    spread = float(np.sqrt(np.sum(rest**2) / freedom))
+    # Configurations scatter differently, those at the ends may most: HC3 of MacKinnon and White 1985.
+    outer = rest / (1.0 - 1.0 / len(x) - x**2 / (x @ x))
+    slope_std, mean_std = float(np.sqrt(np.sum((x * outer) ** 2)) / (x @ x)), float(np.sqrt(np.sum(outer**2))) / len(x)
     p_value = float(2.0 * student.sf(abs(slope) / slope_std, freedom)) if slope_std > 0.0 else float(slope == 0.0)
     return (slope, slope_std), (mean, mean_std), spread, p_value, float(student.ppf(0.5 + 0.5 * level, freedom))
 
