@@ -159,6 +159,51 @@ def test_what_another_tool_made_is_checked_too(robot: Path) -> None:
     assert not any("crash" in f for f in found)
 
 
+SPRING = """
+from pythonfmu3 import Float64, Fmi3Causality, Fmi3Slave, Fmi3Variability
+
+
+class Spring(Fmi3Slave):
+    author, description = "armrs", "a spring along y"
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.time, self.k, self.at, self.x, self.f = 0.0, 200.0, 0.1, 0.0, 0.0
+        self.register_variable(Float64("time", causality=Fmi3Causality.independent, variability=Fmi3Variability.continuous))
+        for name in ("k", "at"):
+            self.register_variable(Float64(name, causality=Fmi3Causality.parameter, variability=Fmi3Variability.fixed))
+        self.register_variable(Float64("x", causality=Fmi3Causality.input))
+        self.register_variable(Float64("f", causality=Fmi3Causality.output, getter=lambda: self.k * (self.at - self.x)))
+
+    def do_step(self, current_time, step_size):
+        return True
+"""
+
+
+def test_a_foreign_partner_of_fmi_3(arm: Rig, tmp_path: Path) -> None:
+    """A spring made by PythonFMU3 at the force port, against the same spring inside the arm behind its motion port."""
+    pytest.importorskip("pythonfmu3")
+    (tmp_path / "spring.py").write_text(SPRING, encoding="utf-8")
+    command = [sys.executable, "-m", "pythonfmu3", "build", "-f", "spring.py", "--handle-state"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (tmp_path / "Spring.fmu").exists(), done.stderr
+    whole = Slave(arm.model.replace(contact=Contact((200.0, 1e-9))), port="motion", start=NEAR, handle=(0.1, 0.0))
+    whole.enter_initialization_mode()
+    whole.exit_initialization_mode()
+    whole.do_step(0.0, 1.0)
+    lines = [("arm.handle.r[1]", "spring.x"), ("spring.f", "arm.handle.F[1]")]
+    errors = []
+    for step in (4e-3, 1e-3):
+        slave = Slave(arm.model, start=NEAR)
+        with ImportedSlave(tmp_path / "Spring.fmu", name="spring") as spring:
+            assert spring.fmi == 3
+            run_system(couple([slave, spring], lines, algorithm="iterated", step=step, duration=1.0))
+        errors.append(float(np.abs(slave.get(["q[1]", "q[2]"]) - whole.get(["q[1]", "q[2]"])).max()))
+    # The arm falls freely but for the spring. Second order: a quarter of the step, a sixteenth of the error.
+    assert errors[1] < 1e-3
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.1)
+
+
 # ---- a wall
 def wall_system(algorithm: str, step: float, damping: float = 3000.0) -> Coupled:
     system = load_system(EXAMPLES / "cosim" / "wall.toml")

@@ -61,6 +61,19 @@ def test_other_tools_accept_and_simulate_it(folder: Path, fmi: int, port: str) -
     assert [v.hex() for v in last[1:]] == [v.hex() for v in slave.get(["q[1]", "q[2]", "energy"]).tolist()]
 
 
+@pytest.mark.parametrize("port", ["force", "motion"])
+def test_descriptions_and_terminals_fit_the_schemas_of_the_standard(folder: Path, port: str) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    etree = pytest.importorskip("lxml.etree")
+    schemas = Path(fmpy.__file__).parent / "schema" / "fmi3"
+    with zipfile.ZipFile(folder / f"{port}3.fmu") as files:
+        for name, schema in (
+            ("modelDescription.xml", "fmi3ModelDescription"),
+            ("terminalsAndIcons/terminalsAndIcons.xml", "fmi3TerminalsAndIcons"),
+        ):
+            etree.XMLSchema(etree.parse(str(schemas / f"{schema}.xsd"))).assertValid(etree.fromstring(files.read(name)))
+
+
 def test_the_same_arm_has_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     again = export_fmu(true_model(), tmp_path / "force3.fmu", start=START)
     assert again.read_bytes() == (folder / "force3.fmu").read_bytes()
