@@ -78,6 +78,13 @@ def test_an_alternative_counts_as_stated_but_not_as_named(score: ModuleType) -> 
     assert not wrong_joint["among_alternatives"]
 
 
+def test_either_name_of_one_term_is_right(score: ModuleType) -> None:
+    rotor = truth(effect("motor_inertia", 1, inertia=0.2))
+    assert score.judge(rotor, answer(named("inertia", 1)))["right"]
+    assert not score.judge(rotor, answer(named("inertia", 2)))["right"]
+    assert not score.judge(truth(effect("motor_inertia", 2, inertia=0.2)), answer(named("inertia", 2)))["right"]
+
+
 def test_two_effects_need_both(score: ModuleType) -> None:
     both = truth(COULOMB, effect("force_bias", channel="Fz", bias=2.0), family="double")
     assert score.judge(both, answer(named("force_bias", channel="Fz"), named("coulomb", 2)))["right"]

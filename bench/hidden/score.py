@@ -29,6 +29,9 @@ CHANNEL_ABOVE_FLOOR = 1.1
 CLOSED = 0.9
 """Part of the gap that is to be closed where the naming is right."""
 
+SAME = (("inertia", 1), ("motor_inertia", 1))
+"""A rotor in the first joint and inertia of the first segment are one term of the equation of motion: either name is right."""
+
 Json = dict[str, Any]
 
 
@@ -37,6 +40,8 @@ Json = dict[str, Any]
 
 def same(truth: Json, named: Json) -> bool:
     """Whether a named effect, or an alternative, is the hidden one: kind, and joint and channel where the kind has one."""
+    if (truth["kind"], truth.get("joint")) in SAME and (named.get("kind"), named.get("joint")) in SAME:
+        return True
     for key in ("kind", "joint", "channel"):
         if truth.get(key) is not None and named.get(key) != truth[key]:
             return False

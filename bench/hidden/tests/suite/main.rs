@@ -2,4 +2,5 @@
 
 mod agreement;
 mod common;
+mod session;
 mod truth;
