@@ -154,7 +154,7 @@ def main() -> None:
         for name, part, errors, inside in recovered(configurations(1.0), runs, scatter, 1.0):
             spread = f"{100 * np.median(errors):5.1f} %, 95 % of runs below {100 * np.quantile(errors, 0.95):6.1f} %"
             print(f"  {name:22} {part:11} error {spread}; interval holds {100 * inside.mean():5.1f} %")
-    for joint, strengths in ((2, (0.0, 1.0, 1.5)), (1, (0.0, 8.0))):
+    for joint, strengths in ((2, (0.0, 1.0, 1.2)), (1, (0.0, 8.0))):
         for coupling in strengths:
             share, values = coupled(coupling, runs, joint)
             found = f"{values.mean():.3f} ± {values.std():.3f} N m/rad"

@@ -146,9 +146,9 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     -----
     What differs from trial to trial (tone, the day) shifts whole courses and is far larger than the noise within one.
     So the shape is fitted within trials, each with a level of its own, under bounds; its intervals come from the scatter of the trials'
-    scores. The coupling is the slope of those levels against the adjacent angle, over trials: Student's t with as many degrees of freedom
-    as trials less two, and a deviation that allows for configurations that scatter more than others. The model without coupling is the
-    one with that slope at zero.
+    scores. The coupling is the slope of those levels against the adjacent angle, over trials: Student's t, with a deviation that allows
+    for configurations that scatter more than others, and the degrees of freedom that the ends of the line leave. The model without
+    coupling is the one with that slope at zero.
     """
     from scipy.optimize import lsq_linear
     from scipy.stats import t as student
@@ -240,8 +240,10 @@ def _line(x: np.ndarray, y: np.ndarray, level: float) -> tuple[tuple[float, floa
     # Configurations scatter differently, those at the ends may most: HC3 of MacKinnon and White 1985.
     outer = rest / (1.0 - 1.0 / len(x) - x**2 / (x @ x))
     slope_std, mean_std = float(np.sqrt(np.sum((x * outer) ** 2)) / (x @ x)), float(np.sqrt(np.sum(outer**2))) / len(x)
-    p_value = float(2.0 * student.sf(abs(slope) / slope_std, freedom)) if slope_std > 0.0 else float(slope == 0.0)
-    return (slope, slope_std), (mean, mean_std), spread, p_value, float(student.ppf(0.5 + 0.5 * level, freedom))
+    # That deviation rests on the ends of the line, and so on fewer trials than there are.
+    ends = min(float(freedom), float((x @ x) ** 2 / np.sum(x**4)))
+    p_value = float(2.0 * student.sf(abs(slope) / slope_std, ends)) if slope_std > 0.0 else float(slope == 0.0)
+    return (slope, slope_std), (mean, mean_std), spread, p_value, float(student.ppf(0.5 + 0.5 * level, ends))
 
 
 def _interval(value: float, half: float, least: float | None) -> tuple[float, float]:
