@@ -97,32 +97,43 @@ impl Order {
     }
 
     /// Makes the sessions, each thread the next that is free. What one thread writes no other touches.
+    ///
+    /// A seed of which no session can be made is said and left out.
     fn fill(&self) -> Result<(), String> {
         let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let worker = || -> Result<Vec<(usize, Value)>, String> {
+        let worker = || {
             let mut made = Vec::new();
             loop {
                 let k = next.fetch_add(1, Ordering::Relaxed);
                 if k >= self.count {
-                    return Ok(made);
+                    return made;
                 }
-                made.push((k, self.make(k)?));
+                made.push((k, self.make(k)));
                 self.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             }
         };
-        let mut entries: Vec<(usize, Value)> = std::thread::scope(|scope| {
+        let mut made: Vec<_> = std::thread::scope(|scope| {
             let workers: Vec<_> = (0..self.threads).map(|_| scope.spawn(worker)).collect();
-            let mut all = Vec::new();
-            for worker in workers {
-                match worker.join() {
-                    Ok(made) => all.extend(made?),
-                    Err(panic) => std::panic::resume_unwind(panic),
-                }
+            let joined = workers.into_iter().map(|worker| worker.join());
+            joined
+                .flat_map(|made| made.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
+        });
+        made.sort_by_key(|(k, _)| *k);
+        let mut entries = Vec::new();
+        for (k, session) in made {
+            match session {
+                Ok(entry) => entries.push(entry),
+                Err(why) if self.count == 1 => return Err(why),
+                Err(why) => eprintln!(
+                    "hidden-world: seed {} is left out: {why}",
+                    self.seed + k as u64
+                ),
             }
-            Ok::<_, String>(all)
-        })?;
-        entries.sort_by_key(|(k, _)| *k);
-        let entries: Vec<Value> = entries.into_iter().map(|(_, entry)| entry).collect();
+        }
+        if entries.is_empty() {
+            return Err("no session could be made".to_owned());
+        }
         self.add_to_manifest(entries)
     }
 
