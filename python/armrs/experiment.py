@@ -59,8 +59,8 @@ class Safety:
     """
 
     angle_margin_deg: float = 3.0
-    speed_rad_s: float = 2.5
-    acceleration_rad_s2: float = 40.0
+    speed_rad_s: float = 4.0
+    acceleration_rad_s2: float = 60.0
     force_N: float = 100.0
 
 
