@@ -154,6 +154,11 @@ def test_a_fault_stops_the_trial(experiment: Path, tmp_path: Path, fault: str, r
         ("[[-60, 60], [-48, 60]", "[[-60, 60], [90, 0]", r"from the robot's base, allowed"),
         ("[handle]", '[[fault]]\nkind = "fire"\nat_s = 1\n[handle]', r"\[\[fault\]\] 1, kind: found 'fire', allowed \"runaway\" or"),
         ("[handle]", "[safety]\nforce_N = 0\n[handle]", r"\[safety\], force_N: found 0\.0, allowed a finite number > 0"),
+        (
+            "speed_rad_s = 0.4\nacceleration_rad_s2 = 2.0",
+            "speed_rad_s = 30\nacceleration_rad_s2 = 300.0",
+            r"\[\[movement\]\] 1 \(slow\): found .* rad/s of a joint of the robot, allowed at most \[safety\] speed",
+        ),
         ("[subject]", 'model = "absent.toml"\n[subject]', r"lengths_m: found a value beside model"),
     ],
 )

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _armrs, files
 from .dataset import Added, Dataset, write_dataset
-from .errors import ArmrsError
+from .errors import ArmrsError, BadInput, Text
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .markers import Markers, planar_motion
 from .model import Effect, Model
@@ -97,6 +97,7 @@ def record(
     if not isinstance(experiment, Experiment):
         experiment = load_experiment(experiment)
     out = files.output_folder(folder)
+    _check_required(experiment)
     session = _Session(experiment)
     measured = []
     for number, run in enumerate(experiment.runs):
@@ -122,6 +123,19 @@ def record(
     stories = tuple(m.story for m in measured)
     written = _write(dataset, experiment, [m for m in kept if m.markers is not None], stories, out)
     return Recorded(dataset, experiment, stories, written)
+
+
+def _check_required(experiment: Experiment) -> None:
+    """Refuse movements that ask more of the robot than its supervisor allows."""
+    safety = experiment.safety
+    for number, run in enumerate(experiment.runs, start=1):
+        asked = simulate(experiment.truth, run.movement, rate=RECORDING_RATE).columns
+        for column, unit, name in (("robot_qd", "rad/s", "speed_rad_s"), ("robot_qdd", "rad/s²", "acceleration_rad_s2")):
+            most, allowed = float(np.abs(asked[column]).max()), getattr(safety, name)
+            if most > allowed:
+                found = Text(f"{most:.3g} {unit} of a joint of the robot")
+                hint = "slower, or away from where the robot is stretched out"
+                raise BadInput(f"[[movement]] {number} ({run.configuration})", found, f"at most [safety] {name} = {allowed:g}", hint=hint)
 
 
 @dataclass(frozen=True, eq=False)
