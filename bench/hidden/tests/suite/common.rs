@@ -44,12 +44,23 @@ pub fn lead(setting: &Setting, movement: &Movement) -> Lead {
 
 /// A trial in the world. Dry friction creeps: at rest a smoothed one cannot do otherwise.
 pub fn world(setting: &Setting, movement: &Movement, lead: &Lead, hidden: &[Hidden]) -> Truth {
+    rubbing(setting, movement, lead, hidden, 20.0)
+}
+
+/// The same with a damping of dry friction where it sticks \[N m s/rad\].
+pub fn rubbing(
+    setting: &Setting,
+    movement: &Movement,
+    lead: &Lead,
+    hidden: &[Hidden],
+    grip: f64,
+) -> Truth {
     let mut rig = setting.truth.clone();
     for effect in hidden {
         effect.alter(&mut rig);
     }
     let near = (0, &Grip::NOMINAL, movement.from.as_slice());
-    run(&rig, hidden, lead, near, 20.0, &mut Random::new(7, 1)).expect("a run")
+    run(&rig, hidden, lead, near, grip, &mut Random::new(7, 1)).expect("a run")
 }
 
 /// The same trial with effects of the catalogue, driven by what the robot's encoders would say 50 times a second: angles

@@ -3,4 +3,5 @@
 mod agreement;
 mod common;
 mod session;
+mod sticking;
 mod truth;
