@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from .dataset import write_dataset as write_dataset
     from .demo import Demonstration as Demonstration
     from .demo import run_demo as run_demo
+    from .discrepancy import GapFound as GapFound
+    from .discrepancy import find_gap as find_gap
     from .errors import ArmrsError as ArmrsError
     from .errors import BadInput as BadInput
     from .errors import IdentificationError as IdentificationError
@@ -67,9 +69,14 @@ _HOMES = {
     "conversion": ("convert",),
     "dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
     "demo": ("Demonstration", "run_demo"),
+<<<<<<< HEAD
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
     "fmu.check": ("check_fmu",),
     "fmu.export": ("export_fmu",),
+=======
+    "discrepancy": ("GapFound", "find_gap"),
+    "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
+>>>>>>> 209c9f7 (feat(gap): a first search for what a model lacks)
     "identification": ("Estimate", "Identified", "identify"),
     "laboratory": ("Recorded", "record"),
     "markers": ("Markers", "PlanarMotion", "planar_motion"),

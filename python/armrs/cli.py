@@ -293,6 +293,34 @@ def identify(
 
 
 @app.command()
+def gap(
+    context: typer.Context,
+    dataset: Source,
+    out: MaybeFolder = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores when absent. The result does not depend on it.")] = None,
+    json: JsonFile = None,
+) -> int:
+    """Find where model and data disagree, name the effect that is missing, and show the gap before and after.
+
+    Everything is chosen and fitted on the fit trials; the gap is measured on the test trials. Exit status 1 when something is left
+    that no effect of the catalogue explains.
+    """
+    from . import gap_results, words
+    from .dataset import load_dataset
+    from .discrepancy import find_gap
+
+    folder = _folder(out, json)
+    data = load_dataset(dataset)
+    with console.stages("looking for what is missing") as tell:
+        result = find_gap(data, threads=threads, progress=tell)
+    plain = gap_results.gap_data(result, _command(context))
+    written = gap_results.write_gap(result, plain, folder) if folder else []
+    console.warn([*data.warnings, *result.warnings])
+    present(lambda: plain, json, lambda: words.gap(plain, written))
+    return 1 if result.verdict == "unexplained" else 0
+
+
+@app.command()
 def simulate(
     context: typer.Context,
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],

@@ -62,6 +62,29 @@ def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], No
         yield lambda steps: shown.advance(task, steps)
 
 
+@contextmanager
+def stages(what: str) -> Iterator[Callable[[str, float], None]]:
+    """Show work that tells its stage and its share, on standard error, when that is a terminal.
+
+    Yields
+    ------
+    callable
+        Call it with the name of the stage and the share that is done, 0 to 1.
+    """
+    if not sys.stderr.isatty():
+        yield lambda stage, share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    shown = Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
+    )
+    with shown:
+        task = shown.add_task(what, total=1.0)
+        yield lambda stage, share: shown.update(task, description=stage, completed=share)
+
+
 def _cell(item: object) -> str:
     if item is None:
         return "-"

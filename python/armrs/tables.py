@@ -247,3 +247,34 @@ def comparison(data: Mapping[str, Any]) -> Table:
         for c in data["comparison"]
     ]
     return Table(["quantity", "unit", "known", "identified", "± std", "error [%]", "error in the thesis [%]", "decided by"], rows, left=2)
+
+
+def missing(data: Mapping[str, Any]) -> Table:
+    """Return the named effects with their estimates."""
+    rows: list[list[object]] = []
+    for effect in data["effects"]:
+        place = effect["joint"] or effect["channel"]
+        fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
+        for k, (name, value) in enumerate((fitted or effect["parameters"]).items()):
+            head = [effect["kind"], place, f"{effect['share']:.0%}"] if k == 0 else ["", "", ""]
+            rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), value["unit"]])
+    return Table(["effect", "at", "share", "parameter", "value", "±", "unit"], rows, 4)
+
+
+def gap(data: Mapping[str, Any]) -> Table:
+    """Return the gap of every channel: as given, calibrated, with the named effects, and the floor."""
+    steps = ("before", "calibrated", "after", "floor")
+    rows = [[name, *(channel[s] for s in steps)] for name, channel in data["gap"].items() if channel["before"] is not None]
+    return Table(["channel", "as given", "calibrated", "with the named", "repeats"], rows, 1)
+
+
+def where_gap(data: Mapping[str, Any], most: int = 6) -> Table:
+    """Return where the calibrated model and the data disagree most."""
+    rows = [[w["trial"], w["condition"], f"{w['t_start']:.3g} to {w['t_end']:.3g}", w["mean"], w["z"]] for w in data["where"][:most]]
+    return Table(["trial", "where", "time [s]", "missing torque [N m]", "z"], rows, 2)
+
+
+def limits(data: Mapping[str, Any]) -> Table:
+    """Return the smallest effects that would have been seen."""
+    rows = [[w["kind"], w["joint"] or w["channel"], w["parameter"], w["at_least"], w["unit"]] for w in data["would_have_seen"]]
+    return Table(["effect", "at", "parameter", "at least", "unit"], rows, 3)

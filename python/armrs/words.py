@@ -36,7 +36,7 @@ def is_synthetic(result: Mapping[str, Any]) -> bool:
 
 def verdict(result: Mapping[str, Any]) -> str:
     """Return a result in a sentence or two."""
-    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
+    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "gap": _gap, "fmu run": _coupled}
     return sentences[result["verb"]](result)
 
 
@@ -79,6 +79,23 @@ def _passive(result: Mapping[str, Any]) -> str:
 
 def _demo(result: Mapping[str, Any]) -> str:
     return str(result["verdict"])
+
+
+def _gap(result: Mapping[str, Any]) -> str:
+    names = [effect_name(e) for e in result["effects"]]
+    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""
+    if result["verdict"] == "nothing_missing":
+        return "Nothing is missing: what is left of these data is what repeats of one movement differ by."
+    if result["verdict"] == "explained":
+        return f"The model lacks {listed}; with it, what is left is noise." if len(names) == 1 else f"The model lacks {listed}."
+    rest = "something is missing that the catalogue has no name for"
+    return f"The model lacks {listed}, and {rest}." if names else f"{rest[0].upper()}{rest[1:]}."
+
+
+def effect_name(effect: Mapping[str, Any]) -> str:
+    """Return an effect with its place, in words."""
+    place = f" in joint {effect['joint']}" if effect["joint"] else f" of {effect['channel']}" if effect["channel"] else ""
+    return effect["kind"].replace("_", " ") + place
 
 
 def data_lines(data: Mapping[str, Any]) -> list[str]:
@@ -170,6 +187,21 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     for check in result["checks"]:
         print(check["text"])
     print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
+    files_written(written)
+
+
+def gap(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what the gap workflow found."""
+    _head(result)
+    show("Missing in the model", tables.missing(result))
+    for effect in result["effects"]:
+        others = [f"{effect_name(a)} ({a['why']})" for a in effect["alternatives"]]
+        if others:
+            print(f"Instead of {effect_name(effect)} it may be {', or '.join(others)}.")
+    show("Gap on the test trials, root mean square of simulated less measured", tables.gap(result))
+    show("Where the calibrated model and the data disagree most", tables.where_gap(result))
+    if result["verdict"] == "nothing_missing":
+        show("The smallest effects that these data would have shown", tables.limits(result))
     files_written(written)
 
 

@@ -1,6 +1,7 @@
 //! The one place that turns errors of the core into Python's.
 
 use arm_core::Invalid;
+use arm_gap::GapError;
 use arm_ident::IdentError;
 use arm_sim::SimulationError;
 use pyo3::prelude::*;
@@ -133,5 +134,21 @@ pub fn simulation(error: SimulationError) -> PyErr {
             &format!("{min} m to {max} m"),
         ),
         other => in_python("SimulationError", &other.to_string()),
+    }
+}
+
+/// A refusal or failure of the gap workflow.
+pub fn gap(error: GapError) -> PyErr {
+    match error {
+        GapError::Data {
+            what,
+            found,
+            allowed,
+        } => bad_input(what, found, allowed),
+        GapError::Numerics(error) => identification(error),
+        GapError::Simulation { trial, source } => {
+            in_python("SimulationError", &format!("trial {}: {source}", trial + 1))
+        }
+        other => in_python("IdentificationError", &other.to_string()),
     }
 }

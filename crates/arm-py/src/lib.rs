@@ -5,6 +5,7 @@ mod catalogue;
 mod convert;
 mod cosim;
 mod errors;
+mod gap;
 mod ident;
 mod lab;
 mod plan;
@@ -30,6 +31,8 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<cosim::ArmSlave>()?;
     m.add_class::<cosim::ArmState>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
+    m.add_function(wrap_pyfunction!(gap::find_gap, m)?)?;
+    m.add_function(wrap_pyfunction!(gap::play, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;
     m.add_function(wrap_pyfunction!(plan::forecast_py, m)?)?;

@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
+use super::probe::{Probe, Question};
 use crate::{Body, Scalar, Setup};
 
 /// A point mass at the tip of the last segment, such as a payload in the hand.
@@ -14,6 +15,7 @@ impl Law for AddedMass {
         parameters: &[Parameter::linear("mass", "kg", 0.0, 50.0, 0.0)],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.02)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         if let Some(segment) = setup.segments.last_mut() {

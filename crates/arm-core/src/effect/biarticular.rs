@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
 /// A spring over two adjacent joints, as of a muscle that crosses both; its joint is the distal one.
@@ -21,6 +22,9 @@ impl Law for Biarticular {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+        .shaped(&[(1, Values::Each(&[1.0, 0.5]))])
+        .resting(2)]);
     const CROSSES: bool = true;
 
     #[inline]

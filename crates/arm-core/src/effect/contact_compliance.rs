@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
+use super::probe::{Probe, Question};
 use crate::{Scalar, Setup};
 
 /// Compliance of hand and handle beyond that of the model, in series with it.
@@ -19,6 +20,7 @@ impl Law for ContactCompliance {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(5e-6)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         for axis in 0..2 {

@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
 /// A linear spring about a rest angle.
@@ -17,6 +18,9 @@ impl Law for Elastic {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+        .shaped(&[(1, Values::Middle)])
+        .resting(1)]);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
 /// The steep rise of passive moment towards both ends of the range of motion (double exponential).
@@ -22,6 +23,14 @@ impl Law for EndRange {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[
+        Question::of(&[0])
+            .shaped(&[(2, Values::Each(&[5.0, 8.0, 12.0])), (3, Values::Highest)])
+            .refining(&[2]),
+        Question::of(&[1])
+            .shaped(&[(2, Values::Each(&[5.0, 8.0, 12.0])), (4, Values::Lowest)])
+            .refining(&[2]),
+    ]);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
+use super::probe::{Probe, Question};
 use crate::{Reading, Scalar};
 
 /// An offset of one channel of the force sensor that grows with time from zero at the start of the trial (N/s, for `Mx`
@@ -15,6 +16,7 @@ impl Law for ForceDrift {
         parameters: &[Parameter::linear("rate", "N/s", -100.0, 100.0, 0.0)],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.02)]);
 
     #[inline]
     fn distort<T: Scalar, const N: usize>(

@@ -1,5 +1,6 @@
 //! What a kind of effect is.
 
+use super::probe::Probe;
 use crate::{Reading, Scalar, Setup};
 
 /// Most parameters that one effect has.
@@ -149,6 +150,8 @@ pub trait Law {
     const INFO: Info;
     /// Whether it acts in the joint before as well, by [`Law::proximal_share`].
     const CROSSES: bool = false;
+    /// How a search asks for it.
+    const PROBE: Probe = Probe::FIRST;
 
     /// Torque with which the joint resists \[N m\].
     fn torque<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {

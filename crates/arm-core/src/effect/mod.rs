@@ -7,8 +7,10 @@
 //! To add a kind, write its file and add one line to the `catalogue!` below.
 
 mod law;
+mod probe;
 
 pub use law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+pub use probe::{Nature, Probe, Promise, Question, Values};
 
 use crate::{Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
 
@@ -35,6 +37,10 @@ macro_rules! catalogue {
         }
 
         impl Kind {
+            /// How a search asks for it.
+            pub const fn probe(self) -> Probe {
+                match self { $(Self::$law => <$module::$law as Law>::PROBE),* }
+            }
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::CROSSES),* }

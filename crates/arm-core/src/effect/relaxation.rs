@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
 /// A spring in series with a damper (Maxwell element): its torque fades when the joint rests.
@@ -19,6 +20,9 @@ impl Law for Relaxation {
         ],
         memory: true,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+        .shaped(&[(1, Values::Each(&[0.3, 1.0, 3.0]))])
+        .refining(&[1])]);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

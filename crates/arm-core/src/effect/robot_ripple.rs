@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
+use super::probe::{Nature, Probe, Question};
 use crate::{Scalar, Setup};
 
 /// A periodic error of the robot's position, as of gears or of vibration.
@@ -21,6 +22,8 @@ impl Law for RobotRipple {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).refining(&[2, 3]).stepping(1e-4)])
+        .of_nature(Nature::Periodic);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.ripple[0] += p[0];

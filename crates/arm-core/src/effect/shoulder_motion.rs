@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
+use super::probe::{Probe, Question, Values};
 use crate::{Scalar, Setup};
 
 /// A first joint that does not stay in place but moves with its own angle, as a shoulder does.
@@ -20,6 +21,9 @@ impl Law for ShoulderMotion {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1])
+        .shaped(&[(2, Values::Middle)])
+        .stepping(1e-3)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.base_motion[0] += p[0];

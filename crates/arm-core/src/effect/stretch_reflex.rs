@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
 /// Resistance to stretch faster than a threshold, as in spasticity.
@@ -20,6 +21,12 @@ impl Law for StretchReflex {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+        .shaped(&[
+            (1, Values::Each(&[0.15, 0.3, 0.5])),
+            (2, Values::Each(&[1.0, -1.0, 0.0])),
+        ])
+        .refining(&[1])]);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

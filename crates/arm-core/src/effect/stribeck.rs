@@ -2,6 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
+use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
 /// The excess of dry friction at low speed, which fades as the joint moves faster.
@@ -23,6 +24,9 @@ impl Law for Stribeck {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+        .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])
+        .refining(&[1, 2])]);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -2,6 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
+use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
 /// Friction and stiffness of a structure that breaks down in motion and builds up again at rest.
@@ -26,6 +27,11 @@ impl Law for Thixotropy {
         ],
         memory: true,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+        .shaped(&[
+            (3, Values::Each(&[0.03, 0.1, 0.3])),
+            (4, Values::Each(&[1.0, 3.0, 10.0])),
+        ])]);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

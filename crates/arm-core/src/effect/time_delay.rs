@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
+use super::probe::{Probe, Promise, Question};
 use crate::{Scalar, Setup};
 
 /// The force channels lag behind the joint angles, or with a negative value lead.
@@ -14,6 +15,7 @@ impl Law for TimeDelay {
         parameters: &[Parameter::shape("delay", "s", -1.0, 1.0, 0.0)],
         memory: false,
     };
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(4e-3)]).promised(Promise::TimeDelay);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.force_delay += p[0];

@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Nature, Probe};
 use crate::Scalar;
 
 /// A rhythmic torque of the muscles.
@@ -20,6 +21,7 @@ impl Law for Tremor {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::FIRST.of_nature(Nature::Rhythm);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Nature, Probe};
 use crate::Scalar;
 
 /// A burst of muscle torque: a smooth pulse that starts and ends with zero slope and is highest in its middle.
@@ -21,6 +22,7 @@ impl Law for Voluntary {
         ],
         memory: false,
     };
+    const PROBE: Probe = Probe::FIRST.of_nature(Nature::Burst);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

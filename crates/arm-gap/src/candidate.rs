@@ -1,0 +1,375 @@
+//! The questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
+
+use arm_core::effect::{
+    Effect, KINDS, Kind, Motion, Nature, Place, Question, Values, resisting_torque,
+};
+use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
+
+use crate::GapError;
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::predict::Run;
+use crate::session::Session;
+use crate::study::{Change, Response, Study};
+
+/// Share of a joint's torque that an effect has in the change with which its response is taken.
+const SHARE: f64 = 0.02;
+/// Torque below which a joint counts as unloaded \[N m\].
+const UNLOADED: f64 = 0.05;
+
+/// One question: a kind at a place in a shape, with what is free in it.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The effect with its free parameters at zero.
+    pub effect: Effect<f64>,
+    /// Which of the kind's questions.
+    pub question: usize,
+    /// Positions of the parameters that are free.
+    pub free: Vec<usize>,
+    /// Position of a rest angle that is free with them.
+    pub rest: Option<usize>,
+    /// Positions of shapes that are refined once it is named.
+    pub refined: &'static [usize],
+    /// How many shapes were tried of this question.
+    pub tried: usize,
+    /// Change of the free parameters with which responses are taken.
+    pub step: f64,
+    /// What it must earn to be named, in units of twice the log-likelihood; zero before a scan has set it.
+    pub price: f64,
+}
+
+impl Candidate {
+    /// The kind.
+    pub fn kind(&self) -> Kind {
+        self.effect.kind
+    }
+
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.free.len() + usize::from(self.rest.is_some())
+    }
+
+    /// Whether it is about the same kind at the same place.
+    pub fn is_same_effect(&self, effect: &Effect<f64>) -> bool {
+        self.effect.kind == effect.kind && self.effect.index == effect.index
+    }
+
+    /// Smallest and largest value that each column's coefficient may have.
+    pub fn bounds(&self, column: usize) -> (f64, f64) {
+        if self.rest.is_some() {
+            return (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        let parameter = &self.effect.kind.info().parameters[self.free[column]];
+        (parameter.min, parameter.max)
+    }
+
+    /// The effect whose response each column is: one unit of it.
+    fn unit(&self, column: usize, size: f64) -> Effect<f64> {
+        let mut effect = self.effect;
+        match self.rest {
+            Some(rest) => {
+                effect.parameters[self.free[0]] = size;
+                effect.parameters[rest] += column as f64;
+            }
+            None => effect.parameters[self.free[column]] = size,
+        }
+        effect
+    }
+
+    /// The effect with the coefficients of its columns.
+    ///
+    /// With a rest angle the two columns are the effect at two rest angles: together they are one effect at another rest.
+    pub fn found(&self, coefficients: &[f64]) -> Effect<f64> {
+        let mut effect = self.effect;
+        match self.rest {
+            Some(rest) => {
+                let amplitude = coefficients[0] + coefficients[1];
+                let parameter = &effect.kind.info().parameters[rest];
+                effect.parameters[self.free[0]] = amplitude;
+                if amplitude != 0.0 {
+                    let moved = effect.parameters[rest] + coefficients[1] / amplitude;
+                    effect.parameters[rest] = moved.clamp(parameter.min, parameter.max);
+                }
+            }
+            None => {
+                for (&p, &value) in self.free.iter().zip(coefficients) {
+                    let parameter = &effect.kind.info().parameters[p];
+                    effect.parameters[p] = value.clamp(parameter.min, parameter.max);
+                }
+            }
+        }
+        effect
+    }
+
+    /// The numbers that a fit may change once the effect stands at a place in the list of named ones.
+    pub fn coordinates(&self, slot: usize, effect: &Effect<f64>) -> Vec<Coordinate> {
+        let info = effect.kind.info();
+        let free = self.free.iter().map(|&p| (p, self.step));
+        let shapes = self.rest.iter().chain(self.refined);
+        let shapes = shapes.map(|&p| {
+            let size = (0.05 * effect.parameters[p].abs()).max(1e-3);
+            (p, size)
+        });
+        free.chain(shapes)
+            .map(|(p, step)| Coordinate {
+                target: Target::Named(slot, p),
+                prior: None,
+                lower: info.parameters[p].min,
+                upper: info.parameters[p].max,
+                step,
+            })
+            .collect()
+    }
+}
+
+/// All candidates of a session with their responses; those that the movements do not excite are left out.
+pub struct Library {
+    /// The questions.
+    pub candidates: Vec<Candidate>,
+    /// Responses to the columns of each.
+    pub responses: Vec<Vec<Response>>,
+    /// Kinds and places that these movements do not excite at all.
+    pub silent: Vec<(Kind, usize)>,
+}
+
+impl Library {
+    /// Asks the whole catalogue, linearised at a hypothesis.
+    ///
+    /// * `periodic` - frequency \[Hz\] and phase \[rad\] of a periodic residual of the handle, where there is one
+    ///
+    /// # Errors
+    /// As [`Study::responses`].
+    pub fn build<const N: usize>(
+        study: &Study<N>,
+        hypothesis: &Hypothesis<N>,
+        periodic: Option<[f64; 2]>,
+    ) -> Result<Self, GapError> {
+        let motions = motions(study, hypothesis)?;
+        let mut candidates = Vec::new();
+        let mut silent = Vec::new();
+        for &kind in KINDS {
+            for index in places(study.session, kind) {
+                let questions = kind.probe().questions;
+                let mut heard = false;
+                for (number, question) in questions.iter().enumerate() {
+                    let found = ask(&motions, kind, index, (number, question), periodic);
+                    heard |= !found.is_empty();
+                    candidates.extend(found);
+                }
+                if !heard && kind.probe().nature == Nature::Lasting {
+                    silent.push((kind, index));
+                }
+            }
+        }
+        let mut changes = Vec::new();
+        for candidate in &candidates {
+            for column in 0..candidate.width() {
+                let mut changed = hypothesis.clone();
+                changed.named.push(candidate.unit(column, candidate.step));
+                let target = Target::Named(changed.named.len() - 1, 0);
+                let sensing = study.session.is_sensing(&changed, target);
+                changes.push(Change {
+                    changed,
+                    size: candidate.step,
+                    sensing,
+                    moves_handle: false,
+                });
+            }
+        }
+        let mut all = study.responses(hypothesis, &changes)?.into_iter();
+        let mut kept = Vec::new();
+        let mut responses = Vec::new();
+        for candidate in candidates {
+            let own: Vec<Response> = all.by_ref().take(candidate.width()).collect();
+            let simulated = own.iter().all(|r| r.0.iter().all(Option::is_some));
+            let moves = own.iter().all(|r| {
+                let mut values = r.0.iter().flatten().flatten().flatten();
+                values.any(|v| *v != 0.0)
+            });
+            if simulated && moves {
+                kept.push(candidate);
+                responses.push(own);
+            } else if !silent.contains(&(candidate.kind(), candidate.effect.index)) {
+                silent.push((candidate.kind(), candidate.effect.index));
+            }
+        }
+        silent.retain(|s| !kept.iter().any(|c| (c.kind(), c.effect.index) == *s));
+        Ok(Self {
+            candidates: kept,
+            responses,
+            silent,
+        })
+    }
+}
+
+/// Where a kind may act in a session.
+fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
+    let led = session.is_led();
+    match kind.info().place {
+        Place::Joint => usize::from(kind.crosses())..N,
+        Place::Segment | Place::AngleSensor => 0..N,
+        Place::Frame | Place::Hand => 0..1,
+        Place::ForceSensor if led => 0..2,
+        Place::Contact | Place::Sensors if led => 0..1,
+        Place::ForceSensor | Place::Contact | Place::Sensors => 0..0,
+    }
+}
+
+/// The joint motion of a group's reference, sample by sample.
+struct Movement<const N: usize> {
+    motion: Vec<Motion<f64, N>>,
+    interval: f64,
+    /// Size of the torque in each joint.
+    torque: [f64; N],
+}
+
+fn motions<const N: usize>(
+    study: &Study<N>,
+    hypothesis: &Hypothesis<N>,
+) -> Result<Vec<Movement<N>>, GapError> {
+    let one = |group: usize| {
+        let trial = study.references[group];
+        let course = &study.courses[trial];
+        let run = study
+            .session
+            .run(hypothesis, course)
+            .map_err(|source| GapError::Simulation { trial, source })?;
+        let state = |i: usize| match course.motion() {
+            Some(motion) => (motion.q[i], motion.qd[i], motion.qdd[i]),
+            None => recorded(&run, i),
+        };
+        let chain = &study.session.chain;
+        let mut square = [0.0; N];
+        let count = course.seen[0].len();
+        let motion = (0..count)
+            .map(|i| {
+                let (q, qd, qdd) = state(i);
+                let pose = Pose::new(&q);
+                let torque = inverse_dynamics(chain, &pose, &qd, &qdd);
+                for (sum, value) in square.iter_mut().zip(torque.iter()) {
+                    *sum += value * value / count as f64;
+                }
+                let through = joint_force(chain, &pose, (&qd, &qdd), [0.0; 2]);
+                let mut at = Motion::new(i as f64 / course.rate, q, qd).with_joint_force(&through);
+                at.qdd = qdd;
+                at
+            })
+            .collect();
+        Ok(Movement {
+            motion,
+            interval: 1.0 / course.rate,
+            torque: square.map(|s| libm::sqrt(s).max(UNLOADED)),
+        })
+    };
+    study
+        .parallel(study.references.len(), one)
+        .into_iter()
+        .collect()
+}
+
+fn recorded<const N: usize>(
+    run: &Run<N>,
+    i: usize,
+) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
+    let r = run.recording();
+    let i = i.min(r.len().saturating_sub(1));
+    let at = |v: &[f64]| Joints::from_column_slice(&v[i * N..(i + 1) * N]);
+    (at(&r.q), at(&r.qd), at(&r.qdd))
+}
+
+/// The candidates of one question about a kind at a place.
+fn ask<const N: usize>(
+    movements: &[Movement<N>],
+    kind: Kind,
+    index: usize,
+    (number, question): (usize, &'static Question),
+    periodic: Option<[f64; 2]>,
+) -> Vec<Candidate> {
+    let nature = kind.probe().nature;
+    if matches!(nature, Nature::Rhythm | Nature::Burst) {
+        return Vec::new();
+    }
+    let mut plain = Effect::<f64>::new(kind, index);
+    for &p in question.free {
+        plain.parameters[p] = 0.0;
+    }
+    let mut shapes = vec![plain];
+    if nature == Nature::Periodic {
+        let Some(wave) = periodic else {
+            return Vec::new();
+        };
+        // A kind that is periodic refines its frequency and its phase.
+        for (&p, value) in question.refined.iter().zip(wave) {
+            shapes[0].parameters[p] = value;
+        }
+    }
+    let joint = index.min(N - 1);
+    let angles = || {
+        let all = movements.iter().flat_map(|m| &m.motion).map(|m| m.q[joint]);
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
+            (a.min(q), b.max(q))
+        })
+    };
+    for (p, values) in question.shapes {
+        let (low, high) = angles();
+        let values = match values {
+            Values::Each(list) => list.to_vec(),
+            Values::Highest => vec![high],
+            Values::Lowest => vec![low],
+            Values::Middle => vec![0.5 * (low + high)],
+        };
+        shapes = shapes
+            .iter()
+            .flat_map(|shape| {
+                values.iter().map(|&value| {
+                    let mut shape = *shape;
+                    shape.parameters[*p] = value;
+                    shape
+                })
+            })
+            .collect();
+    }
+    let tried = shapes.len();
+    let candidate = |effect: Effect<f64>| {
+        let mut candidate = Candidate {
+            effect,
+            question: number,
+            free: question.free.to_vec(),
+            rest: question.rest,
+            refined: question.refined,
+            tried,
+            step: question.step,
+            price: 0.0,
+        };
+        if candidate.step == 0.0 {
+            candidate.step = torque_step(movements, &candidate)?;
+        }
+        Some(candidate)
+    };
+    shapes.into_iter().filter_map(candidate).collect()
+}
+
+/// The amplitude with which the effect's torque is a small share of what its joint carries; `None` where it has none.
+fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate) -> Option<f64> {
+    const LEAST: f64 = 1e-6;
+    let joint = candidate.effect.index;
+    let mut largest = 0.0;
+    for movement in movements {
+        let mut square = 0.0;
+        let effect = candidate.unit(0, 1.0);
+        let mut memory = 0.0;
+        for at in &movement.motion {
+            let local = at.local(joint, memory);
+            if effect.kind.info().memory {
+                for _ in 0..10 {
+                    let local = at.local(joint, memory);
+                    memory += effect.memory_rate(&local) * movement.interval / 10.0;
+                }
+            }
+            let torque = resisting_torque(&[effect], at, &[local.memory])[joint];
+            square += torque * torque;
+        }
+        let size = libm::sqrt(square / movement.motion.len().max(1) as f64);
+        largest = f64::max(largest, size / movement.torque[joint]);
+    }
+    (largest > LEAST).then(|| SHARE / largest)
+}

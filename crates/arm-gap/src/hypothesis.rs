@@ -1,0 +1,114 @@
+//! What is believed of a rig: its segments, its known effects, its calibration, and the effects that were named.
+
+use arm_core::effect::Effect;
+use arm_core::{Chain, Contact, Invalid, Segment, Setup};
+
+/// A belief about the rig from which every channel follows by simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hypothesis<const N: usize> {
+    /// Relative changes of mass, centre of mass and inertia of each segment.
+    pub segments: [[f64; 3]; N],
+    /// Shift of the robot's base against the arm's, y and z \[m\].
+    pub shift: [f64; 2],
+    /// Where the handle sits in the hand: along the last segment and to its left \[m\].
+    pub placement: [f64; 2],
+    /// Effects of the model.
+    pub known: Vec<Effect<f64>>,
+    /// Small imperfections of the sensors, as effects.
+    pub calibration: Vec<Effect<f64>>,
+    /// Effects that the model lacks.
+    pub named: Vec<Effect<f64>>,
+}
+
+/// One number of a hypothesis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// Relative change of a segment's mass (0), centre of mass (1) or inertia (2).
+    Segment(usize, usize),
+    /// Shift of the robot's base along y (0) or z (1).
+    Shift(usize),
+    /// Place of the handle along the last segment (0) or to its left (1).
+    Placement(usize),
+    /// A parameter of a known effect.
+    Known(usize, usize),
+    /// The first parameter of an imperfection.
+    Calibration(usize),
+    /// A parameter of a named effect.
+    Named(usize, usize),
+}
+
+/// A number that a fit may change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Which one.
+    pub target: Target,
+    /// Its value before the data, and how far it may be from it (standard deviation); `None` leaves it to the data alone.
+    pub prior: Option<(f64, f64)>,
+    /// Smallest value allowed.
+    pub lower: f64,
+    /// Largest value allowed.
+    pub upper: f64,
+    /// A change that is small and yet seen.
+    pub step: f64,
+}
+
+impl<const N: usize> Hypothesis<N> {
+    /// The value of a number.
+    pub fn get(&self, target: Target) -> f64 {
+        match target {
+            Target::Segment(k, part) => self.segments[k][part],
+            Target::Shift(axis) => self.shift[axis],
+            Target::Placement(axis) => self.placement[axis],
+            Target::Known(e, p) => self.known[e].parameters[p],
+            Target::Calibration(e) => self.calibration[e].parameters[0],
+            Target::Named(e, p) => self.named[e].parameters[p],
+        }
+    }
+
+    /// The same belief with one number set.
+    pub fn with(mut self, target: Target, value: f64) -> Self {
+        let place = match target {
+            Target::Segment(k, part) => &mut self.segments[k][part],
+            Target::Shift(axis) => &mut self.shift[axis],
+            Target::Placement(axis) => &mut self.placement[axis],
+            Target::Known(e, p) => &mut self.known[e].parameters[p],
+            Target::Calibration(e) => &mut self.calibration[e].parameters[0],
+            Target::Named(e, p) => &mut self.named[e].parameters[p],
+        };
+        *place = value;
+        self
+    }
+
+    /// All effects: those of the model, the named ones, then the imperfections of the sensors.
+    pub fn effects(&self) -> Vec<Effect<f64>> {
+        let parts = [&self.known, &self.named, &self.calibration];
+        parts.into_iter().flatten().copied().collect()
+    }
+
+    /// The segments as believed.
+    pub fn believed(&self, nominal: &[Segment<f64>; N]) -> [Segment<f64>; N] {
+        core::array::from_fn(|k| {
+            let [mass, com, inertia] = self.segments[k].map(|change| 1.0 + change);
+            let mut segment = nominal[k];
+            segment.mass *= mass;
+            segment.com = segment.com.map(|c| c * com);
+            segment.inertia *= inertia;
+            segment
+        })
+    }
+
+    /// The rig without effects.
+    ///
+    /// # Errors
+    /// [`Invalid`] for segments that cannot be, such as a negative mass.
+    pub fn setup(
+        &self,
+        nominal: &Chain<f64, N>,
+        contact: Contact<f64>,
+    ) -> Result<Setup<f64, N>, Invalid> {
+        let segments = self.believed(nominal.segments());
+        let chain = Chain::new(segments, nominal.base(), nominal.gravity())?
+            .with_rotor_inertia(*nominal.rotor_inertia())?;
+        Ok(Setup::new(&chain, contact))
+    }
+}

@@ -1,0 +1,20 @@
+//! Where simulation and measured data of an arm disagree, which effect is missing, and what adding it gains.
+
+pub mod apart;
+pub mod candidate;
+pub mod chance;
+pub mod error;
+pub mod fit;
+pub mod hypothesis;
+pub mod misfit;
+pub mod noise;
+pub mod normal;
+pub mod predict;
+pub mod response;
+pub mod scan;
+pub mod search;
+pub mod session;
+pub mod spectrum;
+pub mod study;
+
+pub use error::GapError;

@@ -1,0 +1,109 @@
+//! What a fitted hypothesis leaves: more than repeats differ among themselves?
+
+use crate::GapError;
+use crate::fit::Fitted;
+use crate::study::Study;
+
+/// Lack of fit against pure error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lack {
+    /// Variance of what repeats have in common over the variance of what they differ in, both for each degree of freedom.
+    pub ratio: f64,
+    /// The ratio less one in its standard deviations; not a number without repeats.
+    pub z: f64,
+    /// What repeats have in common beyond the noise, as a sum of squares.
+    pub excess: f64,
+}
+
+/// Lack of fit of a hypothesis over the groups of repeats.
+///
+/// # Errors
+/// As [`Study::residuals`].
+pub fn lack_of_fit<const N: usize>(study: &Study<N>, fitted: &Fitted<N>) -> Result<Lack, GapError> {
+    let own = study.own_responses(&fitted.hypothesis)?;
+    let (mut common, mut common_dof, mut apart, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
+    for group in 0..study.references.len() {
+        let members: Vec<usize> = (0..study.fitted.len())
+            .filter(|&m| {
+                let trial = study.fitted[m];
+                study.group_of[trial] == group
+            })
+            .collect();
+        let Some(&first) = members.first() else {
+            continue;
+        };
+        let stretches = &study.stretches[study.fitted[first]];
+        if members
+            .iter()
+            .any(|&m| study.stretches[study.fitted[m]] != *stretches)
+        {
+            continue;
+        }
+        let columns: Vec<Vec<f64>> = own
+            .iter()
+            .filter_map(|r| r.0[group].as_ref())
+            .map(|c| study.noise.whiten(c, stretches))
+            .collect();
+        let rows: Vec<Vec<f64>> = members
+            .iter()
+            .map(|&m| {
+                let mut row = study.noise.whiten(&fitted.residuals[m], stretches);
+                project_off(&mut row, &columns);
+                row
+            })
+            .collect();
+        let n = rows.len() as f64;
+        let size = rows[0].len();
+        let free = (size - columns.len().min(size)) as f64;
+        for i in 0..size {
+            let mean = rows.iter().map(|r| r[i]).sum::<f64>() / n;
+            common += n * mean * mean;
+            apart += rows
+                .iter()
+                .map(|r| (r[i] - mean) * (r[i] - mean))
+                .sum::<f64>();
+        }
+        common_dof += free;
+        apart_dof += free * (n - 1.0);
+    }
+    let unknowns = study.session.nuisances().len() + fitted.asked.len();
+    let common_dof = (common_dof - unknowns as f64).max(1.0);
+    if apart_dof < 1.0 {
+        return Ok(Lack {
+            ratio: f64::NAN,
+            z: f64::NAN,
+            excess: f64::NAN,
+        });
+    }
+    let noise = apart / apart_dof;
+    let ratio = common / common_dof / noise;
+    Ok(Lack {
+        ratio,
+        z: (ratio - 1.0) / libm::sqrt(2.0 / common_dof + 2.0 / apart_dof),
+        excess: common / noise - common_dof,
+    })
+}
+
+/// Takes the least-squares share of columns out of rows.
+fn project_off(rows: &mut [f64], columns: &[Vec<f64>]) {
+    use crate::noise::dot;
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let mut column = column.clone();
+        for other in &basis {
+            let share = dot(&column, other) / dot(other, other);
+            for (c, o) in column.iter_mut().zip(other) {
+                *c -= share * o;
+            }
+        }
+        if dot(&column, &column) > 0.0 {
+            basis.push(column);
+        }
+    }
+    for column in &basis {
+        let share = dot(rows, column) / dot(column, column);
+        for (v, c) in rows.iter_mut().zip(column) {
+            *v -= share * c;
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! The noise of a data set, from what differs between repeats of one movement, and the rows that it leaves white.
+//!
+//! Residuals of filtered samples are never white. Each channel is an autoregression in time, the innovations of the
+//! channels are correlated; both are read off repeats, where the model's errors cancel. Without repeats the residual of a
+//! fit takes their place: what the model lacks is in it too, so that less is seen, not more.
+
+use arm_ident::coloured::{AutoRegression, Whitener};
+use arm_ident::trial::Trial;
+
+use crate::GapError;
+use crate::predict::{Channels, Course};
+
+/// Samples kept for each period of the cutoff.
+const SAMPLES_PER_PERIOD: f64 = 2.5;
+/// Periods of the cutoff that are dropped next to an end or a gap.
+const MARGIN: f64 = 1.5;
+/// Periods of the cutoff that are dropped next to rest where dry friction holds a joint.
+const NEAR_REST: f64 = 0.6;
+/// Fewest samples in a stretch that is used.
+const SHORTEST: usize = 8;
+/// Highest order of the autoregressions.
+const ORDER: usize = 4;
+/// Noise below this share of a channel's own range is not believed: quantisation, and the model's own simplifications.
+const LEAST: f64 = 1e-4;
+
+/// The samples of a trial that are compared: stretches without a gap, thinned to the common band.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stretches(pub Vec<Vec<usize>>);
+
+impl Stretches {
+    /// Of one trial.
+    ///
+    /// * `resting` - samples at which a joint with dry friction rests: what holds it there is not known
+    pub fn of<const N: usize>(trial: &Trial<N>, course: &Course<N>, resting: &[bool]) -> Self {
+        let step = ((course.rate / (SAMPLES_PER_PERIOD * course.band)) as usize).max(1);
+        let margin = ((MARGIN * course.rate / course.band) as usize).max(1);
+        let near = ((NEAR_REST * course.rate / course.band) as usize).max(1);
+        let n = trial.len();
+        let around = |i: usize, reach: usize| i.saturating_sub(reach)..(i + reach + 1).min(n);
+        let usable = |i: usize| {
+            i >= margin
+                && i + margin < n
+                && around(i, margin).all(|k| trial.valid[k])
+                && !around(i, near).any(|k| resting.get(k) == Some(&true))
+        };
+        // On one grid for all trials, so that repeats have the same samples.
+        let mut all = Vec::new();
+        let mut current = Vec::new();
+        for i in (0..n).step_by(step) {
+            if usable(i) {
+                current.push(i);
+            } else if !current.is_empty() {
+                all.push(core::mem::take(&mut current));
+            }
+        }
+        all.push(current);
+        all.retain(|stretch| stretch.len() >= SHORTEST);
+        Self(all)
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.0.iter().map(Vec::len).sum()
+    }
+
+    /// Whether nothing is left.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The values of one channel at the samples, stretch by stretch.
+    pub fn pick(&self, channel: &[f64]) -> Vec<Vec<f64>> {
+        let at = |s: &Vec<usize>| s.iter().map(|&i| channel[i]).collect();
+        self.0.iter().map(at).collect()
+    }
+}
+
+/// What makes rows white.
+#[derive(Clone, Debug)]
+pub struct Noise {
+    whiteners: Vec<Whitener>,
+    /// Inverse of the lower Cholesky factor of the innovations' correlation, row-major.
+    mix: Vec<f64>,
+}
+
+impl Noise {
+    /// White noise of unit size, until the data have told more.
+    ///
+    /// # Errors
+    /// None in practice: the model is valid.
+    pub fn unknown(channels: usize) -> Result<Self, GapError> {
+        let white = AutoRegression {
+            coefficients: Vec::new(),
+            sd: 1.0,
+        };
+        let mix = (0..channels * channels)
+            .map(|i| if i % (channels + 1) == 0 { 1.0 } else { 0.0 })
+            .collect();
+        Ok(Self {
+            whiteners: vec![Whitener::new(&white)?; channels],
+            mix,
+        })
+    }
+
+    /// From deviations, for each trial its channels, thinned, in one list of stretches.
+    ///
+    /// * `deviations` - `[series][channel]`, already scaled for the freedom that their mean took
+    /// * `range` - size of each channel, below a share of which no noise is believed
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for series too short.
+    pub fn of(deviations: &[Vec<Vec<f64>>], range: &[f64]) -> Result<Self, GapError> {
+        let channels = range.len();
+        let mut whiteners = Vec::with_capacity(channels);
+        for (c, range) in range.iter().enumerate() {
+            let series: Vec<&[f64]> = deviations.iter().map(|d| d[c].as_slice()).collect();
+            let least = (LEAST * range).max(1e-12);
+            let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
+            let mut model = if varies {
+                AutoRegression::selected(&series, ORDER)?
+            } else {
+                AutoRegression {
+                    coefficients: Vec::new(),
+                    sd: least,
+                }
+            };
+            if model.sd < least {
+                model = AutoRegression {
+                    coefficients: Vec::new(),
+                    sd: least,
+                };
+            }
+            whiteners.push(Whitener::new(&model)?);
+        }
+        let mut correlation = vec![0.0; channels * channels];
+        let mut count = 0.0;
+        for series in deviations {
+            let mut white = series.clone();
+            for (values, whitener) in white.iter_mut().zip(&whiteners) {
+                whitener.apply(values);
+            }
+            count += white[0].len() as f64;
+            for a in 0..channels {
+                for b in 0..channels {
+                    correlation[a * channels + b] += dot(&white[a], &white[b]);
+                }
+            }
+        }
+        for value in &mut correlation {
+            *value /= f64::max(count, 1.0);
+        }
+        Ok(Self {
+            whiteners,
+            mix: inverse_factor(&correlation, channels),
+        })
+    }
+
+    /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
+    pub fn whiten(&self, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
+        let n = self.whiteners.len();
+        let mut rows = vec![Vec::with_capacity(stretches.len()); n];
+        for (c, whitener) in self.whiteners.iter().enumerate() {
+            for mut piece in stretches.pick(&channels[c]) {
+                whitener.apply(&mut piece);
+                rows[c].extend(piece);
+            }
+        }
+        // From the last channel up: each row needs those before it unmixed.
+        for c in (0..n).rev() {
+            for i in 0..rows[c].len() {
+                rows[c][i] = (0..=c).fold(0.0, |s, b| s + self.mix[c * n + b] * rows[b][i]);
+            }
+        }
+        rows.into_iter().flatten().collect()
+    }
+}
+
+/// Inverse of the lower Cholesky factor; a little of the diagonal is added where channels repeat each other.
+fn inverse_factor(correlation: &[f64], n: usize) -> Vec<f64> {
+    const RIDGE: f64 = 1e-3;
+    let mut lower = vec![0.0; n * n];
+    for j in 0..n {
+        for k in 0..=j {
+            let ridge = if j == k {
+                RIDGE * correlation[j * n + j].max(1e-6)
+            } else {
+                0.0
+            };
+            let mut value = correlation[j * n + k] + ridge;
+            for i in 0..k {
+                value -= lower[j * n + i] * lower[k * n + i];
+            }
+            lower[j * n + k] = if j == k {
+                value.max(1e-9).sqrt()
+            } else {
+                value / lower[k * n + k]
+            };
+        }
+    }
+    let mut inverse = vec![0.0; n * n];
+    for column in 0..n {
+        for j in column..n {
+            let mut value = if j == column { 1.0 } else { 0.0 };
+            for k in column..j {
+                value -= lower[j * n + k] * inverse[k * n + column];
+            }
+            inverse[j * n + column] = value / lower[j * n + j];
+        }
+    }
+    inverse
+}
+
+/// Sum of products in four interleaved partial sums: a fixed order that vector units can follow.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (heads, tails) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = heads
+        .remainder()
+        .iter()
+        .zip(tails.remainder())
+        .fold(0.0, |s, (x, y)| s + x * y);
+    for (x, y) in heads.zip(tails) {
+        for lane in 0..4 {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}

@@ -1,0 +1,319 @@
+//! What each candidate would explain, to first order: with everything refitted that was never exact.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::GapError;
+use crate::candidate::Library;
+use crate::fit::{Background, Fitted, priors};
+use crate::hypothesis::Coordinate;
+use crate::normal::{Cluster, Normal, factor, solve};
+use crate::study::{Response, Study};
+
+/// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
+/// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.
+pub const THRESHOLD: f64 = 12.0;
+/// Weight of "as the noise says" in the spread of scores between trials, in trials.
+const BELIEF: f64 = 6.0;
+
+/// The candidates' normal equations after everything else was projected off.
+pub struct Scan {
+    /// Products of the candidates' columns.
+    gram: DMatrix<f64>,
+    /// Their products with the residual.
+    score: DVector<f64>,
+    /// Columns of each candidate.
+    columns: Vec<std::ops::Range<usize>>,
+    /// How much more the score of each candidate scatters between repeats than the noise allows; at least one.
+    pub spread: Vec<f64>,
+    /// What each candidate must earn to be named.
+    pub price: Vec<f64>,
+    /// Misfit for each degree of freedom that no choice of candidates would take away; at least one.
+    pub scale: f64,
+    bounds: Vec<(f64, f64)>,
+}
+
+/// Some candidates together.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Which, in rising order.
+    pub members: Vec<usize>,
+    /// Coefficients of their columns.
+    pub coefficients: Vec<Vec<f64>>,
+    /// Reduction of the cost.
+    pub gain: f64,
+    /// What is left of it when all have paid; more than zero for a choice worth making.
+    pub worth: f64,
+}
+
+impl Scan {
+    /// Projects nuisances and named effects off.
+    ///
+    /// # Errors
+    /// [`GapError`] where the fitted hypothesis cannot be simulated or is singular.
+    pub fn new<const N: usize>(
+        study: &Study<N>,
+        fitted: &Fitted<N>,
+        background: &Background,
+        library: &Library,
+    ) -> Result<Self, GapError> {
+        let hypothesis = &fitted.hypothesis;
+        let named: Vec<Coordinate> = fitted
+            .asked
+            .iter()
+            .enumerate()
+            .flat_map(|(slot, c)| c.coordinates(slot, &hypothesis.named[slot]))
+            .collect();
+        let responses = study.responses_to(hypothesis, &named)?;
+        let known: Vec<Coordinate> = background
+            .coordinates
+            .iter()
+            .chain(&named)
+            .copied()
+            .collect();
+        let columns: Vec<&Response> = background
+            .responses
+            .iter()
+            .chain(&responses)
+            .chain(library.responses.iter().flatten())
+            .collect();
+        let clusters = study.clusters(&study.fitted, &fitted.residuals, &columns, &background.own);
+        let mut prior = priors(hypothesis, &known);
+        prior.resize(columns.len(), None);
+        let list: Vec<&Cluster> = clusters.iter().collect();
+        let normal = Normal::new(&list, &prior);
+        // Columns that nothing excites drop out of the projection.
+        let base: Vec<usize> = (0..known.len())
+            .filter(|&i| normal.gram[(i, i)] > 0.0)
+            .collect();
+        let first = known.len();
+        let count = columns.len() - first;
+        let left = DMatrix::from_fn(base.len(), base.len(), |a, b| {
+            normal.gram[(base[a], base[b])]
+        });
+        let solver = factor(left).ok_or(GapError::Singular {
+            unknowns: base.len(),
+        })?;
+        let mut share = DMatrix::zeros(count, base.len());
+        for c in 0..count {
+            let right = DVector::from_fn(base.len(), |a, _| normal.gram[(base[a], first + c)]);
+            share.set_row(c, &solver.solve(&right).transpose());
+        }
+        let cross = DMatrix::from_fn(base.len(), count, |a, c| normal.gram[(base[a], first + c)]);
+        let gram = normal.gram.view((first, first), (count, count)) - &share * cross;
+        let score = normal.score.rows(first, count)
+            - &share * DVector::from_fn(base.len(), |a, _| normal.score[base[a]]);
+
+        let mut ranges = Vec::with_capacity(library.candidates.len());
+        let mut bounds = Vec::with_capacity(count);
+        for candidate in &library.candidates {
+            let start = bounds.len();
+            bounds.extend((0..candidate.width()).map(|i| candidate.bounds(i)));
+            ranges.push(start..bounds.len());
+        }
+        let rows = study.rows_of_references();
+        let mut scan = Self {
+            gram,
+            score,
+            columns: ranges,
+            spread: vec![1.0; library.candidates.len()],
+            price: library
+                .candidates
+                .iter()
+                .map(|c| {
+                    let width = c.width() as f64;
+                    THRESHOLD + width * libm::log(rows as f64) + 2.0 * libm::log(c.tried as f64)
+                })
+                .collect(),
+            scale: 1.0,
+            bounds,
+        };
+        for index in 0..scan.columns.len() {
+            scan.spread[index] = scan.spread_of(index, &clusters, (&share, &base, first), study);
+        }
+        let deepest = scan.search(&[], 5, 8, &|_, _| true);
+        let best = deepest.iter().map(|c| c.gain).fold(0.0, f64::max);
+        let dof = normal.rows.saturating_sub(base.len() + 10).max(1);
+        scan.scale = ((normal.square - best) / dof as f64).max(1.0);
+        Ok(scan)
+    }
+
+    /// The spread of one candidate's scores between repeats over what the noise allows, shrunk towards one.
+    fn spread_of<const N: usize>(
+        &self,
+        index: usize,
+        clusters: &[Cluster],
+        (share, base, first): (&DMatrix<f64>, &[usize], usize),
+        study: &Study<N>,
+    ) -> f64 {
+        let Some(choice) = self.evaluate(&[index]) else {
+            return 1.0;
+        };
+        let coefficients = &choice.coefficients[0];
+        let range = self.columns[index].clone();
+        // The direction in which the candidate was found, on the candidate's columns and on what was projected off.
+        let weights: Vec<(usize, f64)> = range
+            .clone()
+            .zip(coefficients)
+            .map(|(c, b)| (first + c, *b))
+            .chain(base.iter().enumerate().map(|(a, &i)| {
+                let sum = range.clone().zip(coefficients);
+                (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(c, a)]))
+            }))
+            .collect();
+        let score = |c: &Cluster| weights.iter().fold(0.0, |s, (i, w)| s + w * c.score[*i]);
+        let expected = |c: &Cluster| {
+            weights.iter().fold(0.0, |s, (i, w)| {
+                s + w * weights
+                    .iter()
+                    .fold(0.0, |t, (j, v)| t + v * c.gram[(*i, *j)])
+            })
+        };
+        let (mut observed, mut predicted, mut dof) = (0.0, 0.0, 0.0);
+        for group in 0..study.references.len() {
+            let own: Vec<&Cluster> = clusters
+                .iter()
+                .filter(|c| c.configuration == group)
+                .collect();
+            if own.len() < 2 {
+                continue;
+            }
+            let mean = own.iter().map(|c| score(c)).sum::<f64>() / own.len() as f64;
+            observed += own
+                .iter()
+                .map(|c| (score(c) - mean) * (score(c) - mean))
+                .sum::<f64>();
+            let variance = own.iter().map(|c| expected(c)).sum::<f64>() / own.len() as f64;
+            predicted += variance * (own.len() - 1) as f64;
+            dof += (own.len() - 1) as f64;
+        }
+        if predicted <= 0.0 {
+            return 1.0;
+        }
+        ((BELIEF + dof * observed / predicted) / (BELIEF + dof)).max(1.0)
+    }
+
+    /// Number of candidates.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// What some candidates explain together; `None` where they cannot be told apart.
+    pub fn evaluate(&self, members: &[usize]) -> Option<Choice> {
+        let columns: Vec<usize> = members
+            .iter()
+            .flat_map(|&m| self.columns[m].clone())
+            .collect();
+        let bounds = |i: usize| self.bounds[columns[i]];
+        let (steps, gain) = solve(&self.gram, &self.score, &columns, &bounds)?;
+        let mut rest = steps.as_slice();
+        let coefficients = members
+            .iter()
+            .map(|&m| {
+                let (own, others) = rest.split_at(self.columns[m].len());
+                rest = others;
+                own.to_vec()
+            })
+            .collect();
+        let price: f64 = members
+            .iter()
+            .map(|&m| self.spread[m] * self.price[m])
+            .sum();
+        Some(Choice {
+            members: members.to_vec(),
+            coefficients,
+            gain,
+            worth: gain / self.scale - price,
+        })
+    }
+
+    /// The best choices that extend `from`, up to `depth` candidates more, by a beam of the given width.
+    ///
+    /// All choices that were met are returned, the most worth first. A candidate that looks like nothing alone is met
+    /// with others beside it.
+    pub fn search(
+        &self,
+        from: &[usize],
+        depth: usize,
+        width: usize,
+        allowed: &dyn Fn(&[usize], usize) -> bool,
+    ) -> Vec<Choice> {
+        let mut all: Vec<Choice> = Vec::new();
+        let mut beam = vec![from.to_vec()];
+        for _ in 0..depth {
+            let mut next: Vec<Choice> = Vec::new();
+            for members in &beam {
+                for candidate in 0..self.len() {
+                    if members.contains(&candidate) || !allowed(members, candidate) {
+                        continue;
+                    }
+                    let mut longer = members.clone();
+                    longer.push(candidate);
+                    longer.sort_unstable();
+                    if next.iter().any(|c| c.members == longer) {
+                        continue;
+                    }
+                    next.extend(self.evaluate(&longer));
+                }
+            }
+            next.sort_by(|a, b| {
+                b.worth
+                    .total_cmp(&a.worth)
+                    .then_with(|| a.members.cmp(&b.members))
+            });
+            all.extend(next.iter().take(8 * width).cloned());
+            beam = next.into_iter().take(width).map(|c| c.members).collect();
+        }
+        all.sort_by(|a, b| {
+            b.worth
+                .total_cmp(&a.worth)
+                .then_with(|| a.members.cmp(&b.members))
+        });
+        all
+    }
+
+    /// Smallest size of a candidate that would have been named, in the unit of its first parameter.
+    pub fn smallest_seen(&self, candidate: usize) -> f64 {
+        let information = self.columns[candidate]
+            .clone()
+            .map(|c| self.gram[(c, c)])
+            .fold(0.0, f64::max);
+        let price = self.scale * self.spread[candidate] * self.price[candidate];
+        if information > 0.0 {
+            libm::sqrt(price / information)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Squared cosine between what two candidates would show, after everything else was refitted.
+    pub fn likeness(&self, a: usize, b: usize) -> f64 {
+        let (i, j) = (self.columns[a].start, self.columns[b].start);
+        let (aa, bb) = (self.gram[(i, i)], self.gram[(j, j)]);
+        if aa > 0.0 && bb > 0.0 {
+            let ab = self.gram[(i, j)];
+            ab * ab / (aa * bb)
+        } else {
+            0.0
+        }
+    }
+}
+
+impl<const N: usize> Study<'_, N> {
+    /// Number of rows with one trial of each group.
+    pub fn rows_of_references(&self) -> usize {
+        let mut seen = Vec::new();
+        let mut rows = 0;
+        for &trial in &self.fitted {
+            if !seen.contains(&self.group_of[trial]) {
+                seen.push(self.group_of[trial]);
+                rows += self.stretches[trial].len() * self.session.channels();
+            }
+        }
+        rows.max(1)
+    }
+}

@@ -1,0 +1,493 @@
+//! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
+
+use crate::GapError;
+use crate::apart::Apart;
+use crate::candidate::{Candidate, Library};
+use crate::chance::chi_square_tail;
+use crate::fit::{Background, Fitted, Precision};
+use crate::hypothesis::Hypothesis;
+use crate::misfit::{Lack, lack_of_fit};
+use crate::scan::{Choice, Scan};
+use crate::study::Study;
+
+/// Share of all that is explained that an effect must explain: less may be the imperfect shape of another one.
+const FLOOR: f64 = 0.02;
+/// Most disturbances of single trials that are named.
+const DISTURBANCES: usize = 4;
+/// Share of the common band below which a ripple is fitted like other effects.
+const SLOW: f64 = 0.8;
+/// Most effects that are named.
+const MOST: usize = 6;
+/// Choices that are converged by simulation in each round.
+const CONTENDERS: usize = 4;
+/// Effects that a choice may add in one round: what is invisible alone may be plain together.
+const AHEAD: usize = 3;
+/// Choices that are kept while looking ahead.
+const WIDTH: usize = 12;
+/// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
+const TIE: f64 = 10.0;
+/// Alternatives that are converged by simulation for each named effect.
+const RIVALS: usize = 5;
+/// Share of what a named effect gains that another must gain to first order to be converged in its place.
+const RIVAL: f64 = 0.6;
+/// Times that a better alternative may take the place of a named effect.
+const EXCHANGES: usize = 4;
+
+/// One effect that was named.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// Its place in the hypothesis.
+    pub slot: usize,
+    /// Probability of such a gain by chance, with all candidates that were asked.
+    pub p_value: f64,
+    /// Share of what can be explained that is lost without it.
+    pub share: f64,
+    /// What would explain the same: the candidate, and how much worse it does.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// Another effect that would explain what a named one does.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// The effect.
+    pub candidate: Candidate,
+    /// How much worse it explains the data, in units of twice the log-likelihood.
+    pub worse: f64,
+    /// Squared cosine between what the two would show.
+    pub likeness: f64,
+}
+
+/// One round of the search.
+#[derive(Clone, Debug)]
+pub struct Rung {
+    /// What was added, best first: the candidates and what they gained.
+    pub tried: Vec<(Vec<Candidate>, f64)>,
+    /// Cost before it.
+    pub before: f64,
+    /// Cost after it.
+    pub after: f64,
+}
+
+/// A candidate of the last scan: what it would still explain, and the smallest size that would have been named.
+#[derive(Clone, Debug)]
+pub struct Ruled {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// What it would gain.
+    pub gain: f64,
+    /// What it would have to gain.
+    pub price: f64,
+    /// Smallest size of its first free parameter that would have been named.
+    pub smallest: f64,
+}
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct Finding<const N: usize> {
+    /// The model after refitting what was never exact.
+    pub calibrated: Fitted<N>,
+    /// The model with the named effects.
+    pub amended: Fitted<N>,
+    /// The named effects, those that explain most first.
+    pub named: Vec<Named>,
+    /// What is not the same in every trial.
+    pub apart: Vec<Apart>,
+    /// Rounds of the search.
+    pub ladder: Vec<Rung>,
+    /// How well the amended model is known.
+    pub precision: Precision,
+    /// Lack of fit of the calibrated and of the amended model.
+    pub lack: [Lack; 2],
+    /// What else was asked.
+    pub ruled: Vec<Ruled>,
+    /// Misfit for each degree of freedom.
+    pub scale: f64,
+}
+
+/// What a search tells while it works: what it does, and how far it is (0 to 1).
+pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
+
+impl<const N: usize> Study<'_, N> {
+    /// Searches for what the model lacks.
+    ///
+    /// # Errors
+    /// [`GapError`] where the model as given cannot be simulated or fitted.
+    pub fn search(&mut self, progress: Progress<'_>) -> Result<Finding<N>, GapError> {
+        progress("calibrating", 0.0);
+        let mut calibrated = self.calibrate()?;
+        if !self.repeated {
+            self.measure_noise(&calibrated.hypothesis)?;
+            calibrated = self.calibrate()?;
+        }
+        let mut apart = Vec::new();
+        if self.session.is_led() {
+            progress("looking at single trials", 0.05);
+            while apart.len() < DISTURBANCES
+                && let Some(found) = self.disturbance(&calibrated, 1.0)?
+            {
+                self.leave_out(&found);
+                apart.push(found);
+                let background = Background::at(self, &calibrated.hypothesis)?;
+                calibrated = self.fit(calibrated.hypothesis, Vec::new(), &background)?;
+            }
+        }
+        let mut periodic = None;
+        if self.session.is_led()
+            && let Some(found) = self.rhythm(&calibrated)?
+        {
+            let [frequency, phase] = found.wave();
+            if found.locked
+                && found.is_periodic()
+                && frequency < SLOW * self.courses[self.fitted[0]].band
+            {
+                periodic = Some([frequency, phase]);
+            } else {
+                apart.push(found);
+            }
+        }
+        let mut current = calibrated.clone();
+        let mut ladder = Vec::new();
+        let mut first: Option<(Library, Scan)> = None;
+        let mut asked = 1.0;
+        let (mut scale, mut ruled) = (1.0, Vec::new());
+        for round in 0..MOST {
+            progress("asking the catalogue", 0.1 + 0.1 * round as f64);
+            let background = Background::at(self, &current.hypothesis)?;
+            let library = Library::build(self, &current.hypothesis, periodic)?;
+            let scan = Scan::new(self, &current, &background, &library)?;
+            asked = library.candidates.len() as f64;
+            scale = scan.scale;
+            ruled = self.ruled(&library, &scan);
+            let outcome = self.round(
+                &current,
+                &background,
+                (&library, &scan),
+                MOST - current.asked.len(),
+            )?;
+            if first.is_none() {
+                first = Some((library, scan));
+            }
+            let Some((better, rung)) = outcome else { break };
+            ladder.push(rung);
+            current = self.pruned(better, &calibrated, &background, scale)?;
+            if self.leave_out_rest(&current.hypothesis)? {
+                calibrated = self.fit(calibrated.hypothesis, Vec::new(), &background)?;
+                current = self.fit(current.hypothesis, current.asked, &background)?;
+                current = self.pruned(current, &calibrated, &background, scale)?;
+            }
+            if !self.repeated {
+                self.measure_noise(&current.hypothesis)?;
+                current = self.fit(current.hypothesis, current.asked, &background)?;
+            }
+            if current.asked.len() >= MOST {
+                break;
+            }
+        }
+        let (amended, named) =
+            self.judged(current, &calibrated, (asked, scale, periodic), progress)?;
+        progress("measuring what is left", 0.9);
+        let precision = self.precision(&amended, scale)?;
+        let lack = [
+            lack_of_fit(self, &calibrated)?,
+            lack_of_fit(self, &amended)?,
+        ];
+        progress("done", 1.0);
+        Ok(Finding {
+            calibrated,
+            amended,
+            named,
+            apart,
+            ladder,
+            precision,
+            lack,
+            ruled,
+            scale,
+        })
+    }
+
+    /// The model as given, with everything refitted that was never exact.
+    ///
+    /// # Errors
+    /// As [`Study::fit`].
+    pub fn calibrate(&self) -> Result<Fitted<N>, GapError> {
+        let given = self.session.given();
+        let background = Background::at(self, &given)?;
+        let once = self.fit(given, Vec::new(), &background)?;
+        let background = Background::at(self, &once.hypothesis)?;
+        self.fit(once.hypothesis, Vec::new(), &background)
+    }
+
+    /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price.
+    fn round(
+        &self,
+        current: &Fitted<N>,
+        background: &Background,
+        (library, scan): (&Library, &Scan),
+        room: usize,
+    ) -> Result<Option<(Fitted<N>, Rung)>, GapError> {
+        let fresh = |members: &[usize], c: usize| {
+            let candidate = &library.candidates[c];
+            let same = |other: &Candidate| {
+                other.is_same_effect(&candidate.effect) && other.question == candidate.question
+            };
+            !current.asked.iter().any(same)
+                && !members.iter().any(|&m| same(&library.candidates[m]))
+        };
+        let choices = scan.search(&[], AHEAD.min(room), WIDTH, &fresh);
+        let mut contenders: Vec<Choice> = Vec::new();
+        let most = choices.first().map_or(0.0, |c| c.worth);
+        for choice in choices.iter().filter(|c| c.worth > 0.5 * most) {
+            if contenders.len() >= CONTENDERS {
+                break;
+            }
+            // Another shape of the same effects is refined by the fit, it need not be converged by itself.
+            let same = |other: &Choice| {
+                other.members.len() == choice.members.len()
+                    && std::iter::zip(&other.members, &choice.members).all(|(&a, &b)| {
+                        library.candidates[a].is_same_effect(&library.candidates[b].effect)
+                    })
+            };
+            if !contenders.iter().any(same) {
+                contenders.push(choice.clone());
+            }
+        }
+        if let Some(single) = choices
+            .iter()
+            .find(|c| c.members.len() == 1 && c.worth > 0.0)
+            && !contenders.iter().any(|c| c.members == single.members)
+        {
+            contenders.push(single.clone());
+        }
+        let mut best: Option<(f64, Fitted<N>)> = None;
+        let mut tried = Vec::new();
+        for choice in &contenders {
+            let asked: Vec<Candidate> = choice
+                .members
+                .iter()
+                .map(|&m| {
+                    let mut candidate = library.candidates[m].clone();
+                    candidate.price = scan.price[m] * scan.spread[m];
+                    candidate
+                })
+                .collect();
+            let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), background)
+            else {
+                continue;
+            };
+            let price: f64 = asked.iter().map(|c| c.price).sum();
+            let gain = current.cost - fitted.cost;
+            let worth = gain / scan.scale - price;
+            tried.push((asked, gain));
+            if worth > 0.0 && best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                best = Some((worth, fitted));
+            }
+        }
+        tried.sort_by(|a, b| b.1.total_cmp(&a.1));
+        Ok(best.map(|(_, fitted)| {
+            let rung = Rung {
+                tried,
+                before: current.cost,
+                after: fitted.cost,
+            };
+            (fitted, rung)
+        }))
+    }
+
+    /// A hypothesis with further effects, fitted; `None` where it cannot be simulated.
+    ///
+    /// The first-order coefficients are halved until they lower the cost: effects that are strong are not linear.
+    fn attempt(
+        &self,
+        current: &Fitted<N>,
+        (asked, coefficients): (&[Candidate], &[Vec<f64>]),
+        background: &Background,
+    ) -> Option<Fitted<N>> {
+        const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+        let mut all = current.asked.clone();
+        all.extend_from_slice(asked);
+        let mut best: Option<Fitted<N>> = None;
+        for share in SHARES {
+            let mut hypothesis = current.hypothesis.clone();
+            for (candidate, own) in std::iter::zip(asked, coefficients) {
+                let own: Vec<f64> = own.iter().map(|b| share * b).collect();
+                hypothesis.named.push(candidate.found(&own));
+            }
+            if let Ok(fitted) = self.fit(hypothesis, all.clone(), background) {
+                if fitted.cost < current.cost {
+                    return Some(fitted);
+                }
+                if best.as_ref().is_none_or(|b| fitted.cost < b.cost) {
+                    best = Some(fitted);
+                }
+            }
+        }
+        best
+    }
+
+    /// A fitted hypothesis without the effect at a place, fitted again.
+    fn without(
+        &self,
+        fitted: &Fitted<N>,
+        slot: usize,
+        background: &Background,
+    ) -> Result<Fitted<N>, GapError> {
+        let mut hypothesis: Hypothesis<N> = fitted.hypothesis.clone();
+        let mut asked = fitted.asked.clone();
+        hypothesis.named.remove(slot);
+        asked.remove(slot);
+        self.fit(hypothesis, asked, background)
+    }
+
+    /// Goes back: effects that are no longer worth their price are taken out.
+    fn pruned(
+        &self,
+        mut fitted: Fitted<N>,
+        calibrated: &Fitted<N>,
+        background: &Background,
+        scale: f64,
+    ) -> Result<Fitted<N>, GapError> {
+        let least = FLOOR * (calibrated.cost - fitted.cost);
+        while !fitted.asked.is_empty() {
+            let mut weakest: Option<(f64, Fitted<N>)> = None;
+            for slot in 0..fitted.asked.len() {
+                let less = self.without(&fitted, slot, background)?;
+                let gain = less.cost - fitted.cost;
+                let worth = gain / scale - fitted.asked[slot].price;
+                let worth = if gain < least {
+                    worth.min(gain - least)
+                } else {
+                    worth
+                };
+                if worth < 0.0 && weakest.as_ref().is_none_or(|(least, _)| worth < *least) {
+                    weakest = Some((worth, less));
+                }
+            }
+            match weakest {
+                Some((_, less)) => fitted = less,
+                None => break,
+            }
+        }
+        Ok(fitted)
+    }
+
+    /// What could stand in the place of each named effect; a better one takes it.
+    fn judged(
+        &self,
+        mut fitted: Fitted<N>,
+        calibrated: &Fitted<N>,
+        (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
+        progress: Progress<'_>,
+    ) -> Result<(Fitted<N>, Vec<Named>), GapError> {
+        let mut exchanges = 0;
+        'again: loop {
+            let mut named = Vec::new();
+            let background = Background::at(self, &fitted.hypothesis)?;
+            for slot in 0..fitted.asked.len() {
+                progress(
+                    "comparing alternatives",
+                    0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
+                );
+                let less = self.without(&fitted, slot, &background)?;
+                let gain = less.cost - fitted.cost;
+                let rivals = self.rivals(&fitted, (slot, &less), (scale, periodic))?;
+                if exchanges < EXCHANGES
+                    && let Some((_, better)) = rivals.iter().find(|(a, _)| a.worse < -1.0)
+                {
+                    fitted = better.clone();
+                    exchanges += 1;
+                    continue 'again;
+                }
+                let candidate = &fitted.asked[slot];
+                let chance = chi_square_tail(gain / scale, candidate.width());
+                named.push(Named {
+                    slot,
+                    p_value: (asked * chance).min(1.0),
+                    share: gain / (calibrated.cost - fitted.cost).max(gain),
+                    alternatives: rivals
+                        .into_iter()
+                        .map(|(a, _)| a)
+                        .filter(|a| a.worse <= TIE)
+                        .collect(),
+                });
+            }
+            named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
+            return Ok((fitted, named));
+        }
+    }
+
+    /// Other effects in the place of one, converged by simulation, the best first.
+    #[allow(clippy::type_complexity)]
+    fn rivals(
+        &self,
+        fitted: &Fitted<N>,
+        (slot, less): (usize, &Fitted<N>),
+        (scale, periodic): (f64, Option<[f64; 2]>),
+    ) -> Result<Vec<(Alternative, Fitted<N>)>, GapError> {
+        let own = &fitted.asked[slot];
+        let gain = less.cost - fitted.cost;
+        let background = Background::at(self, &less.hypothesis)?;
+        let library = Library::build(self, &less.hypothesis, periodic)?;
+        let scan = Scan::new(self, less, &background, &library)?;
+        let mut singles: Vec<Choice> = (0..scan.len())
+            .filter(|&c| {
+                let candidate = &library.candidates[c];
+                !own.is_same_effect(&candidate.effect)
+                    && !less
+                        .asked
+                        .iter()
+                        .any(|a| a.is_same_effect(&candidate.effect))
+            })
+            .filter_map(|c| scan.evaluate(&[c]))
+            .filter(|c| c.gain > RIVAL * gain)
+            .collect();
+        singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let twin = (0..scan.len()).find(|&c| {
+            own.is_same_effect(&library.candidates[c].effect)
+                && own.question == library.candidates[c].question
+        });
+        let mut seen: Vec<&Candidate> = Vec::new();
+        let mut rivals = Vec::new();
+        for choice in &singles {
+            let candidate = &library.candidates[choice.members[0]];
+            if seen.iter().any(|s| s.is_same_effect(&candidate.effect)) {
+                continue;
+            }
+            if seen.len() >= RIVALS {
+                break;
+            }
+            seen.push(candidate);
+            let mut asked = candidate.clone();
+            asked.price = scan.price[choice.members[0]] * scan.spread[choice.members[0]];
+            let Some(rival) = self.attempt(
+                less,
+                (std::slice::from_ref(&asked), &choice.coefficients),
+                &background,
+            ) else {
+                continue;
+            };
+            let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
+            let likeness = twin.map_or(0.0, |t| scan.likeness(t, choice.members[0]));
+            rivals.push((
+                Alternative {
+                    candidate: asked,
+                    worse,
+                    likeness,
+                },
+                rival,
+            ));
+        }
+        rivals.sort_by(|a, b| a.0.worse.total_cmp(&b.0.worse));
+        Ok(rivals)
+    }
+
+    fn ruled(&self, library: &Library, scan: &Scan) -> Vec<Ruled> {
+        (0..scan.len())
+            .map(|c| Ruled {
+                candidate: library.candidates[c].clone(),
+                gain: scan.evaluate(&[c]).map_or(0.0, |choice| choice.gain) / scan.scale,
+                price: scan.price[c] * scan.spread[c],
+                smallest: scan.smallest_seen(c),
+            })
+            .collect()
+    }
+}

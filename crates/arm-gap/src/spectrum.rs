@@ -1,0 +1,100 @@
+//! Lines in the spectrum of what is left: frequencies at which residuals swing in every trial.
+
+use core::f64::consts::TAU;
+
+use crate::chance::chi_square_tail;
+
+/// Lowest frequency at which a line is looked for \[Hz\]: below it movements have power of their own.
+const LOWEST: f64 = 0.35;
+/// Probability by chance below which a line is one, over all frequencies and channels.
+const CHANCE: f64 = 1e-6;
+/// How far around a frequency its neighbourhood reaches, and where it starts \[Hz\].
+const AROUND: (f64, f64) = (0.3, 1.5);
+
+/// One Fourier coefficient of a column, tapered by a Hann window.
+pub fn coefficient(column: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
+    let n = column.len() as f64;
+    let mut sum = [0.0; 2];
+    let mean = column.iter().sum::<f64>() / n;
+    for (i, value) in column.iter().enumerate() {
+        let taper = 0.5 - 0.5 * libm::cos(TAU * (i as f64 + 0.5) / n);
+        let (sin, cos) = libm::sincos(TAU * frequency * i as f64 / rate);
+        sum[0] += taper * (value - mean) * cos;
+        sum[1] -= taper * (value - mean) * sin;
+    }
+    sum.map(|s| s * 4.0 / n)
+}
+
+/// The strongest line: its frequency \[Hz\]; `None` when nothing stands out.
+///
+/// * `trials` - channels of every trial, all at the same rate
+///
+/// Each channel's power, averaged over trials, is compared with the median of its neighbourhood.
+pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64) -> Option<f64> {
+    let shortest = trials.iter().map(|t| t[0].len()).min()?;
+    let channels = trials[0].len();
+    let step = 0.5 * rate / shortest as f64;
+    let highest = 0.45 * rate;
+    let count = ((highest - LOWEST) / step) as usize;
+    let frequency = |k: usize| LOWEST + step * k as f64;
+    let mut best: Option<(f64, f64)> = None;
+    for c in 0..channels {
+        let power: Vec<f64> = (0..count)
+            .map(|k| {
+                let one = |t: &&Vec<Vec<f64>>| {
+                    let [a, b] = coefficient(&t[c], frequency(k), rate);
+                    a * a + b * b
+                };
+                trials.iter().map(one).sum::<f64>() / trials.len() as f64
+            })
+            .collect();
+        for k in 0..count {
+            let around: Vec<f64> = (0..count)
+                .filter(|&o| {
+                    let apart = (frequency(o) - frequency(k)).abs();
+                    apart > AROUND.0 && apart < AROUND.1
+                })
+                .map(|o| power[o])
+                .collect();
+            // Both sides must be there, or a slope would look like a line.
+            let both = frequency(k) - AROUND.0 > LOWEST && frequency(k) + AROUND.0 < highest;
+            if around.len() < 8 || !both {
+                continue;
+            }
+            let mut sorted = around;
+            sorted.sort_by(f64::total_cmp);
+            // The larger of the quartiles above: red noise rises to one side.
+            let level = sorted[sorted.len() * 3 / 4];
+            let ratio = power[k] / level.max(f64::MIN_POSITIVE);
+            let dof = 2 * trials.len();
+            let chance = chi_square_tail(ratio * dof as f64, dof) * (count * channels) as f64;
+            if chance < CHANCE && best.is_none_or(|(most, _)| ratio > most) {
+                best = Some((ratio, frequency(k)));
+            }
+        }
+    }
+    let (_, near) = best?;
+    // The peak of all channels together, on a finer grid.
+    let total = |f: f64| -> f64 {
+        let mut sum = 0.0;
+        for c in 0..channels {
+            let size: f64 = trials
+                .iter()
+                .map(|t| t[c].iter().map(|v| v * v).sum::<f64>())
+                .sum();
+            let power: f64 = trials
+                .iter()
+                .map(|t| {
+                    let [a, b] = coefficient(&t[c], f, rate);
+                    a * a + b * b
+                })
+                .sum();
+            sum += power / size.max(f64::MIN_POSITIVE);
+        }
+        sum
+    };
+    let fine = (-10..=10).map(|k| near + 0.1 * step * f64::from(k));
+    fine.map(|f| (total(f), f))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, f)| f)
+}

@@ -1,0 +1,126 @@
+"""What is wrong with a data set before any physics is asked: labels, units, signs, channels that say nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .dataset import Dataset
+from .errors import BadInput, Text
+
+_SATURATED = 0.02
+"""Share of samples at one and the same extreme value above which a channel counts as saturated."""
+_ALIKE = 0.9
+"""Correlation above which two signals are the same movement."""
+_VARIES = 1e-9
+
+
+def examine(dataset: Dataset, led: bool) -> list[str]:
+    """Return what a reader of the result should know beforehand, a line each.
+
+    Raises
+    ------
+    BadInput
+        For channels that never change.
+    """
+    lines = []
+    fit = dataset.fit_trials
+    if len(fit) == 1:
+        lines.append("one fit trial only: what is noise and what is missing cannot be told apart by repeats")
+    elif len({t.configuration for t in fit}) == len(fit):
+        lines.append("no movement was repeated: the noise is taken from what the model leaves, so that less is seen")
+    if not dataset.test_trials:
+        lines.append('no trial with role = "test": the gap cannot be measured on data that were kept apart')
+    for trial in dataset.trials:
+        for name, values in _channels(trial, led):
+            finite = values[np.isfinite(values)]
+            if len(finite) and np.ptp(finite) <= _VARIES:
+                if name.startswith("tau") and not finite.any():
+                    continue  # an arm that swings freely
+                raise BadInput("channel", Text(f"{name} is {finite[0]:g} throughout"), "a channel that changes with the movement", file=trial.file)
+            stuck = _stuck(finite)
+            if stuck is not None:
+                lines.append(f"{trial.file}: {name} stays at {stuck:g} for many samples: saturated?")
+    return lines
+
+
+def _stuck(values: np.ndarray) -> float | None:
+    """Return the extreme value at which a channel is cut off, or None."""
+    if len(values) < 16:
+        return None
+    for extreme in (values.max(), values.min()):
+        at = values == extreme
+        if at.mean() > _SATURATED and _longest(at) >= 5 and np.ptp(values) > 0:
+            return float(extreme)
+    return None
+
+
+def _longest(flags: np.ndarray) -> int:
+    best = run = 0
+    for flag in flags:
+        run = run + 1 if flag else 0
+        best = max(best, run)
+    return best
+
+
+def _channels(trial: Any, led: bool) -> list[tuple[str, np.ndarray]]:
+    if led:
+        return [("Fy", trial.force_on_arm[:, 0]), ("Fz", trial.force_on_arm[:, 1])]
+    return [] if trial.tau is None else [(f"tau{j + 1}", trial.tau[:, j]) for j in range(trial.tau.shape[1])]
+
+
+def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any] | None]) -> None:
+    """Compare what was measured with what the model as given would show, and refuse what only a label can explain.
+
+    Parameters
+    ----------
+    plays
+        For each trial `measured` and `given`, (n_samples, n_channels); None where it cannot be simulated.
+
+    Raises
+    ------
+    BadInput
+        Units wrong by 1000 or by 57.3, a force with reversed sign, swapped channels.
+    """
+    if not led:
+        return
+    n = dataset.model.n_joints
+    measured = np.concatenate([p["measured"] for p in plays if p is not None])
+    given = np.concatenate([p["given"] for p in plays if p is not None])
+    if not len(measured):
+        return
+    forces, expected = measured[:, n:], given[:, n:]
+    size, usual = np.sqrt(np.mean(forces**2)), np.sqrt(np.mean(expected**2))
+    for factor, unit in ((1000.0, "mN labelled as N"), (0.001, "kN labelled as N")):
+        if usual > 0 and abs(np.log10(size / usual / factor)) < 0.5:
+            raise BadInput("Fy_N, Fz_N", Text(f"{size:.3g} N on average where the model expects {usual:.3g} N"), f"forces in newtons ({unit}?)")
+    own = [_correlation(forces[:, c], expected[:, c]) for c in (0, 1)]
+    cross = [_correlation(forces[:, c], expected[:, 1 - c]) for c in (0, 1)]
+    same = float(np.sum(forces * expected) / max(np.sqrt(np.sum(forces**2) * np.sum(expected**2)), 1e-300))
+    if same < -_ALIKE:
+        found = f"force_on = {dataset.force_on!r} with forces opposite to those that carry the arm"
+        raise BadInput("force_on", Text(found), '"arm" or "robot", whichever the force acts on')
+    swapped = float(np.sum(forces * expected[:, ::-1]) / max(np.sqrt(np.sum(forces**2) * np.sum(expected**2)), 1e-300))
+    if swapped > _ALIKE and swapped > same + 0.3 and min(cross) > max(own):
+        raise BadInput("Fy_N, Fz_N", Text("each follows what the other should be"), "Fy along the horizontal, Fz up: swapped columns?")
+    for j in range(n):
+        seen, should = measured[:, j], given[:, j]
+        slope = _slope(seen, should)
+        for factor, unit in ((57.29578, "degrees labelled as radians"), (1 / 57.29578, "radians labelled as degrees")):
+            if slope is not None and abs(np.log(abs(slope) / factor)) < 0.3:
+                raise BadInput(f"q{j + 1}", Text(f"{slope:.3g} times the movement that the robot made"), f"angles in the unit of their column ({unit}?)")
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    if np.ptp(a) == 0 or np.ptp(b) == 0:
+        return 0.0
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def _slope(a: np.ndarray, b: np.ndarray) -> float | None:
+    """Return by how much more `a` moves than `b`, where they move together."""
+    if np.ptp(b) < 1e-3 or abs(_correlation(a, b)) < _ALIKE:
+        return None
+    return float(np.std(a) / np.std(b)) or None
