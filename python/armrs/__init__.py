@@ -69,14 +69,10 @@ _HOMES = {
     "conversion": ("convert",),
     "dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
     "demo": ("Demonstration", "run_demo"),
-<<<<<<< HEAD
+    "discrepancy": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
     "fmu.check": ("check_fmu",),
     "fmu.export": ("export_fmu",),
-=======
-    "discrepancy": ("GapFound", "find_gap"),
-    "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError"),
->>>>>>> 209c9f7 (feat(gap): a first search for what a model lacks)
     "identification": ("Estimate", "Identified", "identify"),
     "laboratory": ("Recorded", "record"),
     "markers": ("Markers", "PlanarMotion", "planar_motion"),

@@ -1,5 +1,5 @@
 # The compiled core. Docstrings stand in the binary; this file is checked against it by `make test`.
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -15,10 +15,12 @@ __all__ = [
     "control",
     "design",
     "effects",
+    "find_gap",
     "forecast",
     "identify",
     "literature",
     "low_pass_both_ways",
+    "play",
     "simulate",
     "smooth",
 ]
@@ -99,9 +101,16 @@ def control(
 ) -> dict[str, Any]: ...
 def design(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]: ...
 def effects() -> list[dict[str, Any]]: ...
+def find_gap(
+    rig: Rig,
+    trials: Sequence[Mapping[str, Any]],
+    settings: Mapping[str, Any],
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]: ...
 def forecast(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], tasks: Sequence[Mapping[str, Any]]) -> dict[str, Any]: ...
 def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...
 def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[dict[str, Any]]: ...
+def play(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> list[dict[str, Any] | None]: ...
 def simulate(
     rig: Rig,
     drive: Mapping[str, Any],

@@ -322,14 +322,18 @@ _NEGLIGIBLE = 0.05
 
 def _found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequence[str]) -> GapFound:
     sign = -1.0 if dataset.force_on == "robot" else 1.0
-    effects = tuple(_missing(item, sign) for item in raw["named"])
+    together = tuple(_missing(item, sign) for item in raw["named"])
+    apart = tuple(_apart(item, dataset, raw) for item in raw["apart"])
+    effects = tuple(sorted((*together, *apart), key=lambda e: -e.share))
     (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
     if after_z >= _MISFIT and not (effects and share < _NEGLIGIBLE):
         verdict = "unexplained"
     else:
         verdict = "explained" if effects else "nothing_missing"
-    discrepancy = [_torque_gap(dataset, led, t, play["measured"], play["calibrated"]) for t, play in zip(dataset.trials, raw["trials"], strict=True)]
+    discrepancy = [
+        _torque_gap(dataset, led, t, play["measured"], play["calibrated"]) for t, play in zip(dataset.trials, raw["trials"], strict=True)
+    ]
     return GapFound(
         verdict=verdict,
         effects=effects,
@@ -374,6 +378,26 @@ def _missing(item: Mapping[str, Any], sign: float) -> Missing:
     return Missing(kind, joint, channel, parameters, item["p_value"], item["share"], tuple(alternatives))
 
 
+def _apart(item: Sequence[Any], dataset: Dataset, raw: Mapping[str, Any]) -> Missing:
+    """Return a rhythm, or what happened in one trial."""
+    (kind, index, values), sd, trial, (start, _end), gain, rivals = item
+    joint, channel = _place(kind, index)
+    known = catalogue()[kind].parameters
+    first = next((k for k, p in enumerate(known) if values[k] and p.name not in ("frequency", "phase", "start", "duration")), 0)
+    parameters = {p.name: Value(v, sd if k == first else None, p.unit) for k, (p, v) in enumerate(zip(known, values, strict=True))}
+    if trial is not None and "start" not in parameters:
+        parameters["start"] = Value(start, None, "s")
+    alternatives = tuple(
+        Alternative(other, *_place(other, place), "swings these channels as much", float(worse), math.nan)
+        for (other, place, _), worse in rivals
+    )
+    explained = gain + raw["calibrated"]["cost"] - raw["amended"]["cost"]
+    chance = math.exp(-min(gain / 2.0, 700.0))
+    return Missing(
+        kind, joint, channel, parameters, chance, gain / explained, alternatives, None if trial is None else dataset.trials[trial].file
+    )
+
+
 def _limits(raw: Mapping[str, Any], sign: float) -> tuple[Limit, ...]:
     best: dict[tuple[str, int, int], Limit] = {}
     for (entry, free), _, _, smallest in raw["ruled"]:
@@ -409,7 +433,14 @@ def _absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
 def _amended(model: Model, amended: Mapping[str, Any]) -> Model:
     """Return the model with refitted segments and known effects, and the named effects added."""
     segments = tuple(
-        Segment(s.name, s.length, s.mass * (1 + m), min(max(s.com * (1 + c), 0.0), s.length), s.inertia * (1 + i), com_normal=s.com_normal * (1 + c))
+        Segment(
+            s.name,
+            s.length,
+            s.mass * (1 + m),
+            min(max(s.com * (1 + c), 0.0), s.length),
+            s.inertia * (1 + i),
+            com_normal=s.com_normal * (1 + c),
+        )
         for s, (m, c, i) in zip(model.segments, amended["segments"], strict=True)
     )
     known = [Effect(kind, *_address(kind, index), parameters=_named(kind, values)) for kind, index, values in amended["known"]]
@@ -512,7 +543,9 @@ def _where(dataset: Dataset, discrepancy: Sequence[np.ndarray | None], most: int
                 error = _standard_error(torque[chosen])
                 if error > 0 and abs(mean) > 3 * error:
                     t = trial.t[chosen]
-                    places.append(Place(trial.file, f"tau{j + 1}_Nm", float(t[0]), float(t[-1]), j + 1, f"dq{j + 1} {condition}", mean, mean / error))
+                    places.append(
+                        Place(trial.file, f"tau{j + 1}_Nm", float(t[0]), float(t[-1]), j + 1, f"dq{j + 1} {condition}", mean, mean / error)
+                    )
     return tuple(sorted(places, key=lambda p: -abs(p.z))[:most])
 
 

@@ -39,7 +39,9 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
             if len(finite) and np.ptp(finite) <= _VARIES:
                 if name.startswith("tau") and not finite.any():
                     continue  # an arm that swings freely
-                raise BadInput("channel", Text(f"{name} is {finite[0]:g} throughout"), "a channel that changes with the movement", file=trial.file)
+                raise BadInput(
+                    "channel", Text(f"{name} is {finite[0]:g} throughout"), "a channel that changes with the movement", file=trial.file
+                )
             stuck = _stuck(finite)
             if stuck is not None:
                 lines.append(f"{trial.file}: {name} stays at {stuck:g} for many samples: saturated?")
@@ -95,7 +97,9 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
     size, usual = np.sqrt(np.mean(forces**2)), np.sqrt(np.mean(expected**2))
     for factor, unit in ((1000.0, "mN labelled as N"), (0.001, "kN labelled as N")):
         if usual > 0 and abs(np.log10(size / usual / factor)) < 0.5:
-            raise BadInput("Fy_N, Fz_N", Text(f"{size:.3g} N on average where the model expects {usual:.3g} N"), f"forces in newtons ({unit}?)")
+            raise BadInput(
+                "Fy_N, Fz_N", Text(f"{size:.3g} N on average where the model expects {usual:.3g} N"), f"forces in newtons ({unit}?)"
+            )
     own = [_correlation(forces[:, c], expected[:, c]) for c in (0, 1)]
     cross = [_correlation(forces[:, c], expected[:, 1 - c]) for c in (0, 1)]
     same = float(np.sum(forces * expected) / max(np.sqrt(np.sum(forces**2) * np.sum(expected**2)), 1e-300))
@@ -110,7 +114,11 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
         slope = _slope(seen, should)
         for factor, unit in ((57.29578, "degrees labelled as radians"), (1 / 57.29578, "radians labelled as degrees")):
             if slope is not None and abs(np.log(abs(slope) / factor)) < 0.3:
-                raise BadInput(f"q{j + 1}", Text(f"{slope:.3g} times the movement that the robot made"), f"angles in the unit of their column ({unit}?)")
+                raise BadInput(
+                    f"q{j + 1}",
+                    Text(f"{slope:.3g} times the movement that the robot made"),
+                    f"angles in the unit of their column ({unit}?)",
+                )
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:

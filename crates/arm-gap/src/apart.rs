@@ -2,16 +2,18 @@
 //! disturbances of one trial.
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
+use arm_core::{Joints, Pose, jacobian};
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::fit::Fitted;
+use crate::misfit::{orthogonal, project_off};
 use crate::noise::{Stretches, dot};
 use crate::normal::factor;
-use crate::predict::Channels;
+use crate::predict::{Channels, smooth};
 use crate::response::Linear;
 use crate::spectrum::{coefficient, line};
-use crate::study::{Study, difference};
+use crate::study::{Response, Study, difference, fitted_to, same_rate};
 
 /// An effect that stands apart from the fit of all trials.
 #[derive(Clone, Debug)]
@@ -28,8 +30,20 @@ pub struct Apart {
     pub rivals: Vec<(Effect<f64>, f64)>,
     /// Whether its phase is the same in every trial.
     pub locked: bool,
+    /// The swings that a rhythm is made of, and their sizes in every trial: in phase, and a quarter of a period earlier.
+    pub columns: Vec<Effect<f64>>,
+    /// See `columns`.
+    pub sizes: Vec<Vec<f64>>,
 }
 
+/// Slowest rhythm of muscles \[Hz\]: below it movements have power of their own.
+const SLOWEST_RHYTHM: f64 = 2.0;
+/// Slowest ripple of the robot \[Hz\].
+const SLOWEST_RIPPLE: f64 = 0.4;
+/// Gain below which a line is no rhythm: many frequencies and channels were looked at.
+const PLAIN: f64 = 60.0;
+/// Share of what is left in some channel that a rhythm must be.
+const SEEN: f64 = 0.02;
 /// Gain in which two explanations of a rhythm count as equal.
 const TIE: f64 = 10.0;
 /// Coherence of the phases of trials above which a rhythm is locked to their start.
@@ -43,15 +57,33 @@ impl<const N: usize> Study<'_, N> {
     pub fn rhythm(&self, fitted: &Fitted<N>) -> Result<Option<Apart>, GapError> {
         let residuals = self.raw_residuals(fitted)?;
         let rate = self.courses[self.fitted[0]].rate;
-        if self.fitted.iter().any(|&t| self.courses[t].rate != rate) {
+        if self
+            .fitted
+            .iter()
+            .any(|&t| !same_rate(self.courses[t].rate, rate))
+        {
             return Ok(None);
         }
-        let lists: Vec<&Channels> = residuals.iter().collect();
-        let Some(frequency) = line(&lists, rate) else {
+        // A rhythm of muscles has another phase in every trial: it is looked for in what repeats differ by, where the
+        // model's own errors cancel. Where tip and handle come apart, only the robot can be behind it.
+        let differences = self.differences(&residuals);
+        let muscles = line(
+            &differences.iter().collect::<Vec<_>>(),
+            rate,
+            SLOWEST_RHYTHM,
+        );
+        let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
+            .map(|(residual, &trial)| self.closure(residual, trial))
+            .collect();
+        let robot = line(&closures.iter().collect::<Vec<_>>(), rate, SLOWEST_RIPPLE);
+        let Some(frequency) = muscles.or(robot) else {
             return Ok(None);
         };
         let mut best: Vec<(f64, Explained)> = Vec::new();
         for columns in self.swings(frequency) {
+            if muscles.is_none() && columns[0].kind.probe().nature != Nature::Periodic {
+                continue;
+            }
             if let Some(explained) = self.explain(fitted, &residuals, frequency, &columns)? {
                 let worth = explained.gain - 8.0 * columns.len() as f64;
                 best.push((worth, explained));
@@ -59,13 +91,17 @@ impl<const N: usize> Study<'_, N> {
         }
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut list = best.into_iter();
-        let Some((most, first)) = list.next() else {
+        let Some((most, first)) = list
+            .next()
+            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN)
+        else {
             return Ok(None);
         };
         let rivals = list
             .filter(|(worth, other)| {
-                worth + TIE > most && other.effect.kind != first.effect.kind
-                    || worth + TIE > most && other.effect.index != first.effect.index
+                let same = (other.effect.kind, other.effect.index)
+                    == (first.effect.kind, first.effect.index);
+                worth + TIE > most && !same
             })
             .map(|(worth, other)| (other.effect, most - worth))
             .collect();
@@ -76,7 +112,91 @@ impl<const N: usize> Study<'_, N> {
             gain: first.gain,
             rivals,
             locked: first.locked,
+            columns: first.columns,
+            sizes: first.sizes,
         }))
+    }
+
+    /// What each trial differs by from the mean of its repeats, over the samples that all have; trials without repeats
+    /// are left out.
+    fn differences(&self, residuals: &[Channels]) -> Vec<Channels> {
+        let mut out = Vec::new();
+        for (m, &trial) in self.fitted.iter().enumerate() {
+            let group = self.group_of[trial];
+            let members: Vec<&Channels> = std::iter::zip(residuals, &self.fitted)
+                .filter(|(_, t)| self.group_of[**t] == group)
+                .map(|(r, _)| r)
+                .collect();
+            if members.len() < 2 {
+                continue;
+            }
+            let count = members.iter().map(|r| r[0].len()).min().unwrap_or(0);
+            let n = members.len() as f64;
+            let scale = libm::sqrt(n / (n - 1.0));
+            let one = |c: usize| {
+                let mean = |i: usize| members.iter().map(|r| r[c][i]).sum::<f64>() / n;
+                (0..count)
+                    .map(|i| scale * (residuals[m][c][i] - mean(i)))
+                    .collect()
+            };
+            out.push((0..self.session.channels()).map(one).collect());
+        }
+        out
+    }
+
+    /// What is left between the arm's tip and the handle, stretch of the contact taken off: y and z \[m\].
+    fn closure(&self, residual: &Channels, trial: usize) -> Channels {
+        let course = &self.courses[trial];
+        let count = residual[0].len();
+        let mut out = vec![Vec::new(); 2];
+        for i in 0..count {
+            let q = Joints::<f64, N>::from_fn(|j, _| course.seen[j][i]);
+            let moved = Joints::<f64, N>::from_fn(|j, _| residual[j][i]);
+            let tip = jacobian(&self.session.chain, &Pose::new(&q)) * moved;
+            for axis in 0..2 {
+                let stretch = residual[N + axis][i] / self.session.contact.stiffness[axis];
+                out[axis].push(tip[axis] + stretch);
+            }
+        }
+        out
+    }
+
+    /// Takes a rhythm out of the measured channels, so that it does not disturb what is fitted to them.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for channels that the filter refuses.
+    pub fn take_out(&mut self, fitted: &Fitted<N>, apart: &Apart) -> Result<(), GapError> {
+        for (sizes, &trial) in apart.sizes.iter().zip(&self.fitted.clone()) {
+            let course = &self.courses[self.references[self.group_of[trial]]];
+            let Some(linear) = Linear::along(self.session, &fitted.hypothesis, course)
+                .map_err(|source| GapError::Simulation { trial, source })?
+            else {
+                continue;
+            };
+            let mut swing = vec![vec![0.0; course.raw[0].len()]; self.session.channels()];
+            for (k, column) in apart.columns.iter().enumerate() {
+                for quarter in [false, true] {
+                    let size = sizes[2 * k + usize::from(quarter)];
+                    let mut changed = fitted.hypothesis.clone();
+                    changed.named.push(small(column, apart.wave()[0], quarter));
+                    if let Some(response) = linear.response_raw(&changed, UNIT, (false, false)) {
+                        for (sum, value) in
+                            swing.iter_mut().flatten().zip(response.iter().flatten())
+                        {
+                            *sum += size * value;
+                        }
+                    }
+                }
+            }
+            let course = &mut self.courses[trial];
+            for (channel, swing) in course.raw.iter_mut().zip(&swing) {
+                for (value, swing) in channel.iter_mut().zip(swing) {
+                    *value -= swing;
+                }
+            }
+            course.seen = smooth(&course.raw, course.band, course.rate)?;
+        }
+        Ok(())
     }
 
     fn raw_residuals(&self, fitted: &Fitted<N>) -> Result<Vec<Channels>, GapError> {
@@ -125,7 +245,6 @@ impl<const N: usize> Study<'_, N> {
         frequency: f64,
         columns: &[Effect<f64>],
     ) -> Result<Option<Explained>, GapError> {
-        const UNIT: f64 = 1e-3;
         let rate = self.courses[self.fitted[0]].rate;
         let channels = self.session.channels();
         // The noise of each channel next to the line.
@@ -149,11 +268,7 @@ impl<const N: usize> Study<'_, N> {
                 .iter()
                 .map(|effect| {
                     let mut changed = fitted.hypothesis.clone();
-                    let mut small = *effect;
-                    small.parameters = small.parameters.map(|v| if v == 1.0 { UNIT } else { v });
-                    // The frequency may be one as well: it is set again.
-                    small.parameters[small_frequency(effect.kind)] = frequency;
-                    changed.named.push(small);
+                    changed.named.push(small(effect, frequency, false));
                     let response = linear.response_raw(&changed, UNIT, (false, false))?;
                     let swings = response.iter().map(|c| coefficient(c, frequency, rate));
                     Some(swings.collect())
@@ -192,6 +307,23 @@ impl<const N: usize> Study<'_, N> {
             gain += 2.0 * solution.dot(&score);
             sizes.push(solution);
         }
+        let share = (0..channels)
+            .map(|c| {
+                let (mut line, mut all) = (0.0, 0.0);
+                for residual in residuals {
+                    let [a, b] = coefficient(&residual[c], frequency, rate);
+                    let count = residual[c].len() as f64;
+                    line += 0.5 * (a * a + b * b);
+                    let mean = residual[c].iter().sum::<f64>() / count;
+                    all += residual[c]
+                        .iter()
+                        .map(|v| (v - mean) * (v - mean))
+                        .sum::<f64>()
+                        / count;
+                }
+                line / f64::max(all, 1e-300)
+            })
+            .fold(0.0, f64::max);
         let n = sizes.len() as f64;
         let size = |a: usize| {
             let square = |s: &DVector<f64>| s[2 * a] * s[2 * a] + s[2 * a + 1] * s[2 * a + 1];
@@ -208,12 +340,8 @@ impl<const N: usize> Study<'_, N> {
         // The columns are cosines, the kinds are sines.
         let phase = phase + 0.5 * core::f64::consts::PI;
         let mut effect = columns[0];
-        let free = free_of(columns[0].kind);
         for (a, column) in columns.iter().enumerate() {
-            let &p = free
-                .iter()
-                .find(|&&p| column.parameters[p] == 1.0)
-                .unwrap_or(&free[0]);
+            let p = size_of(column);
             // Two axes swing in step or against each other.
             let sign = if a > 0 && mean(0) * mean(2 * a) + mean(1) * mean(2 * a + 1) < 0.0 {
                 -1.0
@@ -230,6 +358,9 @@ impl<const N: usize> Study<'_, N> {
             sd: 1.0 / libm::sqrt(2.0 * information.max(1e-300)),
             gain,
             locked,
+            sizes: sizes.iter().map(|s| s.iter().copied().collect()).collect(),
+            columns: columns.to_vec(),
+            share,
         }))
     }
 
@@ -247,8 +378,18 @@ impl<const N: usize> Study<'_, N> {
             .zip(&fitted.residuals)
             .map(|(&t, r)| self.noise.whiten(r, &self.stretches[t]))
             .collect();
+        // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
+        let usual: Vec<Vec<Vec<f64>>> = {
+            let own = self.own_responses(&fitted.hypothesis)?;
+            let one = |&trial: &usize| self.usual(&own, trial);
+            self.fitted.iter().map(one).collect()
+        };
         let deviations: Vec<Vec<f64>> = (0..self.fitted.len())
-            .map(|m| self.deviation(&white, m))
+            .map(|m| {
+                let mut deviation = self.deviation(&white, m);
+                project_off(&mut deviation, &usual[m]);
+                deviation
+            })
             .collect();
         let suspects: Vec<usize> = (0..self.fitted.len())
             .filter(|&m| self.has_repeat(m))
@@ -258,7 +399,8 @@ impl<const N: usize> Study<'_, N> {
         for m in suspects {
             let trial = self.fitted[m];
             for (effect, response) in self.shapes_in(fitted, trial)? {
-                let row = self.noise.whiten(&response, &self.stretches[trial]);
+                let mut row = self.noise.whiten(&response, &self.stretches[trial]);
+                project_off(&mut row, &usual[m]);
                 let (square, along) = (dot(&row, &row), dot(&row, &deviations[m]));
                 if square <= 0.0 {
                     continue;
@@ -280,6 +422,8 @@ impl<const N: usize> Study<'_, N> {
                         gain,
                         rivals: Vec::new(),
                         locked: false,
+                        columns: Vec::new(),
+                        sizes: Vec::new(),
                     });
                 }
             }
@@ -288,6 +432,25 @@ impl<const N: usize> Study<'_, N> {
         let tried = (self.fitted.len() * 4 * N * 100) as f64;
         let price = crate::scan::THRESHOLD + libm::log(rows) + 2.0 * libm::log(tried);
         Ok(best.filter(|b| b.gain > price))
+    }
+
+    /// Whitened columns of what differs from trial to trial without being a disturbance, each orthogonal to the others.
+    fn usual(&self, own: &[Response], trial: usize) -> Vec<Vec<f64>> {
+        let stretches = &self.stretches[trial];
+        let length = self.session.trials[trial].len();
+        let constant = |j: usize| {
+            let mut channels = vec![vec![0.0; length]; self.session.channels()];
+            channels[j] = vec![1.0; length];
+            channels
+        };
+        let placed = own
+            .iter()
+            .filter_map(|r| r.0[self.group_of[trial]].as_ref())
+            .map(|c| self.noise.whiten(&fitted_to(c, length), stretches));
+        let columns: Vec<Vec<f64>> = placed
+            .chain((0..N).map(|j| self.noise.whiten(&constant(j), stretches)))
+            .collect();
+        orthogonal(columns)
     }
 
     /// Other fitted trials with the same movement and the same samples.
@@ -367,7 +530,8 @@ impl<const N: usize> Study<'_, N> {
                 continue;
             }
             for j in 0..N {
-                for s in 1..starts {
+                // A slip within the trial; an offset from its start is how the sensor was put on.
+                for s in 10..starts.saturating_sub(10) {
                     let first = (EVERY * s as f64 * course.rate) as usize;
                     let mut channels = vec![vec![0.0; count]; self.session.channels()];
                     for value in channels[j].iter_mut().skip(first) {
@@ -455,6 +619,32 @@ struct Explained {
     sd: f64,
     gain: f64,
     locked: bool,
+    sizes: Vec<Vec<f64>>,
+    columns: Vec<Effect<f64>>,
+    /// Largest share of the variance of a channel's residual.
+    share: f64,
+}
+
+/// The size with which swings are tried.
+const UNIT: f64 = 1e-3;
+
+/// Position of the size that is one in a swing.
+fn size_of(swing: &Effect<f64>) -> usize {
+    let free = free_of(swing.kind);
+    let one = free.iter().find(|&&p| swing.parameters[p] == 1.0);
+    one.copied().unwrap_or(free[0])
+}
+
+/// A swing of a small size, a quarter of a period earlier on demand.
+fn small(swing: &Effect<f64>, frequency: f64, earlier: bool) -> Effect<f64> {
+    let mut effect = *swing;
+    effect.parameters[size_of(swing)] = UNIT;
+    let [f, phase] = shapes_of(swing.kind);
+    effect.parameters[f] = frequency;
+    if earlier {
+        effect.parameters[phase] += 0.5 * core::f64::consts::PI;
+    }
+    effect
 }
 
 /// Whether some second of a whitened deviation holds far more than noise.
@@ -489,10 +679,6 @@ fn shapes_of(kind: Kind) -> [usize; 2] {
         parameters.iter().position(|p| p.name == name).unwrap_or(0)
     };
     [position("frequency"), position("phase")]
-}
-
-fn small_frequency(kind: Kind) -> usize {
-    shapes_of(kind)[0]
 }
 
 /// A kind that swings with one of its sizes at one, the others at zero.

@@ -138,10 +138,9 @@ impl<const N: usize> Study<'_, N> {
                 let value = hypothesis.get(c.target);
                 (c.lower - value, c.upper - value)
             };
+            // Where nothing decides an unknown, what was found so far stands.
             let Some((step, _)) = solve(&normal.gram, &normal.score, &usable, &bounds) else {
-                return Err(GapError::Singular {
-                    unknowns: usable.len(),
-                });
+                break;
             };
             let Some((next, rest, less)) = self.shortened(
                 &hypothesis,
@@ -196,7 +195,7 @@ impl<const N: usize> Study<'_, N> {
 }
 
 /// Shapes that the data hardly decide move no further than their own size in one step.
-fn regularise<const N: usize>(
+pub fn regularise<const N: usize>(
     gram: &mut DMatrix<f64>,
     hypothesis: &Hypothesis<N>,
     coordinates: &[Coordinate],
@@ -245,7 +244,8 @@ impl<const N: usize> Study<'_, N> {
         let columns: Vec<&Response> = background.responses.iter().chain(&responses).collect();
         let clusters = self.clusters(&self.fitted, &fitted.residuals, &columns, &background.own);
         let list: Vec<&Cluster> = clusters.iter().collect();
-        let normal = Normal::new(&list, &priors(hypothesis, &coordinates));
+        let mut normal = Normal::new(&list, &priors(hypothesis, &coordinates));
+        regularise(&mut normal.gram, hypothesis, &coordinates);
         let mut sd = vec![f64::INFINITY; coordinates.len()];
         // A value at its limit is held there: the others are known as if it were exact.
         let free: Vec<usize> = (0..coordinates.len())

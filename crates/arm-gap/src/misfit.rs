@@ -2,6 +2,7 @@
 
 use crate::GapError;
 use crate::fit::Fitted;
+use crate::noise::dot;
 use crate::study::Study;
 
 /// Lack of fit against pure error.
@@ -44,6 +45,7 @@ pub fn lack_of_fit<const N: usize>(study: &Study<N>, fitted: &Fitted<N>) -> Resu
             .filter_map(|r| r.0[group].as_ref())
             .map(|c| study.noise.whiten(c, stretches))
             .collect();
+        let columns = orthogonal(columns);
         let rows: Vec<Vec<f64>> = members
             .iter()
             .map(|&m| {
@@ -84,23 +86,22 @@ pub fn lack_of_fit<const N: usize>(study: &Study<N>, fitted: &Fitted<N>) -> Resu
     })
 }
 
-/// Takes the least-squares share of columns out of rows.
-fn project_off(rows: &mut [f64], columns: &[Vec<f64>]) {
-    use crate::noise::dot;
+/// Columns made orthogonal to each other, one after the other; those that add nothing are left out.
+pub fn orthogonal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
-    for column in columns {
-        let mut column = column.clone();
-        for other in &basis {
-            let share = dot(&column, other) / dot(other, other);
-            for (c, o) in column.iter_mut().zip(other) {
-                *c -= share * o;
-            }
-        }
-        if dot(&column, &column) > 0.0 {
+    for mut column in columns {
+        let before = dot(&column, &column);
+        project_off(&mut column, &basis);
+        if dot(&column, &column) > 1e-9 * before {
             basis.push(column);
         }
     }
-    for column in &basis {
+    basis
+}
+
+/// Takes the least-squares share of orthogonal columns out of rows.
+pub fn project_off(rows: &mut [f64], basis: &[Vec<f64>]) {
+    for column in basis {
         let share = dot(rows, column) / dot(column, column);
         for (v, c) in rows.iter_mut().zip(column) {
             *v -= share * c;

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::candidate::Library;
-use crate::fit::{Background, Fitted, priors};
+use crate::fit::{Background, Fitted, priors, regularise};
 use crate::hypothesis::Coordinate;
 use crate::normal::{Cluster, Normal, factor, solve};
 use crate::study::{Response, Study};
@@ -80,7 +80,8 @@ impl Scan {
         let mut prior = priors(hypothesis, &known);
         prior.resize(columns.len(), None);
         let list: Vec<&Cluster> = clusters.iter().collect();
-        let normal = Normal::new(&list, &prior);
+        let mut normal = Normal::new(&list, &prior);
+        regularise(&mut normal.gram, hypothesis, &known);
         // Columns that nothing excites drop out of the projection.
         let base: Vec<usize> = (0..known.len())
             .filter(|&i| normal.gram[(i, i)] > 0.0)

@@ -14,8 +14,8 @@ use crate::study::Study;
 const FLOOR: f64 = 0.02;
 /// Most disturbances of single trials that are named.
 const DISTURBANCES: usize = 4;
-/// Share of the common band below which a ripple is fitted like other effects.
-const SLOW: f64 = 0.8;
+/// Frequency below which a ripple is asked like other effects \[Hz\]: movements and what a model lacks of them reach that far.
+const SLOW: f64 = 3.0;
 /// Most effects that are named.
 const MOST: usize = 6;
 /// Choices that are converged by simulation in each round.
@@ -119,32 +119,7 @@ impl<const N: usize> Study<'_, N> {
             self.measure_noise(&calibrated.hypothesis)?;
             calibrated = self.calibrate()?;
         }
-        let mut apart = Vec::new();
-        if self.session.is_led() {
-            progress("looking at single trials", 0.05);
-            while apart.len() < DISTURBANCES
-                && let Some(found) = self.disturbance(&calibrated, 1.0)?
-            {
-                self.leave_out(&found);
-                apart.push(found);
-                let background = Background::at(self, &calibrated.hypothesis)?;
-                calibrated = self.fit(calibrated.hypothesis, Vec::new(), &background)?;
-            }
-        }
-        let mut periodic = None;
-        if self.session.is_led()
-            && let Some(found) = self.rhythm(&calibrated)?
-        {
-            let [frequency, phase] = found.wave();
-            if found.locked
-                && found.is_periodic()
-                && frequency < SLOW * self.courses[self.fitted[0]].band
-            {
-                periodic = Some([frequency, phase]);
-            } else {
-                apart.push(found);
-            }
-        }
+        let (mut calibrated, apart, periodic) = self.set_apart(calibrated, progress)?;
         let mut current = calibrated.clone();
         let mut ladder = Vec::new();
         let mut first: Option<(Library, Scan)> = None;
@@ -203,6 +178,42 @@ impl<const N: usize> Study<'_, N> {
             ruled,
             scale,
         })
+    }
+
+    /// Looks for what is not the same in every trial, and takes it out of what is fitted: a rhythm, then disturbances.
+    ///
+    /// Returns the calibrated model, what was found, and frequency and phase of a ripple that is left to the search.
+    #[allow(clippy::type_complexity)]
+    fn set_apart(
+        &mut self,
+        mut calibrated: Fitted<N>,
+        progress: Progress<'_>,
+    ) -> Result<(Fitted<N>, Vec<Apart>, Option<[f64; 2]>), GapError> {
+        let (mut apart, mut periodic) = (Vec::new(), None);
+        if !self.session.is_led() {
+            return Ok((calibrated, apart, periodic));
+        }
+        progress("looking at single trials", 0.05);
+        if let Some(found) = self.rhythm(&calibrated)? {
+            let [frequency, phase] = found.wave();
+            if found.locked && found.is_periodic() && frequency < SLOW {
+                periodic = Some([frequency, phase]);
+            } else {
+                self.take_out(&calibrated, &found)?;
+                apart.push(found);
+                self.measure_noise(&calibrated.hypothesis)?;
+                calibrated = self.calibrate()?;
+            }
+        }
+        while apart.len() < DISTURBANCES
+            && let Some(found) = self.disturbance(&calibrated, 1.0)?
+        {
+            self.leave_out(&found);
+            apart.push(found);
+            self.measure_noise(&calibrated.hypothesis)?;
+            calibrated = self.calibrate()?;
+        }
+        Ok((calibrated, apart, periodic))
     }
 
     /// The model as given, with everything refitted that was never exact.

@@ -4,8 +4,8 @@ use core::f64::consts::TAU;
 
 use crate::chance::chi_square_tail;
 
-/// Lowest frequency at which a line is looked for \[Hz\]: below it movements have power of their own.
-const LOWEST: f64 = 0.35;
+/// Highest frequency at which a line is looked for \[Hz\]: no muscle and no led arm swings faster.
+const HIGHEST: f64 = 15.0;
 /// Probability by chance below which a line is one, over all frequencies and channels.
 const CHANCE: f64 = 1e-6;
 /// How far around a frequency its neighbourhood reaches, and where it starts \[Hz\].
@@ -28,15 +28,19 @@ pub fn coefficient(column: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
 /// The strongest line: its frequency \[Hz\]; `None` when nothing stands out.
 ///
 /// * `trials` - channels of every trial, all at the same rate
+/// * `lowest` - frequency at which it begins to look \[Hz\]: below it movements have power of their own
 ///
 /// Each channel's power, averaged over trials, is compared with the median of its neighbourhood.
-pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64) -> Option<f64> {
+pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64) -> Option<f64> {
+    if trials.is_empty() {
+        return None;
+    }
     let shortest = trials.iter().map(|t| t[0].len()).min()?;
     let channels = trials[0].len();
     let step = 0.5 * rate / shortest as f64;
-    let highest = 0.45 * rate;
-    let count = ((highest - LOWEST) / step) as usize;
-    let frequency = |k: usize| LOWEST + step * k as f64;
+    let highest = HIGHEST.min(0.45 * rate);
+    let count = ((highest - lowest) / step) as usize;
+    let frequency = |k: usize| lowest + step * k as f64;
     let mut best: Option<(f64, f64)> = None;
     for c in 0..channels {
         let power: Vec<f64> = (0..count)
@@ -57,7 +61,7 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64) -> Option<f64> {
                 .map(|o| power[o])
                 .collect();
             // Both sides must be there, or a slope would look like a line.
-            let both = frequency(k) - AROUND.0 > LOWEST && frequency(k) + AROUND.0 < highest;
+            let both = frequency(k) - AROUND.0 > lowest && frequency(k) + AROUND.0 < highest;
             if around.len() < 8 || !both {
                 continue;
             }

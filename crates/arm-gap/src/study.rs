@@ -368,9 +368,10 @@ impl<'a, const N: usize> Study<'a, N> {
             let trial = trials[i];
             let (group, stretches) = (self.group_of[trial], &self.stretches[trial]);
             let rows = |response: &Response| match &response.0[group] {
-                Some(channels) => self
-                    .noise
-                    .whiten(&fitted_to(channels, trial, self), stretches),
+                Some(channels) => self.noise.whiten(
+                    &fitted_to(channels, self.session.trials[trial].len()),
+                    stretches,
+                ),
                 None => vec![0.0; stretches.len() * self.session.channels()],
             };
             let columns: Vec<Vec<f64>> = columns.iter().map(|r| rows(r)).collect();
@@ -471,9 +472,13 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
     dry
 }
 
+/// Whether two sampling rates are one: time stamps are rounded.
+pub fn same_rate(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-3 * b
+}
+
 /// Channels of a group's reference, cut or held at the end for a member of another length.
-fn fitted_to<const N: usize>(channels: &Channels, trial: usize, study: &Study<N>) -> Channels {
-    let length = study.session.trials[trial].len();
+pub fn fitted_to(channels: &Channels, length: usize) -> Channels {
     let cut = |c: &Vec<f64>| {
         let mut out = c.clone();
         let last = out.last().copied().unwrap_or(0.0);
@@ -540,7 +545,7 @@ fn groups<const N: usize>(trials: &[Trial<N>], courses: &[Course<N>]) -> (Vec<us
     for (i, trial) in trials.iter().enumerate() {
         let found = references.iter().position(|&r| {
             trials[r].configuration == trial.configuration
-                && trials[r].rate == trial.rate
+                && same_rate(trials[r].rate, trial.rate)
                 && courses[r].is_like(&courses[i], SAME_PATH)
         });
         match found {

@@ -1,0 +1,228 @@
+//! The linearised responses are those of the simulation, and a hidden effect is found in simulated data.
+
+use arm_core::effect::{Effect, Kind};
+use arm_core::{Chain, Contact, Elbow, Joints, Limits, Robot, Segment, Setup, Shape};
+use arm_gap::hypothesis::{Coordinate, Hypothesis, Target};
+use arm_gap::session::{Session, Sight};
+use arm_gap::study::Study;
+use arm_ident::trial::{Role, Tolerance, Trial};
+use arm_sim::{
+    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start, simulate,
+};
+
+const RATE: f64 = 50.0;
+
+fn arm() -> Chain<f64, 2> {
+    let segment = |length, mass, com, inertia| Segment {
+        length,
+        mass,
+        com: [com, 0.0],
+        inertia,
+    };
+    Chain::new(
+        [
+            segment(0.32, 2.0, 0.15, 0.02),
+            segment(0.28, 1.3, 0.13, 0.012),
+        ],
+        [0.0, 0.0],
+        [0.0, -9.81],
+    )
+    .expect("a possible arm")
+}
+
+fn known() -> Vec<Effect<f64>> {
+    let viscous = Kind::named("viscous").expect("known");
+    (0..2)
+        .map(|j| Effect::new(viscous, j).with(&[0.1]))
+        .collect()
+}
+
+/// Two movements, each repeated: synthetic trials of an arm with `effects`, read by sensors with white noise.
+fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
+    let chain = arm();
+    let contact = Contact::new([1e4; 2], [25.0; 2]);
+    let robot = Robot::new([0.5, 0.45], [1.0, -0.1], Elbow::Up).expect("a possible robot");
+    let degrees = |list: &[[f64; 2]]| -> Vec<Joints<f64, 2>> {
+        list.iter()
+            .map(|w| Joints::from(w.map(f64::to_radians)))
+            .collect()
+    };
+    let movements = [
+        (
+            degrees(&[[-60.0, 50.0], [-30.0, 50.0], [-30.0, 85.0], [-60.0, 50.0]]),
+            0.4,
+        ),
+        (degrees(&[[-50.0, 80.0], [-20.0, 40.0], [-50.0, 80.0]]), 1.0),
+    ];
+    let mut trials = Vec::new();
+    for (configuration, (waypoints, speed)) in movements.into_iter().enumerate() {
+        let limits = Limits {
+            speed,
+            acceleration: 4.0 * speed,
+        };
+        let movement = Movement::within(Shape::Smooth, &waypoints, &[limits; 2], 0.3)
+            .expect("a possible movement");
+        let duration = (movement.duration() * RATE).ceil() / RATE;
+        let path = HandlePath::of_arm(chain, movement);
+        let drive = Drive::Handle {
+            path,
+            coupling: Coupling::Compliant,
+        };
+        let mut experiment = Experiment::new(Setup::new(&chain, contact), drive, duration);
+        experiment.effects = known().into_iter().chain(effects.iter().copied()).collect();
+        experiment.robot = Some(robot);
+        experiment.start = Start::Equilibrium { near: waypoints[0] };
+        experiment.output_interval = Some(0.5 / RATE);
+        let recording = simulate(&experiment).expect("a stable run");
+        for repeat in 0..4 {
+            let mut sensors = Sensors::<2>::ideal();
+            sensors.rate = RATE;
+            sensors.seed = 100 * configuration as u64 + repeat;
+            sensors.angle = [Channel::white(noise.0); 2];
+            sensors.force = [Channel::white(noise.1); 2];
+            let read = sensors.read(&experiment, &recording).expect("readings");
+            let count = read.time.len();
+            trials.push(Trial {
+                role: if repeat == 3 { Role::Test } else { Role::Fit },
+                configuration,
+                rate: RATE,
+                q: (0..count)
+                    .map(|i| Joints::from_column_slice(&read.q[2 * i..2 * i + 2]))
+                    .collect(),
+                speed: None,
+                force_on_arm: Some(
+                    (0..count)
+                        .map(|i| [read.force_on_arm[2 * i], read.force_on_arm[2 * i + 1]])
+                        .collect(),
+                ),
+                moment_on_arm: None,
+                torque: None,
+                handle: Some(
+                    (0..count)
+                        .map(|i| {
+                            robot.handle(&[read.robot_q[2 * i], read.robot_q[2 * i + 1]].into())
+                        })
+                        .collect(),
+                ),
+                valid: vec![true; count],
+            });
+        }
+    }
+    Session {
+        chain,
+        contact,
+        effects: known(),
+        segment_uncertainty: 0.02,
+        tolerance: Tolerance::default(),
+        trials,
+        sight: Sight::Led,
+    }
+}
+
+/// Root mean square of channels.
+fn size(channels: &[Vec<f64>]) -> f64 {
+    let all = channels.iter().flatten();
+    let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    f64::sqrt(sum / count)
+}
+
+#[test]
+fn linearised_responses_are_those_of_the_simulation() {
+    let session = session(&[], (1e-4, 0.01));
+    let study = Study::new(&session, 1).expect("a sound session");
+    let named = |kind: &str, index: usize| -> Hypothesis<2> {
+        let mut hypothesis = session.given();
+        let mut effect = Effect::new(Kind::named(kind).expect("known"), index);
+        effect.parameters[0] = 0.0;
+        hypothesis.named.push(effect);
+        hypothesis
+    };
+    let plain = session.given();
+    let first = Target::Named(0, 0);
+    let cases = [
+        (plain.clone(), Target::Segment(1, 0), 0.02),
+        (plain.clone(), Target::Segment(0, 2), 0.1),
+        (plain.clone(), Target::Shift(0), 1e-3),
+        (plain.clone(), Target::Placement(1), 1e-3),
+        (plain.clone(), Target::Known(1, 0), 0.02),
+        (named("constant_moment", 0), first, 0.05),
+        (named("elastic", 1), first, 0.05),
+        (named("relaxation", 1), first, 0.05),
+        (named("added_mass", 0), first, 0.02),
+        (named("segment_length", 1), first, 1e-3),
+        (named("gravity_tilt", 0), first, 0.01),
+        (named("contact_compliance", 0), first, 2e-6),
+        (named("motor_inertia", 0), first, 0.01),
+        (named("time_delay", 0), first, 0.004),
+        (named("force_misalignment", 0), first, 0.01),
+    ];
+    let course = &study.courses[0];
+    for (hypothesis, target, step) in cases {
+        let coordinate = Coordinate {
+            target,
+            prior: None,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            step,
+        };
+        let response = study
+            .responses_to(&hypothesis, &[coordinate])
+            .expect("a response");
+        let linear = response[0].0[0].as_ref().expect("this form knows it");
+        let play = |h: &Hypothesis<2>| {
+            let run = session.run(h, course).expect("a stable run");
+            session.read(h, course, &run).expect("readings")
+        };
+        let value = hypothesis.get(target);
+        let up = play(&hypothesis.clone().with(target, value + step));
+        let base = play(&hypothesis);
+        let inner = |channels: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            channels
+                .iter()
+                .map(|c| c[20..c.len() - 20].to_vec())
+                .collect()
+        };
+        let simulated: Vec<Vec<f64>> = std::iter::zip(&up, &base)
+            .map(|(a, b)| std::iter::zip(a, b).map(|(a, b)| (a - b) / step).collect())
+            .collect();
+        for channels in [0..2, 2..4] {
+            let (seen, expected) = (
+                inner(&linear[channels.clone()]),
+                inner(&simulated[channels]),
+            );
+            let apart: Vec<Vec<f64>> = std::iter::zip(&seen, &expected)
+                .map(|(a, b)| std::iter::zip(a, b).map(|(a, b)| a - b).collect())
+                .collect();
+            let (off, whole) = (size(&apart), size(&expected));
+            assert!(
+                off <= 0.06 * whole + 1e-9,
+                "{target:?} {:?}: {off} of {whole}",
+                hypothesis.named.first().map(|e| e.kind)
+            );
+        }
+    }
+}
+
+#[test]
+fn a_hidden_spring_is_named_and_nothing_else() {
+    let elastic = Kind::named("elastic").expect("known");
+    let hidden = Effect::new(elastic, 1).with(&[1.5, 1.0]);
+    let session = session(&[hidden], (1e-3, 0.1));
+    let mut study = Study::new(&session, 2).expect("a sound session");
+    let finding = study.search(&|_, _| ()).expect("a finding");
+    let named = &finding.amended.hypothesis.named;
+    assert_eq!(named.len(), 1, "{named:?}");
+    assert_eq!((named[0].kind, named[0].index), (elastic, 1));
+    assert!((named[0].parameters[0] - 1.5).abs() < 0.15, "{named:?}");
+    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
+}
+
+#[test]
+fn nothing_is_named_where_nothing_is_hidden() {
+    let session = session(&[], (1e-3, 0.1));
+    let mut study = Study::new(&session, 2).expect("a sound session");
+    let finding = study.search(&|_, _| ()).expect("a finding");
+    assert!(finding.amended.hypothesis.named.is_empty());
+    assert!(finding.apart.is_empty());
+    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
+}
