@@ -277,6 +277,7 @@ def find_gap(
     columns = trial_columns(dataset)
     built = rig(dataset.model, all_effects(dataset.model))
     warnings = suspicion.examine(dataset, led)
+    suspicion.refuse_wrong_angles(dataset)
     suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
     raw = _armrs.find_gap(built, columns, settings, progress)
     return _found(dataset, led, raw, warnings)

@@ -30,7 +30,7 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
     if len(fit) == 1:
         lines.append("one fit trial only: what is noise and what is missing cannot be told apart by repeats")
     elif len({t.configuration for t in fit}) == len(fit):
-        lines.append("no movement was repeated: the noise is taken from what the model leaves, so that less is seen")
+        lines.append("no movement was repeated: what is noise and what is missing cannot be told apart; names after the first are guesses")
     if not dataset.test_trials:
         lines.append('no trial with role = "test": the gap cannot be measured on data that were kept apart')
     for trial in dataset.trials:
@@ -84,7 +84,7 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
     Raises
     ------
     BadInput
-        Units wrong by 1000 or by 57.3, a force with reversed sign, swapped channels.
+        Forces wrong by 1000, with reversed sign, or with swapped channels.
     """
     if not led:
         return
@@ -106,29 +106,56 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
     if same < -_ALIKE:
         found = f"force_on = {dataset.force_on!r} with forces opposite to those that carry the arm"
         raise BadInput("force_on", Text(found), '"arm" or "robot", whichever the force acts on')
-    swapped = float(np.sum(forces * expected[:, ::-1]) / max(np.sqrt(np.sum(forces**2) * np.sum(expected**2)), 1e-300))
-    if swapped > _ALIKE and swapped > same + 0.3 and min(cross) > max(own):
+    if min(cross) > _ALIKE and max(own) < 0.7:
         raise BadInput("Fy_N, Fz_N", Text("each follows what the other should be"), "Fy along the horizontal, Fz up: swapped columns?")
-    for j in range(n):
-        seen, should = measured[:, j], given[:, j]
-        slope = _slope(seen, should)
-        for factor, unit in ((57.29578, "degrees labelled as radians"), (1 / 57.29578, "radians labelled as degrees")):
-            if slope is not None and abs(np.log(abs(slope) / factor)) < 0.3:
-                raise BadInput(
-                    f"q{j + 1}",
-                    Text(f"{slope:.3g} times the movement that the robot made"),
-                    f"angles in the unit of their column ({unit}?)",
-                )
+
+
+def refuse_wrong_angles(dataset: Dataset) -> None:
+    """Compare where the measured angles put the hand with where the robot's put its handle.
+
+    Raises
+    ------
+    BadInput
+        Where they lie far apart and another unit of the angles brings them together.
+    """
+    model = dataset.model
+    if model.robot is None:
+        return
+    for trial in dataset.trials:
+        if trial.robot_q is None:
+            continue
+        good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
+        handle = _handle(model.robot, trial.robot_q[good])
+        apart = {factor: _apart(model, trial.q[good] * factor, handle) for factor in (1.0, 57.29577951308232, 1 / 57.29577951308232)}
+        reach = sum(s.length for s in model.segments)
+        if apart[1.0] < 0.3 * reach:
+            continue
+        for factor, unit in ((57.29577951308232, "radians labelled as degrees"), (1 / 57.29577951308232, "degrees labelled as radians")):
+            if apart[factor] < 0.1 * reach:
+                found = Text(f"angles that put the hand {apart[1.0]:.3g} m from the handle")
+                raise BadInput("q1 …", found, f"angles in the unit of their column ({unit}?)", file=trial.file)
+        found = Text(f"the hand {apart[1.0]:.3g} m from the robot's handle")
+        raise BadInput(
+            "q1 …, qr1, qr2", found, "angles of arm and robot that meet: lengths, bases, elbow and units of the model?", file=trial.file
+        )
+
+
+def _handle(robot: Any, q: np.ndarray) -> np.ndarray:
+    first, second = q[:, 0], q[:, 0] + q[:, 1]
+    near, far = robot.lengths
+    return np.column_stack(
+        [robot.base[0] + near * np.cos(first) + far * np.cos(second), robot.base[1] + near * np.sin(first) + far * np.sin(second)]
+    )
+
+
+def _apart(model: Any, q: np.ndarray, handle: np.ndarray) -> float:
+    angles = np.cumsum(q, axis=1)
+    lengths = np.array([s.length for s in model.segments])
+    tip = np.column_stack([model.base[0] + np.cos(angles) @ lengths, model.base[1] + np.sin(angles) @ lengths])
+    return float(np.sqrt(np.mean(np.sum((tip - handle) ** 2, axis=1))))
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     if np.ptp(a) == 0 or np.ptp(b) == 0:
         return 0.0
     return float(np.corrcoef(a, b)[0, 1])
-
-
-def _slope(a: np.ndarray, b: np.ndarray) -> float | None:
-    """Return by how much more `a` moves than `b`, where they move together."""
-    if np.ptp(b) < 1e-3 or abs(_correlation(a, b)) < _ALIKE:
-        return None
-    return float(np.std(a) / np.std(b)) or None

@@ -40,10 +40,12 @@ pub struct Apart {
 const SLOWEST_RHYTHM: f64 = 2.0;
 /// Slowest ripple of the robot \[Hz\].
 const SLOWEST_RIPPLE: f64 = 0.4;
+/// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
+const FASTEST_RIPPLE: f64 = 8.0;
 /// Gain below which a line is no rhythm: many frequencies and channels were looked at.
 const PLAIN: f64 = 60.0;
 /// Share of what is left in some channel that a rhythm must be.
-const SEEN: f64 = 0.02;
+const SEEN: f64 = 0.05;
 /// Gain in which two explanations of a rhythm count as equal.
 const TIE: f64 = 10.0;
 /// Coherence of the phases of trials above which a rhythm is locked to their start.
@@ -75,7 +77,8 @@ impl<const N: usize> Study<'_, N> {
         let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
             .map(|(residual, &trial)| self.closure(residual, trial))
             .collect();
-        let robot = line(&closures.iter().collect::<Vec<_>>(), rate, SLOWEST_RIPPLE);
+        let robot = line(&closures.iter().collect::<Vec<_>>(), rate, SLOWEST_RIPPLE)
+            .filter(|f| *f < FASTEST_RIPPLE);
         let Some(frequency) = muscles.or(robot) else {
             return Ok(None);
         };

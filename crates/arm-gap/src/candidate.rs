@@ -5,6 +5,8 @@ use arm_core::effect::{
 };
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 
+use arm_ident::trial::Trial;
+
 use crate::GapError;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::predict::Run;
@@ -204,7 +206,10 @@ impl Library {
 /// Where a kind may act in a session.
 fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
     let led = session.is_led();
+    // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them.
+    let swings_freely = session.trials.iter().all(Trial::is_unloaded);
     match kind.info().place {
+        Place::Segment | Place::Hand | Place::Frame if swings_freely => 0..0,
         Place::Joint => usize::from(kind.crosses())..N,
         Place::Segment | Place::AngleSensor => 0..N,
         Place::Frame | Place::Hand => 0..1,

@@ -4,7 +4,7 @@
 //! channels are correlated; both are read off repeats, where the model's errors cancel. Without repeats the residual of a
 //! fit takes their place: what the model lacks is in it too, so that less is seen, not more.
 
-use arm_ident::coloured::{AutoRegression, Whitener};
+use arm_ident::coloured::{AutoRegression, Whitener, effective_samples};
 use arm_ident::trial::Trial;
 
 use crate::GapError;
@@ -20,8 +20,9 @@ const NEAR_REST: f64 = 0.6;
 const SHORTEST: usize = 8;
 /// Highest order of the autoregressions.
 const ORDER: usize = 4;
-/// Noise below this share of a channel's own range is not believed: quantisation, and the model's own simplifications.
-const LEAST: f64 = 1e-4;
+/// White noise of this share of a channel's range is always believed in: the path between samples, quantisation and the
+/// model's own simplifications are no better, however smooth the noise of the sensors is.
+const LEAST: f64 = 5e-4;
 
 /// The samples of a trial that are compared: stretches without a gap, thinned to the common band.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -113,10 +114,11 @@ impl Noise {
         let channels = range.len();
         let mut whiteners = Vec::with_capacity(channels);
         for (c, range) in range.iter().enumerate() {
-            let series: Vec<&[f64]> = deviations.iter().map(|d| d[c].as_slice()).collect();
             let least = (LEAST * range).max(1e-12);
+            let noisy: Vec<Vec<f64>> = deviations.iter().map(|d| roughened(&d[c], least)).collect();
+            let series: Vec<&[f64]> = noisy.iter().map(Vec::as_slice).collect();
             let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
-            let mut model = if varies {
+            let model = if varies {
                 AutoRegression::selected(&series, ORDER)?
             } else {
                 AutoRegression {
@@ -124,12 +126,6 @@ impl Noise {
                     sd: least,
                 }
             };
-            if model.sd < least {
-                model = AutoRegression {
-                    coefficients: Vec::new(),
-                    sd: least,
-                };
-            }
             whiteners.push(Whitener::new(&model)?);
         }
         let mut correlation = vec![0.0; channels * channels];
@@ -155,6 +151,31 @@ impl Noise {
         })
     }
 
+    /// Without repeats: white, as large as what is left, and larger by as much as it is correlated in time.
+    ///
+    /// An autoregression of what is left would take slow effects for noise.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for series too short.
+    pub fn without_repeats(deviations: &[Vec<Vec<f64>>], range: &[f64]) -> Result<Self, GapError> {
+        let mut noise = Self::unknown(range.len())?;
+        for (c, range) in range.iter().enumerate() {
+            let (mut square, mut count, mut effective) = (0.0, 0.0, 0.0);
+            for series in deviations {
+                square += dot(&series[c], &series[c]);
+                count += series[c].len() as f64;
+                effective += effective_samples(&series[c])?.max(1.0);
+            }
+            let variance = square / f64::max(count, 1.0) * count / effective;
+            let model = AutoRegression {
+                coefficients: Vec::new(),
+                sd: libm::sqrt(variance).max((LEAST * range).max(1e-12)),
+            };
+            noise.whiteners[c] = Whitener::new(&model)?;
+        }
+        Ok(noise)
+    }
+
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
     pub fn whiten(&self, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
         let n = self.whiteners.len();
@@ -173,6 +194,21 @@ impl Noise {
         }
         rows.into_iter().flatten().collect()
     }
+}
+
+/// A series with white noise of a given size on it, the same in every run.
+fn roughened(series: &[f64], size: f64) -> Vec<f64> {
+    let mut state: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mut uniform = || {
+        // Knuth's multiplier; the upper bits are good enough for a floor of noise.
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    // A uniform number between −½ and ½ has the variance 1/12.
+    let scale = size * libm::sqrt(12.0);
+    series.iter().map(|v| v + scale * uniform()).collect()
 }
 
 /// Inverse of the lower Cholesky factor; a little of the diagonal is added where channels repeat each other.

@@ -346,7 +346,14 @@ impl<const N: usize> Study<'_, N> {
         let mut asked = fitted.asked.clone();
         hypothesis.named.remove(slot);
         asked.remove(slot);
-        self.fit(hypothesis, asked, background)
+        match self.fit(hypothesis.clone(), asked.clone(), background) {
+            // What the effect had held up may be impossible without it: then from the segments as given.
+            Err(GapError::Simulation { .. }) => {
+                hypothesis.segments = [[0.0; 3]; N];
+                self.fit(hypothesis, asked, background)
+            }
+            other => other,
+        }
     }
 
     /// Goes back: effects that are no longer worth their price are taken out.

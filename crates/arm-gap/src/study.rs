@@ -8,9 +8,11 @@ use arm_core::effect::{Local, Place};
 use arm_ident::trial::Trial;
 
 use crate::GapError;
+use crate::candidate::Library;
+use crate::fit::priors;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::noise::{Noise, Stretches};
-use crate::normal::Cluster;
+use crate::normal::{Cluster, Normal, solve};
 use crate::predict::{Channels, Course, Run};
 use crate::response::Linear;
 use crate::session::{Session, Sight};
@@ -155,21 +157,102 @@ impl<'a, const N: usize> Study<'a, N> {
         }
         self.repeated = !deviations.is_empty();
         if !self.repeated {
-            deviations = std::iter::zip(&residuals, &self.fitted)
-                .map(|(r, &trial)| flat(r, &self.stretches[trial]))
-                .collect();
+            deviations = self.unexplained(hypothesis, &residuals)?;
         }
         let range: Vec<f64> = (0..channels)
             .map(|c| {
-                let all = self.fitted.iter().flat_map(|&t| &self.courses[t].seen[c]);
+                // An arm that swings freely has no torque to show, but its inertia has.
+                let seen = self.fitted.iter().flat_map(|&t| &self.courses[t].seen[c]);
+                let all = seen.chain(residuals.iter().flat_map(|r| &r[c]));
                 let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
                     (a.min(*v), b.max(*v))
                 });
                 (high - low).max(0.0)
             })
             .collect();
-        self.noise = Noise::of(&deviations, &range)?;
+        self.noise = if self.repeated {
+            Noise::of(&deviations, &range)?
+        } else {
+            Noise::without_repeats(&deviations, &range)?
+        };
         Ok(())
+    }
+
+    /// What is left of residuals when everything that the catalogue could explain is taken out, to first order.
+    ///
+    /// Without repeats this is all that tells of the noise: a residual that still holds what is missing would make the
+    /// missing look like noise.
+    fn unexplained(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        residuals: &[Channels],
+    ) -> Result<Vec<Vec<Vec<f64>>>, GapError> {
+        let coordinates = self.session.nuisances();
+        let library = Library::build(self, hypothesis, None)?;
+        let nuisances = self.responses_to(hypothesis, &coordinates)?;
+        let columns: Vec<&Response> = nuisances
+            .iter()
+            .chain(library.responses.iter().flatten())
+            .collect();
+        let channels = self.session.channels();
+        let size: Vec<f64> = (0..channels)
+            .map(|c| {
+                let all = residuals.iter().flat_map(|r| &r[c]);
+                let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+                libm::sqrt(sum / f64::max(count, 1.0)).max(1e-12)
+            })
+            .collect();
+        let rows = |channels: &Channels, trial: usize| -> Vec<f64> {
+            let picked = flat(channels, &self.stretches[trial]);
+            std::iter::zip(picked, &size)
+                .flat_map(|(values, size)| values.into_iter().map(move |v| v / size))
+                .collect()
+        };
+        let matrices = self.parallel(self.fitted.len(), |i| {
+            let trial = self.fitted[i];
+            let length = self.session.trials[trial].len();
+            let list: Vec<Vec<f64>> = columns
+                .iter()
+                .filter_map(|r| r.0[self.group_of[trial]].as_ref())
+                .map(|c| rows(&fitted_to(c, length), trial))
+                .collect();
+            (list, rows(&residuals[i], trial))
+        });
+        let clusters: Vec<Cluster> = matrices
+            .iter()
+            .map(|(list, residual)| Cluster::new(0, list, residual, &[]))
+            .collect();
+        let list: Vec<&Cluster> = clusters.iter().collect();
+        let mut known = priors(hypothesis, &coordinates);
+        known.resize(columns.len(), None);
+        let mut normal = Normal::new(&list, &known);
+        // Columns repeat each other: a little of the diagonal settles how they share.
+        for i in 0..columns.len() {
+            normal.gram[(i, i)] *= 1.0 + 1e-4;
+        }
+        let usable: Vec<usize> = (0..columns.len())
+            .filter(|&i| normal.gram[(i, i)] > 0.0)
+            .collect();
+        let free = |_: usize| (f64::NEG_INFINITY, f64::INFINITY);
+        let steps = solve(&normal.gram, &normal.score, &usable, &free).map(|(steps, _)| steps);
+        let mut out = Vec::with_capacity(matrices.len());
+        for (list, mut residual) in matrices {
+            for (&i, step) in usable.iter().zip(steps.iter().flatten()) {
+                for (r, c) in residual.iter_mut().zip(&list[i]) {
+                    *r -= step * c;
+                }
+            }
+            let count = residual.len() / channels;
+            out.push(
+                (0..channels)
+                    .map(|c| {
+                        let own = &residual[c * count..(c + 1) * count];
+                        own.iter().map(|v| v * size[c]).collect()
+                    })
+                    .collect(),
+            );
+        }
+        Ok(out)
     }
 
     /// Leaves out the samples at which a joint with dry friction rests, or reverses: there friction is whatever holds it.

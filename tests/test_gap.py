@@ -1,0 +1,105 @@
+"""The gap workflow on synthetic sessions: named, nothing missing, refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.dataset import Dataset
+from armrs.errors import BadInput
+
+ROBOT = armrs.Robot((0.5, 0.45), (1.0, -0.1), "up")
+
+
+def model(*effects: armrs.Effect) -> armrs.Model:
+    segments = (armrs.Segment("upper arm", 0.32, 2.0, 0.15, 0.02), armrs.Segment("forearm", 0.28, 1.3, 0.13, 0.012))
+    joints = (armrs.Joint("shoulder", viscosity=0.1), armrs.Joint("elbow", viscosity=0.1))
+    contact = armrs.Contact((1e4, 1e4), (25.0, 25.0))
+    return armrs.Model(segments, joints, segment_uncertainty=0.02, robot=ROBOT, contact=contact, effects=effects)
+
+
+def session(*hidden: armrs.Effect) -> Dataset:
+    """Return a session that the rapier engine makes: two movements, three repeats to fit and one to test of each."""
+    movements = {
+        "slow": armrs.Movement(np.radians([[-60, 50], [-30, 50], [-30, 85], [-60, 50]]), speed=0.4, acceleration=1.6, shape="smooth"),
+        "fast": armrs.Movement(np.radians([[-50, 80], [-20, 40], [-50, 80]]), speed=1.0, acceleration=4.0, shape="smooth"),
+    }
+    sensors = armrs.Sensors(angle=armrs.Channel(1e-3), force=armrs.Channel(0.1))
+    trials = []
+    for number, (name, movement) in enumerate(movements.items()):
+        run = armrs.simulate(
+            model(*hidden), movement, engine="rapier", rate=100.0, sensors=sensors, seeds=range(4 * number, 4 * number + 4)
+        )
+        for repeat, read in enumerate(run.readings, start=1):
+            trials.append(
+                armrs.Trial(
+                    file=f"{name}_{repeat}.csv",
+                    configuration=name,
+                    repeat=repeat,
+                    role="test" if repeat == 4 else "fit",
+                    t=read["time"],
+                    q=read["q"],
+                    force_on_arm=read["force_on_arm"],
+                    robot_q=read["robot_q"],
+                )
+            )
+    return Dataset("hidden", model(), tuple(trials), force_on="arm", synthetic=True)
+
+
+def test_a_hidden_viscosity_is_named_with_its_value_and_closes_the_gap() -> None:
+    found = armrs.find_gap(session(armrs.Effect("viscous", 2, parameters={"viscosity": 0.4})), threads=2)
+    assert [(e.kind, e.joint) for e in found.effects] == [("viscous", 2)]
+    value = found.effects[0].parameters["viscosity"]
+    assert value.std is not None
+    assert abs(value.value - 0.4) < 4 * value.std < 0.1
+    assert found.verdict == "explained"
+    for channel in ("Fy_N", "Fz_N"):
+        gap = found.gap[channel]
+        assert gap.after is not None and gap.calibrated is not None and gap.floor is not None
+        assert gap.after < 1.2 * gap.floor
+    assert found.gap["Fz_N"].before > 1.5 * found.gap["Fz_N"].floor  # type: ignore[operator]
+    assert found.effects[0].p_value < 1e-6
+    assert found.model.effects[-1].kind == "viscous"
+
+
+def test_nothing_is_missing_where_nothing_is_hidden(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from armrs.dataset import write_dataset
+
+    write_dataset(session(), tmp_path / "data")
+    assert cli.main(["gap", str(tmp_path / "data"), "-o", str(tmp_path / "out")]) == 0
+    assert "Nothing is missing" in capsys.readouterr().out
+    result = json.loads((tmp_path / "out" / "gap.json").read_text(encoding="utf-8"))
+    assert (result["verdict"], result["effects"]) == ("nothing_missing", [])
+    limits = {(w["kind"], w["joint"]): w["at_least"] for w in result["would_have_seen"]}
+    assert 0 < limits["viscous", 2] < 0.4
+    assert armrs.load_model(tmp_path / "out" / "amended.toml").n_joints == 2
+
+
+def changed(data: Dataset, **columns: object) -> Dataset:
+    """Return a data set with columns of every trial changed by functions."""
+    trials = tuple(
+        dataclasses.replace(t, **{name: change(getattr(t, name)) for name, change in columns.items()})  # type: ignore[operator]
+        for t in data.trials
+    )
+    return data.replace(trials=trials)
+
+
+@pytest.mark.parametrize(
+    ("columns", "word"),
+    [
+        ({"force_on_arm": lambda f: -f}, "force_on"),
+        ({"force_on_arm": lambda f: 1000.0 * f}, "mN"),
+        ({"force_on_arm": lambda f: f[:, ::-1]}, "swapped"),
+        ({"q": lambda q: q * [57.29578, 57.29578]}, "degrees"),
+        ({"force_on_arm": lambda f: f * [1.0, 0.0]}, "throughout"),
+    ],
+)
+def test_what_only_a_label_can_explain_is_refused(columns: dict[str, object], word: str) -> None:
+    with pytest.raises(BadInput, match=word):
+        armrs.find_gap(changed(session(), **columns))
