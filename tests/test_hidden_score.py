@@ -194,3 +194,11 @@ def test_an_answer_in_another_form_is_an_error(score: ModuleType, scored: Path) 
 def test_a_folder_without_sessions_is_refused(score: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert score.main([str(tmp_path)]) == 2
     assert "manifest.json" in capsys.readouterr().err
+
+
+def test_a_bias_is_counted_as_the_file_shows_it(score: ModuleType) -> None:
+    bias = {"kind": "force_bias", "joint": None, "channel": "Fz", "parameters": {"bias": {"exact": True, "value": 0.5}}}
+    truth = {"effects": [bias]}
+    assert score.as_in_file(truth, "arm") is truth
+    assert score.as_in_file(truth, "robot")["effects"][0]["parameters"]["bias"]["value"] == -0.5
+    assert bias["parameters"]["bias"]["value"] == 0.5

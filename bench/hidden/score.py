@@ -15,6 +15,7 @@ import argparse
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import time
@@ -128,9 +129,34 @@ def judge(truth: Json, answer: Json) -> Json:
     }
 
 
+def as_in_file(truth: Json, force_on: str | None) -> Json:
+    """Return the truth with biases and drifts of the force as the file's own channels show them.
+
+    The world counts them as of the force on the arm; `armrs gap` speaks of the channel that the user sees.
+    """
+    if force_on != "robot":
+        return truth
+    effects = []
+    for effect in truth["effects"]:
+        if effect["kind"] in ("force_bias", "force_drift"):
+            turned = {name: {**p, "value": -p["value"]} for name, p in effect["parameters"].items()}
+            effect = {**effect, "parameters": turned}
+        effects.append(effect)
+    return {**truth, "effects": effects}
+
+
+def force_on(folder: Path) -> str | None:
+    """Return what the forces of a data set act on."""
+    path = folder / "data" / "dataset.toml"
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    found = re.search(r'^force_on *= *"(\w+)"', text, flags=re.M)
+    return found[1] if found else None
+
+
 def record(folder: Path) -> Json:
     """Return the line of a session: what was hidden, what was said, how that compares."""
     truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    truth = as_in_file(truth, force_on(folder))
     line = {
         "session": folder.name,
         **{key: truth.get(key) for key in ("seed", "family", "strength", "null", "joints", "friction")},
