@@ -37,6 +37,21 @@ macro_rules! each_length {
 
 pub(crate) use each_length;
 
+/// The same for up to four segments, for what is large to compile and means nothing beyond; else `$otherwise`.
+macro_rules! each_short_length {
+    ($any:expr, $chain:ident => $body:expr, $otherwise:expr) => {
+        match $any {
+            AnyChain::One($chain) => $body,
+            AnyChain::Two($chain) => $body,
+            AnyChain::Three($chain) => $body,
+            AnyChain::Four($chain) => $body,
+            AnyChain::Five(_) | AnyChain::Six(_) => $otherwise,
+        }
+    };
+}
+
+pub(crate) use each_short_length;
+
 impl AnyChain {
     fn new(
         segments: &[Segment<f64>],

@@ -14,8 +14,8 @@ use numpy::ToPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arm::{AnyChain, each_length};
-use crate::errors::gap;
+use crate::arm::{AnyChain, each_short_length};
+use crate::errors::{bad_input, gap};
 use crate::ident::{Columns, trial};
 use crate::rig::Rig;
 
@@ -32,6 +32,11 @@ pub struct Settings {
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
     threads: usize,
+}
+
+/// The refusal of an arm that the search is not made for.
+fn too_long() -> PyErr {
+    bad_input("[[arm.segment]]", "more than 4", "1 to 4 segments")
 }
 
 fn session<const N: usize>(
@@ -101,7 +106,7 @@ pub fn play<'py>(
             .collect::<PyResult<Vec<_>>>()?;
         PyList::new(py, plays)
     }
-    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)), Err(too_long()))
 }
 
 /// Searches for what a model lacks; see `armrs.find_gap`.
@@ -136,7 +141,11 @@ pub fn find_gap<'py>(
             .map_err(gap)?;
         result(py, &study, &finding)
     }
-    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings, progress.as_ref())))
+    each_short_length!(
+        &rig.arm.get().chain,
+        c => run(py, c, rig, (&trials, &settings, progress.as_ref())),
+        Err(too_long())
+    )
 }
 
 fn result<'py, const N: usize>(
