@@ -60,6 +60,22 @@ def test_a_trial_drives_the_arm_along_its_robot_angles(slow_arm: Path, tmp_path:
     assert json.loads((tmp_path / "simulated.json").read_text(encoding="utf-8"))["file"] == "simulated.parquet"
 
 
+@pytest.mark.parametrize("lost", [slice(0, 100), slice(200, 300)])
+def test_a_gap_in_what_drives_the_arm_is_refused(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], lost: slice) -> None:
+    head, *rows = (slow_arm / "trials" / "slow_1.csv").read_text(encoding="utf-8").splitlines()
+    robot = [k for k, name in enumerate(head.split(",")) if name.startswith("qr")]
+    cells = [row.split(",") for row in rows]
+    for row in cells[lost]:
+        for k in robot:
+            row[k] = ""
+    trial, out = tmp_path / "gap.csv", tmp_path / "out"
+    trial.write_text("\n".join([head, *map(",".join, cells)]) + "\n", encoding="utf-8")
+    assert run("simulate", slow_arm / "truth.toml", "--trial", trial, "-o", out) == 2
+    found = capsys.readouterr().err.splitlines()[-1]
+    assert "gap.csv: robot angles: found none at " in found and "without a gap" in found
+    assert not out.exists()
+
+
 def test_both_integrators_and_couplings_run(slow_arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     common = ("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--duration-s", 0.2, "--json", "-")
     digests = set()

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 
 from . import _armrs, checks, tomlfile
-from .errors import BadInput
+from .errors import BadInput, Text
 from .model import Model, load_model
 from .rig import rig
 from .trial import Trial
 
 DEFAULT_DT = 0.25e-3
 """Step of the simulation [s]."""
-_MOST_STEPS = 10**9
 DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
 _MOST_STEPS = 10**9
@@ -266,8 +265,13 @@ def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
         kind, values = ("robot", drive.robot_q) if drive.robot_q is not None else ("torque", drive.tau)
         if values is None:
             raise BadInput("columns", "neither robot angles nor joint torques", "qr1_rad and qr2_rad, or tau1_Nm …", file=drive.file)
-        keep = np.isfinite(values).all(axis=1)
-        led |= {"kind": kind, "values": np.array(values[keep]), "times": np.array(drive.t[keep] - drive.t[0])}
+        there = np.isfinite(values).all(axis=1)
+        upto = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
+        if not there[:upto].all() or not upto:
+            lost = float(drive.t[int(np.argmin(there))])
+            what = "robot angles" if kind == "robot" else "joint torques"
+            raise BadInput(what, Text(f"none at {lost:g} s"), "samples without a gap: they drive the arm", file=drive.file)
+        led |= {"kind": kind, "values": np.array(values[:upto]), "times": np.array(drive.t[:upto] - drive.t[0])}
     return led
 
 

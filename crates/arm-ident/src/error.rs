@@ -82,7 +82,7 @@ pub enum IdentError {
     },
     /// The simulated arm moves elsewhere than the measured one.
     #[error(
-        "the simulated arm differs from the measured one by {found} rad in joint {joint}, expected at most {allowed} rad: do the robot's base, lengths and elbow fit?"
+        "the simulated arm differs from the measured one by {found:.3} rad in joint {joint}, expected at most {allowed} rad: do the robot's base, lengths and elbow fit?"
     )]
     OtherMovement {
         /// One-based joint.
