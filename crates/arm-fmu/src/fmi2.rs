@@ -113,9 +113,8 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
 ) -> c_int {
     // SAFETY: see `pointers`.
     unsafe {
-        with(instance, "fmi2SetupExperiment", |i| {
-            i.experiment = (start, (stop_defined != 0).then_some(stop));
-            Ok(())
+        guarded(instance, "fmi2SetupExperiment", |s| {
+            s.set_experiment(start, (stop_defined != 0).then_some(stop))
         })
     }
 }
@@ -125,9 +124,9 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
 pub unsafe extern "C" fn fmi2EnterInitializationMode(instance: Handle) -> c_int {
     // SAFETY: see `pointers`.
     unsafe {
-        with(instance, "fmi2EnterInitializationMode", |i| {
-            let (start, stop) = i.experiment;
-            i.slave.enter_initialization_mode(start, stop)
+        guarded(instance, "fmi2EnterInitializationMode", |s| {
+            let (start, stop) = s.experiment();
+            s.enter_initialization_mode(start, Some(stop))
         })
     }
 }
@@ -154,12 +153,7 @@ pub unsafe extern "C" fn fmi2Terminate(instance: Handle) -> c_int {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Reset(instance: Handle) -> c_int {
     // SAFETY: see `pointers`.
-    unsafe {
-        with(instance, "fmi2Reset", |i| {
-            i.experiment = (0.0, None);
-            i.slave.reset()
-        })
-    }
+    unsafe { guarded(instance, "fmi2Reset", |s| s.reset()) }
 }
 
 /// Reads variables.

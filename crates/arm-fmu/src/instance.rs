@@ -85,8 +85,6 @@ pub struct Instance {
     pub log: Log,
     /// Whether events are logged.
     pub logging: bool,
-    /// Start and stop time that FMI 2.0 gives before the initialization begins.
-    pub experiment: (f64, Option<f64>),
     /// Lost to a panic.
     dead: bool,
 }
@@ -108,7 +106,6 @@ impl Instance {
                     slave,
                     log,
                     logging,
-                    experiment: (0.0, None),
                     dead: false,
                 };
                 Box::into_raw(Box::new(instance)).cast()
@@ -250,13 +247,14 @@ pub unsafe fn set_state(handle: Handle, what: &str, from: *mut c_void) -> c_int 
     unsafe { guarded(handle, what, |slave| slave.set_state(state(from)?)) }
 }
 
-/// Frees the state that `place` holds, and leaves null there.
+/// Frees the state that `place` holds, and leaves null there; without a place there is nothing to free.
 ///
 /// # Safety
 /// As [`get_state`].
 pub unsafe fn free_state(handle: Handle, what: &str, place: *mut *mut c_void) -> c_int {
     let body = |_: &mut Slave| {
-        if let [held] = (unsafe { write(place, 1) })?
+        // SAFETY: null, or valid as the importer promises.
+        if let Some(held) = unsafe { place.as_mut() }
             && !held.is_null()
         {
             // SAFETY: a state that was not freed, as promised.

@@ -1,6 +1,7 @@
 //! What comes from C. The importer promises what the standards say: pointers are null or valid for the number of elements
 //! given with them, strings end with a zero byte, and an instance is used by one thread at a time and not after it was freed.
 
+use std::alloc::Layout;
 use std::ffi::{CStr, c_char};
 
 use arm_cosim::{Refused, Status};
@@ -13,17 +14,30 @@ pub fn error(message: impl Into<String>) -> Refused {
     }
 }
 
+/// Refuses what cannot be an array: a null pointer, or more bytes than there are addresses.
+fn possible<T>(start: *const T, n: usize) -> Result<(), Refused> {
+    if start.is_null() {
+        return Err(error("a null pointer was given for an array"));
+    }
+    match Layout::array::<T>(n) {
+        Ok(_) => Ok(()),
+        Err(_) => Err(error(format!(
+            "{n} elements are more than an array can have"
+        ))),
+    }
+}
+
 /// An array of `n` elements; empty arrays may be null.
 ///
 /// # Safety
 /// See the module.
 pub unsafe fn read<'a, T>(start: *const T, n: usize) -> Result<&'a [T], Refused> {
-    match (start.is_null(), n) {
-        (_, 0) => Ok(&[]),
-        (true, _) => Err(error("a null pointer was given for an array")),
-        // SAFETY: not null, and valid for `n` elements as the importer promises.
-        (false, _) => Ok(unsafe { std::slice::from_raw_parts(start, n) }),
+    if n == 0 {
+        return Ok(&[]);
     }
+    possible(start, n)?;
+    // SAFETY: not null, of a possible size, and valid for `n` elements as the importer promises.
+    Ok(unsafe { std::slice::from_raw_parts(start, n) })
 }
 
 /// An array of `n` elements to be written.
@@ -31,12 +45,12 @@ pub unsafe fn read<'a, T>(start: *const T, n: usize) -> Result<&'a [T], Refused>
 /// # Safety
 /// See the module.
 pub unsafe fn write<'a, T>(start: *mut T, n: usize) -> Result<&'a mut [T], Refused> {
-    match (start.is_null(), n) {
-        (_, 0) => Ok(&mut []),
-        (true, _) => Err(error("a null pointer was given for an array")),
-        // SAFETY: not null, and valid for `n` elements as the importer promises.
-        (false, _) => Ok(unsafe { std::slice::from_raw_parts_mut(start, n) }),
+    if n == 0 {
+        return Ok(&mut []);
     }
+    possible(start, n)?;
+    // SAFETY: as in `read`.
+    Ok(unsafe { std::slice::from_raw_parts_mut(start, n) })
 }
 
 /// Writes one value where the importer wants to have it; nowhere when it gives no place.

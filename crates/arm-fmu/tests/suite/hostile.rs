@@ -103,9 +103,14 @@ fn arrays_that_are_null_or_of_the_wrong_length() {
                 .iter()
                 .any(|(_, text)| text.contains("value reference 9999"))
         );
+        let absurd = usize::MAX / 2;
+        assert_eq!(
+            fmi3::fmi3GetFloat64(instance, [1].as_ptr(), absurd, value.as_mut_ptr(), absurd),
+            ERROR
+        );
         assert_eq!(fmi3::fmi3SetFMUState(instance, null_mut()), ERROR);
         assert_eq!(fmi3::fmi3GetFMUState(instance, null_mut()), ERROR);
-        assert_eq!(fmi3::fmi3FreeFMUState(instance, null_mut()), ERROR);
+        assert_eq!(fmi3::fmi3FreeFMUState(instance, null_mut()), 0);
         let mut state = null_mut();
         assert_eq!(fmi3::fmi3FreeFMUState(instance, &mut state), 0);
         let garbage = [7_u8; 64];
@@ -225,6 +230,29 @@ fn both_interfaces_and_threads_have_the_same_bits() {
         assert_eq!(fmi2::fmi2GetRealStatus(instance, 2, &mut last), 0);
         assert!((last - 1.0).abs() < 1e-12);
         assert_eq!(fmi2::fmi2Terminate(instance), 0);
+        fmi2::fmi2FreeInstance(instance);
+    }
+}
+
+#[test]
+fn the_experiment_of_fmi_2_belongs_to_the_state() {
+    let resources = Resources::new("experiment");
+    unsafe {
+        let instance = resources.two();
+        assert_eq!(fmi2::fmi2SetupExperiment(instance, 0, 0.0, 5.0, 1, 6.0), 0);
+        let mut state = null_mut();
+        assert_eq!(fmi2::fmi2GetFMUstate(instance, &mut state), 0);
+        assert_eq!(fmi2::fmi2Reset(instance), 0);
+        assert_eq!(fmi2::fmi2SetFMUstate(instance, state), 0);
+        assert_eq!(fmi2::fmi2FreeFMUstate(instance, &mut state), 0);
+        assert_eq!(fmi2::fmi2EnterInitializationMode(instance), 0);
+        assert_eq!(fmi2::fmi2ExitInitializationMode(instance), 0);
+        assert_eq!(fmi2::fmi2DoStep(instance, 5.0, 0.5, 1), 0);
+        // Too late to set it up anew.
+        assert_eq!(
+            fmi2::fmi2SetupExperiment(instance, 0, 0.0, 0.0, 0, 0.0),
+            ERROR
+        );
         fmi2::fmi2FreeInstance(instance);
     }
 }
