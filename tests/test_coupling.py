@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from armrs import Contact, Joint, Model, _armrs, cli
 from armrs.cosim import Partner, Slave
 from armrs.cosim.imported import ImportedSlave
 from armrs.cosim.master import Coupled, run_system
+from armrs.cosim.partner import StepResult
 from armrs.cosim.system import couple, load_system
 from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
@@ -127,6 +129,24 @@ def test_an_explicit_master_at_2_ms_is_called_unstable(arm: Rig, robot: Path, al
     assert arm.error(refused.value.run) > 1.0  # and rightly so
 
 
+def test_what_the_arm_received_is_compared_with_what_was_given(arm: Rig, robot: Path) -> None:
+    """The motion port holds what it was given, so that the hold creates nothing; too long a step shows inside the arm."""
+    with pytest.raises(CoupledError, match=r"not resolved: arm receives .* take a shorter step") as refused:
+        arm.run(robot, "motion", "gauss-seidel", 0.1)
+    assert refused.value.run.verdict == "not resolved"
+    assert arm.error(refused.value.run) > 1e-2
+    run = arm.run(robot, "motion", "gauss-seidel", 0.02)
+    assert 3e-4 < arm.error(run) < 4e-4
+    assert any("off what the communication points say" in text for text in run.warnings)
+    assert not any("off what" in text for text in arm.run(robot, "motion", "gauss-seidel", 0.01).warnings)
+
+
+def test_an_explicit_master_that_is_good_is_as_near_as_the_page_says(arm: Rig, robot: Path) -> None:
+    assert arm.error(arm.run(robot, "force", "gauss-seidel", 1e-3)) == pytest.approx(2.4e-3, rel=0.05)
+    with pytest.raises(CoupledError, match="unstable"):
+        arm.run(robot, "force", "jacobi", 1e-3)
+
+
 def test_our_fmu_couples_with_the_same_bits_as_the_slave_in_python(arm: Rig, robot: Path, tmp_path: Path) -> None:
     slave = Slave(arm.model, port="force", start=arm.q)
     ends = [arm.run(robot, "force", "iterated", 0.02, slave).columns["arm.q[1]"].tobytes()]
@@ -202,6 +222,15 @@ def test_a_foreign_partner_of_fmi_3(arm: Rig, tmp_path: Path) -> None:
     # The arm falls freely but for the spring. Second order: a quarter of the step, a sixteenth of the error.
     assert errors[1] < 1e-3
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.1)
+
+
+def test_a_partner_that_asks_to_end_ends_the_run() -> None:
+    class Ending(Wall):
+        def do_step(self, time: float, step: float) -> StepResult:
+            return dataclasses.replace(super().do_step(time, step), terminate=time > 0.05)
+
+    with pytest.raises(CoupledError, match=r"wall asks to end the run after the step from 0\.06 s"):
+        run_system(couple([Ending("y", 1.0, 1.0)], [], step=0.01, duration=1.0))
 
 
 # ---- a wall
@@ -338,6 +367,12 @@ def test_a_run_that_is_no_result_writes_its_diagnosis_alone(folder: Path, capsys
         ('name = "wall"', 'name = "arm"', "a name for each slave"),
         ("start_deg = [-150.0, 20.0]", "start_deg = [-150.0]", "found 1 values, allowed 2"),
         ("[system]", "[sytem]", "unknown key"),
+        ("[-150.0, 20.0]", "5", "start_deg: found 5, allowed a list of numbers"),
+        ("[-150.0, 20.0]", '[-150.0, 20.0]\nstart = { "body[1].m" = "abc" }', "body[1].m: found 'abc', allowed a finite number"),
+        ("[-150.0, 20.0]", '[-150.0, 20.0]\nstart = { "body[1].m" = [1, 2] }', "body[1].m: found [1, 2], allowed a finite number"),
+        ("[-150.0, 20.0]", "[-150.0, 20.0]\nstart = { mass = 1.0 }", "unknown variable 'mass'"),
+        ('name = "wall"', 'name = "wall"\nstart = { "r[1]" = "abc" }', "r[1]: found 'abc', allowed a finite number"),
+        ("step_s = 0.002", "step_s = 1e-300", "at most 10000000 steps of 1e-300 s"),
     ],
 )
 def test_a_system_that_does_not_fit_is_refused(folder: Path, old: str, new: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -153,8 +153,7 @@ class ImportedSlave(Partner):
         self.variables = {v.name: v for v in self.description.variables}
         self.can_rollback = self.description.flag(f"canGetAndSetFMU{'S' if self.fmi == 3 else 's'}tate")
         self.can_vary_step = self.description.flag("canHandleVariableCommunicationStepSize")
-        step = self.description.flags.get("fixedInternalStepSize")
-        self.internal_step = float(step) if step else None
+        self.internal_step = self.description.number("fixedInternalStepSize")
         folder = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
         try:
             unpack(path, folder)

@@ -17,6 +17,7 @@ MOST_CREATED = 0.02
 MOST_IN_STEPS = 0.1
 """The same of the magnitudes summed over steps."""
 WORTH_A_WARNING = 0.005
+_PORT_INPUTS = ("handle.F[", "robot.v[")
 _LITTLE = 1e-6
 """Energy below which a share says nothing [J]."""
 _ITERATIONS = 25
@@ -54,7 +55,7 @@ class Coupled:
     Attributes
     ----------
     system : System
-    verdict : {"good", "unstable", "diverged", "not converged"}
+    verdict : {"good", "unstable", "not resolved", "diverged", "not converged"}
         Only a good run is a result.
     why : str
         One line on the verdict.
@@ -328,6 +329,8 @@ class _Run:
         if done.status == Status.DISCARD:
             reached = f", it came to {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
             raise _Failed(f"{self.slaves[i].name} discards the step from {time:.6g} s{reached}: {done.message}")
+        if done.terminate:
+            raise _Failed(f"{self.slaves[i].name} asks to end the run after the step from {time:.6g} s")
 
     # ---- what is kept
     def _record(self, time: float) -> None:
@@ -357,9 +360,9 @@ class _Run:
             dual = self.system.connections[k].sign * 0.5 * (duals[1:, j] + duals[:-1, j]) * step[:, 0]
             created[:, k] = np.append(0.0, np.cumsum((used[:, k] - mean[:, k]) * dual))
             exchanged[:, k] = np.append(0.0, np.cumsum(mean[:, k] * dual))
-        verdict, why, warnings = self._judge(created, exchanged)
-        names = [f"{s.name}.{name}" for s, listing in zip(self.slaves, self.recorded, strict=True) for name in listing]
         outputs = np.array(self.outputs)[: n + 1]
+        verdict, why, warnings = self._judge(created, exchanged, outputs)
+        names = [f"{s.name}.{name}" for s, listing in zip(self.slaves, self.recorded, strict=True) for name in listing]
         return Coupled(
             system=self.system,
             verdict=verdict,
@@ -374,11 +377,12 @@ class _Run:
             warnings=(*self.system.warnings, *warnings),
         )
 
-    def _judge(self, created: np.ndarray, exchanged: np.ndarray) -> tuple[str, str, list[str]]:
+    def _judge(self, created: np.ndarray, exchanged: np.ndarray, outputs: np.ndarray) -> tuple[str, str, list[str]]:
         if self.stopped is not None:
             return *self.stopped, []
         if not self.dual_of:
-            return "good", "no energy balance: no connection has a dual variable", []
+            why = "no energy balance: no connection has a dual variable"
+            return "good", why, [why] if self.system.connections else []
         warnings = []
         for i in dict.fromkeys(self.target[self.dual_of].tolist()):
             # What enters one slave is judged together: y and z of one handle.
@@ -392,7 +396,33 @@ class _Run:
                 return "unstable", f"{text}; take a shorter step, the iterated algorithm, or the motion port", []
             if most > WORTH_A_WARNING * through:
                 warnings.append(text)
+            inside = self._received(i, outputs)
+            if inside is None:
+                continue
+            # The arm knows what it received between the communication points, whatever was held there.
+            places = [k for k in places if self._input(k).startswith(_PORT_INPUTS)]
+            went = np.nansum(exchanged[:, places], axis=1)
+            off, through = float(np.max(np.abs(inside - went))), max(float(np.max(np.abs(inside))), _LITTLE)
+            text = f"{self.slaves[i].name} receives {through:.3g} J through its port, {off:.3g} J off what the communication points say"
+            if off > MOST_CREATED * through:
+                return "not resolved", f"{text}; take a shorter step", []
+            if off > WORTH_A_WARNING * through:
+                warnings.append(text)
         return "good", "the energy that the coupling creates is small", warnings
+
+    def _input(self, k: int) -> str:
+        """Name of the input at the end of a connection."""
+        return self.system.connections[k].target[1]
+
+    def _received(self, i: int, outputs: np.ndarray) -> np.ndarray | None:
+        """Work through the port of an arm since the start [J], where all of the port is connected; None for other slaves."""
+        port = {name for name in self.slaves[i].variables if name.startswith(_PORT_INPUTS)}
+        given = {self._input(k) for k in self.dual_of if self.target[k] == i}
+        if "work.port" not in self.recorded[i] or not port or not port <= given:
+            return None
+        at = sum(len(listing) for listing in self.recorded[:i]) + self.recorded[i].index("work.port")
+        work: np.ndarray = outputs[:, at] - outputs[0, at]
+        return work
 
     def _report(self, k: int, residual: np.ndarray, created: np.ndarray, exchanged: np.ndarray) -> ConnectionReport:
         connection = self.system.connections[k]

@@ -21,6 +21,8 @@ from .wall import Wall
 
 ALGORITHMS = ("jacobi", "gauss-seidel", "iterated")
 WITHIN = ("start", "mean", "end")
+_MOST_STEPS = 10_000_000
+"""Most communication steps of a run: every one of them is kept."""
 _FORCES = ((1, 1, -2), (1, 2, -2))
 """Powers of kg, m and s of forces and torques."""
 
@@ -154,13 +156,21 @@ def couple(
             raise BadInput("[[connection]]", Text(f"two connections to {'.'.join(connection.target)}"), "one for each input")
         seen.add(connection.target)
     step = checks.number("[system], step_s", step, above=0.0, unit="s")
+    duration = checks.number("[system], duration_s", duration, least=step, unit="s", hint="at least one step")
+    if duration / step > _MOST_STEPS:
+        raise BadInput("[system], duration_s", duration, f"at most {_MOST_STEPS} steps of {step:g} s")
+    for name, values in (starts or {}).items():
+        if name not in named:
+            raise unknown_name("start", name, named, what="slave")
+        for variable, value in values.items():
+            _check_start(named[name], variable, value)
     return System(
         slaves=named,
         connections=tuple(joined),
         starts={name: dict(values) for name, values in (starts or {}).items()},
         algorithm=checks.choice("[system], algorithm", algorithm, ALGORITHMS),
         step=step,
-        duration=checks.number("[system], duration_s", duration, least=step, unit="s", hint="at least one step"),
+        duration=duration,
         tolerance=checks.number("[system], tolerance", tolerance, above=0.0, most=0.1),
         warnings=tuple(warnings),
     )
@@ -197,6 +207,25 @@ def load_system(path: str | os.PathLike[str]) -> System:
         raise
 
 
+def _check_start(slave: Partner, name: str, value: object) -> None:
+    """Refuse a start value of a variable that is not known, or of another kind than the variable."""
+    place = f"{slave.name}, [slave.start]"
+    if name not in slave.variables:
+        raise unknown_name(place, name, slave.variables, what="variable")
+    kind = slave.variables[name].type
+    if kind == "String":
+        if not isinstance(value, str):
+            raise BadInput(f"{place}, {name}", value, "a text")
+    elif kind == "Boolean":
+        checks.flag(f"{place}, {name}", value)
+    elif kind.startswith(("Int", "UInt")):
+        bits, signed = int(kind.lstrip("UInt")), kind.startswith("Int")
+        least = -(2 ** (bits - 1)) if signed else 0
+        checks.whole(f"{place}, {name}", value, least=least, most=least + 2**bits - 1)
+    else:
+        checks.number(f"{place}, {name}", value)
+
+
 def _slave(table: dict[str, Any], folder: Path) -> Partner:
     kinds = [kind for kind in ("model", "fmu", "wall") if kind in table]
     if len(kinds) != 1:
@@ -210,11 +239,13 @@ def _slave(table: dict[str, Any], folder: Path) -> Partner:
     path = folder / checks.text(kind, table[kind])
     if kind == "fmu":
         checks.keys("", table, required=["fmu"], optional=["name", "start"])
-        return ImportedSlave(path, name=table.get("name"))
+        return ImportedSlave(path, name=checks.text("name", table["name"]) if "name" in table else None)
     optional = ["name", "port", "start", "start_deg", "rest", "inner_step_s", "handle_m"]
     checks.keys("", table, required=["model"], optional=optional)
     degrees = table.get("start_deg")
     if degrees is not None:
+        if not isinstance(degrees, list):
+            raise BadInput("start_deg", degrees, "a list of numbers, one a joint")
         degrees = [np.radians(checks.number(f"start_deg[{k}]", item)) for k, item in enumerate(degrees)]
     settings = {"step": table["inner_step_s"]} if "inner_step_s" in table else {}
     return Slave(

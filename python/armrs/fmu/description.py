@@ -77,6 +77,10 @@ class Description:
         """Return a capability; what is not written is false."""
         return self.flags.get(name) in ("true", "1")
 
+    def number(self, name: str) -> float | None:
+        """Return a capability that is a finite number; None for any other text."""
+        return _number(self.flags.get(name))
+
 
 def read_description(path: str | os.PathLike[str]) -> Description:
     """Read the model description of an FMU.

@@ -85,8 +85,11 @@ def _starts(slave: ImportedSlave) -> None:
 
 
 def _steps(slave: ImportedSlave) -> None:
-    experiment = slave.description.experiment
-    size = float(experiment.get("stepSize") or slave.internal_step or 0.01)
+    asked = slave.description.experiment.get("stepSize")
+    try:
+        size = float(asked or slave.internal_step or 0.01)
+    except ValueError:
+        size = slave.internal_step or 0.01  # what the description says wrong is a finding of its own
     outputs = [v.name for v in slave.variables.values() if v.causality == "output" and _readable(v)]
     _step("making a step")
     if not slave.can_rollback:
