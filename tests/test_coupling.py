@@ -251,6 +251,13 @@ def test_a_wall_takes_energy_and_gives_none() -> None:
     assert np.ptp(energy) < 1e-6
 
 
+def test_a_wall_beyond_all_numbers_does_not_converge() -> None:
+    arm = load_system(EXAMPLES / "cosim" / "wall.toml").slaves["arm"]
+    lines = [("arm.handle.r", "wall.r"), ("wall.F", "arm.handle.F")]
+    with pytest.raises(CoupledError, match=r"not converged|diverged"), np.errstate(all="ignore"):
+        run_system(couple([arm, Wall("y", 0.1, 1e308)], lines, algorithm="iterated", step=2e-3, duration=2.0))
+
+
 def test_explicit_coupling_with_a_wall_is_refused() -> None:
     """The textbook instability of haptic rendering: a sampled wall gives back more than it took."""
     with pytest.raises(CoupledError, match="unstable"):
@@ -372,6 +379,7 @@ def test_a_run_that_is_no_result_writes_its_diagnosis_alone(folder: Path, capsys
         ("[-150.0, 20.0]", '[-150.0, 20.0]\nstart = { "body[1].m" = [1, 2] }', "body[1].m: found [1, 2], allowed a finite number"),
         ("[-150.0, 20.0]", "[-150.0, 20.0]\nstart = { mass = 1.0 }", "unknown variable 'mass'"),
         ('name = "wall"', 'name = "wall"\nstart = { "r[1]" = "abc" }', "r[1]: found 'abc', allowed a finite number"),
+        ('to = "arm.handle.F"', 'to = "arm.handle.F"\ndual = "handle.F[1]"', "a variable that makes a power with handle.F[1]"),
         ("step_s = 0.002", "step_s = 1e-300", "at most 10000000 steps of 1e-300 s"),
     ],
 )

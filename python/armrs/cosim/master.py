@@ -295,6 +295,8 @@ class _Run:
                 self.jacobian = _differences(residual, guess, r, 1e-4 * np.maximum(nominal, np.abs(guess)))
                 r = residual(guess)
             for _ in range(_ITERATIONS):
+                if not (np.isfinite(self.jacobian).all() and np.isfinite(r).all()):
+                    break
                 change = np.linalg.lstsq(self.jacobian, -r, rcond=None)[0]
                 if not np.isfinite(change).all() or not change.any():
                     break

@@ -21,6 +21,7 @@ from .wall import Wall
 
 ALGORITHMS = ("jacobi", "gauss-seidel", "iterated")
 WITHIN = ("start", "mean", "end")
+_POWER = (1, 2, -3)
 _MOST_STEPS = 10_000_000
 """Most communication steps of a run: every one of them is kept."""
 _FORCES = ((1, 1, -2), (1, 2, -2))
@@ -325,6 +326,9 @@ def _dual(given: object, target: tuple[str, str], slaves: dict[str, Partner]) ->
         name = checks.text("dual", given)
         if name not in known:
             raise unknown_name("dual", name, known, what=f"variable of {target[0]}")
+        one, other = known[target[1]].exponents, known[name].exponents
+        if one is not None and other is not None and tuple(a + b for a, b in zip(one[:3], other[:3], strict=True)) != _POWER:
+            raise BadInput("dual", name, f"a variable that makes a power with {target[1]}")
         return name, 1.0
     for stem, dual, sign in (("handle.F", "handle.v", 1.0), ("robot.v", "contact.F", -1.0)):
         match = re.fullmatch(rf"{re.escape(stem)}(\[\d+\])", target[1])
