@@ -272,9 +272,12 @@ fn resistance(
     force: [armrs_real; 2],
 ) -> arm_core::Joints<armrs_real, ARMRS_JOINTS> {
     let chain = arm.equation.chain();
+    let effects = arm.equation.effects();
+    if !arm.equation.feels_force() {
+        return resisting_torque(effects, seen, &arm.memory);
+    }
     let bearing = joint_force(chain, pose, (&seen.qd, &seen.qdd), force);
-    let seen = seen.with_joint_force(&bearing);
-    resisting_torque(arm.equation.effects(), &seen, &arm.memory)
+    resisting_torque(effects, &seen.with_joint_force(&bearing), &arm.memory)
 }
 
 /// Torques that motors would need for a motion under a load [N m]: inertia, gravity and effects, less what the load's force

@@ -11,6 +11,9 @@ pub(crate) fn finite<T: Scalar>(name: &'static str, index: usize, value: T) -> R
     }
 }
 
+/// Smallest number that counts as positive: the smallest normal one of single precision.
+pub(crate) const SMALLEST: f64 = f32::MIN_POSITIVE as f64;
+
 fn at_least<T: Scalar>(
     name: &'static str,
     index: usize,
@@ -18,7 +21,7 @@ fn at_least<T: Scalar>(
     min: f64,
 ) -> Result<(), Invalid> {
     finite(name, index, value)?;
-    if value.every(|v| v >= min) {
+    if value.within(min, f64::INFINITY) {
         return Ok(());
     }
     let found = core::cell::Cell::new(min);
@@ -48,7 +51,7 @@ pub(crate) fn positive<T: Scalar>(
     index: usize,
     value: T,
 ) -> Result<(), Invalid> {
-    at_least(name, index, value, f64::MIN_POSITIVE)
+    at_least(name, index, value, SMALLEST)
 }
 
 /// That a range is one; either end may be infinite.

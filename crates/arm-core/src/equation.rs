@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::effect::{Effect, Motion};
+use crate::effect::{Effect, Motion, resisting_torque};
 use crate::scalar::Real;
 use crate::{
     Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, regressor, static_torque,
@@ -45,6 +45,7 @@ pub struct Equation<T, const N: usize, const P: usize, const E: usize> {
     /// How many parameters of each effect are unknowns: the leading ones, see [`Info`](crate::effect::Info).
     linear: [usize; E],
     used: usize,
+    feels_force: bool,
 }
 
 /// One row a joint: `columns · unknowns + known` is the torque that the motion needs \[N m\].
@@ -105,6 +106,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
             effects,
             linear: leading,
             used,
+            feels_force: effects.iter().any(|e| e.on && e.kind.feels_force()),
         })
     }
 
@@ -115,6 +117,10 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     /// The effects with the values expected of them.
     pub fn effects(&self) -> &[Effect<T>; E] {
         &self.effects
+    }
+    /// Whether an effect depends on the forces through the joints; otherwise they need not be computed.
+    pub fn feels_force(&self) -> bool {
+        self.feels_force
     }
     /// Number of unknowns in use; the others have no influence.
     pub fn used(&self) -> usize {
@@ -222,13 +228,12 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         measured: &Measured<T, N>,
     ) -> (Needed<T, N, P>, Joints<T, N>) {
         let pose = Pose::new(&motion.q);
-        let force = joint_force(
-            &self.chain,
-            &pose,
-            (&motion.qd, &motion.qdd),
-            measured.force_on_arm,
-        );
-        let seen = motion.with_joint_force(&force);
+        let mut seen = *motion;
+        if self.feels_force() {
+            let moving = (&motion.qd, &motion.qdd);
+            let force = joint_force(&self.chain, &pose, moving, measured.force_on_arm);
+            seen = seen.with_joint_force(&force);
+        }
         let mut rows = self.inertial(&pose, &motion.qd, &motion.qdd);
         self.add_effects(&seen, memory, &mut rows);
         let acting = static_torque(
@@ -289,20 +294,14 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         let mut column = 2 * N;
         let effects = self.effects.iter().zip(&self.linear).zip(memory);
         for ((effect, &count), &state) in effects.filter(|((e, _), _)| e.on) {
-            let local = motion.local(effect.index, state);
-            let crosses = effect.kind.crosses() && effect.index > 0;
-            let share = effect.proximal_share();
             if count == 0 {
-                let torque = effect.torque(&local);
-                if let Some(known) = rows.known.get_mut(effect.index) {
-                    *known += torque;
-                }
-                if crosses && let Some(known) = rows.known.get_mut(effect.index - 1) {
-                    *known += share * torque;
-                }
+                let one = core::slice::from_ref(effect);
+                rows.known += resisting_torque(one, motion, &[state]);
                 continue;
             }
-            let gradient = effect.gradient(&local);
+            let crosses = effect.kind.crosses() && effect.index > 0;
+            let share = effect.proximal_share();
+            let gradient = effect.gradient(&motion.local(effect.index, state));
             let mut add = |joint: usize, share: T| {
                 if let Some(row) = rows.columns.get_mut(joint) {
                     let places = row.iter_mut().skip(column).take(count);

@@ -281,5 +281,5 @@ impl<T: Real, const C: usize> Monitor<T, C> {
 }
 
 fn seconds<T: Real>(microseconds: u64) -> T {
-    T::of(microseconds as f64 * 1e-6)
+    T::of_count(microseconds) * T::of(1e-6)
 }

@@ -3,7 +3,8 @@
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use crate::series::{
-    DOUBLE, LARGEST_REDUCED, SATURATED, SINGLE, exp, reduced_sin_cos, tanh, turned, turned_single,
+    DOUBLE, LARGEST_REDUCED, SATURATED, SINGLE, exp, far_reduced_sin_cos, reduced_sin_cos, tanh,
+    turned, turned_single,
 };
 
 /// A real number, or several side by side.
@@ -34,6 +35,11 @@ pub trait Scalar:
     fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
     /// Whether every lane satisfies a condition.
     fn every(self, condition: impl Fn(f64) -> bool) -> bool;
+    /// Whether every lane lies in a range, its ends rounded to this number and included.
+    #[inline]
+    fn within(self, min: f64, max: f64) -> bool {
+        self.every(|value| value >= min && value <= max)
+    }
     /// Each lane through a function of one `f64`.
     fn map(self, f: impl Fn(f64) -> f64) -> Self;
     /// Square root.
@@ -82,6 +88,10 @@ pub trait Scalar:
 pub trait Real: Scalar + PartialOrd {
     /// The same number in double precision.
     fn to_f64(self) -> f64;
+    /// The nearest number to a count.
+    fn of_count(count: u64) -> Self;
+    /// Its whole part; zero for what is negative or no number, the largest count for what is larger.
+    fn whole(self) -> u32;
 }
 
 impl Real for f64 {
@@ -89,12 +99,28 @@ impl Real for f64 {
     fn to_f64(self) -> f64 {
         self
     }
+    #[inline]
+    fn of_count(count: u64) -> Self {
+        count as f64
+    }
+    #[inline]
+    fn whole(self) -> u32 {
+        self as u32
+    }
 }
 
 impl Real for f32 {
     #[inline]
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+    #[inline]
+    fn of_count(count: u64) -> Self {
+        count as f32
+    }
+    #[inline]
+    fn whole(self) -> u32 {
+        self as u32
     }
 }
 
@@ -105,13 +131,12 @@ fn far_sin_cos(x: f64) -> (f64, f64) {
     libm::sincos(x)
 }
 
-/// Reduced in double precision. Beyond 10⁸ neighbouring numbers are more than a turn apart: no angle, and NaN.
+/// Beyond 10⁸ neighbouring numbers are more than a turn apart: no angle, and NaN.
 #[cold]
 #[inline(never)]
 fn far_sin_cos_single(x: f32) -> (f32, f32) {
     if x.abs() < 1e8 {
-        let (sin, cos) = turned(reduced_sin_cos(f64::from(x), &DOUBLE));
-        (sin as f32, cos as f32)
+        turned_single(far_reduced_sin_cos(x))
     } else {
         (f32::NAN, f32::NAN)
     }
@@ -185,6 +210,10 @@ impl Scalar for f32 {
     fn is_finite(self) -> bool {
         // Not through double precision, which small processors compute in software.
         Self::is_finite(self)
+    }
+    #[inline]
+    fn within(self, min: f64, max: f64) -> bool {
+        self >= min as f32 && self <= max as f32
     }
     #[inline]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {

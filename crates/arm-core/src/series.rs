@@ -78,12 +78,48 @@ pub(crate) fn reduced_sin_cos<T: Scalar, const S: usize, const C: usize>(
     let n = quarters - T::of(k.round);
     // In this order: the first two products and differences are exact, which the tiny rest at a multiple of π/2 needs.
     let r = ((x - n * T::of(k.half_pi[0])) - n * T::of(k.half_pi[1])) - n * T::of(k.half_pi[2]);
+    polynomials(quarters, r, k)
+}
+
+/// Sine and cosine of the rest `r` of a reduction, within ±π/4.
+#[inline]
+fn polynomials<T: Scalar, const S: usize, const C: usize>(
+    quarters: T,
+    r: T,
+    k: &Trigonometry<S, C>,
+) -> Reduced<T> {
     let z = r * r;
     let sin = r + r * z * series(&k.sine, z);
     let half = T::of(0.5) * z;
     let w = T::ONE - half;
     let cos = w + (((T::ONE - w) - half) + z * z * series(&k.cosine, z));
     Reduced { quarters, sin, cos }
+}
+
+/// As [`reduced_sin_cos`], for single precision from 2¹² to 2²⁷: with the quarter turns in integers of 64 bits, of which
+/// the upper two count the whole ones. No double precision, which small processors compute in software.
+pub(crate) fn far_reduced_sin_cos(x: f32) -> Reduced<f32> {
+    /// 2/π times 2⁶⁴.
+    const QUARTERS_PER_RADIAN: u64 = 0xa2f9_836e_4e44_152a;
+    /// π/2 times 2³¹.
+    const HALF_PI: i64 = 0xc90f_daa2;
+    let bits = x.abs().to_bits();
+    let mantissa = u64::from(bits & 0x007f_ffff | 0x0080_0000);
+    // |x| is the mantissa times 2^(exponent − 150), and the quarters below are times 2⁶².
+    let exponent = bits >> 23;
+    let scaled = if exponent > 152 {
+        QUARTERS_PER_RADIAN << ((exponent - 152) & 63)
+    } else {
+        QUARTERS_PER_RADIAN >> ((152 - exponent) & 63)
+    };
+    let quarters = scaled.wrapping_mul(mantissa);
+    let nearest = quarters.wrapping_add(1 << 61) >> 62;
+    // To radians in integers too, so that there is one rounding.
+    let rest = (quarters.wrapping_sub(nearest << 62) as i64) >> 31;
+    let r = rest.wrapping_mul(HALF_PI) as f32 * (1.0 / (1_u64 << 62) as f32);
+    let sign = 1.0_f32.copysign(x);
+    let whole = sign * nearest as u32 as f32;
+    polynomials(SINGLE.round as f32 + whole, sign * r, &SINGLE)
 }
 
 /// `c₀ + c₁z + c₂z² + …` by pairs, which wait for each other half as often as one by one.

@@ -150,6 +150,8 @@ pub trait Law {
     const INFO: Info;
     /// Whether it acts in the joint before as well, by [`Law::proximal_share`].
     const CROSSES: bool = false;
+    /// Whether it looks at [`Local::joint_force`].
+    const FEELS_FORCE: bool = false;
     /// How a search asks for it.
     const PROBE: Probe = Probe::FIRST;
 

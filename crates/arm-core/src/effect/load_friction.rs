@@ -23,6 +23,7 @@ impl Law for LoadFriction {
         ],
         memory: false,
     };
+    const FEELS_FORCE: bool = true;
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]);
 
     #[inline]

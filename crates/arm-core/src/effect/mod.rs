@@ -45,6 +45,10 @@ macro_rules! catalogue {
             pub const fn crosses(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::CROSSES),* }
             }
+            /// Whether it depends on the force through the joint.
+            pub const fn feels_force(self) -> bool {
+                match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE),* }
+            }
         }
 
         impl<T: Scalar> Effect<T> {
@@ -197,7 +201,7 @@ impl<T: Scalar> Effect<T> {
             Place::Frame | Place::Contact | Place::Hand | Place::Sensors => usize::MAX,
         };
         // What also acts in the joint before needs one.
-        let shared = info.place == Place::Joint && !self.proximal_share().every(|s| s == 0.0);
+        let shared = info.place == Place::Joint && !self.proximal_share().within(0.0, 0.0);
         let first = usize::from(shared);
         if self.index < first || self.index >= places {
             return Err(Invalid::OutOfRange {
@@ -214,11 +218,12 @@ impl<T: Scalar> Effect<T> {
                 return Err(Invalid::NotFinite { name, index });
             }
             let (min, max) = (parameter.min, parameter.max);
-            let found = core::cell::Cell::new(min);
-            if !value.every(|v| {
-                found.set(v);
-                v >= min && v <= max
-            }) {
+            if !value.within(min, max) {
+                let found = core::cell::Cell::new(min);
+                let _ = value.every(|v| {
+                    found.set(v);
+                    v >= min && v <= max
+                });
                 return Err(Invalid::OutOfRange {
                     name,
                     index,

@@ -1,4 +1,4 @@
-//! One sensor channel: what is wrong with its values, and a low-pass that also differentiates.
+//! One sensor channel: what is wrong with its values, and low-passes that also differentiate.
 
 use crate::scalar::Real;
 
@@ -18,12 +18,11 @@ pub enum Fault {
 }
 
 /// A second-order low-pass of two integrators (trapezoidal state-variable filter: Zavalishin 2012, chapter 4), with the
-/// derivatives of what it lets through. Butterworth: no overshoot in frequency.
+/// derivative of what it lets through. Butterworth: no overshoot in frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cutoff<T> {
     /// Frequency-warped cutoff, `tan(π f/f_s)`.
     pub g: T,
-    damping: T,
     scale: T,
 }
 
@@ -32,25 +31,28 @@ impl<T: Real> Cutoff<T> {
         let damping = T::of(core::f64::consts::SQRT_2);
         Self {
             g,
-            damping,
             scale: T::ONE / (T::ONE + g * (g + damping)),
         }
     }
 }
 
 /// The two integrators.
+///
+/// Well below the cutoff the second one moves by less than a last bit of single precision in a period. It would stick, and the
+/// rates with it, did it not keep what rounding takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LowPass<T> {
     first: T,
     second: T,
+    /// What `second` lacks by rounding (fast two-sum: Dekker 1971).
+    lost: T,
 }
 
-/// A filtered value and its derivatives, in units of the value over the filter's own time `1/(2 g f_s)`.
+/// A filtered value and its derivative, in units of the value over the filter's own time `1/(2 g f_s)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Smooth<T> {
     pub value: T,
     pub rate: T,
-    pub rate_of_rate: T,
 }
 
 impl<T: Real> LowPass<T> {
@@ -59,25 +61,36 @@ impl<T: Real> LowPass<T> {
         Self {
             first: T::ZERO,
             second: value,
+            lost: T::ZERO,
         }
     }
 
     #[inline]
     fn step(&mut self, input: T, cutoff: &Cutoff<T>) -> Smooth<T> {
-        let error = input - self.second;
-        let band = cutoff.scale * (self.first + cutoff.g * error);
-        let low = self.second + cutoff.g * band;
-        self.first = band + band - self.first;
-        self.second = low + low - self.second;
-        Smooth {
-            value: low,
-            rate: band,
-            rate_of_rate: input - cutoff.damping * band - low,
+        if input == T::ZERO && *self == Self::at(T::ZERO) {
+            // A sensor that is not there costs nothing.
+            return Smooth {
+                value: T::ZERO,
+                rate: T::ZERO,
+            };
         }
+        let error = (input - self.second) - self.lost;
+        let band = cutoff.scale * (self.first + cutoff.g * error);
+        let half = cutoff.g * band;
+        let value = self.second + (self.lost + half);
+        self.first = band + band - self.first;
+        let step = self.lost + (half + half);
+        let moved = self.second + step;
+        self.lost = step - (moved - self.second);
+        self.second = moved;
+        Smooth { value, rate: band }
     }
 }
 
 /// A sensor channel: checks, then two low-passes in a row.
+///
+/// The rates are those of the first low-pass and pass the second as they are. Taken from the second they would be the same
+/// but for rounding: a difference of nearly equal angles, whose last bits the pace of the filter, squared, makes large.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Channel<T> {
     /// Last value that came, good or not.
@@ -92,7 +105,9 @@ pub(super) struct Channel<T> {
     unchanged: u32,
     /// Whether it ever changed: a sensor that is not there cannot freeze.
     alive: bool,
-    filter: [LowPass<T>; 2],
+    first: LowPass<T>,
+    of_value: LowPass<T>,
+    of_rate: LowPass<T>,
 }
 
 impl<T: Real> Channel<T> {
@@ -104,7 +119,9 @@ impl<T: Real> Channel<T> {
             bridged: 0,
             unchanged: 0,
             alive: false,
-            filter: [LowPass::at(T::ZERO); 2],
+            first: LowPass::at(T::ZERO),
+            of_value: LowPass::at(T::ZERO),
+            of_rate: LowPass::at(T::ZERO),
         }
     }
 
@@ -118,7 +135,9 @@ impl<T: Real> Channel<T> {
         self.trend = T::ZERO;
         self.bridged = 0;
         self.unchanged = 0;
-        self.filter = [LowPass::at(value); 2];
+        self.first = LowPass::at(value);
+        self.of_value = self.first;
+        self.of_rate = LowPass::at(T::ZERO);
         true
     }
 
@@ -154,11 +173,11 @@ impl<T: Real> Channel<T> {
         if moved <= farthest {
             return None;
         }
-        let periods = T::of(f64::from(self.bridged + 1));
+        let periods = T::of_count(u64::from(self.bridged) + 1);
         (moved > farthest * periods).then_some(Fault::Spike)
     }
 
-    /// Takes a good value, or bridges the lack of one by going on as before.
+    /// Takes a good value, or bridges the lack of one by going on as before; what the first low-pass lets through.
     #[inline]
     pub fn step(&mut self, value: Option<T>, cutoff: &Cutoff<T>) -> Smooth<T> {
         match value {
@@ -171,18 +190,22 @@ impl<T: Real> Channel<T> {
                 self.bridged = self.bridged.saturating_add(1);
             }
         }
-        if self.last == T::ZERO && self.filter == [LowPass::at(T::ZERO); 2] {
-            // A sensor that is not there costs nothing.
-            return Smooth {
-                value: T::ZERO,
-                rate: T::ZERO,
-                rate_of_rate: T::ZERO,
-            };
-        }
-        let [first, second] = &mut self.filter;
-        let smooth = first.step(self.last, cutoff);
+        let smooth = self.first.step(self.last, cutoff);
         self.trend = (cutoff.g + cutoff.g) * smooth.rate;
-        second.step(smooth.value, cutoff)
+        smooth
+    }
+
+    /// The value behind the second low-pass.
+    #[inline]
+    pub fn value(&mut self, first: &Smooth<T>, cutoff: &Cutoff<T>) -> T {
+        self.of_value.step(first.value, cutoff).value
+    }
+
+    /// The first and the second rate of [`Channel::value`].
+    #[inline]
+    pub fn rates(&mut self, first: &Smooth<T>, cutoff: &Cutoff<T>) -> [T; 2] {
+        let smooth = self.of_rate.step(first.rate, cutoff);
+        [smooth.value, smooth.rate]
     }
 
     pub fn bridged(&self) -> u32 {

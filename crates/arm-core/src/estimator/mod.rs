@@ -295,7 +295,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             let good = if found.is_some() { None } else { value };
             channel.step(good, &self.tuning.cutoff)
         };
-        // Without a better lead the angles lead themselves, and are filtered once.
+        // Without a better lead the angles lead themselves.
         let mut filtered = |kind: usize| -> [Smooth<T>; N] {
             let farthest = if kind < 2 { turn } else { load };
             from_fn(|j| {
@@ -306,19 +306,28 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let angle = filtered(0);
         let lead = if self.led { filtered(1) } else { angle };
         let torque = filtered(2);
-        let hand =
-            from_fn::<_, 3, _>(|c| pass(&mut self.hand[c], sample.map(|s| of_hand(s, c)), load));
+        let hand: [Smooth<T>; 3] =
+            from_fn(|c| pass(&mut self.hand[c], sample.map(|s| of_hand(s, c)), load));
         let all = self.joints.iter().flatten().chain(&self.hand);
         if all.map(Channel::bridged).fold(0, Ord::max) > self.tuning.longest_gap {
             self.running = false;
         }
         let pace = self.tuning.pace;
+        let cutoff = &self.tuning.cutoff;
+        let [angles, leads, torques] = &mut self.joints;
+        let leads = if self.led { leads } else { &mut *angles };
+        let rates: [[T; 2]; N] = from_fn(|j| leads[j].rates(&lead[j], cutoff));
         let mut motion = Motion::new(
             T::ZERO,
-            joints(angle.map(|s| s.value)),
-            joints(lead.map(|s| s.rate * pace)),
+            joints(from_fn(|j| angles[j].value(&angle[j], cutoff))),
+            joints(rates.map(|[rate, _]| rate * pace)),
         );
-        motion.qdd = joints(lead.map(|s| s.rate_of_rate * pace.squared()));
+        motion.qdd = joints(rates.map(|[_, rate]| rate * pace.squared()));
+        let measured = Measured {
+            torque: joints(from_fn(|j| torques[j].value(&torque[j], cutoff))),
+            force_on_arm: from_fn(|c| self.hand[c].value(&hand[c], cutoff)),
+            moment_on_arm: self.hand[2].value(&hand[2], cutoff),
+        };
         self.moving = motion.qd.iter().any(|qd| qd.abs() > self.tuning.dead_band);
         self.equation
             .advance(&motion, &mut self.memory, self.tuning.period);
@@ -329,11 +338,6 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             self.settling -= 1;
             return Err(Heed::Settling);
         }
-        let measured = Measured {
-            torque: joints(torque.map(|s| s.value)),
-            force_on_arm: [hand[0].value, hand[1].value],
-            moment_on_arm: hand[2].value,
-        };
         Ok((motion, measured))
     }
 

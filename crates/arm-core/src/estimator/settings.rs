@@ -2,7 +2,7 @@
 
 use super::channel::Cutoff;
 use crate::Invalid;
-use crate::check::{finite, positive};
+use crate::check::{SMALLEST, at_least_zero, finite, positive};
 use crate::scalar::Real;
 
 /// How an estimator works.
@@ -101,8 +101,7 @@ const FEWEST_ROWS: u32 = 20;
 impl<T: Real, const N: usize> Tuning<T, N> {
     /// * `unknowns` - how many there are: the work to be spread over a window
     pub fn new(s: &Settings<T, N>, unknowns: usize) -> Result<Self, Invalid> {
-        let (period, cutoff) = (s.period.to_f64(), s.cutoff.to_f64());
-        let window = s.window.to_f64();
+        let (period, cutoff, window) = (s.period, s.cutoff, s.window);
         positive("control period", 0, s.period)?;
         finite("control period", 0, s.period)?;
         positive("cutoff", 0, s.cutoff)?;
@@ -123,18 +122,19 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             ("freezing time", s.frozen_after),
             ("time of forgetting", s.forgetting),
         ] {
-            in_range(name, value.to_f64(), f64::MIN_POSITIVE, f64::INFINITY)?;
+            in_range(name, value, SMALLEST, f64::INFINITY)?;
         }
-        in_range("dead band", s.dead_band.to_f64(), 0.0, f64::MAX)?;
+        at_least_zero("dead band", 0, s.dead_band)?;
 
-        let (sin, cos) = (T::of(core::f64::consts::PI * cutoff * period)).sin_cos();
+        let (sin, cos) = (T::of(core::f64::consts::PI) * cutoff * period).sin_cos();
         let g = sin / cos;
         let length = periods(window / period);
-        let stride = (libm::round(1.0 / (ROWS_PER_PERIOD * cutoff * period)) as u32)
+        let stride = (T::ONE / (T::of(ROWS_PER_PERIOD) * cutoff * period) + T::of(0.5))
+            .whole()
             .min(length / FEWEST_ROWS)
             .max(1);
         let rows = length / stride;
-        let quarantine = periods(s.frozen_after.to_f64() / period).min(length / 2);
+        let quarantine = periods(s.frozen_after / period).min(length / 2);
         // Rows, forgetting, a copy, a publication, and at most every unknown to its bound and its deviation.
         let work = (N + 3 + 2 * unknowns) as u32;
         // Done in the periods that have no row, if there are such.
@@ -152,40 +152,41 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             window: length,
             stride,
             rows,
-            enough: periods(ENOUGH * f64::from(rows)).max(1),
+            enough: periods(T::of(ENOUGH) * T::of_count(u64::from(rows))).max(1),
             noise: s.noise,
             weight: s.noise.map(|noise| T::ONE / noise.squared()),
             dead_band: s.dead_band,
             gate: s.gate,
             farthest: [s.fastest * s.period, s.steepest * s.period],
-            frozen_after: periods(s.frozen_after.to_f64() / period),
-            longest_gap: periods(LONGEST_GAP / period).max(2),
-            settling: periods(SETTLING / (cutoff * period)),
+            frozen_after: periods(s.frozen_after / period),
+            longest_gap: periods(T::of(LONGEST_GAP) / period).max(2),
+            settling: periods(T::of(SETTLING) / (cutoff * period)),
             quarantine,
             pace_of_work: work.div_ceil(free.max(1)),
             fade: forgotten,
             // One of the unknowns in turn, so that each comes back at the pace at which it fades.
-            refresh: (T::ONE - forgotten) * T::of(unknowns as f64),
+            refresh: (T::ONE - forgotten) * T::of_count(unknowns as u64),
         })
     }
 }
 
-fn periods(count: f64) -> u32 {
-    // The conversion saturates: an infinite time is as many periods as can be counted.
-    libm::ceil(count) as u32
+/// Counted up; an infinite time is as many periods as can be counted.
+fn periods<T: Real>(count: T) -> u32 {
+    let whole = count.whole();
+    whole.saturating_add(u32::from(T::of_count(u64::from(whole)) < count))
 }
 
-fn in_range(name: &'static str, found: f64, min: f64, max: f64) -> Result<(), Invalid> {
-    if found >= min && found <= max {
+fn in_range<T: Real>(name: &'static str, found: T, min: f64, max: f64) -> Result<(), Invalid> {
+    if found.within(min, max) {
         return Ok(());
     }
-    if found.is_nan() {
+    if found.partial_cmp(&T::ZERO).is_none() {
         return Err(Invalid::NotFinite { name, index: 0 });
     }
     Err(Invalid::OutOfRange {
         name,
         index: 0,
-        found,
+        found: found.to_f64(),
         min,
         max,
     })

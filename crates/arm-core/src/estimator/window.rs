@@ -45,7 +45,7 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
             return None;
         }
         let (columns, value) = (self.columns.get(joint)?, *self.values.get(joint)?);
-        let [count, full] = [count, tuning.rows].map(|n| T::of(f64::from(n)));
+        let [count, full] = [count, tuning.rows].map(|n| T::of_count(u64::from(n)));
         let share = T::ONE / count;
         let weight = *tuning.weight.get(joint)? * count / full;
         Some((columns.map(|c| c * share), value * share, weight))
