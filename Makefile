@@ -26,9 +26,7 @@ demo: build
 	$(BIN)/armrs demo -o out/demo
 	@echo "Report: out/demo/report.html"
 
-# Compilers often keep one core only: both halves go side by side, each with its output in one piece.
-test:
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=recurse rust python
+test: rust python
 	@echo "make test: everything passed"
 
 build: $(STAMPS)/build
