@@ -346,7 +346,9 @@ def criteria(lines: list[Json]) -> list[tuple[str, str, bool | None]]:
     def family(*names: str, strength: str | None = None) -> list[Json]:
         return [r for r in lines if r["family"] in names and (strength is None or r["strength"] == strength)]
 
-    named = lambda r: r["right"]  # noqa: E731
+    def named(line: Json) -> Any:
+        return line["right"]
+
     closed = closures(family("single", "double", "triple"))
     held = [h for r in family("single", "double", "triple") if r["error"] is None for h in r["covered"].values()]
     asked = [

@@ -7,10 +7,13 @@ effects are only checked for their form.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any
+
+FORCE_CHANNELS = ("Fy", "Fz", "Mx")
+"""Channels of the force sensor in the order of the core."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,14 @@ class Kind:
     """What else an effect of this kind must say: "joint", "channel" or nothing (None)."""
     first_joint: int = 1
     """Lowest joint at which it can stand; 2 where it also acts in the joint before."""
+
+    def values(self, numbers: Sequence[float]) -> dict[str, float]:
+        """Return numbers in the order of the parameters by name; what rounding has put beyond a bound is at the bound."""
+        return {p.name: min(max(v, p.min), p.max) for p, v in zip(self.parameters, numbers, strict=True)}
+
+    def place(self, index: int) -> tuple[int | None, str | None]:
+        """Return joint and channel of the core's index."""
+        return (index + 1 if self.address == "joint" else None, FORCE_CHANNELS[index] if self.address == "channel" else None)
 
 
 @functools.cache

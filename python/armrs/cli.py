@@ -305,16 +305,17 @@ def gap(
     Everything is chosen and fitted on the fit trials; the gap is measured on the test trials. Exit status 1 when something is left
     that no effect of the catalogue explains.
     """
-    from . import gap_results, words
+    from . import words
     from .dataset import load_dataset
     from .discrepancy import find_gap
+    from .discrepancy.results import gap_data, write_gap
 
     folder = _folder(out, json)
     data = load_dataset(dataset)
     with console.stages("looking for what is missing") as tell:
         result = find_gap(data, threads=threads, progress=tell)
-    plain = gap_results.gap_data(result, _command(context))
-    written = gap_results.write_gap(result, plain, folder) if folder else []
+    plain = gap_data(result, _command(context))
+    written = write_gap(result, plain, folder) if folder else []
     console.warn([*data.warnings, *result.warnings])
     present(lambda: plain, json, lambda: words.gap(plain, written))
     return 1 if result.verdict == "unexplained" else 0

@@ -224,7 +224,7 @@ def identify(
         if trial.force_on_arm is None and trial.tau is None:
             raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
     configurations = sorted({t.configuration for t in dataset.trials})
-    columns = [_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
+    columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     raw = _armrs.identify(rig(model, effects), columns, settings)
     explained = tuple(
         Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
@@ -373,7 +373,7 @@ def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
     return added
 
 
-def _columns(trial: Trial) -> dict[str, Any]:
+def core_columns(trial: Trial) -> dict[str, Any]:
     """Return a trial for the core; gaps are bridged by straight lines and masked by `valid`."""
 
     def whole(values: np.ndarray | None) -> np.ndarray | None:
@@ -433,7 +433,7 @@ def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) 
     )
     joints = [dataclasses.asdict(j) | {"stiffness": 0.0, "rest": 0.0, "viscosity": 0.0, "coulomb": 0.0} for j in model.joints]
     listed = []
-    fitted = [Effect(kind, index + 1, parameters=_named(kind, values)) for kind, index, values in raw["effects"]]
+    fitted = [Effect(kind, index + 1, parameters=catalogue()[kind].values(values)) for kind, index, values in raw["effects"]]
     # What an effect did to the segments is in them now.
     absorbed = {name for name, kind in catalogue().items() if kind.where in ("segment", "hand")}
     held = [e for e in effects if e.kind not in _joint_kinds() and e.kind not in absorbed]
@@ -449,10 +449,6 @@ def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) 
         else:
             listed.append(effect)
     return model.replace(segments=segments, joints=tuple(Joint(**j) for j in joints), effects=(*listed, *held))
-
-
-def _named(kind: str, values: Sequence[float]) -> dict[str, float]:
-    return {p.name: v for p, v in zip(catalogue()[kind].parameters, values, strict=True)}
 
 
 def _changed(effect: Effect) -> set[str]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from . import _armrs
-from .catalogue import catalogue
+from .catalogue import FORCE_CHANNELS, catalogue
 from .model import Effect, Model
 
-_CHANNELS = {"Fy": 0, "Fz": 1, "Mx": 2}
 NO_CONTACT = ((10_000.0, 10_000.0), (25.0, 25.0))
 """Stiffness [N/m] and damping [N s/m] of the thesis' contact, where a model says nothing."""
 
@@ -54,5 +53,5 @@ def rig(model: Model, effects: Iterable[Effect] | None = None) -> _armrs.Rig:
 
 
 def _entry(effect: Effect) -> tuple[str, int, list[float]]:
-    index = _CHANNELS[effect.channel] if effect.channel is not None else (effect.joint or 1) - 1
+    index = FORCE_CHANNELS.index(effect.channel) if effect.channel is not None else (effect.joint or 1) - 1
     return effect.kind, index, [effect.parameters.get(p.name, p.default) for p in catalogue()[effect.kind].parameters]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from . import files
-from .discrepancy import GapFound
-from .results import data_of, origin
+from .. import files
+from ..results import data_of, origin
+from .found import GapFound
 
 
 def gap_data(result: GapFound, command: str | None = None) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .dataset import Dataset
-from .errors import BadInput, Text
+from ..dataset import Dataset
+from ..errors import BadInput, Text
 
 _SATURATED = 0.02
 """Share of samples at one and the same extreme value above which a channel counts as saturated."""

@@ -1,0 +1,214 @@
+"""From what the core returned to what a user reads: kinds with joints and channels, values with units, gaps in root mean square."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..catalogue import catalogue
+from ..dataset import Dataset
+from ..model import Effect, Joint, Model, Segment
+from ..trial import Trial
+from . import maps
+from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Rung, Tried, Value
+
+_MISFIT = 4.0
+"""Lack of fit beyond which something is left, in standard deviations."""
+_NEGLIGIBLE = 0.05
+"""Share of the calibrated model's lack of fit that may be left where effects were named: shapes are never exact."""
+
+
+def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequence[str]) -> GapFound:
+    """Return what the core found in a data set as objects."""
+    sign = -1.0 if dataset.force_on == "robot" else 1.0
+    together = tuple(_missing(item, sign) for item in raw["named"])
+    apart = tuple(_apart(item, dataset, raw) for item in raw["apart"])
+    effects = tuple(sorted((*together, *apart), key=lambda e: -e.share))
+    (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
+    share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
+    if after_z >= _MISFIT and not (effects and share < _NEGLIGIBLE):
+        verdict = "unexplained"
+    else:
+        verdict = "explained" if effects else "nothing_missing"
+    return GapFound(
+        verdict=verdict,
+        effects=effects,
+        where=maps.places(maps.discrepancies(dataset, led, raw["trials"], "calibrated")),
+        gap=_gap(dataset, led, raw),
+        would_have_seen=_limits(raw),
+        unexplained=min(share, 1.0) if verdict == "unexplained" or effects else 0.0,
+        looks_like=maps.shape(maps.discrepancies(dataset, led, raw["trials"], "amended")) if verdict == "unexplained" else None,
+        absorbed=_absorbed(raw),
+        lack=((before_ratio, before_z), (after_ratio, after_z)),
+        ladder=tuple(_rung(tried, before, after) for tried, before, after in raw["ladder"]),
+        warnings=tuple(warnings),
+        model=_amended(dataset.model, raw["amended"]),
+        dataset=dataset,
+        raw=raw,
+    )
+
+
+def is_led(dataset: Dataset) -> bool:
+    """Whether every trial has what the closed chain is simulated from: robot angles, a robot, and forces."""
+    known = all(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials)
+    return known and dataset.model.robot is not None
+
+
+def channel_names(dataset: Dataset, led: bool) -> list[str]:
+    """Return the names of the channels that are compared."""
+    n = dataset.model.n_joints
+    return [*(f"q{j}_rad" for j in range(1, n + 1)), "Fy_N", "Fz_N"] if led else [f"tau{j}_Nm" for j in range(1, n + 1)]
+
+
+def _in_file(kind: str, sign: float) -> float:
+    """Return the sign of a sensor fault in the file: biases and drifts are of the channel as it stands there."""
+    return sign if kind in ("force_bias", "force_drift") else 1.0
+
+
+def _missing(item: Mapping[str, Any], sign: float) -> Missing:
+    name, index, values = item["effect"]
+    kind = catalogue()[name]
+    known = dict(item["sd"])
+    own = _in_file(name, sign)
+    parameters = {
+        p.name: Value((own if p.linear else 1.0) * v, known[k] if k in known and math.isfinite(known[k]) else None, p.unit)
+        for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
+    }
+    alternatives = []
+    for (entry, _), worse, likeness in item["alternatives"]:
+        why = "explains these movements as well" if worse < 2.0 else "explains these movements nearly as well"
+        alternatives.append(Alternative(entry[0], *catalogue()[entry[0]].place(entry[1]), why, float(worse), float(likeness)))
+    return Missing(name, *kind.place(index), parameters, item["p_value"], item["share"], tuple(alternatives))
+
+
+def _apart(item: Sequence[Any], dataset: Dataset, raw: Mapping[str, Any]) -> Missing:
+    """Return a rhythm, or what happened in one trial."""
+    (name, index, values), sd, trial, (start, end), gain, rivals = item
+    kind = catalogue()[name]
+    first = next((k for k, p in enumerate(kind.parameters) if values[k] and p.name not in ("frequency", "phase", "start", "duration")), 0)
+    parameters = {
+        p.name: Value(v, sd if k == first else None, p.unit) for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
+    }
+    if trial is not None and "start" not in parameters:
+        parameters["start"] = Value(start, None, "s")
+    alternatives = tuple(
+        Alternative(other, *catalogue()[other].place(place), "swings these channels as much", float(worse), math.nan)
+        for (other, place, _), worse in rivals
+    )
+    explained = gain + raw["calibrated"]["cost"] - raw["amended"]["cost"]
+    chance = math.exp(-min(gain / 2.0, 700.0))
+    where, span = (None, None) if trial is None else (dataset.trials[trial].file, (float(start), float(end)))
+    return Missing(name, *kind.place(index), parameters, chance, gain / explained, alternatives, where, span)
+
+
+def _limits(raw: Mapping[str, Any]) -> tuple[Limit, ...]:
+    best: dict[tuple[str, int, int], Limit] = {}
+    for (entry, free), gain, price, smallest in raw["ruled"]:
+        name, index, _values = entry
+        if not math.isfinite(smallest):
+            continue
+        kind = catalogue()[name]
+        parameter = kind.parameters[free[0]]
+        key = (name, index, free[0])
+        known = best.get(key)
+        # Of several shapes that which shows most clearly, and the most that any of them explains.
+        most = max([(float(gain), float(price)), *([(known.gain, known.price)] if known else [])], key=lambda g: g[0] - g[1])
+        least = float(smallest) if known is None else min(known.at_least, float(smallest))
+        best[key] = Limit(name, *kind.place(index), parameter.name, least, parameter.unit, *most)
+    return tuple(best.values())
+
+
+def _rung(tried: Sequence[Any], before: float, after: float) -> Rung:
+    def effect(asked: Sequence[Any]) -> tuple[str, int | None, str | None]:
+        (name, index, _values), _free = asked
+        return (name, *catalogue()[name].place(index))
+
+    return Rung(tuple(Tried(tuple(map(effect, members)), float(gain)) for members, gain in tried), float(before), float(after))
+
+
+_UNITS = {"mass": "of its value", "com": "of its value", "inertia": "of its value", "shift": "m"}
+
+
+def _absorbed(raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
+    items = []
+    for what, index, part, value, before, _after in raw["unknowns"]:
+        if what in ("mass", "com", "inertia"):
+            items.append(Absorbed(f"{what} of segment {index + 1}", value, before, _UNITS[what]))
+        elif what == "shift":
+            items.append(Absorbed(f"place of the robot, {'yz'[part]}", value, 2 * before, "m"))
+        elif what in catalogue():
+            joint, channel = catalogue()[what].place(index)
+            name = what.replace("_", " ") + (f" of joint {joint}" if joint else f" of {channel}" if channel else "")
+            items.append(Absorbed(name, value, 2 * before, catalogue()[what].parameters[0].unit))
+    return tuple(items)
+
+
+def _amended(model: Model, amended: Mapping[str, Any]) -> Model:
+    """Return the model with refitted segments and known effects, and the named effects added."""
+    segments = tuple(
+        Segment(
+            s.name,
+            s.length,
+            s.mass * (1 + m),
+            min(max(s.com * (1 + c), 0.0), s.length),
+            s.inertia * (1 + i),
+            com_normal=s.com_normal * (1 + c),
+        )
+        for s, (m, c, i) in zip(model.segments, amended["segments"], strict=True)
+    )
+    known = [_effect(entry) for entry in amended["known"]]
+    joints = []
+    rest = iter(known)
+    for joint in model.joints:
+        values = dataclasses.asdict(joint)
+        if joint.stiffness:
+            values["stiffness"] = next(rest).parameters["stiffness"]
+        if joint.viscosity:
+            values["viscosity"] = next(rest).parameters["viscosity"]
+        if joint.coulomb:
+            values["coulomb"] = next(rest).parameters["torque"]
+        joints.append(Joint(**values))
+    return model.replace(segments=segments, joints=tuple(joints), effects=(*rest, *map(_effect, amended["named"])))
+
+
+def _effect(entry: Sequence[Any]) -> Effect:
+    name, index, values = entry
+    kind = catalogue()[name]
+    return Effect(name, *kind.place(index), parameters=kind.values(values))
+
+
+def _gap(dataset: Dataset, led: bool, raw: Mapping[str, Any]) -> dict[str, ChannelGap]:
+    tests = [k for k, t in enumerate(dataset.trials) if t.role == "test"]
+    result = {}
+    for c, name in enumerate(channel_names(dataset, led)):
+        rms = {}
+        for version in ("given", "calibrated", "amended"):
+            rows = [_difference(dataset.trials[k], raw["trials"][k], version)[:, c] for k in tests if raw["trials"][k][version] is not None]
+            rms[version] = float(np.sqrt(np.mean(np.square(np.concatenate(rows))))) if rows and sum(map(len, rows)) else None
+        result[name] = ChannelGap(rms["given"], rms["calibrated"], rms["amended"], _floor(dataset, raw, c))
+    return result
+
+
+def _difference(trial: Trial, play: Mapping[str, Any], version: str) -> np.ndarray:
+    return (play[version] - play["measured"])[trial.valid]
+
+
+def _floor(dataset: Dataset, raw: Mapping[str, Any], channel: int) -> float | None:
+    """Return what repeats of one movement differ by, after their own simulated differences; None without repeats."""
+    square, freedom = 0.0, 0.0
+    groups = np.asarray(raw["groups"])
+    for group in np.unique(groups):
+        members = [k for k in np.flatnonzero(groups == group) if raw["trials"][k]["amended"] is not None]
+        if len(members) < 2:
+            continue
+        length = min(len(dataset.trials[k]) for k in members)
+        rows = np.array([(raw["trials"][k]["measured"] - raw["trials"][k]["amended"])[:length, channel] for k in members])
+        valid = np.all([dataset.trials[k].valid[:length] for k in members], axis=0)
+        deviation = (rows - rows.mean(axis=0))[:, valid]
+        square += float(np.sum(deviation**2))
+        freedom += deviation.shape[1] * (len(members) - 1)
+    return math.sqrt(square / freedom) if freedom else None

@@ -1,0 +1,76 @@
+"""The gap workflow: where simulation and data disagree, which effect is missing, and what adding it gains."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+from .. import _armrs
+from ..dataset import Dataset, load_dataset
+from ..identification import core_columns
+from ..rig import all_effects, rig
+from . import reading, suspicion
+from .found import GapFound
+
+
+def find_gap(
+    dataset: Dataset | str | os.PathLike[str],
+    *,
+    threads: int | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> GapFound:
+    """Find where a model and its data disagree, and which effect is missing.
+
+    Everything is chosen and fitted on the fit trials; the gap is measured on the test trials.
+
+    Parameters
+    ----------
+    dataset : Dataset or path
+    threads : int, optional
+        All cores when absent; the result does not depend on it.
+    progress : callable, optional
+        Told what is being done and how far it is, 0 to 1.
+
+    Returns
+    -------
+    GapFound
+
+    Raises
+    ------
+    BadInput
+        For data that cannot be judged: wrong units, swapped channels, a reversed force.
+    SimulationError
+        When the model as given cannot be simulated on a trial.
+    """
+    if not isinstance(dataset, Dataset):
+        dataset = load_dataset(dataset)
+    led = reading.is_led(dataset)
+    settings = _settings(dataset, led, threads)
+    columns = _columns(dataset)
+    built = rig(dataset.model, all_effects(dataset.model))
+    warnings = suspicion.examine(dataset, led)
+    suspicion.refuse_wrong_angles(dataset)
+    suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
+    raw = _armrs.find_gap(built, columns, settings, progress)
+    return reading.found(dataset, led, raw, warnings)
+
+
+def _columns(dataset: Dataset) -> list[dict[str, Any]]:
+    """Return the trials for the core."""
+    configurations = sorted({t.configuration for t in dataset.trials})
+    return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
+
+
+def _settings(dataset: Dataset, led: bool, threads: int | None) -> dict[str, Any]:
+    tolerance = dataset.tolerance
+    return {
+        "segment_uncertainty": dataset.model.segment_uncertainty,
+        "angle_offset": tolerance.angle_offset,
+        "force_bias": tolerance.force_bias_N,
+        "force_gain": tolerance.force_gain,
+        "time_delay": tolerance.time_delay_s,
+        "handle_placement": tolerance.handle_placement_m,
+        "led": led,
+        "threads": threads or os.cpu_count() or 1,
+    }
