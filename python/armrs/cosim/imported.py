@@ -109,6 +109,16 @@ class Library:
         make = self.function("Instantiate", c_void_p)
         return make(text[0], c_int(1), text[1], place, byref(self._callbacks), c_int(0), c_int(logging))
 
+    def release(self) -> None:
+        """Let the library give back what must not wait for the end of the process.
+
+        Libraries of PythonFMU and PythonFMU3 do so when the process ends, but then write into memory that they have freed just
+        before, which can end the process with "corrupted double-linked list". Done before, it is not done again. Every FMU is
+        unpacked into a folder of its own, so that no other instance shares the library.
+        """
+        if hasattr(self._library, "finalizePythonInterpreter"):
+            self._library.finalizePythonInterpreter()
+
     def last_message(self) -> str:
         """Return what the FMU logged last."""
         return self.messages[-1][2] if self.messages else "the FMU says nothing of it"
@@ -323,6 +333,7 @@ class ImportedSlave(Partner):
 
 def _release(library: Library, handle: int, folder: Path) -> None:
     library.function("FreeInstance", None)(c_void_p(handle))
+    library.release()
     shutil.rmtree(folder, ignore_errors=True)
 
 
