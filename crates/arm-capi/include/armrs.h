@@ -85,7 +85,7 @@ typedef enum armrs_status {
   ARMRS_NULL = 1,
   // A struct was not made by its `_init` function.
   ARMRS_NOT_INITIALISED = 2,
-  // A value is NaN or infinite.
+  // A value that was given is NaN or infinite, or makes a result so; nothing was written.
   ARMRS_NOT_FINITE = 3,
   // A value or a number of things is outside what is allowed.
   ARMRS_OUT_OF_RANGE = 4,
@@ -369,11 +369,14 @@ enum armrs_status armrs_arm_init(struct armrs_arm *arm,
                                  const struct armrs_effect *effects,
                                  size_t count);
 
-// Carries the states of effects (relaxation, thixotropy) over a period [s]; nothing for arms without any.
+// Carries the states of effects (relaxation, thixotropy) over a period [s]; nothing for arms without any. A motion that is not
+// finite leaves them as they were.
 //
 // # Safety
 // The pointers are null or point to what is said.
-enum armrs_status armrs_arm_advance(struct armrs_arm *arm, const struct armrs_motion *motion, armrs_real period);
+enum armrs_status armrs_arm_advance(struct armrs_arm *arm,
+                                    const struct armrs_motion *motion,
+                                    armrs_real period);
 
 // Where the tip is at joint angles: `point` is its position [m], `rows` the derivative of that to the angles, row y, then row z
 // [m/rad]. Either may be null.
@@ -561,7 +564,7 @@ enum armrs_status armrs_robot_angles(const struct armrs_robot *robot,
                                      const armrs_real (*handle)[2],
                                      armrs_real (*q)[2]);
 
-// Joint speeds that move the handle [rad/s]; not finite at full stretch.
+// Joint speeds that move the handle [rad/s]. ARMRS_NOT_FINITE at full stretch, where there are none.
 //
 // # Safety
 // The pointers are null or point to what is said.

@@ -12,7 +12,7 @@ use arm_core::{
 use crate::held::{Held, held};
 use crate::motion::{armrs_motion, array, joints};
 use crate::status::{
-    ARMRS_NULL, ARMRS_OUT_OF_RANGE, ARMRS_UNKNOWN, armrs_status, ended, given, place,
+    ARMRS_NULL, ARMRS_OUT_OF_RANGE, ARMRS_UNKNOWN, armrs_status, ended, finite, given, place,
 };
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_real};
 
@@ -167,7 +167,8 @@ fn off() -> Effect<armrs_real> {
     }
 }
 
-/// Carries the states of effects (relaxation, thixotropy) over a period [s]; nothing for arms without any.
+/// Carries the states of effects (relaxation, thixotropy) over a period [s]; nothing for arms without any. A motion that is not
+/// finite leaves them as they were.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
@@ -181,8 +182,14 @@ pub unsafe extern "C" fn armrs_arm_advance(
         // SAFETY: as promised by the caller.
         let (arm, motion) = unsafe { (place(arm)?, given(motion)?) };
         let kept = arm.inner_mut()?;
-        kept.equation
-            .advance(&motion.core(), &mut kept.memory, period);
+        let [period] = finite([period])?;
+        if period < 0.0 {
+            return Err(ARMRS_OUT_OF_RANGE);
+        }
+        // A bad sample must not stay in the memory for ever.
+        let mut memory = kept.memory;
+        kept.equation.advance(&motion.core()?, &mut memory, period);
+        kept.memory = finite(memory)?;
         Ok(())
     };
     ended(run())
@@ -203,7 +210,10 @@ pub unsafe extern "C" fn armrs_kinematics(
     let run = || {
         // SAFETY: as promised by the caller.
         let (arm, q) = unsafe { (given(arm)?, given(q)?) };
-        let (chain, pose) = (arm.inner()?.equation.chain(), Pose::new(&joints(q)));
+        let (chain, pose) = (
+            arm.inner()?.equation.chain(),
+            Pose::new(&joints(&finite(*q)?)),
+        );
         // SAFETY: as promised by the caller.
         if let Some(point) = unsafe { point.as_mut() } {
             *point = tip(chain, &pose);
@@ -232,7 +242,7 @@ pub unsafe extern "C" fn armrs_gravity(
         // SAFETY: as promised by the caller.
         let (arm, q, torque) = unsafe { (given(arm)?, given(q)?, place(torque)?) };
         let found = gravity(arm.inner()?.equation.chain(), &Pose::new(&joints(q)));
-        *torque = array(&found);
+        *torque = finite(array(&found))?;
         Ok(())
     };
     ended(run())
@@ -257,9 +267,9 @@ pub unsafe extern "C" fn armrs_resistance(
         let force = unsafe { force_on_arm.as_ref() }
             .copied()
             .unwrap_or_default();
-        let seen = motion.core();
+        let seen = motion.core()?;
         let found = resistance(arm.inner()?, &Pose::new(&seen.q), &seen, force);
-        *torque = array(&found);
+        *torque = finite(array(&found))?;
         Ok(())
     };
     ended(run())
@@ -297,12 +307,14 @@ pub unsafe extern "C" fn armrs_inverse_dynamics(
         let (arm, motion) = unsafe { (given(arm)?.inner()?, given(motion)?) };
         // SAFETY: as promised by the caller.
         let (load, torque) = unsafe { (given(load)?, place(torque)?) };
-        let (chain, seen) = (arm.equation.chain(), motion.core());
+        let (chain, seen) = (arm.equation.chain(), motion.core()?);
         let pose = Pose::new(&seen.q);
         let moving = inverse_dynamics(chain, &pose, &seen.qd, &seen.qdd);
         let resisting = resistance(arm, &pose, &seen, load.force_on_arm);
         let pushed = static_torque(chain, &pose, load.force_on_arm, load.moment_on_arm);
-        *torque = core::array::from_fn(|j| moving[j] + resisting[j] - pushed[j]);
+        *torque = finite(core::array::from_fn(|j| {
+            moving[j] + resisting[j] - pushed[j]
+        }))?;
         Ok(())
     };
     ended(run())
@@ -324,11 +336,7 @@ pub unsafe extern "C" fn armrs_forward_dynamics(
         let (arm, motion) = unsafe { (given(arm)?.inner()?, given(motion)?) };
         // SAFETY: as promised by the caller.
         let (load, acceleration) = unsafe { (given(load)?, place(acceleration)?) };
-        let still = armrs_motion {
-            qdd: [0.0; ARMRS_JOINTS],
-            ..*motion
-        };
-        let seen = still.core();
+        let seen = motion.still().core()?;
         let pose = Pose::new(&seen.q);
         let resisting = resistance(arm, &pose, &seen, load.force_on_arm);
         let net = Load {
@@ -337,7 +345,7 @@ pub unsafe extern "C" fn armrs_forward_dynamics(
             moment_on_arm: load.moment_on_arm,
         };
         let found = forward_dynamics(arm.equation.chain(), &pose, &seen.qd, &net);
-        *acceleration = array(&found);
+        *acceleration = finite(array(&found))?;
         Ok(())
     };
     ended(run())

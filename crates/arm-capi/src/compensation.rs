@@ -2,12 +2,12 @@
 
 use core::mem::MaybeUninit;
 
-use arm_core::Compensation;
+use arm_core::{Carry, Compensation};
 
 use crate::arm::armrs_arm;
 use crate::held::{Held, held};
 use crate::motion::{armrs_motion, array};
-use crate::status::{armrs_status, ended, given, place};
+use crate::status::{armrs_status, ended, finite, given, place};
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_real};
 
 /// An identified arm and the covariance of its unknowns.
@@ -70,12 +70,22 @@ pub unsafe extern "C" fn armrs_compensation_carry(
         // SAFETY: as promised by the caller.
         let (torque, sd) = unsafe { (place(torque)?, sd.as_mut()) };
         let core = compensation.inner()?;
-        let carry = core.carry(&motion.core(), &[0.0; ARMRS_EFFECTS]);
-        *torque = array(&carry.torque);
-        if let Some(sd) = sd {
-            *sd = array(&carry.sd);
-        }
-        Ok(())
+        let carry = core.carry(&motion.still().core()?, &[0.0; ARMRS_EFFECTS]);
+        write_carry(&carry, torque, sd)
     };
     ended(run())
+}
+
+/// Writes torques, and their standard deviations where there is a place for them; both or none.
+pub(crate) fn write_carry(
+    carry: &Carry<armrs_real, ARMRS_JOINTS>,
+    torque: &mut [armrs_real; ARMRS_JOINTS],
+    sd: Option<&mut [armrs_real; ARMRS_JOINTS]>,
+) -> Result<(), armrs_status> {
+    let (found, uncertain) = (finite(array(&carry.torque))?, finite(array(&carry.sd))?);
+    *torque = found;
+    if let Some(sd) = sd {
+        *sd = uncertain;
+    }
+    Ok(())
 }

@@ -6,8 +6,9 @@ use arm_core::Measured;
 use arm_core::estimator::{Decision, Estimator, Fault, Heed, Sample, Settings};
 
 use crate::arm::armrs_arm;
+use crate::compensation::write_carry;
 use crate::held::{Held, held};
-use crate::motion::{armrs_motion, array, joints};
+use crate::motion::{armrs_motion, joints};
 use crate::status::{ARMRS_OUT_OF_RANGE, armrs_status, ended, given, place};
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_load, armrs_real};
 
@@ -131,6 +132,24 @@ type Core = Estimator<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 
 held!(armrs_estimator holds Core, b"estim0.1");
 
+/// Settings of C from those of the core, and back: the fields have the same names.
+macro_rules! with_fields_of {
+    ($to:ident, $from:ident) => {
+        $to {
+            period: $from.period,
+            cutoff: $from.cutoff,
+            window: $from.window,
+            noise: $from.noise,
+            dead_band: $from.dead_band,
+            fastest: $from.fastest,
+            steepest: $from.steepest,
+            gate: $from.gate,
+            frozen_after: $from.frozen_after,
+            forgetting: $from.forgetting,
+        }
+    };
+}
+
 /// Fills settings for a control period [s]: movements to 3 Hz, only what is not finite is refused.
 ///
 /// # Safety
@@ -144,18 +163,7 @@ pub unsafe extern "C" fn armrs_estimator_settings(
         // SAFETY: as promised by the caller.
         let settings = unsafe { place(settings)? };
         let s = Settings::<armrs_real, ARMRS_JOINTS>::new(period);
-        *settings = armrs_settings {
-            period: s.period,
-            cutoff: s.cutoff,
-            window: s.window,
-            noise: s.noise,
-            dead_band: s.dead_band,
-            fastest: s.fastest,
-            steepest: s.steepest,
-            gate: s.gate,
-            frozen_after: s.frozen_after,
-            forgetting: s.forgetting,
-        };
+        *settings = with_fields_of!(armrs_settings, s);
         Ok(())
     };
     ended(run())
@@ -177,18 +185,7 @@ pub unsafe extern "C" fn armrs_estimator_init(
         // SAFETY: as promised by the caller.
         let (estimator, arm, s) = unsafe { (place(estimator)?, given(arm)?, given(settings)?) };
         let equation = arm.inner()?.equation;
-        let settings = Settings {
-            period: s.period,
-            cutoff: s.cutoff,
-            window: s.window,
-            noise: s.noise,
-            dead_band: s.dead_band,
-            fastest: s.fastest,
-            steepest: s.steepest,
-            gate: s.gate,
-            frozen_after: s.frozen_after,
-            forgetting: s.forgetting,
-        };
+        let settings = with_fields_of!(Settings, s);
         let priors = equation.priors(uncertainty);
         estimator.keep(&Estimator::new(equation, priors, &settings)?);
         Ok(())
@@ -275,12 +272,8 @@ pub unsafe extern "C" fn armrs_estimator_carry(
         let (estimator, motion) = unsafe { (given(estimator)?, given(motion)?) };
         // SAFETY: as promised by the caller.
         let (torque, sd) = unsafe { (place(torque)?, sd.as_mut()) };
-        let carry = estimator.inner()?.carry(&motion.core());
-        *torque = array(&carry.torque);
-        if let Some(sd) = sd {
-            *sd = array(&carry.sd);
-        }
-        Ok(())
+        let carry = estimator.inner()?.carry(&motion.still().core()?);
+        write_carry(&carry, torque, sd)
     };
     ended(run())
 }

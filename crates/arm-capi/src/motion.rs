@@ -7,7 +7,7 @@ use arm_core::effect::Motion;
 use arm_core::{Joints, Limits, Path, Route, Shape};
 
 use crate::held::{Held, held};
-use crate::status::{ARMRS_OUT_OF_RANGE, armrs_status, ended, given, place};
+use crate::status::{ARMRS_OUT_OF_RANGE, armrs_status, ended, finite, given, place};
 use crate::{ARMRS_JOINTS, ARMRS_WAYPOINTS, armrs_real};
 
 /// Motion of the joints at one instant.
@@ -25,10 +25,20 @@ pub struct armrs_motion {
 }
 
 impl armrs_motion {
-    pub(crate) fn core(&self) -> Motion<armrs_real, ARMRS_JOINTS> {
-        let mut motion = Motion::new(self.time, joints(&self.q), joints(&self.qd));
-        motion.qdd = joints(&self.qdd);
-        motion
+    pub(crate) fn core(&self) -> Result<Motion<armrs_real, ARMRS_JOINTS>, armrs_status> {
+        let [time] = finite([self.time])?;
+        let (q, qd) = (finite(self.q)?, finite(self.qd)?);
+        let mut motion = Motion::new(time, joints(&q), joints(&qd));
+        motion.qdd = joints(&finite(self.qdd)?);
+        Ok(motion)
+    }
+
+    /// Without its accelerations, for what does not read them.
+    pub(crate) fn still(&self) -> Self {
+        Self {
+            qdd: [0.0; ARMRS_JOINTS],
+            ..*self
+        }
     }
 }
 
@@ -139,6 +149,7 @@ pub unsafe extern "C" fn armrs_path_at(
     let run = || {
         // SAFETY: as promised by the caller.
         let (path, motion) = unsafe { (given(path)?, place(motion)?) };
+        let [time] = finite([time])?;
         let found = path.inner()?.at(time);
         *motion = armrs_motion {
             time,

@@ -7,7 +7,7 @@ use arm_core::{Elbow, Joints, Robot};
 
 use crate::armrs_real;
 use crate::held::{Held, held};
-use crate::status::{armrs_status, ended, given, place};
+use crate::status::{armrs_status, ended, finite, given, place};
 
 /// A robot of two links.
 #[repr(C)]
@@ -60,7 +60,7 @@ pub unsafe extern "C" fn armrs_robot_handle(
     let run = || {
         // SAFETY: as promised by the caller.
         let (robot, q, handle) = unsafe { (given(robot)?, given(q)?, place(handle)?) };
-        *handle = robot.inner()?.handle(&Joints::<_, 2>::new(q[0], q[1]));
+        *handle = finite(robot.inner()?.handle(&Joints::<_, 2>::new(q[0], q[1])))?;
         Ok(())
     };
     ended(run())
@@ -79,13 +79,13 @@ pub unsafe extern "C" fn armrs_robot_angles(
     let run = || {
         // SAFETY: as promised by the caller.
         let (robot, handle, q) = unsafe { (given(robot)?, given(handle)?, place(q)?) };
-        *q = robot.inner()?.angles(*handle)?.into();
+        *q = finite(robot.inner()?.angles(*handle)?.into())?;
         Ok(())
     };
     ended(run())
 }
 
-/// Joint speeds that move the handle [rad/s]; not finite at full stretch.
+/// Joint speeds that move the handle [rad/s]. ARMRS_NOT_FINITE at full stretch, where there are none.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
@@ -102,7 +102,7 @@ pub unsafe extern "C" fn armrs_robot_speeds(
         // SAFETY: as promised by the caller.
         let (velocity, speeds) = unsafe { (given(velocity)?, place(speeds)?) };
         let q = Joints::<_, 2>::new(q[0], q[1]);
-        *speeds = robot.inner()?.speeds(&q, *velocity).into();
+        *speeds = finite(robot.inner()?.speeds(&q, *velocity).into())?;
         Ok(())
     };
     ended(run())

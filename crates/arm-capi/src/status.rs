@@ -1,5 +1,7 @@
 use arm_core::Invalid;
 
+use crate::armrs_real;
+
 /// What a call came to.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,7 +12,7 @@ pub enum armrs_status {
     ARMRS_NULL = 1,
     /// A struct was not made by its `_init` function.
     ARMRS_NOT_INITIALISED = 2,
-    /// A value is NaN or infinite.
+    /// A value that was given is NaN or infinite, or makes a result so; nothing was written.
     ARMRS_NOT_FINITE = 3,
     /// A value or a number of things is outside what is allowed.
     ARMRS_OUT_OF_RANGE = 4,
@@ -40,6 +42,17 @@ pub(crate) fn ended(result: Result<(), armrs_status>) -> armrs_status {
     match result {
         Ok(()) => ARMRS_OK,
         Err(status) => status,
+    }
+}
+
+/// A result that may be written. One that is not finite never reaches a motor: it comes from a value that was not, or from one
+/// beyond all numbers.
+pub(crate) fn finite<const N: usize>(
+    result: [armrs_real; N],
+) -> Result<[armrs_real; N], armrs_status> {
+    match result.iter().all(|value| value.is_finite()) {
+        true => Ok(result),
+        false => Err(ARMRS_NOT_FINITE),
     }
 }
 
