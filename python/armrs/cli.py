@@ -465,6 +465,18 @@ def record(
 
 
 @app.command()
+def reproduce(context: typer.Context, out: OutFolder = Path("armrs-thesis"), json: JsonFile = None) -> None:
+    """Compute every table and figure of the thesis that a machine can: what is printed, what comes out, and why they differ."""
+    from . import words
+    from .reproduce import run_reproduce
+
+    _folder(out, json)
+    with console.stages("the thesis") as tell:
+        result = run_reproduce(out, command=_command(context), tell=tell)
+    present(lambda: result.data, json, lambda: words.reproduced(result.data, result.files))
+
+
+@app.command()
 def report(
     sources: Annotated[list[Path], typer.Argument(metavar="RESULT.json…", help="Results that other verbs wrote.")],
     out: OutFolder = Path(),

@@ -109,13 +109,12 @@ def _part(source: str | os.PathLike[str]) -> str:
         raise BadInput("content", Text(f"not what a result holds ({error})"), "a whole result", file=source) from None
 
 
-def write_page(path: str | os.PathLike[str], parts: Sequence[str]) -> None:
-    """Write a page from finished parts."""
-    title = "armrs report"
+def write_page(path: str | os.PathLike[str], parts: Sequence[str], *, title: str = "armrs report", css: str = "") -> None:
+    """Write a page from finished parts, with further styles where they need some."""
     content = (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{title}</title>\n<style>{_CSS}</style>\n</head>\n'
-        f"<body>\n<main>\n{''.join(parts)}</main>\n</body>\n</html>\n"
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{title}</title>\n'
+        f"<style>{_CSS}{css}</style>\n</head>\n<body>\n<main>\n{''.join(parts)}</main>\n</body>\n</html>\n"
     )
     files.write_text(path, content, kind=".html")
 

@@ -273,3 +273,15 @@ def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
     )
     print("\n".join(str(path) for path in written))
+
+
+def reproduced(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what came out for every item of the thesis."""
+    import textwrap
+
+    for part in result["parts"]:
+        for item in part["items"]:
+            print(item["title"])
+            print(textwrap.fill(item["ours"], 110, initial_indent="    ", subsequent_indent="    "))
+    print("\n" + textwrap.fill(result["verdict"], 110))
+    files_written(written[-1:])

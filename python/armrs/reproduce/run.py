@@ -1,0 +1,117 @@
+"""Recompute every item and write the page, its figures and the same as JSON."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import files, plotting
+from ..results import origin
+from . import dynamics, equations, page, simulation
+from .item import Found, Item
+
+GROUPS = (dynamics.GROUP, simulation.GROUP)
+"""The parts of the page, in the order of the thesis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduced:
+    """What was recomputed.
+
+    Attributes
+    ----------
+    data : dict
+        Everything that the page says, as plain data.
+    files : tuple of Path
+        What was written, the page last.
+    """
+
+    data: dict[str, Any]
+    files: tuple[Path, ...]
+
+
+def run_reproduce(
+    folder: str | os.PathLike[str], *, command: str | None = None, tell: Callable[[str, float], None] = lambda stage, share: None
+) -> Reproduced:
+    """Recompute every table and figure of the thesis that a machine can.
+
+    Parameters
+    ----------
+    folder : path
+        Gets `report.html`, which needs nothing else, `reproduced.json` and `figures/`.
+    command : str, optional
+        For the page: how to repeat this.
+    tell : callable
+        Called with what is being done and the share that is done, 0 to 1.
+    """
+    made: list[dict[str, Any]] = []
+
+    def write(out: Path) -> list[Path]:
+        count, done, parts, written = sum(len(g.items) for g in GROUPS), 0, [], []
+        for group in GROUPS:
+            items = []
+            for item in group.items:
+                tell(item.title, done / count)
+                with plotting.style():
+                    found = item.make()
+                written += _draw(found, out)
+                items.append(_plain(item, found))
+                done += 1
+            parts.append({"key": group.key, "title": group.title, "items": items})
+        data = _data(parts, command)
+        made.append(data)
+        files.write_json(out / "reproduced.json", data)
+        page.write(out / "report.html", data, out)
+        return [*written, out / "reproduced.json", out / "report.html"]
+
+    written = files.write_whole(folder, write)
+    return Reproduced(made[0], tuple(written))
+
+
+def _draw(found: Found, out: Path) -> list[Path]:
+    paths = []
+    for drawn in found.figures:
+        path = out / "figures" / f"{drawn.name}.png"
+        files.may_replace(path, ".png")
+        with plotting.style(), files.replacing(path) as temporary:
+            drawn.figure.savefig(temporary, format="png", dpi=110)
+        paths.append(path)
+    return paths
+
+
+def _plain(item: Item, found: Found) -> dict[str, Any]:
+    return {
+        "key": item.key,
+        "title": item.title,
+        "place": item.place,
+        "virtual": item.virtual,
+        "printed": item.printed,
+        "ours": found.ours,
+        "why": found.why,
+        "values": dict(found.values),
+        "tables": [
+            {"title": s.title, "head": list(s.table.head), "rows": [list(row) for row in s.table.rows], "left": s.table.left}
+            for s in found.sheets
+        ],
+        "figures": [{"file": f"figures/{d.name}.png", "title": d.title, "text": d.text} for d in found.figures],
+        "animations": [dict(a) for a in found.animations],
+    }
+
+
+def _data(parts: list[dict[str, Any]], command: str | None) -> dict[str, Any]:
+    items = [item for part in parts for item in part["items"]]
+    virtual = sum(item["virtual"] for item in items)
+    return {
+        "verb": "reproduce",
+        "verdict": (
+            f"{len(items)} items of chapters 3 and 4 and the appendices with {sum(len(i['tables']) for i in items)} tables and "
+            f"{sum(len(i['figures']) + len(i['animations']) for i in items)} figures. The thesis prints no measured samples: "
+            f"{virtual} items rest on virtual experiments, which say how the methods behave, not what these subjects were like."
+        ),
+        "parts": parts,
+        "equations": equations.rows(),
+        "made_by": origin(command),
+    }
