@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome", "chromium-headless-shell")
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage"]
 """As in containers, where Chromium may neither make a sandbox of its own nor use much shared memory."""
 

@@ -12,7 +12,11 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.dataset import Dataset
+from armrs.discrepancy.results import gap_data, write_gap
+from armrs.discrepancy.shapes import portrait
+from armrs.discrepancy.suspicion import examine
 from armrs.errors import BadInput
+from browser import opened
 
 ROBOT = armrs.Robot((0.5, 0.45), (1.0, -0.1), "up")
 
@@ -52,8 +56,60 @@ def session(*hidden: armrs.Effect) -> Dataset:
     return Dataset("hidden", model(), tuple(trials), force_on="arm", synthetic=True)
 
 
-def test_a_hidden_viscosity_is_named_with_its_value_and_closes_the_gap() -> None:
-    found = armrs.find_gap(session(armrs.Effect("viscous", 2, parameters={"viscosity": 0.4})), threads=2)
+def look(report: Path, *, figures: int, headings: set[str]) -> str:
+    """Open a report, see that it has these headings and figures and that each shows something; return its verdict."""
+    with opened(report) as seen:
+        assert headings <= set(seen.page.locator("h2").all_inner_texts())
+        images = seen.page.locator("figure img")
+        assert images.count() == figures
+        assert all(width > 300 for width in images.evaluate_all("all => all.map(i => i.complete ? i.naturalWidth : 0)"))
+        # Nothing sticks out of the page, on a narrow screen as well.
+        for width in (1280, 400):
+            seen.page.set_viewport_size({"width": width, "height": 900})
+            assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+        return str(seen.page.inner_text(".verdict"))
+
+
+@pytest.fixture(scope="module")
+def viscous() -> armrs.GapFound:
+    return armrs.find_gap(session(armrs.Effect("viscous", 2, parameters={"viscosity": 0.4})), threads=2)
+
+
+def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -> None:
+    written = write_gap(viscous, gap_data(viscous, "armrs gap hidden -o out"), tmp_path)
+    assert [p.name for p in written if p.suffix != ".png"] == ["amended.toml", "gap.json", "report.html"]
+    verdict = look(
+        written[-1],
+        figures=5,
+        headings={
+            "What the model lacks",
+            "Each effect by itself",
+            "The gap on trials that were kept apart",
+            "Where model and data disagree",
+            "Evidence",
+            "What was ruled out",
+            "How to repeat",
+        },
+    )
+    assert verdict.startswith("The model lacks viscous in joint 2 (elbow): resistance in proportion to joint speed, viscosity 0.")
+
+
+def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> None:
+    seen = portrait(viscous, viscous.effects[0])
+    value = viscous.effects[0].parameters["viscosity"]
+    assert seen.against == "speed"
+    assert seen.torque is not None
+    fast = np.abs(seen.x) > 0.1
+    # A cell's mean torque is that at its mean speed; its middle may be half a cell beside.
+    assert np.abs(seen.torque / seen.x - value.value)[fast].max() < 0.1 * value.value
+    # What was measured beyond the rest of the model follows the law without being asked to.
+    assert np.corrcoef(seen.data[np.isfinite(seen.data)], seen.torque[np.isfinite(seen.data)])[0, 1] > 0.95
+    assert seen.changed is not None
+    assert np.abs(seen.changed[:, 2:]).max() > 0.5
+
+
+def test_a_hidden_viscosity_is_named_with_its_value_and_closes_the_gap(viscous: armrs.GapFound) -> None:
+    found = viscous
     assert [(e.kind, e.joint) for e in found.effects] == [("viscous", 2)]
     value = found.effects[0].parameters["viscosity"]
     assert value.std is not None
@@ -79,6 +135,9 @@ def test_nothing_is_missing_where_nothing_is_hidden(tmp_path: Path, capsys: pyte
     limits = {(w["kind"], w["joint"]): w["at_least"] for w in result["would_have_seen"]}
     assert 0 < limits["viscous", 2] < 0.4
     assert armrs.load_model(tmp_path / "out" / "amended.toml").n_joints == 2
+    assert len(result["made_by"]["input_sha256"]) == 64
+    verdict = look(tmp_path / "out" / "report.html", figures=3, headings={"The gap on trials that were kept apart", "What was ruled out"})
+    assert verdict.startswith("Nothing is missing")
 
 
 def changed(data: Dataset, **columns: object) -> Dataset:
@@ -103,3 +162,15 @@ def changed(data: Dataset, **columns: object) -> Dataset:
 def test_what_only_a_label_can_explain_is_refused(columns: dict[str, object], word: str) -> None:
     with pytest.raises(BadInput, match=word):
         armrs.find_gap(changed(session(), **columns))
+
+
+@pytest.mark.parametrize("share", [0.6, 0.9])
+def test_a_cut_off_channel_is_warned_of(share: float) -> None:
+    data = session()
+    most = share * max(np.abs(t.force_on_arm).max() for t in data.trials if t.force_on_arm is not None)
+    cut = changed(data, force_on_arm=lambda f: np.clip(f, -most, most))
+    assert any("saturated" in line for line in examine(cut, True))
+
+
+def test_a_coarse_channel_at_rest_is_not_called_saturated() -> None:
+    assert examine(changed(session(), force_on_arm=lambda f: 0.1 * np.round(f / 0.1)), True) == []

@@ -305,9 +305,8 @@ def gap(
     Everything is chosen and fitted on the fit trials; the gap is measured on the test trials. Exit status 1 when something is left
     that no effect of the catalogue explains.
     """
-    from . import words
     from .dataset import load_dataset
-    from .discrepancy import find_gap
+    from .discrepancy import find_gap, words
     from .discrepancy.results import gap_data, write_gap
 
     folder = _folder(out, json)
@@ -317,7 +316,7 @@ def gap(
     plain = gap_data(result, _command(context))
     written = write_gap(result, plain, folder) if folder else []
     console.warn([*data.warnings, *result.warnings])
-    present(lambda: plain, json, lambda: words.gap(plain, written))
+    present(lambda: plain, json, lambda: words.show(plain, written))
     return 1 if result.verdict == "unexplained" else 0
 
 

@@ -28,12 +28,13 @@ Part = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure with the name of its file, its title and what it shows in words."""
+    """A figure with the name of its file, its title and what it shows in words; `section` is the part of a report it belongs to."""
 
     name: str
     title: str
     text: str
     figure: Figure
+    section: str = ""
 
 
 def identified(result: Identified, data: Mapping[str, Any]) -> list[Drawn]:

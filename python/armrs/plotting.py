@@ -190,7 +190,7 @@ def angles(t: np.ndarray, q: np.ndarray, names: Sequence[str], ax: Axes | None =
     for j, name in enumerate(names):
         if measured is not None:
             ax.plot(*_broken(t, np.degrees(measured[:, j])), color=SILVER, lw=3.2, label="measured" if j == 0 else None)
-        ax.plot(t, np.degrees(q[:, j]), color=CYCLE[j % len(CYCLE)], ls=_DASHES[j % len(_DASHES)], label=name)
+        ax.plot(t, np.degrees(q[:, j]), color=CYCLE[j % len(CYCLE)], ls=DASHES[j % len(DASHES)], label=name)
     ax.set(title="Joint angles", ylabel="angle [°]", xlabel="time [s]")
     _legend(ax)
     return ax
@@ -200,7 +200,7 @@ def force(t: np.ndarray, force_on_arm: np.ndarray, ax: Axes | None = None) -> Ax
     """Plot the contact force on the arm, shape (n, 2) [N]."""
     ax = _axes(ax)
     for k, name in enumerate(("forward (y)", "up (z)")):
-        ax.plot(t, force_on_arm[:, k], color=CYCLE[k], ls=_DASHES[k], label=name)
+        ax.plot(t, force_on_arm[:, k], color=CYCLE[k], ls=DASHES[k], label=name)
     ax.set(title="Force on the arm", ylabel="force [N]", xlabel="time [s]")
     _legend(ax)
     return ax
@@ -218,7 +218,7 @@ def contributions(t: np.ndarray, torques: Mapping[str, np.ndarray], ax: Axes | N
     """
     ax = _axes(ax)
     for k, (name, values) in enumerate(torques.items()):
-        ax.plot(t, values, color=CYCLE[k % len(CYCLE)], ls=_DASHES[(k // 2) % len(_DASHES)], label=name)
+        ax.plot(t, values, color=CYCLE[k % len(CYCLE)], ls=DASHES[(k // 2) % len(DASHES)], label=name)
     ax.axhline(0.0, color=INK, lw=0.8)
     ax.set(title=title, ylabel="torque [N m]", xlabel="time [s]")
     _legend(ax)
@@ -287,7 +287,7 @@ def by_direction(
     return ax
 
 
-_DASHES = ("-", "--", "-.", ":")
+DASHES = ("-", "--", "-.", ":")
 
 
 def _legend(ax: Axes) -> None:

@@ -32,6 +32,8 @@ p { max-width: 46rem; margin: .5rem 0; }
 .soft, figcaption { color: var(--soft); font-size: .92rem; }
 .label { display: inline-block; background: var(--warn); border: 1px solid var(--warn-line); border-radius: 4px; padding: .1rem .6rem;
   font-weight: 600; font-size: .88rem; }
+.care { background: var(--warn); border: 1px solid var(--warn-line); border-radius: 6px; padding: .2rem 1rem .4rem; margin: 1.2rem 0; }
+.care h2 { border: 0; margin: .4rem 0 .2rem; padding: 0; font-size: 1.05rem; }
 .wide { overflow-x: auto; margin: .8rem 0; }
 table { border-collapse: collapse; font-size: .92rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .32rem .75rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
@@ -54,6 +56,7 @@ KINDS = {
     "simulate": "Simulation",
     "passive": "Passive joint moments",
     "demo": "Demonstration",
+    "gap": "Gap between model and measurement",
     "fmu run": "Co-simulation",
 }
 """What a report can be made of: the `verb` of a result, and its title."""
@@ -173,13 +176,24 @@ def _class(kind: str) -> str:
 
 
 def _result(data: Mapping[str, Any], folder: Path) -> str:
-    sections = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
-    figures = "".join(picture(entry, folder) for entry in data.get("figures", []))
-    drawn = heading("Figures") + figures if figures else ""
+    figures: dict[str, str] = {}
+    for entry in data.get("figures", []):
+        figures[entry.get("section", "")] = figures.get(entry.get("section", ""), "") + picture(entry, folder)
+    drawn = heading("Figures") + figures[""] if "" in figures else ""
     head = f"<h1>{escape(KINDS[data['verb']])}: {escape(words.name(data))}</h1>\n"
     if words.is_synthetic(data):
         head += '<p><span class="label">Synthetic data: simulated, not measured</span></p>\n'
-    return head + paragraph(words.verdict(data), "verdict") + sections[data["verb"]](data) + drawn + _origin(data)
+    return head + paragraph(words.verdict(data), "verdict") + _sections(data, figures) + drawn + _origin(data)
+
+
+def _sections(data: Mapping[str, Any], figures: Mapping[str, str]) -> str:
+    """Return what is between the verdict and the figures that belong to no section."""
+    from .discrepancy import page
+
+    if data["verb"] == "gap":
+        return page.sections(data, figures)
+    sections = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
+    return sections[data["verb"]](data)
 
 
 def _identified(data: Mapping[str, Any]) -> str:
@@ -247,4 +261,12 @@ def _origin(data: Mapping[str, Any]) -> str:
     out = heading("How to repeat")
     if made.get("command"):
         out += f"<p><code>{escape(made['command'])}</code></p>\n"
-    return out + paragraph(f"armrs {made.get('armrs')}, {made.get('build_profile')} build, Python {made.get('python')}.", "soft")
+    out += paragraph(f"armrs {made.get('armrs')}, {made.get('build_profile')} build, Python {made.get('python')}.", "soft")
+    if made.get("random_numbers") == "none":
+        out += paragraph(
+            "No random numbers are drawn, and the number of threads changes nothing: the same input gives the same result.", "soft"
+        )
+    if made.get("input_sha256"):
+        out += paragraph("SHA-256 of dataset.toml, the model and the trials, one after the other in their order:", "soft")
+        out += f"<p><code>{escape(made['input_sha256'])}</code></p>\n"
+    return out

@@ -95,7 +95,9 @@ def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figu
         with files.replacing(path) as temporary:
             item.figure.savefig(temporary, format="png", dpi=130)
         pictures.append(path)
-    data["figures"] = [{"file": f"figures/{d.name}.png", "title": d.title, "text": d.text} for d in drawn]
+    data["figures"] = [
+        {"file": f"figures/{d.name}.png", "title": d.title, "text": d.text} | ({"section": d.section} if d.section else {}) for d in drawn
+    ]
     document, page = folder / f"{stem}.json", folder / "report.html"
     files.write_json(document, data)
     report.write_report([document], page)

@@ -15,6 +15,8 @@ DECIDED_BY = {
 """What decided a value, in plain words."""
 
 _UNITS = {"1": ""}
+_MOST_DECIMALS = 6
+"""With more, a number is written with a power of ten."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def number(value: float | None, std: float | None) -> str:
         return f"{value:.4g}"
     digits = _decimals(std)
     # Adding zero turns a rounded -0 into 0.
-    return f"{round(value, digits) + 0.0:.{digits}f}" if digits <= 9 else f"{value:.3g}"
+    return f"{round(value, digits) + 0.0:.{digits}f}" if digits <= _MOST_DECIMALS else f"{value:.3g}"
 
 
 def spread(std: float | None) -> str:
@@ -106,7 +108,7 @@ def spread(std: float | None) -> str:
     if std is None:
         return "–"
     digits = _decimals(std) if std > 0 else 0
-    return f"{std:.{digits}f}" if std > 0 and digits <= 9 else f"{std:.2g}"
+    return f"{std:.{digits}f}" if std > 0 and digits <= _MOST_DECIMALS else f"{std:.2g}"
 
 
 def _decimals(std: float) -> int:
@@ -247,34 +249,3 @@ def comparison(data: Mapping[str, Any]) -> Table:
         for c in data["comparison"]
     ]
     return Table(["quantity", "unit", "known", "identified", "± std", "error [%]", "error in the thesis [%]", "decided by"], rows, left=2)
-
-
-def missing(data: Mapping[str, Any]) -> Table:
-    """Return the named effects with their estimates."""
-    rows: list[list[object]] = []
-    for effect in data["effects"]:
-        place = effect["joint"] or effect["channel"]
-        fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
-        for k, (name, value) in enumerate((fitted or effect["parameters"]).items()):
-            head = [effect["kind"], place, f"{effect['share']:.0%}"] if k == 0 else ["", "", ""]
-            rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), value["unit"]])
-    return Table(["effect", "at", "share", "parameter", "value", "±", "unit"], rows, 4)
-
-
-def gap(data: Mapping[str, Any]) -> Table:
-    """Return the gap of every channel: as given, calibrated, with the named effects, and the floor."""
-    steps = ("before", "calibrated", "after", "floor")
-    rows = [[name, *(channel[s] for s in steps)] for name, channel in data["gap"].items() if channel["before"] is not None]
-    return Table(["channel", "as given", "calibrated", "with the named", "repeats"], rows, 1)
-
-
-def where_gap(data: Mapping[str, Any], most: int = 6) -> Table:
-    """Return where the calibrated model and the data disagree most."""
-    rows = [[w["trial"], w["condition"], f"{w['t_start']:.3g} to {w['t_end']:.3g}", w["mean"], w["z"]] for w in data["where"][:most]]
-    return Table(["trial", "where", "time [s]", "missing torque [N m]", "z"], rows, 2)
-
-
-def limits(data: Mapping[str, Any]) -> Table:
-    """Return the smallest effects that would have been seen."""
-    rows = [[w["kind"], w["joint"] or w["channel"], w["parameter"], w["at_least"], w["unit"]] for w in data["would_have_seen"]]
-    return Table(["effect", "at", "parameter", "at least", "unit"], rows, 3)

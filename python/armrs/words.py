@@ -36,7 +36,16 @@ def is_synthetic(result: Mapping[str, Any]) -> bool:
 
 def verdict(result: Mapping[str, Any]) -> str:
     """Return a result in a sentence or two."""
-    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "gap": _gap, "fmu run": _coupled}
+    from .discrepancy import words as gap
+
+    sentences = {
+        "identify": _identified,
+        "simulate": _simulated,
+        "passive": _passive,
+        "demo": _demo,
+        "gap": gap.verdict,
+        "fmu run": _coupled,
+    }
     return sentences[result["verb"]](result)
 
 
@@ -81,23 +90,6 @@ def _demo(result: Mapping[str, Any]) -> str:
     return str(result["verdict"])
 
 
-def _gap(result: Mapping[str, Any]) -> str:
-    names = [effect_name(e) for e in result["effects"]]
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""
-    if result["verdict"] == "nothing_missing":
-        return "Nothing is missing: what is left of these data is what repeats of one movement differ by."
-    if result["verdict"] == "explained":
-        return f"The model lacks {listed}; with it, what is left is noise." if len(names) == 1 else f"The model lacks {listed}."
-    rest = "something is missing that the catalogue has no name for"
-    return f"The model lacks {listed}, and {rest}." if names else f"{rest[0].upper()}{rest[1:]}."
-
-
-def effect_name(effect: Mapping[str, Any]) -> str:
-    """Return an effect with its place, in words."""
-    place = f" in joint {effect['joint']}" if effect["joint"] else f" of {effect['channel']}" if effect["channel"] else ""
-    return effect["kind"].replace("_", " ") + place
-
-
 def data_lines(data: Mapping[str, Any]) -> list[str]:
     """Return what a result rests on."""
     lines = []
@@ -132,7 +124,7 @@ def _trade(line: str) -> str:
 def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print an identification."""
     data, joints, level = result["data"], result["data"]["joints"], result["level"]
-    _head(result)
+    head(result)
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
     show("Absorbed by the calibration, within the tolerance declared", tables.estimates(result["calibration"], joints, level))
@@ -161,7 +153,7 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what a run came to."""
-    _head(result)
+    head(result)
     show("", tables.run(result))
     for line in result.get("assumed", ()):
         print(line)
@@ -170,7 +162,7 @@ def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def coupled(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what a co-simulation came to."""
-    _head(result)
+    head(result)
     show("", tables.coupling(result))
     show("Connections", tables.connections(result))
     for name in result["not_connected"]:
@@ -180,28 +172,13 @@ def coupled(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print passive moments."""
-    _head(result)
+    head(result)
     show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
     if result["dependence"]:
         show("Elastic moment against own and adjacent angle", tables.dependence(result))
     for check in result["checks"]:
         print(check["text"])
     print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
-    files_written(written)
-
-
-def gap(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
-    """Print what the gap workflow found."""
-    _head(result)
-    show("Missing in the model", tables.missing(result))
-    for effect in result["effects"]:
-        others = [f"{effect_name(a)} ({a['why']})" for a in effect["alternatives"]]
-        if others:
-            print(f"Instead of {effect_name(effect)} it may be {', or '.join(others)}.")
-    show("Gap on the test trials, root mean square of simulated less measured", tables.gap(result))
-    show("Where the calibrated model and the data disagree most", tables.where_gap(result))
-    if result["verdict"] == "nothing_missing":
-        show("The smallest effects that these data would have shown", tables.limits(result))
     files_written(written)
 
 
@@ -220,7 +197,8 @@ def files_written(written: Sequence[Path]) -> None:
         print("\n".join(str(path) for path in written))
 
 
-def _head(result: Mapping[str, Any]) -> None:
+def head(result: Mapping[str, Any]) -> None:
+    """Print what a result is about and its verdict."""
     label = " (synthetic data)" if is_synthetic(result) else ""
     print(f"{name(result)}{label}: {verdict(result)}")
     print()

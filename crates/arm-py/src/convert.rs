@@ -111,6 +111,30 @@ pub fn over_rows<'py, const K: usize>(
     Ok(array.into_pyarray(py))
 }
 
+/// Calls `f` for every row in its order, each with `width` results: for what remembers the rows before.
+///
+/// All arguments are batches of the same length.
+pub fn in_order<'py, const K: usize>(
+    py: Python<'py>,
+    inputs: [Rows<'_>; K],
+    width: usize,
+    mut f: impl FnMut([&[f64]; K], &mut [f64]),
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let n = inputs[0].batch.unwrap_or(1);
+    if let Some(other) = inputs.iter().find(|r| r.batch != inputs[0].batch) {
+        let found = format!("{} rows", other.batch.unwrap_or(1));
+        return Err(bad_input(other.name, found, &format!("{n} rows")));
+    }
+    let mut out = vec![0.0; n * width];
+    for i in 0..n {
+        let row = &mut out[i * width..(i + 1) * width];
+        f(std::array::from_fn(|k| inputs[k].row(i)), row);
+    }
+    let array = ArrayD::from_shape_vec(IxDyn(&[n, width]), out)
+        .expect("the buffer was made for this shape");
+    Ok(array.into_pyarray(py))
+}
+
 /// A table of samples, `(n, M)`.
 pub fn rows<const M: usize>(
     name: &str,

@@ -297,7 +297,7 @@ fn unknown<const N: usize>(
         Target::Segment(k, part) => (["mass", "com", "inertia"][part.min(2)], k, part),
         Target::Shift(axis) => ("shift", 0, axis),
         Target::Placement(axis) => ("placement", 0, axis),
-        Target::Known(e, p) => (hypothesis.known[e].kind.info().kind, e, p),
+        Target::Known(e, p) => ("known", e, p),
         Target::Calibration(e) => {
             let effect = &hypothesis.calibration[e];
             (effect.kind.info().kind, effect.index, 0)

@@ -1,10 +1,12 @@
 //! `Rig`: an arm with everything that acts on it, as the core computes with it.
 
-use arm_core::effect::{Effect, Kind};
-use arm_core::{Chain, Contact, Elbow, Robot, Setup};
+use arm_core::effect::{Effect, Kind, Motion, Place};
+use arm_core::{Chain, Contact, Elbow, Joints, Pose, Robot, Setup, joint_force};
+use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
-use crate::arm::Arm;
+use crate::arm::{AnyChain, Arm, each_length};
+use crate::convert::{Numbers, Rows, in_order, joints};
 use crate::errors::{bad_input, invalid};
 
 /// An arm, its effects, its contact with the robot and the robot itself.
@@ -66,6 +68,92 @@ impl Rig {
             contact: Contact::new(stiffness.into(), damping.into()),
             robot,
         })
+    }
+
+    /// Torque with which each effect resists in its joint along a motion, shape (n, n_effects) [N m].
+    ///
+    /// Parameters
+    /// ----------
+    /// q, qd, qdd : array_like, shape (n, n_joints)
+    ///     Motion of the joints at equal intervals [rad, rad/s, rad/s²].
+    /// interval : float
+    ///     Between two samples [s].
+    ///
+    /// Notes
+    /// -----
+    /// The load of the joints is that of the arm that moves freely: the force at the hand is not in it. Effects that act
+    /// elsewhere than in joints have no torque.
+    fn resisting<'py>(
+        &self,
+        py: Python<'py>,
+        q: Numbers<'py>,
+        qd: Numbers<'py>,
+        qdd: Numbers<'py>,
+        interval: f64,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let chain = &self.arm.get().chain;
+        each_length!(chain, c => {
+            let n = self.arm.get().n_joints();
+            let rows = [
+                Rows::new("q", &q, n)?,
+                Rows::new("qd", &qd, n)?,
+                Rows::new("qdd", &qdd, n)?,
+            ];
+            let mut along = Along::new(c, &self.effects, interval);
+            in_order(py, rows, self.effects.len(), |[q, qd, qdd], out| {
+                along.next(&joints(q), &joints(qd), &joints(qdd), out);
+            })
+        })
+    }
+}
+
+/// Effects along a motion, sample by sample: those with a state of their own remember.
+struct Along<'a, const N: usize> {
+    chain: &'a Chain<f64, N>,
+    effects: &'a [Effect<f64>],
+    memory: Vec<f64>,
+    interval: f64,
+    time: f64,
+}
+
+impl<'a, const N: usize> Along<'a, N> {
+    fn new(chain: &'a Chain<f64, N>, effects: &'a [Effect<f64>], interval: f64) -> Self {
+        let memory = vec![0.0; effects.len()];
+        Self {
+            chain,
+            effects,
+            memory,
+            interval,
+            time: 0.0,
+        }
+    }
+
+    fn next(
+        &mut self,
+        q: &Joints<f64, N>,
+        qd: &Joints<f64, N>,
+        qdd: &Joints<f64, N>,
+        out: &mut [f64],
+    ) {
+        const PARTS: usize = 10;
+        let through = joint_force(self.chain, &Pose::new(q), (qd, qdd), [0.0; 2]);
+        let mut motion = Motion::new(self.time, *q, *qd).with_joint_force(&through);
+        motion.qdd = *qdd;
+        let step = self.interval / PARTS as f64;
+        for ((effect, memory), out) in self.effects.iter().zip(&mut self.memory).zip(out) {
+            let joint = effect.kind.info().place == Place::Joint;
+            *out = if joint {
+                effect.torque(&motion.local(effect.index, *memory))
+            } else {
+                0.0
+            };
+            if effect.kind.info().memory {
+                for _ in 0..PARTS {
+                    *memory += step * effect.memory_rate(&motion.local(effect.index, *memory));
+                }
+            }
+        }
+        self.time += self.interval;
     }
 }
 

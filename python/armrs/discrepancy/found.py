@@ -145,7 +145,10 @@ class ChannelGap:
 
 @dataclass(frozen=True)
 class Absorbed:
-    """A small imperfection that was refitted within what was promised of it."""
+    """A small imperfection that was refitted, beside twice the standard deviation that was known of it beforehand.
+
+    For sensors that is the tolerance of the data set, for segments twice their `segment_uncertainty`.
+    """
 
     name: str
     value: float

@@ -18,6 +18,8 @@ _MOVING = 0.1
 """Share of a joint's fastest speed in a trial below which it counts as resting."""
 _FEWEST = 16
 """Samples below which a region says nothing."""
+_SEEN = 3
+"""Samples of one trial below which a cell of a map was not visited."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,28 +123,40 @@ class Map:
     angle, speed : ndarray, shape (a + 1,), (s + 1,)
         Edges of the cells [rad, rad/s].
     torque : ndarray, shape (s, a)
-        Means [N m]; NaN where too few samples fall.
+        Means over trials [N m]; NaN where too few samples fall.
+    clear : ndarray of bool, shape (s, a)
+        Where the mean is more than twice its standard error, by the scatter between trials.
     """
 
     angle: np.ndarray
     speed: np.ndarray
     torque: np.ndarray
+    clear: np.ndarray
 
 
 def residual_map(found: Sequence[Discrepancy], joint: int, cells: tuple[int, int] = (14, 9), role: str = "fit") -> Map:
     """Return the map of one joint (zero-based) over the trials of a role, with so many cells of angle and of speed."""
     own = [d for d in found if d.trial.role == role]
-    q, qd, torque = (np.concatenate([getattr(d, name)[d.valid(), joint] for d in own]) for name in ("q", "qd", "torque"))
+    q, qd = (np.concatenate([getattr(d, name)[d.valid(), joint] for d in own]) for name in ("q", "qd"))
     angle = np.linspace(q.min(), q.max() if np.ptp(q) > 0 else q.min() + 1e-9, cells[0] + 1)
     fast = float(np.quantile(np.abs(qd), 0.995)) or 1e-9
     speed = np.linspace(-fast, fast, cells[1] + 1)
-    column = np.clip(np.searchsorted(angle, q, side="right") - 1, 0, cells[0] - 1)
-    row = np.clip(np.searchsorted(speed, qd, side="right") - 1, 0, cells[1] - 1)
-    count, total = np.zeros((cells[1], cells[0])), np.zeros((cells[1], cells[0]))
-    np.add.at(count, (row, column), 1.0)
-    np.add.at(total, (row, column), torque)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return Map(angle, speed, np.where(count >= _FEWEST / 2, total / count, np.nan))
+    means = []
+    for d in own:
+        valid = d.valid()
+        column = np.clip(np.searchsorted(angle, d.q[valid, joint], side="right") - 1, 0, cells[0] - 1)
+        row = np.clip(np.searchsorted(speed, d.qd[valid, joint], side="right") - 1, 0, cells[1] - 1)
+        count, total = np.zeros((cells[1], cells[0])), np.zeros((cells[1], cells[0]))
+        np.add.at(count, (row, column), 1.0)
+        np.add.at(total, (row, column), d.torque[valid, joint])
+        means.append(np.where(count >= _SEEN, total / np.maximum(count, 1.0), np.nan))
+    trials = np.array(means)
+    there = np.isfinite(trials)
+    number = there.sum(axis=0)
+    mean = np.where(number > 0, np.where(there, trials, 0.0).sum(axis=0) / np.maximum(number, 1), np.nan)
+    square = np.where(there, (trials - mean) ** 2, 0.0).sum(axis=0)
+    error = np.sqrt(square / np.maximum(number - 1, 1) / np.maximum(number, 1))
+    return Map(angle, speed, mean, (number > 1) & (np.abs(np.nan_to_num(mean)) > 2.0 * error))
 
 
 _CLEAR = 0.15

@@ -12,6 +12,7 @@ import numpy as np
 from ..catalogue import catalogue
 from ..dataset import Dataset
 from ..model import Effect, Joint, Model, Segment
+from ..rig import all_effects
 from ..trial import Trial
 from . import maps
 from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Rung, Tried, Value
@@ -24,8 +25,7 @@ _NEGLIGIBLE = 0.05
 
 def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequence[str]) -> GapFound:
     """Return what the core found in a data set as objects."""
-    sign = -1.0 if dataset.force_on == "robot" else 1.0
-    together = tuple(_missing(item, sign) for item in raw["named"])
+    together = tuple(_missing(item, dataset) for item in raw["named"])
     apart = tuple(_apart(item, dataset, raw) for item in raw["apart"])
     effects = tuple(sorted((*together, *apart), key=lambda e: -e.share))
     (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
@@ -42,7 +42,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         would_have_seen=_limits(raw),
         unexplained=min(share, 1.0) if verdict == "unexplained" or effects else 0.0,
         looks_like=maps.shape(maps.discrepancies(dataset, led, raw["trials"], "amended")) if verdict == "unexplained" else None,
-        absorbed=_absorbed(raw),
+        absorbed=_absorbed(dataset, raw),
         lack=((before_ratio, before_z), (after_ratio, after_z)),
         ladder=tuple(_rung(tried, before, after) for tried, before, after in raw["ladder"]),
         warnings=tuple(warnings),
@@ -64,16 +64,16 @@ def channel_names(dataset: Dataset, led: bool) -> list[str]:
     return [*(f"q{j}_rad" for j in range(1, n + 1)), "Fy_N", "Fz_N"] if led else [f"tau{j}_Nm" for j in range(1, n + 1)]
 
 
-def _in_file(kind: str, sign: float) -> float:
-    """Return the sign of a sensor fault in the file: biases and drifts are of the channel as it stands there."""
-    return sign if kind in ("force_bias", "force_drift") else 1.0
+def in_file(kind: str, dataset: Dataset) -> float:
+    """Return the sign of an effect in the files: biases and drifts are of the channel as it stands there, not of the force on the arm."""
+    return -1.0 if dataset.force_on == "robot" and kind in ("force_bias", "force_drift") else 1.0
 
 
-def _missing(item: Mapping[str, Any], sign: float) -> Missing:
+def _missing(item: Mapping[str, Any], dataset: Dataset) -> Missing:
     name, index, values = item["effect"]
     kind = catalogue()[name]
     known = dict(item["sd"])
-    own = _in_file(name, sign)
+    own = in_file(name, dataset)
     parameters = {
         p.name: Value((own if p.linear else 1.0) * v, known[k] if k in known and math.isfinite(known[k]) else None, p.unit)
         for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
@@ -107,9 +107,10 @@ def _apart(item: Sequence[Any], dataset: Dataset, raw: Mapping[str, Any]) -> Mis
 
 def _limits(raw: Mapping[str, Any]) -> tuple[Limit, ...]:
     best: dict[tuple[str, int, int], Limit] = {}
+    named = [tuple(item["effect"][:2]) for item in raw["named"]]
     for (entry, free), gain, price, smallest in raw["ruled"]:
         name, index, _values = entry
-        if not math.isfinite(smallest):
+        if not math.isfinite(smallest) or (name, index) in named:
             continue
         kind = catalogue()[name]
         parameter = kind.parameters[free[0]]
@@ -130,21 +131,27 @@ def _rung(tried: Sequence[Any], before: float, after: float) -> Rung:
     return Rung(tuple(Tried(tuple(map(effect, members)), float(gain)) for members, gain in tried), float(before), float(after))
 
 
-_UNITS = {"mass": "of its value", "com": "of its value", "inertia": "of its value", "shift": "m"}
-
-
-def _absorbed(raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
+def _absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
     items = []
     for what, index, part, value, before, _after in raw["unknowns"]:
         if what in ("mass", "com", "inertia"):
-            items.append(Absorbed(f"{what} of segment {index + 1}", value, before, _UNITS[what]))
+            items.append(Absorbed(f"{what} of segment {index + 1}", value, 2 * before, "of its value"))
+        elif what == "known":
+            effect = all_effects(dataset.model)[index]
+            parameter = catalogue()[effect.kind].parameters[part]
+            name = f"{parameter.name} of {_worded(effect.kind, effect.joint, effect.channel)}"
+            given = effect.parameters.get(parameter.name, parameter.default)
+            items.append(Absorbed(name, value / given - 1.0, 2 * before / abs(given), "of its value"))
         elif what == "shift":
             items.append(Absorbed(f"place of the robot, {'yz'[part]}", value, 2 * before, "m"))
         elif what in catalogue():
-            joint, channel = catalogue()[what].place(index)
-            name = what.replace("_", " ") + (f" of joint {joint}" if joint else f" of {channel}" if channel else "")
-            items.append(Absorbed(name, value, 2 * before, catalogue()[what].parameters[0].unit))
+            kind = catalogue()[what]
+            items.append(Absorbed(_worded(what, *kind.place(index)), value, 2 * before, kind.parameters[0].unit))
     return tuple(items)
+
+
+def _worded(kind: str, joint: int | None, channel: str | None) -> str:
+    return kind.replace("_", " ") + (f" of joint {joint}" if joint else f" of {channel}" if channel else "")
 
 
 def _amended(model: Model, amended: Mapping[str, Any]) -> Model:

@@ -2,23 +2,52 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
 from .. import files
-from ..results import data_of, origin
+from ..catalogue import catalogue
+from ..dataset import FILE, Dataset
+from ..results import data_of, origin, write_result
+from . import figures
 from .found import GapFound
 
 
 def gap_data(result: GapFound, command: str | None = None) -> dict[str, Any]:
-    """Return the result as it is written to JSON: that of `GapFound.to_dict`, and what it rests on."""
-    return {"verb": "gap", **result.to_dict(), "data": data_of(result.dataset), "made_by": origin(command)}
+    """Return the result as it is written to JSON: that of `GapFound.to_dict`, what its effects are, and what it rests on."""
+    data = {"verb": "gap", **result.to_dict(), "data": data_of(result.dataset), "made_by": origin(command)}
+    for effect in data["effects"]:
+        kind = catalogue()[effect["kind"]]
+        effect |= {"summary": kind.summary, "formula": kind.formula}
+    data["made_by"] |= {"input_sha256": digest(result.dataset), "random_numbers": "none"}
+    return data
+
+
+def digest(dataset: Dataset) -> str | None:
+    """Return the SHA-256 of a data set's files one after the other: `dataset.toml`, the model, the trials in their order."""
+    if dataset.folder is None or dataset.model_path is None:
+        return None
+    whole = hashlib.sha256()
+    try:
+        for path in (dataset.folder / FILE, dataset.model_path, *(dataset.folder / t.file for t in dataset.trials)):
+            whole.update(path.read_bytes())
+    except OSError:
+        return None
+    return whole.hexdigest()
 
 
 def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path]:
-    """Write `amended.toml` and `gap.json` below a folder; return the files."""
-    model, document = folder / "amended.toml", folder / "gap.json"
-    files.not_an_input([model], [result.dataset.model_path] if result.dataset.model_path else [])
-    result.model.write(model)
-    files.write_json(document, data)
-    return [model, document]
+    """Write `amended.toml`, `gap.json`, figures and `report.html` below a folder; return the files, the report last.
+
+    `data` is that of `gap_data`; the list of figures is added to it.
+    """
+    name = "amended.toml"
+    files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
+    drawn = figures.gap(result)
+
+    def write(out: Path) -> list[Path]:
+        result.model.write(out / name)
+        return [out / name, *write_result(out, "gap", data, drawn)]
+
+    return files.write_whole(folder, write)

@@ -46,8 +46,8 @@ def find_gap(
     if not isinstance(dataset, Dataset):
         dataset = load_dataset(dataset)
     led = reading.is_led(dataset)
-    settings = _settings(dataset, led, threads)
-    columns = _columns(dataset)
+    settings = core_settings(dataset, led, threads)
+    columns = core_trials(dataset)
     built = rig(dataset.model, all_effects(dataset.model))
     warnings = suspicion.examine(dataset, led)
     suspicion.refuse_wrong_angles(dataset)
@@ -56,13 +56,14 @@ def find_gap(
     return reading.found(dataset, led, raw, warnings)
 
 
-def _columns(dataset: Dataset) -> list[dict[str, Any]]:
+def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
     """Return the trials for the core."""
     configurations = sorted({t.configuration for t in dataset.trials})
     return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
 
 
-def _settings(dataset: Dataset, led: bool, threads: int | None) -> dict[str, Any]:
+def core_settings(dataset: Dataset, led: bool, threads: int | None) -> dict[str, Any]:
+    """Return what is known beforehand, for the core."""
     tolerance = dataset.tolerance
     return {
         "segment_uncertainty": dataset.model.segment_uncertainty,

@@ -10,8 +10,12 @@ import numpy as np
 from ..dataset import Dataset
 from ..errors import BadInput, Text
 
-_SATURATED = 0.02
-"""Share of samples at one and the same extreme value above which a channel counts as saturated."""
+_LONG = 5
+"""Samples in a row at one and the same extreme value from which on a channel may be saturated."""
+_NEAR = 0.02
+"""Part of a channel's range that counts as next to its extreme."""
+_OFTEN = 3.0
+"""A saturated channel is that much oftener at its extreme than next to it."""
 _ALIKE = 0.9
 """Correlation above which two signals are the same movement."""
 _VARIES = 1e-9
@@ -42,21 +46,28 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
                 raise BadInput(
                     "channel", Text(f"{name} is {finite[0]:g} throughout"), "a channel that changes with the movement", file=trial.file
                 )
-            stuck = _stuck(finite)
-            if stuck is not None:
-                lines.append(f"{trial.file}: {name} stays at {stuck:g} for many samples: saturated?")
+    return lines + _saturated(dataset, led)
+
+
+def _saturated(dataset: Dataset, led: bool) -> list[str]:
+    """Return the channels that are cut off: at the extreme of all trials, for long, and hardly ever next to it."""
+    together: dict[str, list[tuple[str, np.ndarray]]] = {}
+    for trial in dataset.trials:
+        for name, values in _channels(trial, led):
+            together.setdefault(name, []).append((trial.file, values[np.isfinite(values)]))
+    lines = []
+    for name, columns in together.items():
+        everything = np.concatenate([values for _, values in columns])
+        if len(everything) == 0:
+            continue
+        near = _NEAR * np.ptp(everything)
+        for extreme in (everything.max(), everything.min()):
+            at = sum(int((values == extreme).sum()) for _, values in columns)
+            beside = sum(int((np.abs(values - extreme) <= near).sum()) for _, values in columns) - at
+            files = [file for file, values in columns if _longest(values == extreme) >= _LONG]
+            if files and near > 0 and at > _OFTEN * beside:
+                lines.append(f"{', '.join(files)}: {name} stays at {extreme:g}, the most of all trials, for many samples: saturated?")
     return lines
-
-
-def _stuck(values: np.ndarray) -> float | None:
-    """Return the extreme value at which a channel is cut off, or None."""
-    if len(values) < 16:
-        return None
-    for extreme in (values.max(), values.min()):
-        at = values == extreme
-        if at.mean() > _SATURATED and _longest(at) >= 5 and np.ptp(values) > 0:
-            return float(extreme)
-    return None
 
 
 def _longest(flags: np.ndarray) -> int:
