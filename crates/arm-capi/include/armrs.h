@@ -3,11 +3,8 @@
 #ifndef ARMRS_H
 #define ARMRS_H
 
-#include <stdarg.h>
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <stdlib.h>
 
 #if !defined(ARMRS_TWO_JOINTS)
 // Number of joints of an arm.

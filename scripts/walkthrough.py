@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+"""Do what docs/firmware.md says, to the letter, in a folder that is empty: from no project to an image that runs in QEMU.
+
+Exits with 77 and the reason where a tool is missing.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+BLOCK = re.compile(r"^```(\w+)(?: ([^\n]+))?\n(.*?)^```", flags=re.M | re.S)
+TOOLS = {
+    "/usr/bin/rustc": "rustc-web rust-web-src",
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi",
+    "qemu-system-arm": "qemu-system-arm",
+    "make": "make",
+    "cmake": "cmake",
+}
+
+
+def main() -> int:
+    """Write its files, run its commands, and look for what it says they print."""
+    for tool, package in TOOLS.items():
+        if shutil.which(tool) is None:
+            print(f"walkthrough: skipped, {tool} is missing (Debian: {package})", file=sys.stderr)
+            return 77
+    page = (ROOT / "docs" / "firmware.md").read_text(encoding="utf-8")
+    section = page[page.index("## Into a C project") : page.index("### What changes")]
+    with tempfile.TemporaryDirectory() as folder:
+        commands, promised = ["set -euo pipefail"], []
+        for language, name, content in BLOCK.findall(section):
+            if language == "sh":
+                commands.append(content.replace("../myproject", folder))
+            elif language == "text":
+                promised.append(content)
+            else:
+                Path(folder, name).write_text(content, encoding="utf-8")
+        done = subprocess.run(["bash", "-c", "\n".join(commands)], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    # Make and CMake, one after the other.
+    missing = [text for text in promised if done.stdout.count(text) != 2]
+    if done.returncode or missing or not promised:
+        print(f"walkthrough: status {done.returncode}, not printed twice: {missing}; printed:\n{done.stdout}", file=sys.stderr)
+        return 1
+    print("walkthrough: docs/firmware.md from an empty folder to a running image, with Make and with CMake")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
