@@ -186,4 +186,4 @@ def test_the_cascade_holds_what_it_does_not_find(slow_arm: Path) -> None:
     assert plain[1] - friction(less)[1] > 0.01
     rotor = armrs.Effect("motor_inertia", 1, parameters={"inertia": 0.01})
     with_rotor = armrs.identify(data.replace(model=data.model.replace(effects=(rotor,))), method="cascade", with_effects="coulomb")
-    assert any("motor_inertia of joint 1" in line for line in with_rotor.misfits)
+    assert any("motor_inertia of joint 1" in line for line in with_rotor.left_out)

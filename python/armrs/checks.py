@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .errors import BadInput, Text, unknown_name
 
@@ -80,6 +84,32 @@ def whole(place: str, value: object, *, least: int, most: int | None = None) -> 
     if result < least or (most is not None and result > most):
         raise BadInput(place, result, allowed)
     return int(result)
+
+
+def numbers(place: str, value: object, unit: str = "") -> np.ndarray:
+    """Return an array of finite numbers of any shape; its own copy."""
+    allowed = " ".join(part for part in ("finite numbers", unit) if part)
+    try:
+        result = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise BadInput(place, value, allowed) from None
+    if not np.isfinite(result).all():
+        raise BadInput(place, Text("a value that is not finite"), allowed)
+    return result
+
+
+def path(place: str, value: object) -> Path:
+    """Return the path of a file or folder."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise BadInput(place, value, "a path")
+    return Path(value)
+
+
+def instance(place: str, value: object, *kinds: type) -> None:
+    """Refuse an object of another class."""
+    if not isinstance(value, kinds):
+        names = [kind.__name__ for kind in kinds]
+        raise BadInput(place, value, " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in names))
 
 
 def flag(place: str, value: object) -> bool:

@@ -8,6 +8,7 @@ To add a verb, write a function with `@app.command()`; its docstring is the help
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import math
 import os
@@ -23,7 +24,7 @@ from . import console, files
 from .errors import ArmrsError, BadInput, Text, one_line, unknown_name
 
 if TYPE_CHECKING:
-    from .trial import Trial
+    from .trial import Reading
 
 fmu = typer.Typer(
     name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.", no_args_is_help=True
@@ -258,7 +259,7 @@ def identify(
     """Identify body segment and joint parameters, each with an interval and what decided it.
 
     Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, or when
-    speeds are noise to a good part. Such a result is not added to a history.
+    the model does not describe these data. Such a result is not added to a history.
     """
     from . import history as sessions
     from . import results, words
@@ -282,13 +283,15 @@ def identify(
             level=level,
         )
     plain = results.identified_data(result, _command(context))
-    if history is not None and result.is_sound:
-        plain["history"] = [course.to_dict() for course in sessions.add(history, result, day)]
-    written = results.write_identified(result, plain, folder) if folder else []
-    console.warn([*data.warnings, *result.contradictions, *result.misfits])
-    if history is not None and not result.is_sound:
-        console.warn([f"{history}: not added to the history, since the result is not sound"])
-    present(lambda: plain, json, lambda: words.identified(plain, written))
+    with contextlib.ExitStack() as kept:
+        # What is added to the history stays only if everything else could be written.
+        if history is not None and result.is_sound:
+            plain["history"] = [course.to_dict() for course in kept.enter_context(sessions.adding(history, result, day))]
+        written = results.write_identified(result, plain, folder) if folder else []
+        console.warn([*data.warnings, *result.warnings])
+        if history is not None and not result.is_sound:
+            console.warn([f"{history}: not added to the history, since the result is not sound"])
+        present(lambda: plain, json, lambda: words.identified(plain, written))
     return 0 if result.is_sound else 1
 
 
@@ -352,8 +355,8 @@ def simulate(
         raise BadInput("--movement, --trial", found, "one of them")
     folder = _folder(out, json)
     arm = load_model(model)
-    measured = None if trial is None else _single_trial(trial, arm.n_joints)
-    console.warn(arm.warnings)
+    reading = None if trial is None else _single_trial(trial, arm.n_joints)
+    measured = None if reading is None else reading.trial
     drive = measured if movement is None else load_movement(movement, arm.n_joints)
     with console.progress("simulating"):
         result = run_simulation(
@@ -368,6 +371,7 @@ def simulate(
         )
     plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", _command(context))
     written = results.write_simulated(result, plain, folder, suffix=f".{to.value}", trial=measured) if folder else []
+    console.warn([*arm.warnings, *(() if reading is None else reading.warnings)])
     present(lambda: plain, json, lambda: words.simulated(plain, written))
 
 
@@ -483,8 +487,7 @@ def report(
     """Make one self-contained HTML report, report.html, of any results."""
     from .report import write_report
 
-    folder = files.output_folder(out)
-    print(write_report(sources, folder / "report.html"))
+    print(write_report(sources, files.output_folder(out) / "report.html"))
 
 
 app.add_typer(fmu)
@@ -604,7 +607,7 @@ def _angles(option: str, text: str) -> list[float] | None:
         raise BadInput(option, text, "numbers separated by commas") from None
 
 
-def _single_trial(path: Path, n_joints: int) -> Trial:
+def _single_trial(path: Path, n_joints: int) -> Reading:
     """Read a trial that stands alone. Its forces are not used, so that it does not matter what they act on."""
     from .trial import read_trial
 
@@ -616,8 +619,7 @@ def _single_trial(path: Path, n_joints: int) -> Trial:
         raise error.within(file=path) from None
     if reading is None:
         raise BadInput("file", Text("no samples below the header"), "samples", file=path)
-    console.warn(reading.warnings)
-    return reading.trial
+    return reading
 
 
 def _listed(text: str) -> list[str]:
@@ -628,7 +630,11 @@ def _folder(out: Path | None, json: Path | None = None) -> Path | None:
     """Refuse outputs that cannot be written before any work is done."""
     if json is not None and json != _STDOUT:
         files.may_replace(json, ".json")
-    return None if out is None else files.output_folder(out)
+        files.must_be_writable(json)
+    if out is None:
+        return None
+    files.must_be_writable(out)
+    return files.output_folder(out)
 
 
 def _command(context: typer.Context) -> str:

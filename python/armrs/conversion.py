@@ -54,7 +54,7 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     Parquet counts as missing too.
     """
     suffix = "." + checks.choice("to", to, tuple(s[1:] for s in SUFFIXES))
-    path = Path(source)
+    path = checks.path("source", source)
     out = files.output_folder(folder)
     if path.suffix.lower() in SUFFIXES and not path.is_dir():
         target = out / path.with_suffix(suffix).name
@@ -105,7 +105,7 @@ def _write(job: _Job) -> Path:
     """Write one file and read it back before it takes its place, so that a value that got lost cannot pass unseen."""
 
     def verify(written: Path) -> None:
-        back = _text_table(written) if job.target.suffix == ".csv" else parquet_table(written)
+        back = _csv_table(written) if job.target.suffix == ".csv" else parquet_table(written)
         for name in job.table.column_names:
             if not _same(job.table.column(name), back.column(name)):
                 raise BadInput(f"column {name}", Text("values that do not come back"), "values both formats can hold", file=job.target)
@@ -160,10 +160,12 @@ def _text_table(path: Path) -> Any:
 
 
 def _typed(column: Any, path: Path, name: str) -> Any:
-    """Turn a column of text into numbers, where all of it is numbers."""
+    """Turn a column of text into numbers, where all of it is numbers; 007 is a name."""
     import pyarrow as pa
     from pyarrow import compute as pc
 
+    if pc.any(pc.match_substring_regex(column, r"^\s*[+-]?0[0-9]")).as_py():
+        return column
     try:
         numbers = _trimmed(column).cast(pa.float64())
     except pa.ArrowInvalid:

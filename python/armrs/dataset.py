@@ -284,7 +284,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
 
 def describe(source: str | os.PathLike[str]) -> Description:
     """Read `dataset.toml` alone."""
-    path = Path(source)
+    path = checks.path("data set", source)
     path = path / FILE if path.is_dir() else path
     document = tomlfile.read(path)
     try:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from . import checks
 from .errors import BadInput, Text
 
 PathLike = str | os.PathLike[str]
@@ -143,10 +144,23 @@ def may_replace(path: PathLike, kind: str) -> None:
 
 def output_folder(path: PathLike) -> Path:
     """Return a folder to write below; it need not exist yet, but it must not be a file."""
-    folder = Path(path)
+    folder = checks.path("-o", path)
     if folder.exists() and not folder.is_dir():
         raise BadInput("-o", Text("a file"), "a folder", file=path)
     return folder
+
+
+def must_be_writable(path: PathLike) -> None:
+    """Refuse a place at which no file or folder can be made, before any work is done."""
+    target = Path(path)
+    try:
+        there = next(p for p in (target, *target.absolute().parents) if p.exists())
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from None
+    if there != target and not there.is_dir():
+        raise BadInput("file", Text("Not a directory"), "a place that can be written", file=path)
+    if not os.access(there, os.W_OK):
+        raise BadInput("file", Text("Permission denied"), "a place that can be written", file=path)
 
 
 def not_an_input(outputs: list[Path], inputs: list[Path]) -> None:

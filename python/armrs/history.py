@@ -6,14 +6,15 @@ import datetime
 import os
 import re
 import sqlite3
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from . import files
 from .errors import BadInput, Text
 from .identification import Estimate, Identified
 
@@ -123,7 +124,14 @@ def check(path: str | os.PathLike[str], joints: int) -> None:
 
 
 def add(path: str | os.PathLike[str], result: Identified, date: str) -> tuple[Course, ...]:
-    """Add a result to the history of its subject, and return the history.
+    """Add a result to the history of its subject, as `adding` does, and return the history."""
+    with adding(path, result, date) as courses:
+        return courses
+
+
+@contextmanager
+def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Iterator[tuple[Course, ...]]:
+    """Add a result to the history of its subject and give that history; what is added stays only if the block ends well.
 
     Parameters
     ----------
@@ -141,23 +149,31 @@ def add(path: str | os.PathLike[str], result: Identified, date: str) -> tuple[Co
     """
     file = Path(path)
     check(file, result.dataset.model.n_joints)
+    files.must_be_writable(file)
     file.parent.mkdir(parents=True, exist_ok=True)
-    estimates = {(e.name, e.kind, e.joint or 0): e for e in (*result.parameters, *result.combinations)}
+    is_new, is_kept = not file.exists(), False
     try:
-        with closing(_open(file)) as connection, connection:
+        with closing(_open(file)) as connection:
             connection.executescript(f"PRAGMA application_id = {APPLICATION}; {_SCHEMA}")
-            key = (result.dataset.name, date, result.method)
-            connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
-            made = connection.execute(
-                "INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints)
-            )
-            rows = [
-                (made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)
-            ]
-            connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
+            _insert(connection, result, date)
+            yield _courses(connection, result.method)
+            # Not committed otherwise: what is open when a connection closes is undone.
+            connection.commit()
+            is_kept = True
     except sqlite3.Error as error:
         raise BadInput("--history", Text(str(error)), "a history that can be written", file=file) from None
-    return read(file, result.method)
+    finally:
+        if is_new and not is_kept:
+            file.unlink(missing_ok=True)
+
+
+def _insert(connection: sqlite3.Connection, result: Identified, date: str) -> None:
+    key = (result.dataset.name, date, result.method)
+    connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
+    made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints))
+    estimates = {(e.name, e.kind, e.joint or 0): e for e in (*result.parameters, *result.combinations)}
+    rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)]
+    connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
 
 
 def read(path: str | os.PathLike[str], method: str = "joint") -> tuple[Course, ...]:
@@ -165,13 +181,17 @@ def read(path: str | os.PathLike[str], method: str = "joint") -> tuple[Course, .
     file = Path(path)
     try:
         with closing(_open(file)) as connection:
-            rows = connection.execute(
-                "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id FROM estimate e JOIN session s ON s.id = e.session "
-                "WHERE s.method = ? AND e.decided_by = 'data' ORDER BY s.date, s.id, e.rowid",
-                (method,),
-            ).fetchall()
+            return _courses(connection, method)
     except sqlite3.Error as error:
         raise BadInput("--history", Text(str(error)), "a history that armrs wrote", file=file) from None
+
+
+def _courses(connection: sqlite3.Connection, method: str) -> tuple[Course, ...]:
+    rows = connection.execute(
+        "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id FROM estimate e JOIN session s ON s.id = e.session "
+        "WHERE s.method = ? AND e.decided_by = 'data' ORDER BY s.date, s.id, e.rowid",
+        (method,),
+    ).fetchall()
     by_parameter: dict[tuple[str, str, int, str], list[_Point]] = {}
     beside: dict[tuple[int, int], set[tuple[str, str]]] = {}
     for name, kind, joint, unit, date, value, std, session in rows:

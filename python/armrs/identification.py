@@ -97,6 +97,8 @@ class Identified:
     misfits : tuple of str
         Joints whose torque the fitted model does not describe, calibrations far beyond their tolerance, speeds that are noise.
         Intervals hold only where the model's structure is right.
+    left_out : tuple of str
+        What of the model the method does not take into account.
     trades : tuple of str
         Which unknowns the movements cannot tell apart, in words.
     scale_free : bool
@@ -123,6 +125,7 @@ class Identified:
     calibration: tuple[Estimate, ...]
     contradictions: tuple[str, ...]
     misfits: tuple[str, ...]
+    left_out: tuple[str, ...]
     trades: tuple[str, ...]
     scale_free: bool
     level: float
@@ -139,9 +142,13 @@ class Identified:
 
     @property
     def is_sound(self) -> bool:
-        """Whether the solver got there, the result is possible, and nothing is known against what the data decided."""
-        doubtful = any(e.caveat for e in (*self.parameters, *self.combinations))
-        return self.status == "solved" and not self.contradictions and not doubtful
+        """Whether the solver got there, the result is possible, and the model describes the data."""
+        return self.status == "solved" and not self.contradictions and not self.misfits
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user has to know besides the numbers, a line each."""
+        return (*self.contradictions, *self.misfits, *self.left_out)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as it is written to JSON; the model stands in a file of its own."""
@@ -153,7 +160,7 @@ class Identified:
             "parameters": [dataclasses.asdict(e) for e in self.parameters],
             "combinations": [dataclasses.asdict(e) for e in self.combinations],
             "calibration": [dataclasses.asdict(e) for e in self.calibration],
-            "warnings": [*self.contradictions, *self.misfits],
+            "warnings": list(self.warnings),
             "not_separable": list(self.trades),
             "scale_free": self.scale_free,
             "level": self.level,
@@ -245,7 +252,8 @@ def identify(
         combinations=combinations,
         calibration=calibration,
         contradictions=_contradictions(parameters),
-        misfits=(*_left_out(method, effects), *_beyond_tolerance(calibration, settings), *poor, *noisy),
+        misfits=(*_beyond_tolerance(calibration, settings), *poor, *noisy),
+        left_out=_left_out(method, effects),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
         level=level,

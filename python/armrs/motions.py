@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from . import files
+from . import checks, files
 from .conversion import read_table
 from .errors import BadInput, Text, unknown_name
 from .markers import MARKER_SUFFIXES, Markers, PlanarMotion, planar_motion, read_c3d
@@ -27,7 +27,7 @@ def read_markers(path: str | os.PathLike[str]) -> Markers:
     BadInput
         Names the file, the place, the value found and the value allowed.
     """
-    file = Path(path)
+    file = checks.path("file", path)
     suffix = file.suffix.lower()
     if suffix not in MARKER_SUFFIXES:
         raise BadInput("file", Text(f"suffix {file.suffix!r}"), " or ".join(MARKER_SUFFIXES), file=file)
@@ -63,7 +63,7 @@ def convert_markers(
     tuple of str
         What the reader has to tell.
     """
-    path = Path(source)
+    path = checks.path("source", source)
     target = files.output_folder(folder) / path.with_suffix(f".{to}").name
     markers = read_markers(path)
     try:
@@ -93,7 +93,7 @@ def convert_motion(source: str | os.PathLike[str], folder: str | os.PathLike[str
     Path
         The file written.
     """
-    path = Path(source)
+    path = checks.path("source", source)
     target = files.output_folder(folder) / path.with_suffix(f".{to}").name
     files.not_an_input([target], [path])
     if path.suffix.lower() in MOTION_SUFFIXES:

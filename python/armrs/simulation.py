@@ -21,6 +21,7 @@ DEFAULT_DT = 0.25e-3
 DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
 _MOST_STEPS = 10**9
+_CHANNELS = ("angle", "force", "moment", "robot", "torque")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +49,15 @@ class Movement:
     shape: str = "trapezoid"
 
     def __post_init__(self) -> None:
-        points = np.array(self.waypoints, dtype=float)
+        points = checks.numbers("waypoints", self.waypoints, "rad")
         if points.ndim != 2 or len(points) < 2:
             raise BadInput("waypoints", f"an array of shape {points.shape}", "two or more rows of joint angles")
-        if np.isfinite(points).all() and np.abs(points).max() > 4 * np.pi:
+        if np.abs(points).max(initial=0.0) > 4 * np.pi:
             raise BadInput("waypoints", float(np.abs(points).max()), "angles within two turns, in radians", hint="looks like degrees")
+        checks.number("speed", self.speed, above=0.0, unit="rad/s")
+        checks.number("acceleration", self.acceleration, above=0.0, unit="rad/s²")
+        checks.number("pause", self.pause, least=0.0, unit="s")
+        checks.choice("shape", self.shape, ("trapezoid", "smooth"))
         points.flags.writeable = False
         object.__setattr__(self, "waypoints", points)
 
@@ -78,6 +83,14 @@ class Channel:
     range: float = np.inf
     bits: int | None = None
 
+    def __post_init__(self) -> None:
+        checks.number("deviation", self.deviation, least=0.0)
+        checks.number("correlation_time", self.correlation_time, least=0.0, unit="s")
+        if self.range != np.inf:
+            checks.number("range", self.range, above=0.0)
+        if self.bits is not None:
+            checks.whole("bits", self.bits, least=1, most=32)
+
     def _entry(self) -> tuple[float, float, float, int | None]:
         return self.deviation, self.correlation_time, self.range, self.bits
 
@@ -92,6 +105,11 @@ class Sensors:
     moment: Channel = Channel()
     robot: Channel = Channel()
     torque: Channel = Channel()
+
+    def __post_init__(self) -> None:
+        checks.number("rate", self.rate, above=0.0, unit="Hz")
+        for kind in _CHANNELS:
+            checks.instance(kind, getattr(self, kind), Channel)
 
     @classmethod
     def realistic(cls) -> Sensors:
@@ -190,11 +208,12 @@ def simulate(
     """
     if not isinstance(model, Model):
         model = load_model(model)
-    if coupling not in ("compliant", "rigid"):
-        raise BadInput("coupling", coupling, "compliant or rigid")
-    for name, value in (("dt", dt), ("rate", rate)):
-        if not (np.isfinite(value) and value > 0):
-            raise BadInput(name, value, "a number above 0")
+    checks.choice("coupling", coupling, ("compliant", "rigid"))
+    checks.choice("engine", engine, ("native", "rapier"))
+    checks.choice("integrator", integrator, ("rk4", "euler"))
+    checks.instance("drive", drive, Movement, Trial, type(None))
+    checks.number("dt", dt, above=0.0, unit="s")
+    checks.number("rate", rate, above=0.0, unit="Hz")
     steps = 1.0 / (rate * dt)
     if abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
         raise BadInput("dt", dt, f"a whole part of the interval between samples, {1.0 / rate:g} s")
@@ -212,11 +231,19 @@ def simulate(
         "dt": dt,
         "duration": duration,
         "output_interval": 1.0 / rate,
-        "q": None if start is None else [float(v) for v in start],
-        "qd": None if start_speed is None else [float(v) for v in start_speed],
+        "q": None if start is None else checks.numbers("start", start, "rad").reshape(-1).tolist(),
+        "qd": None if start_speed is None else checks.numbers("start_speed", start_speed, "rad/s").reshape(-1).tolist(),
     }
+    if sensors is not None:
+        checks.instance("sensors", sensors, Sensors)
     sensing = None if sensors is None else _sensing(sensors, seeds)
-    raw = _armrs.simulate(rig(model), led, settings, sensing)
+    try:
+        raw = _armrs.simulate(rig(model), led, settings, sensing)
+    except BadInput as error:
+        if error.place != "duration" or drive is None:
+            raise
+        kind = type(drive).__name__.lower()
+        raise BadInput(f"length of the {kind} [s]", error.found, f"{error.allowed}; a step is {dt:g} s", file=error.file) from None
     return Simulated(
         t=raw["time"],
         q=raw["q"],
@@ -276,8 +303,9 @@ def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
 
 
 def _sensing(sensors: Sensors, seeds: Sequence[int]) -> dict[str, Any]:
-    kinds = ("angle", "force", "moment", "robot", "torque")
-    return {"rate": sensors.rate, "seeds": list(seeds)} | {kind: getattr(sensors, kind)._entry() for kind in kinds}
+    checks.instance("seeds", seeds, list, tuple, range, np.ndarray)
+    read = [checks.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
+    return {"rate": sensors.rate, "seeds": read} | {kind: getattr(sensors, kind)._entry() for kind in _CHANNELS}
 
 
 def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:

@@ -6,9 +6,9 @@ import os
 import re
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
+from . import checks
 from .errors import BadInput, Text
 
 if sys.version_info >= (3, 11):
@@ -33,7 +33,7 @@ def read(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> str:
     """Return the text of a UTF-8 file of at most `most` bytes, or raise `BadInput`."""
-    file = Path(path)
+    file = checks.path("file", path)
     try:
         is_folder, size = file.is_dir(), file.stat().st_size
         raw = b"" if is_folder or size > most else file.read_bytes()

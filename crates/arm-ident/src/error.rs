@@ -92,6 +92,14 @@ pub enum IdentError {
         /// Largest difference allowed [rad].
         allowed: f64,
     },
+    /// Something about one trial.
+    #[error("trial {number}: {error}")]
+    InTrial {
+        /// One-based, in the order given.
+        number: usize,
+        /// What.
+        error: Box<IdentError>,
+    },
     /// The simulation that gives the motion was refused or stopped.
     #[error("simulated motion: {0}")]
     Simulation(#[from] arm_sim::SimulationError),
@@ -114,6 +122,16 @@ pub(crate) fn check_len(
             found,
             expected,
         })
+    }
+}
+
+impl IdentError {
+    /// Says in which trial it happened, counted from zero.
+    pub(crate) fn in_trial(self, index: usize) -> Self {
+        Self::InTrial {
+            number: index + 1,
+            error: Box::new(self),
+        }
     }
 }
 

@@ -240,11 +240,12 @@ fn prepare<const N: usize>(
 ) -> Result<Vec<Pieces>, IdentError> {
     let motions = trials
         .iter()
-        .map(|t| {
+        .enumerate()
+        .map(|(k, t)| {
             let seen = measured(t, cutoff)?;
             // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
             if simulate && (t.role == Role::Fit || can_simulate(t)) {
-                simulated(model, t, seen, cutoff)
+                simulated(model, t, seen, cutoff).map_err(|error| error.in_trial(k))
             } else {
                 Ok(seen)
             }

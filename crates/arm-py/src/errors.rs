@@ -54,6 +54,14 @@ pub fn invalid(error: Invalid) -> PyErr {
 /// A refusal or failure of an identification: bad data are `BadInput`, the rest is `IdentificationError`.
 pub fn identification(error: IdentError) -> PyErr {
     match error {
+        IdentError::InTrial { error, .. }
+            if matches!(
+                *error,
+                IdentError::TooFew { .. } | IdentError::OutOfRange { .. }
+            ) =>
+        {
+            identification(*error)
+        }
         IdentError::TooFew {
             name,
             found,
