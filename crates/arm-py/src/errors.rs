@@ -53,26 +53,26 @@ pub fn invalid(error: Invalid) -> PyErr {
 
 /// A refusal or failure of an identification: bad data are `BadInput`, the rest is `IdentificationError`.
 pub fn identification(error: IdentError) -> PyErr {
+    let (trial, error) = match error {
+        IdentError::InTrial { number, error } => (format!("trial {number}: "), *error),
+        error => (String::new(), error),
+    };
     match error {
-        IdentError::InTrial { error, .. }
-            if matches!(
-                *error,
-                IdentError::TooFew { .. } | IdentError::OutOfRange { .. }
-            ) =>
-        {
-            identification(*error)
-        }
         IdentError::TooFew {
             name,
             found,
             expected,
-        } => bad_input(name, found, &format!("at least {expected}")),
+        } => bad_input(
+            &format!("{trial}{name}"),
+            found,
+            &format!("at least {expected}"),
+        ),
         IdentError::OutOfRange {
             name,
             found,
             min,
             max,
-        } => bad_input(name, found, &format!("{min} to {max}")),
+        } => bad_input(&format!("{trial}{name}"), found, &format!("{min} to {max}")),
         IdentError::Rank {
             found, expected, ..
         } => in_python(
@@ -82,7 +82,7 @@ pub fn identification(error: IdentError) -> PyErr {
                  leave out effects that these movements do not show"
             ),
         ),
-        other => in_python("IdentificationError", &other.to_string()),
+        other => in_python("IdentificationError", &format!("{trial}{other}")),
     }
 }
 
