@@ -11,7 +11,7 @@ use arm_core::estimator::{Estimator, Sample, Settings};
 use arm_core::{Chain, Elbow, Equation, Joints, Measured, Real, Robot, Segment};
 use arm_ident::joint::{Options, identify};
 use arm_ident::trial::{Model, Role, Trial};
-use arm_sim::{Channel, Integrator, Sensors, digest, models, simulate};
+use arm_sim::{Channel, Integrator, Sensors, digest, models, simulate, simulate_batch};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -135,11 +135,17 @@ fn platform() -> u64 {
 fn main() -> Outcome<()> {
     let mut experiment = models::reference()?;
     let rk4 = digest(&simulate(&experiment)?)?;
+    let threads = if cfg!(target_family = "wasm") { 1 } else { 2 };
+    let lanes = simulate_batch(&[experiment.clone(), experiment.clone()], threads);
+    let lanes = lanes.into_iter().map(|lane| digest(&lane?));
+    let lanes = lanes.collect::<Result<Vec<u64>, _>>()?;
     experiment.integrator = Integrator::SemiImplicitEuler;
     let euler = digest(&simulate(&experiment)?)?;
     let ((trial, lead), model) = (trial()?, model()?);
     let found = [
         ("simulation-rk4", rk4),
+        ("simulation-rk4-lane-1", lanes[0]),
+        ("simulation-rk4-lane-2", lanes[1]),
         ("simulation-euler", euler),
         ("identification", identification(&model, &trial)?),
         ("estimator-f64", estimation::<f64>(&model, &trial, &lead)?),
