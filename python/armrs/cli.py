@@ -695,7 +695,7 @@ def _refuse(line: str) -> int:
 
 def _usage_text(error: Exception) -> str:
     text: str = getattr(error, "format_message", error.__str__)()
-    return text.rstrip(".")
+    return text.rstrip(".").replace("Value error, ", "")
 
 
 def _range(low: float, high: float) -> str:

@@ -103,11 +103,16 @@ def _job(source: Path, target: Path) -> _Job:
 
 def _write(job: _Job) -> Path:
     """Write one file and read it back before it takes its place, so that a value that got lost cannot pass unseen."""
+    import pyarrow as pa
 
     def verify(written: Path) -> None:
-        back = _csv_table(written) if job.target.suffix == ".csv" else parquet_table(written)
+        is_text = job.target.suffix == ".csv"
+        back = _text_table(written) if is_text else parquet_table(written)
         for name in job.table.column_names:
-            if not _same(job.table.column(name), back.column(name)):
+            wanted, found = job.table.column(name), back.column(name)
+            if is_text and pa.types.is_string(wanted.type):
+                found = _typed(found, written, name)
+            if not _same(wanted, found):
                 raise BadInput(f"column {name}", Text("values that do not come back"), "values both formats can hold", file=job.target)
 
     write_table(job.target, job.table, verify)
