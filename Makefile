@@ -79,7 +79,7 @@ crosscheck:
 	scripts/crosscheck
 
 bench: build
-	cargo bench --quiet
+	cargo bench --quiet -p speed
 	$(BIN)/python scripts/bench_import.py
 
 # ---- the judge of the gap workflow. Seeds from 100000 on are scored, and only here; those below are for development.

@@ -17,14 +17,14 @@ NAMES = {"win32": "arm_fmu.dll", "darwin": "libarm_fmu.dylib"}
 
 
 def main() -> None:
-    """Build with the profile `fmu` and copy what came out."""
-    built = ROOT / "target" / "fmu"
+    """Build and copy what came out."""
+    built = ROOT / "target" / "release"
     command = ["cargo", "build"]
     if "--portable" in sys.argv:
         target = f"{platform.machine()}-unknown-linux-gnu"
         command = ["cargo", "zigbuild", "--target", f"{target}.2.17"]
-        built = ROOT / "target" / target / "fmu"
-    subprocess.run([*command, "--quiet", "--profile", "fmu", "-p", "arm-fmu"], cwd=ROOT, check=True)
+        built = ROOT / "target" / target / "release"
+    subprocess.run([*command, "--quiet", "--release", "-p", "arm-fmu"], cwd=ROOT, check=True)
     name = NAMES.get(sys.platform, "libarm_fmu.so")
     place = ROOT / "python" / "armrs" / "fmu" / "lib"
     place.mkdir(exist_ok=True)
