@@ -54,6 +54,16 @@ def test_narrow_numbers_are_widened_without_loss(tmp_path: Path) -> None:
     assert parquet.read_table(again).column("i").to_pylist() == [1, -2, 3]
 
 
+def test_digits_with_a_leading_zero_are_a_name(tmp_path: Path) -> None:
+    first = tmp_path / "names.csv"
+    first.write_text("t_s,label\n0,007\n1,012\n", encoding="utf-8")
+    (middle,) = armrs.convert(first, tmp_path / "parquet", to="parquet")
+    assert parquet.read_table(middle).column("label").to_pylist() == ["007", "012"]
+    parquet.write_table(pa.table({"label": ["7", "12"]}), tmp_path / "text.parquet")
+    with pytest.raises(BadInput, match="column label: found values that do not come back"):
+        armrs.convert(tmp_path / "text.parquet", tmp_path / "csv", to="csv")
+
+
 def test_a_file_with_a_header_only_keeps_its_header(tmp_path: Path) -> None:
     first = tmp_path / "empty.csv"
     first.write_text("t_s,q1_rad\n", encoding="utf-8")

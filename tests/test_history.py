@@ -90,6 +90,19 @@ def test_the_date_is_in_the_name_or_today() -> None:
         sessions.session_date("S1", "2026-02-30")
 
 
+def test_a_session_stays_only_if_everything_else_was_written(identified: Identified, tmp_path: Path) -> None:
+    """When an output fails, a new file disappears and an old one keeps what it had."""
+    file = tmp_path / "s.sqlite"
+    with pytest.raises(OSError, match="full"), sessions.adding(file, identified, "2026-01-01"):
+        raise OSError("full")
+    assert not file.exists()
+    sessions.add(file, identified, "2026-01-01")
+    with pytest.raises(OSError, match="full"), sessions.adding(file, identified, "2026-02-01") as courses:
+        assert courses[0].dates == ("2026-01-01", "2026-02-01")
+        raise OSError("full")
+    assert all(course.dates == ("2026-01-01",) for course in sessions.read(file))
+
+
 def test_refuses_other_files(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "text.sqlite").write_text("no database, but long enough to look like one " * 30)
     with sqlite3.connect(tmp_path / "other.sqlite") as other:

@@ -259,7 +259,7 @@ def identify(
     """Identify body segment and joint parameters, each with an interval and what decided it.
 
     Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, or when
-    the model does not describe these data. Such a result is not added to a history.
+    speeds are noise to a good part. Such a result is not added to a history.
     """
     from . import history as sessions
     from . import results, words

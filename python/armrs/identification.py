@@ -93,10 +93,11 @@ class Identified:
     calibration : tuple of Estimate
         Small imperfections of the measurement that were refitted within the declared tolerance.
     contradictions : tuple of str
-        What in the result no arm can be, such as a mass at its limit. Then no number is to be trusted.
+        What in the result cannot be true of this arm and these sensors: a mass at its limit, a calibration far beyond its tolerance,
+        a torque that is not described at all. Then no number is to be trusted.
     misfits : tuple of str
-        Joints whose torque the fitted model does not describe, calibrations far beyond their tolerance, speeds that are noise.
-        Intervals hold only where the model's structure is right.
+        Joints whose torque the fitted model does not describe well, and speeds that are noise. Intervals hold only where the model's
+        structure is right.
     left_out : tuple of str
         What of the model the method does not take into account.
     trades : tuple of str
@@ -142,8 +143,9 @@ class Identified:
 
     @property
     def is_sound(self) -> bool:
-        """Whether the solver got there, the result is possible, and the model describes the data."""
-        return self.status == "solved" and not self.contradictions and not self.misfits
+        """Whether the solver got there, the result is possible, and nothing is known against what the data decided."""
+        doubtful = any(e.caveat for e in (*self.parameters, *self.combinations))
+        return self.status == "solved" and not self.contradictions and not doubtful
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -242,7 +244,7 @@ def identify(
         _estimates(raw[name], NOISY_SPEED if noisy else None) for name in ("parameters", "combinations", "calibration")
     )
     # Without a load there is no torque that a residual could be a part of.
-    poor = () if raw["scale_free"] else _misfits(explained)
+    shares = [] if raw["scale_free"] else _residual_shares(explained)
     return Identified(
         method=method,
         status=raw["status"],
@@ -251,8 +253,8 @@ def identify(
         parameters=parameters,
         combinations=combinations,
         calibration=calibration,
-        contradictions=_contradictions(parameters),
-        misfits=(*_beyond_tolerance(calibration, settings), *poor, *noisy),
+        contradictions=(*_contradictions(parameters), *_beyond_tolerance(calibration, settings), *_misfits(shares, _NO_FIT, np.inf)),
+        misfits=(*_misfits(shares, _POOR, _NO_FIT), *noisy),
         left_out=_left_out(method, effects),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
@@ -311,7 +313,9 @@ def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dic
 _BEYOND = 5.0
 """A calibration this many times its tolerance is no calibration."""
 _POOR = 0.2
-"""A residual above this share of the torques is no fit."""
+"""A residual above this share of the variation of a torque is a poor fit."""
+_NO_FIT = 0.5
+"""And above this, none."""
 
 
 def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
@@ -333,15 +337,20 @@ def _beyond_tolerance(calibration: Sequence[Estimate], settings: dict[str, Any])
     return tuple(lines)
 
 
-def _misfits(explained: Sequence[Explained]) -> tuple[str, ...]:
-    """Return the joints whose torque the fitted model does not describe, a line each."""
-    lines = []
+def _residual_shares(explained: Sequence[Explained]) -> list[float]:
+    """Return how much of the variation of every joint's torque the fitted model leaves, over the fit trials."""
     measured = np.concatenate([e.measured for e in explained if e.trial.role == "fit"])
     rest = np.concatenate([e.measured - e.fitted for e in explained if e.trial.role == "fit"])
-    for j, (m, r) in enumerate(zip(np.std(measured, axis=0), np.std(rest, axis=0), strict=True), start=1):
-        if r > _POOR * m > 0:
-            lines.append(f"the residual of joint {j} is {r / m:.0%} of the variation of its torque: the model does not describe these data")
-    return tuple(lines)
+    return [float(r / m) if m > 0 else 0.0 for m, r in zip(np.std(measured, axis=0), np.std(rest, axis=0), strict=True)]
+
+
+def _misfits(shares: Sequence[float], above: float, upto: float) -> tuple[str, ...]:
+    """Return the joints that leave a share of their torque between two limits, a line each."""
+    return tuple(
+        f"the residual of joint {j} is {share:.0%} of the variation of its torque: the model does not describe these data"
+        for j, share in enumerate(shares, start=1)
+        if above < share <= upto
+    )
 
 
 NOISY_SPEED = "noisy speed"
