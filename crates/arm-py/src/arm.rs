@@ -114,6 +114,21 @@ pub struct Arm {
     pub chain: AnyChain,
 }
 
+impl Arm {
+    /// Reads three arguments that have a value for every joint.
+    pub fn rows<'a>(
+        &self,
+        [(a, x), (b, y), (c, z)]: [(&'static str, &'a Numbers<'_>); 3],
+    ) -> PyResult<[Rows<'a>; 3]> {
+        let n = self.n_joints();
+        Ok([
+            Rows::new(a, x, n)?,
+            Rows::new(b, y, n)?,
+            Rows::new(c, z, n)?,
+        ])
+    }
+}
+
 #[pymethods]
 impl Arm {
     #[new]
@@ -304,12 +319,7 @@ impl Arm {
                 );
             })
         }
-        let n = self.n_joints();
-        let rows = [
-            Rows::new("q", &q, n)?,
-            Rows::new("qd", &qd, n)?,
-            Rows::new("qdd", &qdd, n)?,
-        ];
+        let rows = self.rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
         each_length!(&self.chain, c => run(c, py, rows))
     }
 
@@ -336,12 +346,7 @@ impl Arm {
                 out.copy_from_slice(qdd.as_slice());
             })
         }
-        let n = self.n_joints();
-        let rows = [
-            Rows::new("q", &q, n)?,
-            Rows::new("qd", &qd, n)?,
-            Rows::new("tau", &tau, n)?,
-        ];
+        let rows = self.rows([("q", &q), ("qd", &qd), ("tau", &tau)])?;
         each_length!(&self.chain, c => run(c, py, rows))
     }
 
@@ -372,12 +377,7 @@ impl Arm {
                 }
             })
         }
-        let n = self.n_joints();
-        let rows = [
-            Rows::new("q", &q, n)?,
-            Rows::new("qd", &qd, n)?,
-            Rows::new("qdd", &qdd, n)?,
-        ];
+        let rows = self.rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
         each_length!(&self.chain, c => run(c, py, rows))
     }
 }

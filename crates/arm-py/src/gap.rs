@@ -16,7 +16,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::arm::{AnyChain, each_short_length};
 use crate::errors::{bad_input, gap};
-use crate::ident::{Columns, trial};
+use crate::ident::{Columns, read_trials};
 use crate::rig::Rig;
 
 /// What is known beforehand.
@@ -57,10 +57,7 @@ fn session<const N: usize>(
             time_delay: settings.time_delay,
             handle_placement: settings.handle_placement,
         },
-        trials: columns
-            .iter()
-            .map(|c| trial::<N>(c, rig))
-            .collect::<PyResult<Vec<_>>>()?,
+        trials: read_trials(columns, rig)?,
         sight: if settings.led {
             Sight::Led
         } else {

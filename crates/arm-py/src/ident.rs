@@ -61,7 +61,12 @@ impl Settings {
     }
 }
 
-pub fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
+/// Trials as the core takes them.
+pub fn read_trials<const N: usize>(columns: &[Columns<'_>], rig: &Rig) -> PyResult<Vec<Trial<N>>> {
+    columns.iter().map(|c| trial(c, rig)).collect()
+}
+
+fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
     let joints = |name, a| {
         Ok::<_, PyErr>(
             rows::<N>(name, a)?
@@ -174,10 +179,7 @@ pub fn identify<'py>(
     ) -> PyResult<Bound<'py, PyDict>> {
         let (columns, settings) = input;
         let model = model(chain, rig, settings)?;
-        let trials = columns
-            .iter()
-            .map(|c| trial::<N>(c, rig))
-            .collect::<PyResult<Vec<_>>>()?;
+        let trials = read_trials::<N>(columns, rig)?;
         let options = Options {
             cutoff: settings.cutoff,
             motion: match settings.motion.as_str() {

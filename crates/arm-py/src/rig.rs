@@ -6,7 +6,7 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, Arm, each_length};
-use crate::convert::{Numbers, Rows, in_order, joints};
+use crate::convert::{Numbers, in_order, joints};
 use crate::errors::{bad_input, invalid};
 
 /// An arm, its effects, its contact with the robot and the robot itself.
@@ -93,12 +93,7 @@ impl Rig {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let chain = &self.arm.get().chain;
         each_length!(chain, c => {
-            let n = self.arm.get().n_joints();
-            let rows = [
-                Rows::new("q", &q, n)?,
-                Rows::new("qd", &qd, n)?,
-                Rows::new("qdd", &qdd, n)?,
-            ];
+            let rows = self.arm.get().rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
             let mut along = Along::new(c, &self.effects, interval);
             in_order(py, rows, self.effects.len(), |[q, qd, qdd], out| {
                 along.next(&joints(q), &joints(qd), &joints(qdd), out);
