@@ -42,6 +42,24 @@ pub enum Invalid {
     },
 }
 
+/// A number as messages show it: plainly where that is short, else with an exponent.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown(
+    /// The number.
+    pub f64,
+);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        if size == 0.0 || (1e-6..1e16).contains(&size) || !size.is_finite() {
+            write!(f, "{}", self.0)
+        } else {
+            write!(f, "{:e}", self.0)
+        }
+    }
+}
+
 impl fmt::Display for Invalid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -55,14 +73,20 @@ impl fmt::Display for Invalid {
             } => {
                 write!(
                     f,
-                    "{name} {} is {found}, allowed is {min} to {max}",
-                    index + 1
+                    "{name} {} is {}, allowed is {} to {}",
+                    index + 1,
+                    Shown(found),
+                    Shown(min),
+                    Shown(max)
                 )
             }
             Self::OutOfReach { distance, min, max } => {
                 write!(
                     f,
-                    "the point is {distance} m from the robot's base, its reach is {min} m to {max} m"
+                    "the point is {} m from the robot's base, its reach is {} m to {} m",
+                    Shown(distance),
+                    Shown(min),
+                    Shown(max)
                 )
             }
             Self::Unknown { name } => write!(f, "unknown {name}"),

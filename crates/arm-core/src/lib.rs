@@ -53,7 +53,7 @@ pub use coriolis::{centrifugal, coriolis, coriolis_matrix};
 pub use dynamics::{Load, forward_dynamics, inverse_dynamics, joint_force, static_torque};
 pub use energy::{kinetic_energy, potential_energy};
 pub use equation::{Equation, Measured, Needed, Prior};
-pub use error::Invalid;
+pub use error::{Invalid, Shown};
 pub use gravity::gravity;
 pub use inertia::{inertia, link_inertia};
 pub use kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};

@@ -20,12 +20,14 @@ pub(crate) trait Plant: Send + Sync {
     fn output(&mut self, quantity: Quantity) -> f64;
     /// Its time derivative, with the inputs going on as they are.
     fn derivative(&mut self, quantity: Quantity) -> f64;
+    /// How many numbers a state has.
+    fn size(&self) -> usize;
     /// Writes the state but for the inputs.
     fn save(&self) -> SavedPlant;
     /// Angles near those of the specification at which the arm rests with its inputs \[rad\].
     fn rest(&mut self, spec: &ArmSpec) -> Result<Vec<f64>, SimulationError>;
-    /// Comes back to a state; false when it is not one of this arm.
-    fn load(&mut self, saved: &SavedPlant) -> bool;
+    /// Comes back to a state that [`Plant::save`] has written for the same arm.
+    fn load(&mut self, saved: &SavedPlant);
 }
 
 /// The state of a plant but for the inputs, as numbers.
@@ -143,6 +145,10 @@ impl<const N: usize> Plant for Coupled<N> {
         }
     }
 
+    fn size(&self) -> usize {
+        2 * N + 4 + self.stepper.memories() + 2
+    }
+
     fn save(&self) -> SavedPlant {
         let Snapshot {
             q,
@@ -169,11 +175,8 @@ impl<const N: usize> Plant for Coupled<N> {
         Ok(rest.iter().copied().collect())
     }
 
-    fn load(&mut self, saved: &SavedPlant) -> bool {
+    fn load(&mut self, saved: &SavedPlant) {
         let memories = self.stepper.memories();
-        if saved.numbers.len() != 2 * N + 4 + memories + 2 {
-            return false;
-        }
         let (q, rest) = saved.numbers.split_at(N);
         let (qd, rest) = rest.split_at(N);
         let (work, rest) = rest.split_at(4);
@@ -188,6 +191,5 @@ impl<const N: usize> Plant for Coupled<N> {
         });
         self.outside.age = rest[1];
         self.tip = None;
-        true
     }
 }

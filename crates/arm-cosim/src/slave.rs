@@ -1,5 +1,6 @@
 //! The life cycle of a co-simulation slave: which call is allowed when, and what each does.
 
+use arm_core::Shown;
 use arm_sim::SimulationError;
 
 use crate::plant::{Plant, plant};
@@ -165,7 +166,9 @@ impl Slave {
         }
         if stop.is_nan() || stop < start {
             return self.failed(format!(
-                "the stop time is {stop} s, allowed is at least the start time, {start} s"
+                "the stop time is {} s, allowed is at least the start time, {} s",
+                Shown(stop),
+                Shown(start)
             ));
         }
         (self.start, self.stop, self.stale) = (start, stop, true);
@@ -222,7 +225,10 @@ impl Slave {
                     ..
                 } = variable;
                 return Err(Refused::discard(format!(
-                    "{name} is {value}, allowed is a finite number, {min} to {max} {unit}"
+                    "{name} is {}, allowed is a finite number, {} to {} {unit}",
+                    Shown(value),
+                    Shown(*min),
+                    Shown(*max)
                 )));
             }
         }
@@ -242,7 +248,8 @@ impl Slave {
     /// Reads variables by value reference, in every mode.
     ///
     /// # Errors
-    /// [`Refused`] for a reference that is not known, and before the first step for parameters that the core refuses together.
+    /// [`Status::Error`] for a reference that is not known, and before the first step for parameters that the core refuses
+    /// together; [`Status::Discard`] for a value that follows from inputs beyond all numbers.
     pub fn get(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refused> {
         if references.len() != values.len() {
             return self.failed(format!(
@@ -270,7 +277,14 @@ impl Slave {
             (Causality::Output, _) => {
                 let quantity = variable.quantity;
                 self.prepared()?;
-                Ok(self.plant.output(quantity))
+                let value = self.plant.output(quantity);
+                if !value.is_finite() {
+                    let name = &self.table[at].name;
+                    return Err(Refused::discard(format!(
+                        "{name} is {value}: the inputs or parameters are too large"
+                    )));
+                }
+                Ok(value)
             }
             (Causality::Input | Causality::Parameter | Causality::Local, _) => Ok(self.values[at]),
         }
@@ -326,14 +340,24 @@ impl Slave {
         let near = |a: f64, b: f64| within(SAME_TIME, a, b) || (a - b).abs() <= lag;
         if !near(time, own) {
             return self.failed(format!(
-                "a step from {time} s was asked for, the slave is at {own} s"
+                "a step from {} s was asked for, the slave is at {} s",
+                Shown(time),
+                Shown(own)
             ));
         }
         let end = time + step;
+        if step > 0.0 && end <= time {
+            return self.failed(format!(
+                "a step of {} s from {} s was asked for: a number cannot hold the time after it",
+                Shown(step),
+                Shown(time)
+            ));
+        }
         if end > self.stop && !near(end, self.stop) {
             return self.failed(format!(
-                "a step to {end} s was asked for, the run ends at {} s",
-                self.stop
+                "a step to {} s was asked for, the run ends at {} s",
+                Shown(end),
+                Shown(self.stop)
             ));
         }
         // Steps that are nearly whole inner steps, such as 1 ms in single precision, would take us ever further away from the
@@ -390,13 +414,23 @@ impl Slave {
     /// Comes back to a state; possible in every mode.
     ///
     /// # Errors
-    /// [`Refused`] for a state of another arm or version; the slave is then as before.
+    /// [`Refused`] for a state of another arm or version, or with values that no arm can have; the slave is then as before.
     pub fn set_state(&mut self, state: &SlaveState) -> Result<(), Refused> {
         if state.token != self.token || state.values.len() != self.values.len() {
             let (found, allowed) = (&state.token, &self.token);
             return Err(Refused::error(format!(
                 "the state belongs to {found}, this slave is {allowed}"
             )));
+        }
+        let fit = |(v, &value): (&Variable, &f64)| v.start.is_none() || fits(v, value);
+        let (numbers, (start, stop)) = (&state.plant.numbers, state.span);
+        let fits = numbers.len() == self.plant.size()
+            && numbers.iter().all(|v| v.is_finite())
+            && self.table.iter().zip(&state.values).all(fit)
+            && start.is_finite()
+            && start <= stop;
+        if !fits {
+            return Err(Refused::error("the state does not fit this arm"));
         }
         let parameters = self.table.iter().zip(self.values.iter().zip(&state.values));
         let same = parameters
@@ -410,10 +444,7 @@ impl Slave {
             return Err(refused);
         }
         self.give_inputs();
-        if !self.plant.load(&state.plant) {
-            self.values = before;
-            return Err(Refused::error("the state does not fit this arm"));
-        }
+        self.plant.load(&state.plant);
         (self.start, self.stop) = state.span;
         (self.mode, self.stale) = (state.mode, state.stale);
         Ok(())

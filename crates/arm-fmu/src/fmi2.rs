@@ -2,10 +2,11 @@
 
 use std::ffi::{CString, c_char, c_int, c_void};
 
-use crate::instance::{self, Handle, Instance, Log, guarded, unsupported, with};
+use crate::instance::{self, Handle, Instance, Log, guarded, unsupported};
 use crate::pointers::{error, give, read, text, write};
 use crate::refused::{refused, without_variables};
 use crate::resources;
+use crate::shared::shared;
 
 /// `fmi2CoSimulation`.
 const CO_SIMULATION: c_int = 1;
@@ -43,26 +44,6 @@ pub extern "C" fn fmi2GetVersion() -> *const c_char {
     c"2.0".as_ptr()
 }
 
-/// Switches the log of events on or off; errors are always logged.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(
-    instance: Handle,
-    on: c_int,
-    n: usize,
-    categories: *const *const c_char,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe {
-        with(instance, "fmi2SetDebugLogging", |i| {
-            let names = read(categories, n)?
-                .iter()
-                .filter_map(|c| text(*c))
-                .collect::<Vec<_>>();
-            i.set_logging(on != 0, &names)
-        })
-    }
-}
-
 /// Makes an instance of the arm in the resources; null when it is refused.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Instantiate(
@@ -94,13 +75,6 @@ pub unsafe extern "C" fn fmi2Instantiate(
     })
 }
 
-/// Frees an instance; null is nothing to free.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeInstance(instance: Handle) {
-    // SAFETY: see `pointers`.
-    unsafe { instance::free(instance) }
-}
-
 /// Takes start and stop time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2SetupExperiment(
@@ -129,31 +103,6 @@ pub unsafe extern "C" fn fmi2EnterInitializationMode(instance: Handle) -> c_int 
             s.enter_initialization_mode(start, Some(stop))
         })
     }
-}
-
-/// Ends the initialization.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2ExitInitializationMode(instance: Handle) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe {
-        guarded(instance, "fmi2ExitInitializationMode", |s| {
-            s.exit_initialization_mode()
-        })
-    }
-}
-
-/// Ends the run.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Terminate(instance: Handle) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { guarded(instance, "fmi2Terminate", |s| s.terminate()) }
-}
-
-/// Goes back to how the instance was made.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Reset(instance: Handle) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { guarded(instance, "fmi2Reset", |s| s.reset()) }
 }
 
 /// Reads variables.
@@ -255,60 +204,19 @@ pub unsafe extern "C" fn fmi2GetBooleanStatus(
     }
 }
 
-/// Keeps the state.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetFMUstate(instance: Handle, state: *mut *mut c_void) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::get_state(instance, "fmi2GetFMUstate", state) }
-}
-
-/// Goes back to a state.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetFMUstate(instance: Handle, state: *mut c_void) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::set_state(instance, "fmi2SetFMUstate", state) }
-}
-
-/// Frees a state; null is nothing to free.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeFMUstate(instance: Handle, state: *mut *mut c_void) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::free_state(instance, "fmi2FreeFMUstate", state) }
-}
-
-/// Tells how many bytes a state takes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
-    instance: Handle,
-    state: *mut c_void,
-    size: *mut usize,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::state_size(instance, "fmi2SerializedFMUstateSize", state, size) }
-}
-
-/// Writes a state as bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(
-    instance: Handle,
-    state: *mut c_void,
-    bytes: *mut u8,
-    size: usize,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::serialize(instance, "fmi2SerializeFMUstate", state, (bytes, size)) }
-}
-
-/// Makes a state from bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
-    instance: Handle,
-    bytes: *const u8,
-    size: usize,
-    state: *mut *mut c_void,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::deserialize(instance, "fmi2DeSerializeFMUstate", (bytes, size), state) }
+shared! {
+    truth: c_int,
+    logging: fmi2SetDebugLogging,
+    free: fmi2FreeInstance,
+    exit_initialization: fmi2ExitInitializationMode,
+    terminate: fmi2Terminate,
+    reset: fmi2Reset,
+    get_state: fmi2GetFMUstate,
+    set_state: fmi2SetFMUstate,
+    free_state: fmi2FreeFMUstate,
+    state_size: fmi2SerializedFMUstateSize,
+    serialize: fmi2SerializeFMUstate,
+    deserialize: fmi2DeSerializeFMUstate,
 }
 
 without_variables! {

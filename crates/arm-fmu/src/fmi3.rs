@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use arm_cosim::Status;
 
-use crate::instance::{self, ERRORS, Handle, Instance, Log, guarded, unsupported, with};
+use crate::instance::{self, ERRORS, Handle, Instance, Log, guarded, unsupported};
 use crate::pointers::{error, give, read, text, write};
 use crate::refused::{refused, without_variables};
 use crate::resources;
+use crate::shared::shared;
 
 type Message = Option<unsafe extern "C" fn(Handle, c_int, *const c_char, *const c_char)>;
 /// A callback that is never called.
@@ -18,26 +19,6 @@ type Unused = *const c_void;
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
-}
-
-/// Switches the log of events on or off; errors are always logged.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetDebugLogging(
-    instance: Handle,
-    on: u8,
-    n: usize,
-    categories: *const *const c_char,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe {
-        with(instance, "fmi3SetDebugLogging", |i| {
-            let names = read(categories, n)?
-                .iter()
-                .filter_map(|c| text(*c))
-                .collect::<Vec<_>>();
-            i.set_logging(on != 0, &names)
-        })
-    }
 }
 
 /// Makes an instance of the arm in the resources; null when it is refused.
@@ -119,13 +100,6 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
     no_instance("scheduled execution", environment, message)
 }
 
-/// Frees an instance; null is nothing to free.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3FreeInstance(instance: Handle) {
-    // SAFETY: see `pointers`.
-    unsafe { instance::free(instance) }
-}
-
 /// Begins the initialization.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3EnterInitializationMode(
@@ -143,31 +117,6 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
             s.enter_initialization_mode(start, stop)
         })
     }
-}
-
-/// Ends the initialization.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3ExitInitializationMode(instance: Handle) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe {
-        guarded(instance, "fmi3ExitInitializationMode", |s| {
-            s.exit_initialization_mode()
-        })
-    }
-}
-
-/// Ends the run.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Terminate(instance: Handle) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { guarded(instance, "fmi3Terminate", |s| s.terminate()) }
-}
-
-/// Goes back to how the instance was made.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Reset(instance: Handle) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { guarded(instance, "fmi3Reset", |s| s.reset()) }
 }
 
 /// Reads variables.
@@ -251,60 +200,19 @@ pub unsafe extern "C" fn fmi3GetOutputDerivatives(
     }
 }
 
-/// Keeps the state.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFMUState(instance: Handle, state: *mut *mut c_void) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::get_state(instance, "fmi3GetFMUState", state) }
-}
-
-/// Goes back to a state.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFMUState(instance: Handle, state: *mut c_void) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::set_state(instance, "fmi3SetFMUState", state) }
-}
-
-/// Frees a state; null is nothing to free.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3FreeFMUState(instance: Handle, state: *mut *mut c_void) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::free_state(instance, "fmi3FreeFMUState", state) }
-}
-
-/// Tells how many bytes a state takes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializedFMUStateSize(
-    instance: Handle,
-    state: *mut c_void,
-    size: *mut usize,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::state_size(instance, "fmi3SerializedFMUStateSize", state, size) }
-}
-
-/// Writes a state as bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializeFMUState(
-    instance: Handle,
-    state: *mut c_void,
-    bytes: *mut u8,
-    size: usize,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::serialize(instance, "fmi3SerializeFMUState", state, (bytes, size)) }
-}
-
-/// Makes a state from bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3DeserializeFMUState(
-    instance: Handle,
-    bytes: *const u8,
-    size: usize,
-    state: *mut *mut c_void,
-) -> c_int {
-    // SAFETY: see `pointers`.
-    unsafe { instance::deserialize(instance, "fmi3DeserializeFMUState", (bytes, size), state) }
+shared! {
+    truth: u8,
+    logging: fmi3SetDebugLogging,
+    free: fmi3FreeInstance,
+    exit_initialization: fmi3ExitInitializationMode,
+    terminate: fmi3Terminate,
+    reset: fmi3Reset,
+    get_state: fmi3GetFMUState,
+    set_state: fmi3SetFMUState,
+    free_state: fmi3FreeFMUState,
+    state_size: fmi3SerializedFMUStateSize,
+    serialize: fmi3SerializeFMUState,
+    deserialize: fmi3DeserializeFMUState,
 }
 
 without_variables! {

@@ -16,5 +16,6 @@ mod instance;
 mod pointers;
 mod refused;
 mod resources;
+mod shared;
 
 pub use instance::{Handle, guarded};

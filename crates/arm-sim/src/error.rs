@@ -1,6 +1,6 @@
 //! What can be wrong with an experiment, and how a run can fail.
 
-use arm_core::Invalid;
+use arm_core::{Invalid, Shown};
 
 /// Why a simulation was refused or stopped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -10,7 +10,7 @@ pub enum SimulationError {
     #[error(transparent)]
     Invalid(#[from] Invalid),
     /// A setting outside what is allowed.
-    #[error("{name} is {found}, allowed is {allowed}")]
+    #[error("{name} is {}, allowed is {allowed}", Shown(*found))]
     Setting {
         /// Name of the setting.
         name: &'static str,

@@ -1,6 +1,6 @@
 //! The slave's time and the importer's.
 
-use arm_cosim::{ArmSpec, Slave};
+use arm_cosim::{ArmSpec, Slave, Status};
 
 /// From steps of a length that is nearly, but not quite, a whole number of inner steps.
 fn run(step: f64, inner: f64) -> Slave {
@@ -34,5 +34,19 @@ fn steps_in_single_precision_do_not_run_away() {
     }
     for share in [1e-9, 3e-7, -3e-7, 9e-7, 2e-6] {
         run(1e-3 + share * 0.25e-3, 0.25e-3);
+    }
+}
+
+#[test]
+fn a_step_that_time_cannot_hold_is_refused() {
+    for (start, step) in [(1e300, 0.01), (1e15, 0.01), (1.0, 1e-300)] {
+        let mut arm = Slave::new(ArmSpec::sample()).unwrap();
+        arm.enter_initialization_mode(start, None).unwrap();
+        arm.exit_initialization_mode().unwrap();
+        let refused = arm.do_step(start, step).unwrap_err();
+        assert_eq!(refused.status, Status::Error);
+        assert!(refused.message.contains("cannot hold"), "{refused}");
+        // Numbers of 300 digits are no line that anybody reads.
+        assert!(refused.message.len() < 100, "{refused}");
     }
 }
