@@ -1,19 +1,21 @@
 //! What is not the same in every trial, or swings too fast for the common band: rhythms, the robot's ripple, and
 //! disturbances of one trial.
 
+use std::sync::Arc;
+
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
 use arm_core::{Joints, Pose, jacobian};
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
-use crate::fit::Fitted;
+use crate::anchor::Anchor;
+use crate::groups::same_rate;
 use crate::misfit::{orthogonal, project_off};
 use crate::noise::{Stretches, dot};
 use crate::normal::factor;
-use crate::predict::{Channels, smooth};
-use crate::response::Linear;
+use crate::predict::{Channels, Course, smooth};
 use crate::spectrum::{coefficient, line};
-use crate::study::{Response, Study, difference, fitted_to, same_rate};
+use crate::study::Study;
 
 /// An effect that stands apart from the fit of all trials.
 #[derive(Clone, Debug)]
@@ -56,8 +58,8 @@ impl<const N: usize> Study<'_, N> {
     ///
     /// # Errors
     /// [`GapError::Simulation`] where the hypothesis cannot be simulated.
-    pub fn rhythm(&self, fitted: &Fitted<N>) -> Result<Option<Apart>, GapError> {
-        let residuals = self.raw_residuals(fitted)?;
+    pub fn rhythm(&self, anchor: &Anchor<N>) -> Result<Option<Apart>, GapError> {
+        let residuals = self.raw_residuals(anchor)?;
         let rate = self.courses[self.fitted[0]].rate;
         if self
             .fitted
@@ -87,7 +89,7 @@ impl<const N: usize> Study<'_, N> {
             if muscles.is_none() && columns[0].kind.probe().nature != Nature::Periodic {
                 continue;
             }
-            if let Some(explained) = self.explain(fitted, &residuals, frequency, &columns)? {
+            if let Some(explained) = self.explain(anchor, &residuals, frequency, &columns) {
                 let worth = explained.gain - 8.0 * columns.len() as f64;
                 best.push((worth, explained));
             }
@@ -168,53 +170,31 @@ impl<const N: usize> Study<'_, N> {
     ///
     /// # Errors
     /// [`GapError::Numerics`] for channels that the filter refuses.
-    pub fn take_out(&mut self, fitted: &Fitted<N>, apart: &Apart) -> Result<(), GapError> {
+    pub fn take_out(&mut self, anchor: &Anchor<N>, apart: &Apart) -> Result<(), GapError> {
         for (sizes, &trial) in apart.sizes.iter().zip(&self.fitted.clone()) {
-            let course = &self.courses[self.references[self.group_of[trial]]];
-            let Some(linear) = Linear::along(self.session, &fitted.hypothesis, course)
-                .map_err(|source| GapError::Simulation { trial, source })?
-            else {
+            let Some(line) = anchor.lines.get(self.group_of[trial]) else {
                 continue;
             };
-            let mut swing = vec![vec![0.0; course.raw[0].len()]; self.session.channels()];
+            let mut course = Course::clone(&self.courses[trial]);
             for (k, column) in apart.columns.iter().enumerate() {
                 for quarter in [false, true] {
                     let size = sizes[2 * k + usize::from(quarter)];
-                    let mut changed = fitted.hypothesis.clone();
+                    let mut changed = anchor.hypothesis.clone();
                     changed.named.push(small(column, apart.wave()[0], quarter));
-                    if let Some(response) = linear.response_raw(&changed, UNIT, (false, false)) {
-                        for (sum, value) in
-                            swing.iter_mut().flatten().zip(response.iter().flatten())
-                        {
-                            *sum += size * value;
+                    let Some(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
+                        continue;
+                    };
+                    for (channel, swing) in course.raw.iter_mut().zip(&swing) {
+                        for (value, swing) in channel.iter_mut().zip(swing) {
+                            *value -= size * swing;
                         }
                     }
                 }
             }
-            let course = &mut self.courses[trial];
-            for (channel, swing) in course.raw.iter_mut().zip(&swing) {
-                for (value, swing) in channel.iter_mut().zip(swing) {
-                    *value -= swing;
-                }
-            }
             course.seen = smooth(&course.raw, course.band, course.rate)?;
+            self.courses[trial] = Arc::new(course);
         }
         Ok(())
-    }
-
-    fn raw_residuals(&self, fitted: &Fitted<N>) -> Result<Vec<Channels>, GapError> {
-        let one = |i: usize| {
-            let trial = self.fitted[i];
-            let course = &self.courses[trial];
-            let run = self.session.run(&fitted.hypothesis, course)?;
-            let read = self.session.read_raw(&fitted.hypothesis, course, &run)?;
-            Ok(difference(&course.raw, &read))
-        };
-        std::iter::zip(self.parallel(self.fitted.len(), one), &self.fitted)
-            .map(|(outcome, &trial)| {
-                outcome.map_err(|source| GapError::Simulation { trial, source })
-            })
-            .collect()
     }
 
     /// What can swing at a frequency: for each explanation the effects whose swings it adds up.
@@ -243,11 +223,11 @@ impl<const N: usize> Study<'_, N> {
     /// How much of the line some swings explain, with a size and phase of their own in every trial.
     fn explain(
         &self,
-        fitted: &Fitted<N>,
+        anchor: &Anchor<N>,
         residuals: &[Channels],
         frequency: f64,
         columns: &[Effect<f64>],
-    ) -> Result<Option<Explained>, GapError> {
+    ) -> Option<Explained> {
         let rate = self.courses[self.fitted[0]].rate;
         let channels = self.session.channels();
         // The noise of each channel next to the line.
@@ -265,14 +245,13 @@ impl<const N: usize> Study<'_, N> {
             })
             .collect();
         let swing = |group: usize| -> Option<Vec<Vec<[f64; 2]>>> {
-            let course = &self.courses[self.references[group]];
-            let linear = Linear::along(self.session, &fitted.hypothesis, course).ok()??;
+            let line = anchor.lines.get(group)?;
             columns
                 .iter()
                 .map(|effect| {
-                    let mut changed = fitted.hypothesis.clone();
+                    let mut changed = anchor.hypothesis.clone();
                     changed.named.push(small(effect, frequency, false));
-                    let response = linear.response_raw(&changed, UNIT, (false, false))?;
+                    let response = line.response_raw(&changed, UNIT, (false, false))?;
                     let swings = response.iter().map(|c| coefficient(c, frequency, rate));
                     Some(swings.collect())
                 })
@@ -283,9 +262,7 @@ impl<const N: usize> Study<'_, N> {
         let (mut gain, mut sizes) = (0.0, Vec::new());
         let mut information = 0.0;
         for (residual, &trial) in residuals.iter().zip(&self.fitted) {
-            let Some(swings) = &swings[self.group_of[trial]] else {
-                return Ok(None);
-            };
+            let swings = swings[self.group_of[trial]].as_ref()?;
             // Complex least squares as real ones: each column turned by 0 and by 90°.
             let mut gram = DMatrix::zeros(2 * k, 2 * k);
             let mut score = DVector::zeros(2 * k);
@@ -303,10 +280,7 @@ impl<const N: usize> Study<'_, N> {
                 }
             }
             information += gram[(0, 0)];
-            let Some(solver) = factor(gram) else {
-                return Ok(None);
-            };
-            let solution = solver.solve(&score);
+            let solution = factor(gram)?.solve(&score);
             gain += 2.0 * solution.dot(&score);
             sizes.push(solution);
         }
@@ -356,7 +330,7 @@ impl<const N: usize> Study<'_, N> {
         let [f, ph] = shapes_of(effect.kind);
         effect.parameters[f] = frequency;
         effect.parameters[ph] = phase;
-        Ok(Some(Explained {
+        Some(Explained {
             effect,
             sd: 1.0 / libm::sqrt(2.0 * information.max(1e-300)),
             gain,
@@ -364,7 +338,7 @@ impl<const N: usize> Study<'_, N> {
             sizes: sizes.iter().map(|s| s.iter().copied().collect()).collect(),
             columns: columns.to_vec(),
             share,
-        }))
+        })
     }
 
     /// The clearest disturbance of a single trial; `None` when no trial stands out.
@@ -372,21 +346,17 @@ impl<const N: usize> Study<'_, N> {
     /// A trial is compared with its repeats where it has some, else with the fitted model. Two shapes are tried: a burst
     /// of torque in a joint, and an angle sensor that slips and stays off.
     ///
-    /// # Errors
-    /// As [`Study::responses`].
-    pub fn disturbance(&self, fitted: &Fitted<N>, scale: f64) -> Result<Option<Apart>, GapError> {
+    /// * `scale` - misfit for each degree of freedom
+    pub fn disturbance(&self, anchor: &Anchor<N>, scale: f64) -> Option<Apart> {
         let white: Vec<Vec<f64>> = self
             .fitted
             .iter()
-            .zip(&fitted.residuals)
+            .zip(&anchor.residuals)
             .map(|(&t, r)| self.noise.whiten(r, &self.stretches[t]))
             .collect();
         // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
-        let usual: Vec<Vec<Vec<f64>>> = {
-            let own = self.own_responses(&fitted.hypothesis)?;
-            let one = |&trial: &usize| self.usual(&own, trial);
-            self.fitted.iter().map(one).collect()
-        };
+        let each = self.fitted.iter();
+        let usual: Vec<Vec<Vec<f64>>> = each.map(|&trial| self.usual(anchor, trial)).collect();
         let deviations: Vec<Vec<f64>> = (0..self.fitted.len())
             .map(|m| {
                 let mut deviation = self.deviation(&white, m);
@@ -401,7 +371,7 @@ impl<const N: usize> Study<'_, N> {
         let mut best: Option<Apart> = None;
         for m in suspects {
             let trial = self.fitted[m];
-            for (effect, response) in self.shapes_in(fitted, trial)? {
+            for (effect, response) in self.shapes_in(anchor, trial) {
                 let mut row = self.noise.whiten(&response, &self.stretches[trial]);
                 project_off(&mut row, &usual[m]);
                 let (square, along) = (dot(&row, &row), dot(&row, &deviations[m]));
@@ -434,11 +404,11 @@ impl<const N: usize> Study<'_, N> {
         let rows = self.rows_of_references() as f64;
         let tried = (self.fitted.len() * 4 * N * 100) as f64;
         let price = crate::scan::THRESHOLD + libm::log(rows) + 2.0 * libm::log(tried);
-        Ok(best.filter(|b| b.gain > price))
+        best.filter(|b| b.gain > price)
     }
 
     /// Whitened columns of what differs from trial to trial without being a disturbance, each orthogonal to the others.
-    fn usual(&self, own: &[Response], trial: usize) -> Vec<Vec<f64>> {
+    fn usual(&self, anchor: &Anchor<N>, trial: usize) -> Vec<Vec<f64>> {
         let stretches = &self.stretches[trial];
         let length = self.session.trials[trial].len();
         let constant = |j: usize| {
@@ -446,10 +416,8 @@ impl<const N: usize> Study<'_, N> {
             channels[j] = vec![1.0; length];
             channels
         };
-        let placed = own
-            .iter()
-            .filter_map(|r| r.0[self.group_of[trial]].as_ref())
-            .map(|c| self.noise.whiten(&fitted_to(c, length), stretches));
+        let own = anchor.own.iter();
+        let placed = own.map(|r| self.noise.whiten(&r.0[self.group_of[trial]], stretches));
         let columns: Vec<Vec<f64>> = placed
             .chain((0..N).map(|j| self.noise.whiten(&constant(j), stretches)))
             .collect();
@@ -490,21 +458,15 @@ impl<const N: usize> Study<'_, N> {
     }
 
     /// Unit disturbances of a trial with what they would show: bursts in every joint, slips of every angle sensor.
-    fn shapes_in(
-        &self,
-        fitted: &Fitted<N>,
-        trial: usize,
-    ) -> Result<Vec<(Effect<f64>, Channels)>, GapError> {
+    fn shapes_in(&self, anchor: &Anchor<N>, trial: usize) -> Vec<(Effect<f64>, Channels)> {
         const EVERY: f64 = 0.1;
         const LONG: [f64; 3] = [0.3, 0.6, 1.2];
         const UNIT: f64 = 1e-2;
         let course = &self.courses[self.references[self.group_of[trial]]];
         let end = course.raw[0].len() as f64 / course.rate;
         let starts = (end / EVERY) as usize;
-        let Some(linear) = Linear::along(self.session, &fitted.hypothesis, course)
-            .map_err(|source| GapError::Simulation { trial, source })?
-        else {
-            return Ok(Vec::new());
+        let Some(line) = anchor.lines.get(self.group_of[trial]) else {
+            return Vec::new();
         };
         let bursts: Vec<Effect<f64>> = KINDS
             .iter()
@@ -520,9 +482,9 @@ impl<const N: usize> Study<'_, N> {
             })
             .collect();
         let answered = self.parallel(bursts.len(), |i| {
-            let mut changed = fitted.hypothesis.clone();
+            let mut changed = anchor.hypothesis.clone();
             changed.named.push(bursts[i]);
-            linear.response(&changed, UNIT, (false, false))
+            line.response(&changed, UNIT, (false, false))
         });
         let mut list: Vec<(Effect<f64>, Channels)> = std::iter::zip(bursts, answered)
             .filter_map(|(effect, response)| Some((effect, response?)))
@@ -547,14 +509,7 @@ impl<const N: usize> Study<'_, N> {
                 }
             }
         }
-        for (_, channels) in &mut list {
-            let length = self.session.trials[trial].len();
-            for channel in channels.iter_mut() {
-                let last = channel.last().copied().unwrap_or(0.0);
-                channel.resize(length, last);
-            }
-        }
-        Ok(list)
+        list
     }
 
     /// Leaves out what a disturbance has touched.

@@ -8,10 +8,11 @@ use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 use arm_ident::trial::Trial;
 
 use crate::GapError;
-use crate::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::predict::Run;
-use crate::session::Session;
-use crate::study::{Change, Response, Study};
+use crate::anchor::{Anchor, Change, Response};
+use crate::hypothesis::{Coordinate, Target};
+use crate::memory;
+use crate::session::{Session, Sight};
+use crate::study::Study;
 
 /// Share of a joint's torque that an effect has in the change with which its response is taken.
 const SHARE: f64 = 0.02;
@@ -129,12 +130,10 @@ pub struct Library {
     pub candidates: Vec<Candidate>,
     /// Responses to the columns of each.
     pub responses: Vec<Vec<Response>>,
-    /// Kinds and places that these movements do not excite at all.
-    pub silent: Vec<(Kind, usize)>,
 }
 
 impl Library {
-    /// Asks the whole catalogue, linearised at a hypothesis.
+    /// Asks the whole catalogue, linearised at an anchor.
     ///
     /// * `periodic` - frequency \[Hz\] and phase \[rad\] of a periodic residual of the handle, where there is one
     ///
@@ -142,23 +141,16 @@ impl Library {
     /// As [`Study::responses`].
     pub fn build<const N: usize>(
         study: &Study<N>,
-        hypothesis: &Hypothesis<N>,
+        anchor: &Anchor<N>,
         periodic: Option<[f64; 2]>,
     ) -> Result<Self, GapError> {
-        let motions = motions(study, hypothesis)?;
+        let hypothesis = &anchor.hypothesis;
+        let motions = motions(study, anchor);
         let mut candidates = Vec::new();
-        let mut silent = Vec::new();
         for &kind in KINDS {
             for index in places(study.session, kind) {
-                let questions = kind.probe().questions;
-                let mut heard = false;
-                for (number, question) in questions.iter().enumerate() {
-                    let found = ask(&motions, kind, index, (number, question), periodic);
-                    heard |= !found.is_empty();
-                    candidates.extend(found);
-                }
-                if !heard && kind.probe().nature == Nature::Lasting {
-                    silent.push((kind, index));
+                for asked in kind.probe().questions.iter().enumerate() {
+                    candidates.extend(ask(&motions, kind, index, asked, periodic));
                 }
             }
         }
@@ -177,35 +169,27 @@ impl Library {
                 });
             }
         }
-        let mut all = study.responses(hypothesis, &changes)?.into_iter();
+        let mut all = study.responses(anchor, &changes)?.into_iter();
         let mut kept = Vec::new();
         let mut responses = Vec::new();
         for candidate in candidates {
             let own: Vec<Response> = all.by_ref().take(candidate.width()).collect();
-            let simulated = own.iter().all(|r| r.0.iter().all(Option::is_some));
-            let moves = own.iter().all(|r| {
-                let mut values = r.0.iter().flatten().flatten().flatten();
-                values.any(|v| *v != 0.0)
-            });
-            if simulated && moves {
+            let moves = |r: &Response| r.0.iter().flatten().flatten().any(|v| *v != 0.0);
+            if own.iter().all(moves) {
                 kept.push(candidate);
                 responses.push(own);
-            } else if !silent.contains(&(candidate.kind(), candidate.effect.index)) {
-                silent.push((candidate.kind(), candidate.effect.index));
             }
         }
-        silent.retain(|s| !kept.iter().any(|c| (c.kind(), c.effect.index) == *s));
         Ok(Self {
             candidates: kept,
             responses,
-            silent,
         })
     }
 }
 
 /// Where a kind may act in a session.
 fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
-    let led = session.is_led();
+    let led = session.sight == Sight::Led;
     // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them.
     let swings_freely = session.trials.iter().all(Trial::is_unloaded);
     match kind.info().place {
@@ -227,20 +211,13 @@ struct Movement<const N: usize> {
     torque: [f64; N],
 }
 
-fn motions<const N: usize>(
-    study: &Study<N>,
-    hypothesis: &Hypothesis<N>,
-) -> Result<Vec<Movement<N>>, GapError> {
+fn motions<const N: usize>(study: &Study<N>, anchor: &Anchor<N>) -> Vec<Movement<N>> {
     let one = |group: usize| {
-        let trial = study.references[group];
-        let course = &study.courses[trial];
-        let run = study
-            .session
-            .run(hypothesis, course)
-            .map_err(|source| GapError::Simulation { trial, source })?;
-        let state = |i: usize| match course.motion() {
-            Some(motion) => (motion.q[i], motion.qd[i], motion.qdd[i]),
-            None => recorded(&run, i),
+        let course = &study.courses[study.references[group]];
+        let state = |i: usize| match (course.motion(), anchor.lines.get(group)) {
+            (Some(motion), _) => (motion.q[i], motion.qd[i], motion.qdd[i]),
+            (None, Some(line)) => line.state(i),
+            (None, None) => (Joints::zeros(), Joints::zeros(), Joints::zeros()),
         };
         let chain = &study.session.chain;
         let mut square = [0.0; N];
@@ -259,26 +236,13 @@ fn motions<const N: usize>(
                 at
             })
             .collect();
-        Ok(Movement {
+        Movement {
             motion,
             interval: 1.0 / course.rate,
             torque: square.map(|s| libm::sqrt(s).max(UNLOADED)),
-        })
+        }
     };
-    study
-        .parallel(study.references.len(), one)
-        .into_iter()
-        .collect()
-}
-
-fn recorded<const N: usize>(
-    run: &Run<N>,
-    i: usize,
-) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
-    let r = run.recording();
-    let i = i.min(r.len().saturating_sub(1));
-    let at = |v: &[f64]| Joints::from_column_slice(&v[i * N..(i + 1) * N]);
-    (at(&r.q), at(&r.qd), at(&r.qdd))
+    study.parallel(study.references.len(), one)
 }
 
 /// The candidates of one question about a kind at a place.
@@ -361,16 +325,13 @@ fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate)
     for movement in movements {
         let mut square = 0.0;
         let effect = candidate.unit(0, 1.0);
-        let mut memory = 0.0;
+        let mut memory = [0.0];
+        let mut before: Option<&Motion<f64, N>> = None;
         for at in &movement.motion {
-            let local = at.local(joint, memory);
-            if effect.kind.info().memory {
-                for _ in 0..10 {
-                    let local = at.local(joint, memory);
-                    memory += effect.memory_rate(&local) * movement.interval / 10.0;
-                }
+            if let Some(from) = before.replace(at) {
+                memory::advance(&[effect], (from, at), &mut memory, movement.interval);
             }
-            let torque = resisting_torque(&[effect], at, &[local.memory])[joint];
+            let torque = resisting_torque(&[effect], at, &memory)[joint];
             square += torque * torque;
         }
         let size = libm::sqrt(square / movement.motion.len().max(1) as f64);

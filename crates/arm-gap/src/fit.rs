@@ -1,22 +1,26 @@
-//! Fitting a hypothesis by simulation: Gauss and Newton's method with step control.
+//! Fitting a hypothesis to the fit trials: Gauss and Newton's method with step control, near a simulated one.
 
 use nalgebra::DMatrix;
 
 use crate::GapError;
+use crate::anchor::Anchor;
 use crate::candidate::Candidate;
 use crate::hypothesis::{Coordinate, Hypothesis};
 use crate::normal::{Cluster, Normal, factor, solve};
 use crate::predict::Channels;
-use crate::study::{Response, Study};
+use crate::spread::spread;
+use crate::study::Study;
 
 /// Most steps of a fit.
-const STEPS: usize = 5;
+const STEPS: usize = 12;
 /// Most halvings of a step.
-const HALVINGS: usize = 5;
+const HALVINGS: usize = 6;
 /// A step that gains less than this, in units of the noise, is the last.
-const ENOUGH: f64 = 0.5;
+const ENOUGH: f64 = 0.2;
 /// Share of the cost that a last step gains at most, where the model is far from the data.
-const SHARE: f64 = 3e-4;
+const SHARE: f64 = 1e-4;
+/// Times that a fit is simulated anew from where it ended.
+const AGAIN: usize = 4;
 
 /// A hypothesis fitted to the fit trials.
 #[derive(Clone, Debug)]
@@ -31,40 +35,17 @@ pub struct Fitted<const N: usize> {
     pub residuals: Vec<Channels>,
 }
 
-/// Responses to the nuisances, taken at one hypothesis and used near it.
-#[derive(Clone, Debug)]
-pub struct Background {
-    /// The nuisances.
-    pub coordinates: Vec<Coordinate>,
-    /// Responses to them.
-    pub responses: Vec<Response>,
-    /// Responses to what differs from trial to trial.
-    pub own: Vec<Response>,
+impl<const N: usize> Fitted<N> {
+    /// The numbers of the named effects that a fit may change.
+    pub fn named(&self) -> Vec<Coordinate> {
+        named(&self.hypothesis, &self.asked)
+    }
 }
 
-impl Background {
-    /// Linearised at a hypothesis.
-    ///
-    /// # Errors
-    /// As [`Study::responses`].
-    pub fn at<const N: usize>(
-        study: &Study<N>,
-        hypothesis: &Hypothesis<N>,
-    ) -> Result<Self, GapError> {
-        let coordinates = study.session.nuisances();
-        let all: Vec<Coordinate> = coordinates
-            .iter()
-            .copied()
-            .chain(study.session.by_trial())
-            .collect();
-        let mut responses = study.responses_to(hypothesis, &all)?;
-        let own = responses.split_off(coordinates.len());
-        Ok(Self {
-            coordinates,
-            responses,
-            own,
-        })
-    }
+fn named<const N: usize>(hypothesis: &Hypothesis<N>, asked: &[Candidate]) -> Vec<Coordinate> {
+    let each = asked.iter().enumerate();
+    each.flat_map(|(slot, c)| c.coordinates(slot, &hypothesis.named[slot]))
+        .collect()
 }
 
 /// The distance of each number from what was known of it, with its standard deviation.
@@ -81,18 +62,11 @@ pub fn priors<const N: usize>(
         .collect()
 }
 
-impl<const N: usize> Study<'_, N> {
+impl<'a, const N: usize> Study<'a, N> {
     /// Cost of residuals under a hypothesis, for the trials that are fitted.
-    fn cost(
-        &self,
-        hypothesis: &Hypothesis<N>,
-        coordinates: &[Coordinate],
-        residuals: &[Channels],
-        own: &[Response],
-    ) -> f64 {
-        let clusters = self.clusters(&self.fitted, residuals, &[], own);
+    fn cost(&self, anchor: &Anchor<N>, hypothesis: &Hypothesis<N>, clusters: &[Cluster]) -> f64 {
         let data: f64 = clusters.iter().map(|c| c.square).sum();
-        let known: f64 = priors(hypothesis, coordinates)
+        let known: f64 = priors(hypothesis, &anchor.coordinates)
             .into_iter()
             .flatten()
             .map(|(distance, sd)| (distance / sd) * (distance / sd))
@@ -100,39 +74,64 @@ impl<const N: usize> Study<'_, N> {
         data + known
     }
 
-    /// Fits the nuisances and the named effects of a hypothesis.
-    ///
-    /// * `asked` - the candidate behind each named effect
-    /// * `steps` - most steps
+    /// A hypothesis near an anchor with its residuals and their cost.
+    fn state(
+        &self,
+        anchor: &Anchor<N>,
+        hypothesis: Hypothesis<N>,
+        asked: Vec<Candidate>,
+    ) -> Result<Fitted<N>, GapError> {
+        let residuals = self.residuals(anchor, &hypothesis)?;
+        let squares = anchor.rows.squares(self, &residuals);
+        let cost = self.cost(anchor, &hypothesis, &squares);
+        Ok(Fitted {
+            hypothesis,
+            asked,
+            cost,
+            residuals,
+        })
+    }
+
+    /// The normal equations of all unknowns at a fitted hypothesis: nuisances first, then the named effects' own, then
+    /// whatever else is asked.
     ///
     /// # Errors
-    /// [`GapError`] where the start cannot be simulated, or nothing decides an unknown.
+    /// As [`Study::responses_at`].
+    pub fn equations(
+        &self,
+        anchor: &Anchor<N>,
+        fitted: &Fitted<N>,
+        more: &[&crate::anchor::Response],
+    ) -> Result<(Vec<Coordinate>, Vec<Cluster>), GapError> {
+        let own = fitted.named();
+        let responses = self.responses_at(anchor, &fitted.hypothesis, &own)?;
+        let extra: Vec<_> = responses.iter().chain(more.iter().copied()).collect();
+        let clusters = anchor.rows.clusters(self, &extra, &fitted.residuals);
+        let coordinates = anchor.coordinates.iter().copied().chain(own).collect();
+        Ok((coordinates, clusters))
+    }
+
+    /// Fits the nuisances and the named effects of a hypothesis, followed from an anchor.
+    ///
+    /// * `asked` - the candidate behind each named effect
+    ///
+    /// # Errors
+    /// [`GapError`] where the start cannot be followed from the anchor.
     pub fn fit(
         &self,
+        anchor: &Anchor<N>,
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
-        background: &Background,
     ) -> Result<Fitted<N>, GapError> {
-        let mut hypothesis = start;
-        let mut residuals = self.residuals(&hypothesis, &self.fitted)?;
-        let nuisances = &background.coordinates;
-        let mut cost = self.cost(&hypothesis, nuisances, &residuals, &background.own);
+        let mut fitted = self.state(anchor, start, asked)?;
         for _ in 0..STEPS {
-            let named: Vec<Coordinate> = asked
-                .iter()
-                .enumerate()
-                .flat_map(|(slot, c)| c.coordinates(slot, &hypothesis.named[slot]))
-                .collect();
-            let own_columns = self.responses_to(&hypothesis, &named)?;
-            let coordinates: Vec<Coordinate> = nuisances.iter().chain(&named).copied().collect();
-            let columns: Vec<&Response> = background.responses.iter().chain(&own_columns).collect();
-            let clusters = self.clusters(&self.fitted, &residuals, &columns, &background.own);
-            let list: Vec<&Cluster> = clusters.iter().collect();
-            let mut normal = Normal::new(&list, &priors(&hypothesis, &coordinates));
+            let hypothesis = &fitted.hypothesis;
+            let (coordinates, clusters) = self.equations(anchor, &fitted, &[])?;
+            let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
             let usable: Vec<usize> = (0..coordinates.len())
                 .filter(|&i| normal.gram[(i, i)] > 0.0)
                 .collect();
-            regularise(&mut normal.gram, &hypothesis, &coordinates);
+            regularise(&mut normal.gram, hypothesis, &coordinates);
             let bounds = |i: usize| {
                 let c = &coordinates[usable[i]];
                 let value = hypothesis.get(c.target);
@@ -142,55 +141,70 @@ impl<const N: usize> Study<'_, N> {
             let Some((step, _)) = solve(&normal.gram, &normal.score, &usable, &bounds) else {
                 break;
             };
-            let Some((next, rest, less)) = self.shortened(
-                &hypothesis,
-                (&coordinates, &usable, &step),
-                background,
-                cost,
-            )?
-            else {
+            let moves: Vec<(Coordinate, f64)> = std::iter::zip(&usable, step)
+                .map(|(&i, step)| (coordinates[i], step))
+                .collect();
+            let Some(next) = self.shortened(anchor, &fitted, &moves) else {
                 break;
             };
-            let gained = cost - less;
-            (hypothesis, residuals, cost) = (next, rest, less);
-            if gained < ENOUGH + SHARE * cost {
+            let gained = fitted.cost - next.cost;
+            fitted = next;
+            if gained < ENOUGH + SHARE * fitted.cost {
                 break;
             }
         }
-        Ok(Fitted {
-            hypothesis,
-            asked,
-            cost,
-            residuals,
-        })
+        Ok(fitted)
     }
 
     /// The first of a step, its half, its quarter … that lowers the cost.
-    #[allow(clippy::type_complexity)]
     fn shortened(
         &self,
-        from: &Hypothesis<N>,
-        (coordinates, usable, step): (&[Coordinate], &[usize], &[f64]),
-        background: &Background,
-        cost: f64,
-    ) -> Result<Option<(Hypothesis<N>, Vec<Channels>, f64)>, GapError> {
+        anchor: &Anchor<N>,
+        from: &Fitted<N>,
+        moves: &[(Coordinate, f64)],
+    ) -> Option<Fitted<N>> {
         let mut share = 1.0;
-        for _ in 0..HALVINGS {
-            let mut next = from.clone();
-            for (&i, change) in usable.iter().zip(step) {
-                let c = &coordinates[i];
-                let value = from.get(c.target) + share * change;
+        (0..HALVINGS).find_map(|_| {
+            let mut next = from.hypothesis.clone();
+            for (c, step) in moves {
+                let value = from.hypothesis.get(c.target) + share * step;
                 next = next.with(c.target, value.clamp(c.lower, c.upper));
             }
-            if let Ok(residuals) = self.residuals(&next, &self.fitted) {
-                let less = self.cost(&next, &background.coordinates, &residuals, &background.own);
-                if less < cost {
-                    return Ok(Some((next, residuals, less)));
-                }
-            }
             share *= 0.5;
+            let next = self.state(anchor, next, from.asked.clone()).ok()?;
+            (next.cost < from.cost).then_some(next)
+        })
+    }
+
+    /// Fits a hypothesis, simulating it anew from where the fit ended until that changes nothing.
+    ///
+    /// # Errors
+    /// [`GapError`] where the hypothesis cannot be simulated.
+    pub fn settle(
+        &self,
+        start: Hypothesis<N>,
+        asked: Vec<Candidate>,
+    ) -> Result<(Fitted<N>, Anchor<'a, N>), GapError> {
+        let mut anchor = self.anchor(&start)?;
+        let mut before = self.state(&anchor, start, asked)?;
+        for _ in 0..AGAIN {
+            let after = self.fit(&anchor, before.hypothesis.clone(), before.asked.clone())?;
+            let gained = before.cost - after.cost;
+            if gained < 2.0 * ENOUGH + 2.0 * SHARE * after.cost {
+                return Ok((after, anchor));
+            }
+            let there = match self.anchor(&after.hypothesis) {
+                Ok(there) => there,
+                // What can be followed but not simulated is no answer.
+                Err(_) => break,
+            };
+            let simulated = self.state(&there, after.hypothesis, after.asked)?;
+            if simulated.cost > before.cost {
+                break;
+            }
+            (before, anchor) = (simulated, there);
         }
-        Ok(None)
+        Ok((before, anchor))
     }
 }
 
@@ -208,7 +222,7 @@ pub fn regularise<const N: usize>(
     }
 }
 
-/// Standard deviations of the named parameters of a fitted hypothesis, and the covariance of all unknowns.
+/// How well the unknowns of a fitted hypothesis are known.
 #[derive(Clone, Debug)]
 pub struct Precision {
     /// The unknowns: nuisances first, then the named effects' own.
@@ -220,31 +234,19 @@ pub struct Precision {
 impl<const N: usize> Study<'_, N> {
     /// How well the unknowns of a fitted hypothesis are known.
     ///
-    /// The spread between trials counts where it is larger than the noise tells: the covariance is that of the sandwich
-    /// of trial scores, or the model's own if that is larger.
+    /// The spread between trials counts where it is larger than the noise tells.
     ///
     /// # Errors
-    /// As [`Study::responses`].
-    pub fn precision(&self, fitted: &Fitted<N>, scale: f64) -> Result<Precision, GapError> {
+    /// As [`Study::equations`].
+    pub fn precision(
+        &self,
+        anchor: &Anchor<N>,
+        fitted: &Fitted<N>,
+        scale: f64,
+    ) -> Result<Precision, GapError> {
         let hypothesis = &fitted.hypothesis;
-        let background = Background::at(self, hypothesis)?;
-        let named: Vec<Coordinate> = fitted
-            .asked
-            .iter()
-            .enumerate()
-            .flat_map(|(slot, c)| c.coordinates(slot, &hypothesis.named[slot]))
-            .collect();
-        let responses = self.responses_to(hypothesis, &named)?;
-        let coordinates: Vec<Coordinate> = background
-            .coordinates
-            .iter()
-            .chain(&named)
-            .copied()
-            .collect();
-        let columns: Vec<&Response> = background.responses.iter().chain(&responses).collect();
-        let clusters = self.clusters(&self.fitted, &fitted.residuals, &columns, &background.own);
-        let list: Vec<&Cluster> = clusters.iter().collect();
-        let mut normal = Normal::new(&list, &priors(hypothesis, &coordinates));
+        let (coordinates, clusters) = self.equations(anchor, fitted, &[])?;
+        let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
         regularise(&mut normal.gram, hypothesis, &coordinates);
         let mut sd = vec![f64::INFINITY; coordinates.len()];
         // A value at its limit is held there: the others are known as if it were exact.
@@ -260,64 +262,13 @@ impl<const N: usize> Study<'_, N> {
         });
         if let Some(factor) = factor(left) {
             let inverse = factor.inverse();
-            // Scores that scatter more between trials than the noise allows widen everything alike.
-            let spread = self.score_spread(&clusters, &free, &inverse);
             for (a, &i) in free.iter().enumerate() {
-                let widen = f64::max(scale, spread[a]);
+                let row = free.iter().enumerate();
+                let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
+                let widen = f64::max(scale, spread(&clusters, &weights));
                 sd[i] = (inverse[(a, a)] * widen).sqrt();
             }
         }
         Ok(Precision { coordinates, sd })
-    }
-
-    /// For each free unknown the ratio of its variance from the scatter of trials within groups to that from the noise,
-    /// shrunk towards one.
-    fn score_spread(
-        &self,
-        clusters: &[Cluster],
-        free: &[usize],
-        inverse: &DMatrix<f64>,
-    ) -> Vec<f64> {
-        /// Weight of "as the noise says", in trials.
-        const BELIEF: f64 = 6.0;
-        let n = free.len();
-        (0..n)
-            .map(|a| {
-                let score =
-                    |c: &Cluster| (0..n).fold(0.0, |s, b| s + inverse[(a, b)] * c.score[free[b]]);
-                let expected = |c: &Cluster| {
-                    let mut sum = 0.0;
-                    for b in 0..n {
-                        for d in 0..n {
-                            sum += inverse[(a, b)] * c.gram[(free[b], free[d])] * inverse[(a, d)];
-                        }
-                    }
-                    sum
-                };
-                let (mut observed, mut predicted, mut dof) = (0.0, 0.0, 0.0);
-                for group in 0..self.references.len() {
-                    let own: Vec<&Cluster> = clusters
-                        .iter()
-                        .filter(|c| c.configuration == group)
-                        .collect();
-                    if own.len() < 2 {
-                        continue;
-                    }
-                    let mean = own.iter().map(|c| score(c)).sum::<f64>() / own.len() as f64;
-                    let variance = own.iter().map(|c| expected(c)).sum::<f64>() / own.len() as f64;
-                    observed += own
-                        .iter()
-                        .map(|c| (score(c) - mean) * (score(c) - mean))
-                        .sum::<f64>();
-                    predicted += variance * (own.len() - 1) as f64;
-                    dof += (own.len() - 1) as f64;
-                }
-                if predicted <= 0.0 {
-                    return 1.0;
-                }
-                let ratio = observed / predicted;
-                ((BELIEF + dof * ratio) / (BELIEF + dof)).max(1.0)
-            })
-            .collect()
     }
 }

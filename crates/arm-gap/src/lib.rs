@@ -1,20 +1,27 @@
 //! Where simulation and measured data of an arm disagree, which effect is missing, and what adding it gains.
 
+pub mod anchor;
 pub mod apart;
 pub mod candidate;
 pub mod chance;
 pub mod error;
 pub mod fit;
+pub mod groups;
 pub mod hypothesis;
+pub mod memory;
 pub mod misfit;
 pub mod noise;
 pub mod normal;
 pub mod predict;
 pub mod response;
+pub mod rows;
 pub mod scan;
 pub mod search;
 pub mod session;
 pub mod spectrum;
+pub mod spread;
 pub mod study;
+pub mod threads;
+mod unrepeated;
 
 pub use error::GapError;

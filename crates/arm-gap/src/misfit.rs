@@ -1,6 +1,6 @@
 //! What a fitted hypothesis leaves: more than repeats differ among themselves?
 
-use crate::GapError;
+use crate::anchor::Anchor;
 use crate::fit::Fitted;
 use crate::noise::dot;
 use crate::study::Study;
@@ -17,11 +17,11 @@ pub struct Lack {
 }
 
 /// Lack of fit of a hypothesis over the groups of repeats.
-///
-/// # Errors
-/// As [`Study::residuals`].
-pub fn lack_of_fit<const N: usize>(study: &Study<N>, fitted: &Fitted<N>) -> Result<Lack, GapError> {
-    let own = study.own_responses(&fitted.hypothesis)?;
+pub fn lack_of_fit<const N: usize>(
+    study: &Study<N>,
+    anchor: &Anchor<N>,
+    fitted: &Fitted<N>,
+) -> Lack {
     let (mut common, mut common_dof, mut apart, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
     for group in 0..study.references.len() {
         let members: Vec<usize> = (0..study.fitted.len())
@@ -40,12 +40,11 @@ pub fn lack_of_fit<const N: usize>(study: &Study<N>, fitted: &Fitted<N>) -> Resu
         {
             continue;
         }
-        let columns: Vec<Vec<f64>> = own
-            .iter()
-            .filter_map(|r| r.0[group].as_ref())
-            .map(|c| study.noise.whiten(c, stretches))
-            .collect();
-        let columns = orthogonal(columns);
+        let own = anchor.own.iter();
+        let columns = orthogonal(
+            own.map(|r| study.noise.whiten(&r.0[group], stretches))
+                .collect(),
+        );
         let rows: Vec<Vec<f64>> = members
             .iter()
             .map(|&m| {
@@ -71,19 +70,19 @@ pub fn lack_of_fit<const N: usize>(study: &Study<N>, fitted: &Fitted<N>) -> Resu
     let unknowns = study.session.nuisances().len() + fitted.asked.len();
     let common_dof = (common_dof - unknowns as f64).max(1.0);
     if apart_dof < 1.0 {
-        return Ok(Lack {
+        return Lack {
             ratio: f64::NAN,
             z: f64::NAN,
             excess: f64::NAN,
-        });
+        };
     }
     let noise = apart / apart_dof;
     let ratio = common / common_dof / noise;
-    Ok(Lack {
+    Lack {
         ratio,
         z: (ratio - 1.0) / libm::sqrt(2.0 / common_dof + 2.0 / apart_dof),
         excess: common / noise - common_dof,
-    })
+    }
 }
 
 /// Columns made orthogonal to each other, one after the other; those that add nothing are left out.

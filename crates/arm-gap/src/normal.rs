@@ -1,8 +1,8 @@
 //! Normal equations, trial by trial: what every question is answered from.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::sync::Arc;
 
-use crate::noise::dot;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Whitened rows of one trial condensed: `gram = AᵀA`, `score = Aᵀr`, `square = rᵀr`.
 #[derive(Clone, Debug)]
@@ -10,64 +10,13 @@ pub struct Cluster {
     /// The movement; repeats share it.
     pub configuration: usize,
     /// Products of columns.
-    pub gram: DMatrix<f64>,
+    pub gram: Arc<DMatrix<f64>>,
     /// Products of columns and residual.
     pub score: DVector<f64>,
     /// Square of the residual.
     pub square: f64,
     /// Number of rows.
     pub rows: usize,
-}
-
-impl Cluster {
-    /// Condenses the rows of one trial.
-    ///
-    /// * `columns` - whitened columns
-    /// * `own` - columns whose coefficients belong to this trial alone, with the standard deviation of each; they are
-    ///   marginalised
-    pub fn new(
-        configuration: usize,
-        columns: &[Vec<f64>],
-        residual: &[f64],
-        own: &[(Vec<f64>, f64)],
-    ) -> Self {
-        let (n, k) = (columns.len(), own.len());
-        let all: Vec<&[f64]> = own
-            .iter()
-            .map(|(c, _)| c.as_slice())
-            .chain(columns.iter().map(Vec::as_slice))
-            .chain([residual])
-            .collect();
-        let size = k + n + 1;
-        let mut full = DMatrix::zeros(size, size);
-        for a in 0..size {
-            for b in a..size {
-                let value = dot(all[a], all[b]);
-                full[(a, b)] = value;
-                full[(b, a)] = value;
-            }
-        }
-        for (i, (_, sd)) in own.iter().enumerate() {
-            full[(i, i)] += 1.0 / (sd * sd);
-        }
-        for i in 0..k {
-            let pivot = full[(i, i)];
-            let row: Vec<f64> = (0..size).map(|b| full[(i, b)]).collect();
-            for a in i + 1..size {
-                let factor = row[a] / pivot;
-                for b in i + 1..size {
-                    full[(a, b)] -= factor * row[b];
-                }
-            }
-        }
-        Self {
-            configuration,
-            gram: full.view((k, k), (n, n)).into_owned(),
-            score: full.view((k, size - 1), (n, 1)).column(0).into_owned(),
-            square: full[(size - 1, size - 1)],
-            rows: residual.len(),
-        }
-    }
 }
 
 /// The sum over trials, with what is known beforehand.
@@ -87,7 +36,7 @@ impl Normal {
     /// Sums clusters and adds priors.
     ///
     /// * `priors` - for each column its present distance from the prior value, and the prior's standard deviation
-    pub fn new(clusters: &[&Cluster], priors: &[Option<(f64, f64)>]) -> Self {
+    pub fn new(clusters: &[Cluster], priors: &[Option<(f64, f64)>]) -> Self {
         let n = priors.len();
         let mut sum = Self {
             gram: DMatrix::zeros(n, n),
@@ -96,7 +45,7 @@ impl Normal {
             rows: 0,
         };
         for cluster in clusters {
-            sum.gram += &cluster.gram;
+            sum.gram += &*cluster.gram;
             sum.score += &cluster.score;
             sum.square += cluster.square;
             sum.rows += cluster.rows;

@@ -11,6 +11,7 @@ use arm_sim::{
 
 use crate::GapError;
 use crate::hypothesis::{Hypothesis, Target};
+use crate::memory;
 use crate::session::{Session, Sight};
 
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
@@ -299,7 +300,11 @@ impl<const N: usize> Session<N> {
         Ok(angles.chain(forces).collect())
     }
 
-    fn torques(
+    /// Joint torques by inverse dynamics of the measured motion.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig that cannot be.
+    pub fn torques(
         &self,
         hypothesis: &Hypothesis<N>,
         course: &Course<N>,
@@ -315,7 +320,8 @@ impl<const N: usize> Session<N> {
         }
         let chain = setup.chain()?;
         let offset = offsets(&effects);
-        let mut memory = vec![0.0; effects.len()];
+        let mut states = vec![0.0; effects.len()];
+        let mut before: Option<Motion<f64, N>> = None;
         let mut channels = vec![Vec::with_capacity(course.times.len()); N];
         for (i, &time) in course.times.iter().enumerate() {
             let (q, qd, qdd) = (motion.q[i] - offset, motion.qd[i], motion.qdd[i]);
@@ -323,9 +329,11 @@ impl<const N: usize> Session<N> {
             let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);
             let mut at = Motion::new(time, q, qd).with_joint_force(&through);
             at.qdd = qdd;
-            advance(&effects, &at, &mut memory, 1.0 / course.rate);
+            if let Some(from) = before.replace(at) {
+                memory::advance(&effects, (&from, &at), &mut states, 1.0 / course.rate);
+            }
             let torque = inverse_dynamics(&chain, &pose, &qd, &qdd)
-                + resisting_torque(&effects, &at, &memory);
+                + resisting_torque(&effects, &at, &states);
             for (channel, value) in channels.iter_mut().zip(torque.iter()) {
                 channel.push(*value);
             }
@@ -360,6 +368,12 @@ pub fn smooth(channels: &[Vec<f64>], band: f64, rate: f64) -> Result<Channels, G
     Ok(passed.collect::<Result<_, _>>()?)
 }
 
+/// Channels less channels, over the samples that both have.
+pub fn difference(a: &Channels, b: &Channels) -> Channels {
+    let one = |(a, b): (&Vec<f64>, &Vec<f64>)| std::iter::zip(a, b).map(|(a, b)| a - b).collect();
+    std::iter::zip(a, b).map(one).collect()
+}
+
 /// What the sensors of the angles add to them.
 fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N> {
     let mut reading = Reading::<f64, N> {
@@ -372,24 +386,6 @@ fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N> {
         effect.distort(&mut reading);
     }
     reading.q
-}
-
-/// Effects with a state of their own, carried over one sampling interval in ten steps.
-fn advance<const N: usize>(
-    effects: &[Effect<f64>],
-    motion: &Motion<f64, N>,
-    memory: &mut [f64],
-    interval: f64,
-) {
-    const PARTS: usize = 10;
-    for (effect, state) in effects.iter().zip(memory) {
-        if effect.kind.info().memory {
-            for _ in 0..PARTS {
-                let local = motion.local(effect.index, *state);
-                *state += effect.memory_rate(&local) * interval / PARTS as f64;
-            }
-        }
-    }
 }
 
 /// Longest step with which the steepest dry friction does not rattle \[s\]: one time constant of its slope at rest on the

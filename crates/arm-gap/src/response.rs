@@ -3,6 +3,9 @@
 //! A change of the rig, an effect or the handle's path leaves a torque over in the equation of motion of the run. The
 //! arm answers it as a linear system with coefficients that follow the run; that system is solved implicitly, so that a
 //! stiff contact and dry friction need no short steps. A hundred candidates cost less than one simulation each.
+//!
+//! The same scheme, with Newton's method in every step, follows a change that is not small ([`Linear::play`]): what it
+//! gives is the run itself and, on top, what two coarse solutions differ by, so that their common error drops out.
 
 use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{
@@ -11,8 +14,10 @@ use arm_core::{
 };
 use arm_sim::{HandlePath, SimulationError};
 use nalgebra::SMatrix;
+use std::sync::Arc;
 
 use crate::hypothesis::Hypothesis;
+use crate::memory;
 use crate::predict::{Channels, Course, smooth};
 use crate::session::Session;
 
@@ -45,9 +50,22 @@ impl<const N: usize> Plant<N> {
         })
     }
 
-    /// Whether its base stands still.
-    fn stands(&self) -> bool {
-        self.setup.base_motion == [0.0; 2]
+    /// The chain as seen from its base, and how far and how fast the base has moved with the first joint.
+    ///
+    /// A base that is accelerated is one that stands in another gravity.
+    fn based(&self, state: &State<N>) -> (Chain<f64, N>, Hand) {
+        let u = self.setup.base_motion;
+        if u == [0.0; 2] {
+            return (self.chain, ([0.0; 2], [0.0; 2]));
+        }
+        let angle = state.q[0] - self.setup.base_rest;
+        let mut setup = self.setup;
+        for axis in 0..2 {
+            setup.gravity[axis] -= u[axis] * state.qdd[0];
+        }
+        // The segments were accepted before, and gravity may be any.
+        let chain = setup.chain().unwrap_or(self.chain);
+        (chain, (u.map(|u| u * angle), u.map(|u| u * state.qd[0])))
     }
 
     /// The handle with the robot's ripple on it.
@@ -76,42 +94,79 @@ struct State<const N: usize> {
     qdd: Joints<f64, N>,
 }
 
-/// The torque left over in the equation of motion, and the force on the arm.
+impl<const N: usize> State<N> {
+    /// The state with changes on it.
+    fn moved(&self, q: &Joints<f64, N>, qd: &Joints<f64, N>, qdd: &Joints<f64, N>) -> Self {
+        Self {
+            time: self.time,
+            q: self.q + q,
+            qd: self.qd + qd,
+            qdd: self.qdd + qdd,
+        }
+    }
+
+    /// The motion as the states of effects see it.
+    fn motion(&self) -> Motion<f64, N> {
+        let mut motion = Motion::new(self.time, self.q, self.qd);
+        motion.qdd = self.qdd;
+        motion
+    }
+}
+
+/// What the equation of motion says of a state.
+#[derive(Clone, Copy)]
+struct Balance<const N: usize> {
+    /// Torque left over.
+    torque: Joints<f64, N>,
+    /// Force on the arm.
+    force: Plane<f64>,
+    /// The motion as joint effects see it.
+    motion: Motion<f64, N>,
+}
+
 fn balance<const N: usize>(
     plant: &Plant<N>,
     state: &State<N>,
     hand: Hand,
     memory: &[f64],
-) -> (Joints<f64, N>, Plane<f64>) {
+) -> Balance<N> {
     let pose = Pose::new(&state.q);
     let (at, rate) = plant.handle(state.time, hand);
-    let place = tip(&plant.chain, &pose);
-    let moving = jacobian(&plant.chain, &pose) * state.qd;
+    let (chain, (shift, drift)) = plant.based(state);
+    let place = tip(&chain, &pose);
+    let moving = jacobian(&chain, &pose) * state.qd;
     let force = plant.contact.force_on_arm(
-        [at[0] - place[0], at[1] - place[1]],
-        [rate[0] - moving[0], rate[1] - moving[1]],
+        [0, 1].map(|a| at[a] - place[a] - shift[a]),
+        [0, 1].map(|a| rate[a] - moving[a] - drift[a]),
     );
-    let through = joint_force(&plant.chain, &pose, (&state.qd, &state.qdd), force);
+    let through = joint_force(&chain, &pose, (&state.qd, &state.qdd), force);
     let mut motion = Motion::new(state.time, state.q, state.qd).with_joint_force(&through);
     motion.qdd = state.qdd;
-    let torque = inverse_dynamics(&plant.chain, &pose, &state.qd, &state.qdd)
+    let mut torque = inverse_dynamics(&chain, &pose, &state.qd, &state.qdd)
         + resisting_torque(&plant.effects, &motion, memory)
-        - static_torque(&plant.chain, &pose, force, 0.0);
-    (torque, force)
+        - static_torque(&chain, &pose, force, 0.0);
+    // The guide of a moving base carries the force through the first joint.
+    let u = plant.setup.base_motion;
+    torque[0] += u[0] * through[0][0] + u[1] * through[0][1];
+    Balance {
+        torque,
+        force,
+        motion,
+    }
 }
 
 /// One run with the linear system along it.
 pub struct Linear<'a, const N: usize> {
     session: &'a Session<N>,
-    course: &'a Course<N>,
+    course: Arc<Course<N>>,
     step: f64,
     setup: Setup<f64, N>,
     states: Vec<State<N>>,
     hands: Vec<Hand>,
-    /// The motion as joint effects see it, and what they resist with.
-    resisted: Vec<(Motion<f64, N>, Joints<f64, N>)>,
-    /// Torque left over and force of the run itself.
-    balances: Vec<(Joints<f64, N>, Plane<f64>)>,
+    /// What joint effects resist with.
+    resisted: Vec<Joints<f64, N>>,
+    /// What the run itself leaves over: the error of its own sampling.
+    balances: Vec<Balance<N>>,
     damping: Vec<SMatrix<f64, N, N>>,
     stiffness: Vec<SMatrix<f64, N, N>>,
     /// Inverse of what multiplies the new accelerations of each step.
@@ -124,19 +179,16 @@ pub struct Linear<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Linear<'a, N> {
-    /// Linearises along the run of a hypothesis; `None` where the arm's base moves, which this form does not know.
+    /// Linearises along the run of a hypothesis.
     ///
     /// # Errors
     /// [`SimulationError`] where the hypothesis cannot be simulated.
     pub fn along(
         session: &'a Session<N>,
         hypothesis: &Hypothesis<N>,
-        course: &'a Course<N>,
-    ) -> Result<Option<Self>, SimulationError> {
+        course: &Arc<Course<N>>,
+    ) -> Result<Self, SimulationError> {
         let plant = Plant::new(session, hypothesis)?;
-        if !plant.stands() {
-            return Ok(None);
-        }
         let run = session.run_finely(hypothesis, course, PARTS)?;
         let recording = run.recording();
         let step = 1.0 / course.rate / PARTS as f64;
@@ -150,11 +202,10 @@ impl<'a, const N: usize> Linear<'a, N> {
             })
             .collect();
         let hands = hands(&course.handle_path(hypothesis)?, states.len(), step);
-        let memories = memories(&plant, &states, step);
         let count = states.len();
         let mut linear = Self {
             session,
-            course,
+            course: Arc::clone(course),
             step,
             balances: Vec::with_capacity(count),
             damping: Vec::with_capacity(count),
@@ -168,15 +219,13 @@ impl<'a, const N: usize> Linear<'a, N> {
             states,
             hands,
         };
+        let memories = linear.memories(&plant);
         for i in 0..count {
-            linear.differentiate(&plant, i, &memories[i]);
-            let state = &linear.states[i];
-            let (pose, force) = (Pose::new(&state.q), linear.balances[i].1);
-            let through = joint_force(&plant.chain, &pose, (&state.qd, &state.qdd), force);
-            let mut motion = Motion::new(state.time, state.q, state.qd).with_joint_force(&through);
-            motion.qdd = state.qdd;
-            let torque = resisting_torque(&plant.effects, &motion, &memories[i]);
-            linear.resisted.push((motion, torque));
+            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
+            linear.differentiate(&plant, i, memory);
+            let motion = &linear.balances[i].motion;
+            let torque = resisting_torque(&plant.effects, motion, memory);
+            linear.resisted.push(torque);
         }
         let first = linear
             .stiffness
@@ -185,7 +234,37 @@ impl<'a, const N: usize> Linear<'a, N> {
             .unwrap_or_else(SMatrix::zeros);
         linear.rest = first.try_inverse().unwrap_or_else(SMatrix::zeros);
         linear.base = linear.sensed(&plant, None);
-        Ok(Some(linear))
+        Ok(linear)
+    }
+
+    /// Angles \[rad\], speeds \[rad/s\] and accelerations \[rad/s²\] of the joints at a sample of the trial.
+    pub fn state(&self, sample: usize) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
+        let last = self.states.len().saturating_sub(1);
+        let State { q, qd, qdd, .. } = self.states[(sample * PARTS).min(last)];
+        (q, qd, qdd)
+    }
+
+    /// The states of effects that have one, along the run; nothing where none has.
+    fn memories(&self, plant: &Plant<N>) -> Vec<Vec<f64>> {
+        if !memory::is_needed(&plant.effects) {
+            return Vec::new();
+        }
+        let mut now = vec![0.0; plant.effects.len()];
+        let motion = |state: &State<N>| state.motion();
+        let mut out = Vec::with_capacity(self.states.len());
+        for (i, state) in self.states.iter().enumerate() {
+            if i > 0 {
+                let before = motion(&self.states[i - 1]);
+                memory::advance(
+                    &plant.effects,
+                    (&before, &motion(state)),
+                    &mut now,
+                    self.step,
+                );
+            }
+            out.push(now.clone());
+        }
+        out
     }
 
     fn differentiate(&mut self, plant: &Plant<N>, i: usize, memory: &[f64]) {
@@ -197,11 +276,14 @@ impl<'a, const N: usize> Linear<'a, N> {
         let mut stiffness = SMatrix::<f64, N, N>::zeros();
         let mut by_angle = SMatrix::<f64, 2, N>::zeros();
         let mut by_speed = SMatrix::<f64, 2, N>::zeros();
-        let (middle, force) = balance(plant, &state, hand, memory);
+        let middle = balance(plant, &state, hand, memory);
         for j in 0..N {
             let mut moved = state;
             moved.qdd[j] += 1.0;
-            mass.set_column(j, &(balance(plant, &moved, hand, memory).0 - middle));
+            mass.set_column(
+                j,
+                &(balance(plant, &moved, hand, memory).torque - middle.torque),
+            );
             let both = |change: &dyn Fn(&mut State<N>, f64), size: f64| {
                 let (mut up, mut down) = (state, state);
                 change(&mut up, size);
@@ -210,8 +292,8 @@ impl<'a, const N: usize> Linear<'a, N> {
                     balance(plant, &up, hand, memory),
                     balance(plant, &down, hand, memory),
                 );
-                let force = [0, 1].map(|c| (up.1[c] - down.1[c]) / (2.0 * size));
-                ((up.0 - down.0) / (2.0 * size), force)
+                let force = [0, 1].map(|c| (up.force[c] - down.force[c]) / (2.0 * size));
+                ((up.torque - down.torque) / (2.0 * size), force)
             };
             let (torque, pull) = both(&|s, d| s.q[j] += d, ANGLE);
             stiffness.set_column(j, &torque);
@@ -227,10 +309,10 @@ impl<'a, const N: usize> Linear<'a, N> {
         self.damping.push(damping);
         self.stiffness.push(stiffness);
         self.force.push((by_angle, by_speed));
-        self.balances.push((middle, force));
+        self.balances.push(middle);
     }
 
-    /// What the sensors would read more, for one unit of a change; `None` where it reaches beyond this form.
+    /// What the sensors would read more, for one unit of a change; `None` where the rig cannot be.
     ///
     /// * `changed` - the hypothesis with the change made
     /// * `size` - of the change
@@ -253,9 +335,6 @@ impl<'a, const N: usize> Linear<'a, N> {
         (sensing, moves_handle): (bool, bool),
     ) -> Option<Channels> {
         let plant = Plant::new(self.session, changed).ok()?;
-        if !plant.stands() {
-            return None;
-        }
         let sensed = if sensing {
             self.sensed(&plant, None)
         } else {
@@ -270,8 +349,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             } else {
                 &self.hands
             };
-            let memories = memories(&plant, &self.states, self.step);
-            let answer = self.solve(&plant, hands, &memories);
+            let answer = self.solve(&plant, hands);
             self.sensed(&plant, Some(&answer))
         };
         let mut out = sensed;
@@ -284,26 +362,22 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 
     /// Changes of angles and forces along the run when another plant takes its place.
-    fn solve(
-        &self,
-        plant: &Plant<N>,
-        hands: &[Hand],
-        memories: &[Vec<f64>],
-    ) -> Vec<(Joints<f64, N>, Plane<f64>)> {
+    fn solve(&self, plant: &Plant<N>, hands: &[Hand]) -> Vec<(Joints<f64, N>, Plane<f64>)> {
         let h = self.step;
+        let memories = self.memories(plant);
         let (mut q, mut qd, mut qdd) = (Joints::zeros(), Joints::zeros(), Joints::zeros());
         let mut out = Vec::with_capacity(self.states.len());
         // A change of joint effects alone needs no more than their torque.
         let same_rig = plant.setup == self.setup && std::ptr::eq(hands, self.hands.as_slice());
         for i in 0..self.states.len() {
-            let (own_torque, own_force) = &self.balances[i];
+            let own = &self.balances[i];
+            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
             let (push, force) = if same_rig {
-                let (motion, torque) = &self.resisted[i];
-                let changed = resisting_torque(&plant.effects, motion, &memories[i]);
-                (torque - changed, *own_force)
+                let changed = resisting_torque(&plant.effects, &own.motion, memory);
+                (self.resisted[i] - changed, own.force)
             } else {
-                let (torque, force) = balance(plant, &self.states[i], hands[i], &memories[i]);
-                (own_torque - torque, force)
+                let changed = balance(plant, &self.states[i], hands[i], memory);
+                (own.torque - changed.torque, changed.force)
             };
             if i == 0 {
                 q = self.rest * push;
@@ -318,10 +392,90 @@ impl<'a, const N: usize> Linear<'a, N> {
             }
             let (by_angle, by_speed) = &self.force[i];
             let follow = by_angle * q + by_speed * qd;
-            let direct = [0, 1].map(|c| force[c] - own_force[c] + follow[c]);
+            let direct = [0, 1].map(|c| force[c] - own.force[c] + follow[c]);
             out.push((q, direct));
         }
         out
+    }
+
+    /// What the sensors would read under another hypothesis, which need not be near, on a trial of the same movement;
+    /// before the low-pass. `None` where it cannot be followed.
+    pub fn play(&self, changed: &Hypothesis<N>, course: &Course<N>) -> Option<Channels> {
+        let plant = Plant::new(self.session, changed).ok()?;
+        let path = course.handle_path(changed).ok()?;
+        let hands = hands(&path, self.states.len(), self.step);
+        let answer = self.follow(&plant, &hands)?;
+        Some(self.sensed(&plant, Some(&answer)))
+    }
+
+    /// Changes of angles and forces along the run when another plant takes its place, however large.
+    fn follow(
+        &self,
+        plant: &Plant<N>,
+        hands: &[Hand],
+    ) -> Option<Vec<(Joints<f64, N>, Plane<f64>)>> {
+        /// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
+        const NUDGE: (f64, f64) = (1e-7, 1e-5);
+        let h = self.step;
+        let remembers = memory::is_needed(&plant.effects);
+        let mut memory = vec![0.0; if remembers { plant.effects.len() } else { 0 }];
+        let zero = Joints::<f64, N>::zeros();
+        let (mut q, mut qd, mut qdd) = (zero, zero, zero);
+        let mut out = Vec::with_capacity(self.states.len());
+        let mut before = self.states[0].moved(&q, &qd, &qdd);
+        for i in 0..self.states.len() {
+            let (own, state) = (&self.balances[i], &self.states[i]);
+            let found = if i == 0 {
+                // At rest: the angles give way.
+                let missing = |angle: &Joints<f64, N>| {
+                    let moved = state.moved(angle, &zero, &zero);
+                    let there = balance(plant, &moved, hands[i], &memory);
+                    (own.torque - there.torque, there)
+                };
+                let (angle, there) = newton(zero, &self.rest, missing, NUDGE.0)?;
+                q = angle;
+                there
+            } else {
+                let speed = qd + qdd * (h * (1.0 - THETA));
+                let angle = q + speed * (h * THETA) + qd * (h * (1.0 - THETA));
+                let reach = h * THETA;
+                let carried = |moved: &State<N>| {
+                    let mut memory = memory.clone();
+                    let motions = (&before.motion(), &moved.motion());
+                    memory::advance(&plant.effects, motions, &mut memory, h);
+                    memory
+                };
+                let place = |next: &Joints<f64, N>| {
+                    state.moved(
+                        &(angle + next * (reach * reach)),
+                        &(speed + next * reach),
+                        next,
+                    )
+                };
+                let missing = |next: &Joints<f64, N>| {
+                    let moved = place(next);
+                    let there = if remembers {
+                        balance(plant, &moved, hands[i], &carried(&moved))
+                    } else {
+                        balance(plant, &moved, hands[i], &[])
+                    };
+                    (own.torque - there.torque, there)
+                };
+                let start =
+                    -(self.inverse[i] * (self.damping[i] * speed + self.stiffness[i] * angle));
+                let (next, there) = newton(start, &self.inverse[i], missing, NUDGE.1 / reach)?;
+                q = angle + next * (reach * reach);
+                qd = speed + next * reach;
+                qdd = next;
+                if remembers {
+                    memory = carried(&place(&next));
+                }
+                there
+            };
+            before = state.moved(&q, &qd, &qdd);
+            out.push((q, [0, 1].map(|c| found.force[c] - own.force[c])));
+        }
+        Some(out)
     }
 
     /// What the sensors read of the run with changes on it, at the samples of the trial.
@@ -338,7 +492,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             let i = (place as usize).min(last.saturating_sub(1));
             let share = place - i as f64;
             let force = |k: usize| {
-                let own = self.balances[k].1;
+                let own = self.balances[k].force;
                 let more = changes.map_or([0.0; 2], |c| c[k].1);
                 [own[0] + more[0], own[1] + more[1]]
             };
@@ -368,37 +522,70 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 }
 
+/// The unknown at which nothing is missing, and the balance there; `None` where it is not found.
+///
+/// First with the inverse slope of the run itself, which is enough for what is smooth or small; then with slopes of its
+/// own and shorter steps, for friction that reverses and a contact that opens.
+///
+/// * `missing` - the torque missing at an unknown
+/// * `nudge` - a change of the unknown that tells a slope
+fn newton<const N: usize>(
+    start: Joints<f64, N>,
+    inverse: &SMatrix<f64, N, N>,
+    missing: impl Fn(&Joints<f64, N>) -> (Joints<f64, N>, Balance<N>),
+    nudge: f64,
+) -> Option<(Joints<f64, N>, Balance<N>)> {
+    /// Torque that may be missing, and that is missing at most where a step finds no better \[N m\].
+    const ENOUGH: (f64, f64) = (1e-7, 1e-3);
+    const SIMPLE: usize = 8;
+    const FULL: usize = 20;
+    const HALVINGS: usize = 6;
+    let size = |r: &Joints<f64, N>| r.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let (mut at, (mut left, mut there)) = (start, missing(&start));
+    for _ in 0..SIMPLE {
+        if size(&left) < ENOUGH.0 {
+            return Some((at, there));
+        }
+        let next = at + inverse * left;
+        let (rest, balance) = missing(&next);
+        // A comparison with what is not a number is false.
+        if !(size(&rest) < 0.3 * size(&left)) {
+            break;
+        }
+        (at, left, there) = (next, rest, balance);
+    }
+    for _ in 0..FULL {
+        if size(&left) < ENOUGH.0 {
+            return Some((at, there));
+        }
+        let mut slope = SMatrix::<f64, N, N>::zeros();
+        for j in 0..N {
+            let mut beside = at;
+            beside[j] += nudge;
+            slope.set_column(j, &((left - missing(&beside).0) / nudge));
+        }
+        let whole = slope.try_inverse()? * left;
+        let mut share = 1.0;
+        let better = (0..HALVINGS).find_map(|_| {
+            let next = at + whole * share;
+            let (rest, balance) = missing(&next);
+            share *= 0.5;
+            (size(&rest) < size(&left)).then_some((next, rest, balance))
+        });
+        let Some((next, rest, balance)) = better else {
+            break;
+        };
+        (at, left, there) = (next, rest, balance);
+    }
+    (size(&left) < ENOUGH.1).then_some((at, there))
+}
+
 fn hands<const N: usize>(path: &HandlePath<N>, count: usize, step: f64) -> Vec<Hand> {
     let (_, end) = path.span();
     (0..count)
         .map(|i| {
             let handle = path.at((i as f64 * step).min(end));
             (handle.position, handle.velocity)
-        })
-        .collect()
-}
-
-/// The states of effects that have one, along a motion; one list for each instant.
-fn memories<const N: usize>(plant: &Plant<N>, states: &[State<N>], step: f64) -> Vec<Vec<f64>> {
-    let mut memory = vec![0.0; plant.effects.len()];
-    if !plant.effects.iter().any(|e| e.kind.info().memory) {
-        return vec![memory; states.len()];
-    }
-    states
-        .iter()
-        .map(|state| {
-            let now = memory.clone();
-            let motion = Motion::new(state.time, state.q, state.qd);
-            for (effect, value) in plant.effects.iter().zip(&mut memory) {
-                if effect.kind.info().memory {
-                    // Two half steps keep quick states stable.
-                    for _ in 0..2 {
-                        let local = motion.local(effect.index, *value);
-                        *value += effect.memory_rate(&local) * step * 0.5;
-                    }
-                }
-            }
-            now
         })
         .collect()
 }

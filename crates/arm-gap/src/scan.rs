@@ -3,17 +3,16 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
+use crate::anchor::{Anchor, Response};
 use crate::candidate::Library;
-use crate::fit::{Background, Fitted, priors, regularise};
-use crate::hypothesis::Coordinate;
-use crate::normal::{Cluster, Normal, factor, solve};
-use crate::study::{Response, Study};
+use crate::fit::{Fitted, priors, regularise};
+use crate::normal::{Normal, factor, solve};
+use crate::spread::spread;
+use crate::study::Study;
 
 /// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
 /// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.
 pub const THRESHOLD: f64 = 12.0;
-/// Weight of "as the noise says" in the spread of scores between trials, in trials.
-const BELIEF: f64 = 6.0;
 
 /// The candidates' normal equations after everything else was projected off.
 pub struct Scan {
@@ -53,41 +52,22 @@ impl Scan {
     pub fn new<const N: usize>(
         study: &Study<N>,
         fitted: &Fitted<N>,
-        background: &Background,
+        anchor: &Anchor<N>,
         library: &Library,
     ) -> Result<Self, GapError> {
         let hypothesis = &fitted.hypothesis;
-        let named: Vec<Coordinate> = fitted
-            .asked
-            .iter()
-            .enumerate()
-            .flat_map(|(slot, c)| c.coordinates(slot, &hypothesis.named[slot]))
-            .collect();
-        let responses = study.responses_to(hypothesis, &named)?;
-        let known: Vec<Coordinate> = background
-            .coordinates
-            .iter()
-            .chain(&named)
-            .copied()
-            .collect();
-        let columns: Vec<&Response> = background
-            .responses
-            .iter()
-            .chain(&responses)
-            .chain(library.responses.iter().flatten())
-            .collect();
-        let clusters = study.clusters(&study.fitted, &fitted.residuals, &columns, &background.own);
+        let asked: Vec<&Response> = library.responses.iter().flatten().collect();
+        let (known, clusters) = study.equations(anchor, fitted, &asked)?;
         let mut prior = priors(hypothesis, &known);
-        prior.resize(columns.len(), None);
-        let list: Vec<&Cluster> = clusters.iter().collect();
-        let mut normal = Normal::new(&list, &prior);
+        prior.resize(known.len() + asked.len(), None);
+        let mut normal = Normal::new(&clusters, &prior);
         regularise(&mut normal.gram, hypothesis, &known);
         // Columns that nothing excites drop out of the projection.
         let base: Vec<usize> = (0..known.len())
             .filter(|&i| normal.gram[(i, i)] > 0.0)
             .collect();
         let first = known.len();
-        let count = columns.len() - first;
+        let count = asked.len();
         let left = DMatrix::from_fn(base.len(), base.len(), |a, b| {
             normal.gram[(base[a], base[b])]
         });
@@ -129,68 +109,25 @@ impl Scan {
             bounds,
         };
         for index in 0..scan.columns.len() {
-            scan.spread[index] = scan.spread_of(index, &clusters, (&share, &base, first), study);
+            let Some(choice) = scan.evaluate(&[index]) else {
+                continue;
+            };
+            // The direction in which the candidate was found, on its columns and on what was projected off.
+            let range = scan.columns[index].clone();
+            let found: Vec<(usize, f64)> = range.zip(choice.coefficients[0].clone()).collect();
+            let own = found.iter().map(|(c, b)| (first + c, *b));
+            let others = base.iter().enumerate().map(|(a, &i)| {
+                let sum = found.iter();
+                (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(*c, a)]))
+            });
+            let weights: Vec<(usize, f64)> = own.chain(others).collect();
+            scan.spread[index] = spread(&clusters, &weights);
         }
         let deepest = scan.search(&[], 5, 8, &|_, _| true);
         let best = deepest.iter().map(|c| c.gain).fold(0.0, f64::max);
         let dof = normal.rows.saturating_sub(base.len() + 10).max(1);
         scan.scale = ((normal.square - best) / dof as f64).max(1.0);
         Ok(scan)
-    }
-
-    /// The spread of one candidate's scores between repeats over what the noise allows, shrunk towards one.
-    fn spread_of<const N: usize>(
-        &self,
-        index: usize,
-        clusters: &[Cluster],
-        (share, base, first): (&DMatrix<f64>, &[usize], usize),
-        study: &Study<N>,
-    ) -> f64 {
-        let Some(choice) = self.evaluate(&[index]) else {
-            return 1.0;
-        };
-        let coefficients = &choice.coefficients[0];
-        let range = self.columns[index].clone();
-        // The direction in which the candidate was found, on the candidate's columns and on what was projected off.
-        let weights: Vec<(usize, f64)> = range
-            .clone()
-            .zip(coefficients)
-            .map(|(c, b)| (first + c, *b))
-            .chain(base.iter().enumerate().map(|(a, &i)| {
-                let sum = range.clone().zip(coefficients);
-                (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(c, a)]))
-            }))
-            .collect();
-        let score = |c: &Cluster| weights.iter().fold(0.0, |s, (i, w)| s + w * c.score[*i]);
-        let expected = |c: &Cluster| {
-            weights.iter().fold(0.0, |s, (i, w)| {
-                s + w * weights
-                    .iter()
-                    .fold(0.0, |t, (j, v)| t + v * c.gram[(*i, *j)])
-            })
-        };
-        let (mut observed, mut predicted, mut dof) = (0.0, 0.0, 0.0);
-        for group in 0..study.references.len() {
-            let own: Vec<&Cluster> = clusters
-                .iter()
-                .filter(|c| c.configuration == group)
-                .collect();
-            if own.len() < 2 {
-                continue;
-            }
-            let mean = own.iter().map(|c| score(c)).sum::<f64>() / own.len() as f64;
-            observed += own
-                .iter()
-                .map(|c| (score(c) - mean) * (score(c) - mean))
-                .sum::<f64>();
-            let variance = own.iter().map(|c| expected(c)).sum::<f64>() / own.len() as f64;
-            predicted += variance * (own.len() - 1) as f64;
-            dof += (own.len() - 1) as f64;
-        }
-        if predicted <= 0.0 {
-            return 1.0;
-        }
-        ((BELIEF + dof * observed / predicted) / (BELIEF + dof)).max(1.0)
     }
 
     /// Number of candidates.

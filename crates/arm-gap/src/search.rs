@@ -1,13 +1,15 @@
 //! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
 
 use crate::GapError;
+use crate::anchor::Anchor;
 use crate::apart::Apart;
 use crate::candidate::{Candidate, Library};
 use crate::chance::chi_square_tail;
-use crate::fit::{Background, Fitted, Precision};
+use crate::fit::{Fitted, Precision};
 use crate::hypothesis::Hypothesis;
 use crate::misfit::{Lack, lack_of_fit};
 use crate::scan::{Choice, Scan};
+use crate::session::Sight;
 use crate::study::Study;
 
 /// Share of all that is explained that an effect must explain: less may be the imperfect shape of another one.
@@ -55,6 +57,12 @@ pub struct Alternative {
     pub worse: f64,
     /// Squared cosine between what the two would show.
     pub likeness: f64,
+}
+
+/// An alternative, fitted.
+struct Rival<const N: usize> {
+    alternative: Alternative,
+    fitted: Fitted<N>,
 }
 
 /// One round of the search.
@@ -107,65 +115,75 @@ pub struct Finding<const N: usize> {
 /// What a search tells while it works: what it does, and how far it is (0 to 1).
 pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
-impl<const N: usize> Study<'_, N> {
+/// A fitted hypothesis with the simulation that it was followed from.
+type Settled<'a, const N: usize> = (Fitted<N>, Anchor<'a, N>);
+
+/// What the search has in hand once single trials were looked at.
+struct Prepared<'a, const N: usize> {
+    calibrated: Fitted<N>,
+    anchor: Anchor<'a, N>,
+    apart: Vec<Apart>,
+    /// Frequency and phase of a ripple that is left to the search.
+    periodic: Option<[f64; 2]>,
+}
+
+impl<'a, const N: usize> Study<'a, N> {
     /// Searches for what the model lacks.
     ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
     pub fn search(&mut self, progress: Progress<'_>) -> Result<Finding<N>, GapError> {
         progress("calibrating", 0.0);
-        let mut calibrated = self.calibrate()?;
+        let (mut calibrated, mut anchor) = self.calibrate()?;
         if !self.repeated {
-            self.measure_noise(&calibrated.hypothesis)?;
-            calibrated = self.calibrate()?;
+            self.measure_noise(&anchor)?;
+            (calibrated, anchor) = self.calibrate()?;
         }
-        let (mut calibrated, apart, periodic) = self.set_apart(calibrated, progress)?;
+        let prepared = self.set_apart((calibrated, anchor), progress)?;
+        let (mut calibrated, mut anchor) = (prepared.calibrated, prepared.anchor);
+        let (apart, periodic) = (prepared.apart, prepared.periodic);
+        // What the calibration leaves is judged with the samples and the noise that it was fitted with.
+        let mut before = lack_of_fit(self, &anchor, &calibrated);
         let mut current = calibrated.clone();
         let mut ladder = Vec::new();
-        let mut first: Option<(Library, Scan)> = None;
         let mut asked = 1.0;
         let (mut scale, mut ruled) = (1.0, Vec::new());
         for round in 0..MOST {
             progress("asking the catalogue", 0.1 + 0.1 * round as f64);
-            let background = Background::at(self, &current.hypothesis)?;
-            let library = Library::build(self, &current.hypothesis, periodic)?;
-            let scan = Scan::new(self, &current, &background, &library)?;
+            let library = Library::build(self, &anchor, periodic)?;
+            let scan = Scan::new(self, &current, &anchor, &library)?;
             asked = library.candidates.len() as f64;
             scale = scan.scale;
             ruled = self.ruled(&library, &scan);
-            let outcome = self.round(
-                &current,
-                &background,
-                (&library, &scan),
-                MOST - current.asked.len(),
-            )?;
-            if first.is_none() {
-                first = Some((library, scan));
-            }
-            let Some((better, rung)) = outcome else { break };
+            let room = MOST - current.asked.len();
+            let Some((better, rung)) = self.round(&current, &anchor, (&library, &scan), room)?
+            else {
+                break;
+            };
             ladder.push(rung);
-            current = self.pruned(better, &calibrated, &background, scale)?;
-            if self.leave_out_rest(&current.hypothesis)? {
-                calibrated = self.fit(calibrated.hypothesis, Vec::new(), &background)?;
-                current = self.fit(current.hypothesis, current.asked, &background)?;
-                current = self.pruned(current, &calibrated, &background, scale)?;
+            (current, anchor) = self.settle(better.hypothesis, better.asked)?;
+            (current, anchor) = self.pruned((current, anchor), &calibrated, scale)?;
+            if self.leave_out_rest(&anchor) {
+                let from;
+                (calibrated, from) = self.settle(calibrated.hypothesis, Vec::new())?;
+                before = lack_of_fit(self, &from, &calibrated);
+                let settled = self.settle(current.hypothesis, current.asked)?;
+                (current, anchor) = self.pruned(settled, &calibrated, scale)?;
             }
             if !self.repeated {
-                self.measure_noise(&current.hypothesis)?;
-                current = self.fit(current.hypothesis, current.asked, &background)?;
+                self.measure_noise(&anchor)?;
+                (current, anchor) = self.settle(current.hypothesis, current.asked)?;
             }
             if current.asked.len() >= MOST {
                 break;
             }
         }
-        let (amended, named) =
-            self.judged(current, &calibrated, (asked, scale, periodic), progress)?;
+        let settled = (current, anchor);
+        let (amended, anchor, named) =
+            self.judged(settled, &calibrated, (asked, scale, periodic), progress)?;
         progress("measuring what is left", 0.9);
-        let precision = self.precision(&amended, scale)?;
-        let lack = [
-            lack_of_fit(self, &calibrated)?,
-            lack_of_fit(self, &amended)?,
-        ];
+        let precision = self.precision(&anchor, &amended, scale)?;
+        let lack = [before, lack_of_fit(self, &anchor, &amended)];
         progress("done", 1.0);
         Ok(Finding {
             calibrated,
@@ -181,58 +199,60 @@ impl<const N: usize> Study<'_, N> {
     }
 
     /// Looks for what is not the same in every trial, and takes it out of what is fitted: a rhythm, then disturbances.
-    ///
-    /// Returns the calibrated model, what was found, and frequency and phase of a ripple that is left to the search.
-    #[allow(clippy::type_complexity)]
     fn set_apart(
         &mut self,
-        mut calibrated: Fitted<N>,
+        (mut calibrated, mut anchor): Settled<'a, N>,
         progress: Progress<'_>,
-    ) -> Result<(Fitted<N>, Vec<Apart>, Option<[f64; 2]>), GapError> {
+    ) -> Result<Prepared<'a, N>, GapError> {
         let (mut apart, mut periodic) = (Vec::new(), None);
-        if !self.session.is_led() {
-            return Ok((calibrated, apart, periodic));
-        }
-        progress("looking at single trials", 0.05);
-        if let Some(found) = self.rhythm(&calibrated)? {
-            let [frequency, phase] = found.wave();
-            if found.locked && found.is_periodic() && frequency < SLOW {
-                periodic = Some([frequency, phase]);
-            } else {
-                self.take_out(&calibrated, &found)?;
+        if self.session.sight == Sight::Led {
+            progress("looking at single trials", 0.05);
+            if let Some(found) = self.rhythm(&anchor)? {
+                let [frequency, phase] = found.wave();
+                if found.locked && found.is_periodic() && frequency < SLOW {
+                    periodic = Some([frequency, phase]);
+                } else {
+                    self.take_out(&anchor, &found)?;
+                    apart.push(found);
+                    (calibrated, anchor) = self.calibrate_anew()?;
+                }
+            }
+            while apart.len() < DISTURBANCES
+                && let Some(found) = self.disturbance(&anchor, 1.0)
+            {
+                self.leave_out(&found);
                 apart.push(found);
-                self.measure_noise(&calibrated.hypothesis)?;
-                calibrated = self.calibrate()?;
+                (calibrated, anchor) = self.calibrate_anew()?;
             }
         }
-        while apart.len() < DISTURBANCES
-            && let Some(found) = self.disturbance(&calibrated, 1.0)?
-        {
-            self.leave_out(&found);
-            apart.push(found);
-            self.measure_noise(&calibrated.hypothesis)?;
-            calibrated = self.calibrate()?;
-        }
-        Ok((calibrated, apart, periodic))
+        Ok(Prepared {
+            calibrated,
+            anchor,
+            apart,
+            periodic,
+        })
     }
 
     /// The model as given, with everything refitted that was never exact.
     ///
     /// # Errors
-    /// As [`Study::fit`].
-    pub fn calibrate(&self) -> Result<Fitted<N>, GapError> {
-        let given = self.session.given();
-        let background = Background::at(self, &given)?;
-        let once = self.fit(given, Vec::new(), &background)?;
-        let background = Background::at(self, &once.hypothesis)?;
-        self.fit(once.hypothesis, Vec::new(), &background)
+    /// As [`Study::settle`].
+    pub fn calibrate(&self) -> Result<Settled<'a, N>, GapError> {
+        self.settle(self.session.given(), Vec::new())
+    }
+
+    /// The same after the data have changed, with the noise read anew.
+    fn calibrate_anew(&mut self) -> Result<Settled<'a, N>, GapError> {
+        let given = self.anchor(&self.session.given())?;
+        self.measure_noise(&given)?;
+        self.calibrate()
     }
 
     /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price.
     fn round(
         &self,
         current: &Fitted<N>,
-        background: &Background,
+        anchor: &Anchor<N>,
         (library, scan): (&Library, &Scan),
         room: usize,
     ) -> Result<Option<(Fitted<N>, Rung)>, GapError> {
@@ -281,8 +301,7 @@ impl<const N: usize> Study<'_, N> {
                     candidate
                 })
                 .collect();
-            let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), background)
-            else {
+            let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), anchor) else {
                 continue;
             };
             let price: f64 = asked.iter().map(|c| c.price).sum();
@@ -304,14 +323,14 @@ impl<const N: usize> Study<'_, N> {
         }))
     }
 
-    /// A hypothesis with further effects, fitted; `None` where it cannot be simulated.
+    /// A hypothesis with further effects, fitted; `None` where it cannot be followed.
     ///
     /// The first-order coefficients are halved until they lower the cost: effects that are strong are not linear.
     fn attempt(
         &self,
         current: &Fitted<N>,
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
-        background: &Background,
+        anchor: &Anchor<N>,
     ) -> Option<Fitted<N>> {
         const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
         let mut all = current.asked.clone();
@@ -323,7 +342,7 @@ impl<const N: usize> Study<'_, N> {
                 let own: Vec<f64> = own.iter().map(|b| share * b).collect();
                 hypothesis.named.push(candidate.found(&own));
             }
-            if let Ok(fitted) = self.fit(hypothesis, all.clone(), background) {
+            if let Ok(fitted) = self.fit(anchor, hypothesis, all.clone()) {
                 if fitted.cost < current.cost {
                     return Some(fitted);
                 }
@@ -340,17 +359,21 @@ impl<const N: usize> Study<'_, N> {
         &self,
         fitted: &Fitted<N>,
         slot: usize,
-        background: &Background,
+        anchor: &Anchor<N>,
     ) -> Result<Fitted<N>, GapError> {
         let mut hypothesis: Hypothesis<N> = fitted.hypothesis.clone();
         let mut asked = fitted.asked.clone();
         hypothesis.named.remove(slot);
         asked.remove(slot);
-        match self.fit(hypothesis.clone(), asked.clone(), background) {
+        match self.fit(anchor, hypothesis.clone(), asked.clone()) {
             // What the effect had held up may be impossible without it: then from the segments as given.
             Err(GapError::Simulation { .. }) => {
                 hypothesis.segments = [[0.0; 3]; N];
-                self.fit(hypothesis, asked, background)
+                match self.fit(anchor, hypothesis.clone(), asked.clone()) {
+                    // Or too far away to be followed.
+                    Err(GapError::Simulation { .. }) => Ok(self.settle(hypothesis, asked)?.0),
+                    other => other,
+                }
             }
             other => other,
         }
@@ -359,16 +382,15 @@ impl<const N: usize> Study<'_, N> {
     /// Goes back: effects that are no longer worth their price are taken out.
     fn pruned(
         &self,
-        mut fitted: Fitted<N>,
+        (mut fitted, mut anchor): Settled<'a, N>,
         calibrated: &Fitted<N>,
-        background: &Background,
         scale: f64,
-    ) -> Result<Fitted<N>, GapError> {
+    ) -> Result<Settled<'a, N>, GapError> {
         let least = FLOOR * (calibrated.cost - fitted.cost);
         while !fitted.asked.is_empty() {
             let mut weakest: Option<(f64, Fitted<N>)> = None;
             for slot in 0..fitted.asked.len() {
-                let less = self.without(&fitted, slot, background)?;
+                let less = self.without(&fitted, slot, &anchor)?;
                 let gain = less.cost - fitted.cost;
                 let worth = gain / scale - fitted.asked[slot].price;
                 let worth = if gain < least {
@@ -380,38 +402,45 @@ impl<const N: usize> Study<'_, N> {
                     weakest = Some((worth, less));
                 }
             }
-            match weakest {
-                Some((_, less)) => fitted = less,
-                None => break,
-            }
+            let Some((_, less)) = weakest else { break };
+            (fitted, anchor) = self.settle(less.hypothesis, less.asked)?;
         }
-        Ok(fitted)
+        Ok((fitted, anchor))
     }
 
     /// What could stand in the place of each named effect; a better one takes it.
     fn judged(
         &self,
-        mut fitted: Fitted<N>,
+        (mut fitted, mut anchor): Settled<'a, N>,
         calibrated: &Fitted<N>,
         (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
         progress: Progress<'_>,
-    ) -> Result<(Fitted<N>, Vec<Named>), GapError> {
+    ) -> Result<(Fitted<N>, Anchor<'a, N>, Vec<Named>), GapError> {
         let mut exchanges = 0;
         'again: loop {
             let mut named = Vec::new();
-            let background = Background::at(self, &fitted.hypothesis)?;
-            for slot in 0..fitted.asked.len() {
+            let library = match fitted.asked.len() {
+                0 => None,
+                _ => Some(Library::build(self, &anchor, periodic)?),
+            };
+            for (slot, library) in (0..fitted.asked.len()).zip(std::iter::repeat(&library)) {
                 progress(
                     "comparing alternatives",
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 );
-                let less = self.without(&fitted, slot, &background)?;
+                let less = self.without(&fitted, slot, &anchor)?;
                 let gain = less.cost - fitted.cost;
-                let rivals = self.rivals(&fitted, (slot, &less), (scale, periodic))?;
+                let rivals = match library {
+                    Some(library) => {
+                        self.rivals(&fitted, (slot, &less), (&anchor, library), scale)?
+                    }
+                    None => Vec::new(),
+                };
                 if exchanges < EXCHANGES
-                    && let Some((_, better)) = rivals.iter().find(|(a, _)| a.worse < -1.0)
+                    && let Some(better) = rivals.iter().find(|r| r.alternative.worse < -1.0)
                 {
-                    fitted = better.clone();
+                    let better = better.fitted.clone();
+                    (fitted, anchor) = self.settle(better.hypothesis, better.asked)?;
                     exchanges += 1;
                     continue 'again;
                 }
@@ -423,29 +452,27 @@ impl<const N: usize> Study<'_, N> {
                     share: gain / (calibrated.cost - fitted.cost).max(gain),
                     alternatives: rivals
                         .into_iter()
-                        .map(|(a, _)| a)
+                        .map(|r| r.alternative)
                         .filter(|a| a.worse <= TIE)
                         .collect(),
                 });
             }
             named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
-            return Ok((fitted, named));
+            return Ok((fitted, anchor, named));
         }
     }
 
-    /// Other effects in the place of one, converged by simulation, the best first.
-    #[allow(clippy::type_complexity)]
+    /// Other effects in the place of one, fitted, the best first.
     fn rivals(
         &self,
         fitted: &Fitted<N>,
         (slot, less): (usize, &Fitted<N>),
-        (scale, periodic): (f64, Option<[f64; 2]>),
-    ) -> Result<Vec<(Alternative, Fitted<N>)>, GapError> {
+        (anchor, library): (&Anchor<N>, &Library),
+        scale: f64,
+    ) -> Result<Vec<Rival<N>>, GapError> {
         let own = &fitted.asked[slot];
         let gain = less.cost - fitted.cost;
-        let background = Background::at(self, &less.hypothesis)?;
-        let library = Library::build(self, &less.hypothesis, periodic)?;
-        let scan = Scan::new(self, less, &background, &library)?;
+        let scan = Scan::new(self, less, anchor, library)?;
         let mut singles: Vec<Choice> = (0..scan.len())
             .filter(|&c| {
                 let candidate = &library.candidates[c];
@@ -479,22 +506,22 @@ impl<const N: usize> Study<'_, N> {
             let Some(rival) = self.attempt(
                 less,
                 (std::slice::from_ref(&asked), &choice.coefficients),
-                &background,
+                anchor,
             ) else {
                 continue;
             };
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
             let likeness = twin.map_or(0.0, |t| scan.likeness(t, choice.members[0]));
-            rivals.push((
-                Alternative {
+            rivals.push(Rival {
+                alternative: Alternative {
                     candidate: asked,
                     worse,
                     likeness,
                 },
-                rival,
-            ));
+                fitted: rival,
+            });
         }
-        rivals.sort_by(|a, b| a.0.worse.total_cmp(&b.0.worse));
+        rivals.sort_by(|a, b| a.alternative.worse.total_cmp(&b.alternative.worse));
         Ok(rivals)
     }
 

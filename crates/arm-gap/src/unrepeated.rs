@@ -1,0 +1,92 @@
+//! The noise of a data set without repeats.
+
+use crate::GapError;
+use crate::anchor::{Anchor, Response};
+use crate::candidate::Library;
+use crate::fit::priors;
+use crate::noise::dot;
+use crate::normal::solve;
+use crate::predict::Channels;
+use crate::study::{Study, flat};
+
+impl<const N: usize> Study<'_, N> {
+    /// What is left of residuals when everything that the catalogue could explain is taken out, to first order.
+    ///
+    /// Without repeats this is all that tells of the noise: a residual that still holds what is missing would make the
+    /// missing look like noise.
+    pub(crate) fn unexplained(&self, anchor: &Anchor<N>) -> Result<Vec<Vec<Vec<f64>>>, GapError> {
+        let nuisances = self.responses_to(anchor, &anchor.coordinates)?;
+        let library = Library::build(self, anchor, None)?;
+        let columns: Vec<&Response> = nuisances
+            .iter()
+            .chain(library.responses.iter().flatten())
+            .collect();
+        let channels = self.session.channels();
+        let size: Vec<f64> = (0..channels)
+            .map(|c| {
+                let all = anchor.residuals.iter().flat_map(|r| &r[c]);
+                let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+                libm::sqrt(sum / f64::max(count, 1.0)).max(1e-12)
+            })
+            .collect();
+        let rows = |channels: &Channels, trial: usize| -> Vec<f64> {
+            let picked = flat(channels, &self.stretches[trial]);
+            std::iter::zip(picked, &size)
+                .flat_map(|(values, size)| values.into_iter().map(move |v| v / size))
+                .collect()
+        };
+        let matrices = self.parallel(self.fitted.len(), |i| {
+            let trial = self.fitted[i];
+            let list: Vec<Vec<f64>> = columns
+                .iter()
+                .map(|r| rows(&r.0[self.group_of[trial]], trial))
+                .collect();
+            (list, rows(&anchor.residuals[i], trial))
+        });
+        let count = columns.len();
+        let mut gram = nalgebra::DMatrix::zeros(count, count);
+        let mut score = nalgebra::DVector::zeros(count);
+        for (list, residual) in &matrices {
+            for a in 0..count {
+                for b in 0..count {
+                    gram[(a, b)] += dot(&list[a], &list[b]);
+                }
+                score[a] += dot(&list[a], residual);
+            }
+        }
+        for (i, prior) in priors(&anchor.hypothesis, &anchor.coordinates)
+            .into_iter()
+            .enumerate()
+        {
+            if let Some((distance, sd)) = prior {
+                gram[(i, i)] += 1.0 / (sd * sd);
+                score[i] -= distance / (sd * sd);
+            }
+        }
+        // Columns repeat each other: a little of the diagonal settles how they share.
+        for i in 0..count {
+            gram[(i, i)] *= 1.0 + 1e-4;
+        }
+        let usable: Vec<usize> = (0..count).filter(|&i| gram[(i, i)] > 0.0).collect();
+        let free = |_: usize| (f64::NEG_INFINITY, f64::INFINITY);
+        let steps = solve(&gram, &score, &usable, &free).map(|(steps, _)| steps);
+        let mut out = Vec::with_capacity(matrices.len());
+        for (list, mut residual) in matrices {
+            for (&i, step) in usable.iter().zip(steps.iter().flatten()) {
+                for (r, c) in residual.iter_mut().zip(&list[i]) {
+                    *r -= step * c;
+                }
+            }
+            let count = residual.len() / channels;
+            out.push(
+                (0..channels)
+                    .map(|c| {
+                        let own = &residual[c * count..(c + 1) * count];
+                        own.iter().map(|v| v * size[c]).collect()
+                    })
+                    .collect(),
+            );
+        }
+        Ok(out)
+    }
+}
