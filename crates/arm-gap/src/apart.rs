@@ -11,7 +11,7 @@ use crate::GapError;
 use crate::anchor::Anchor;
 use crate::groups::same_rate;
 use crate::misfit::{orthogonal, project_off};
-use crate::noise::{Stretches, dot};
+use crate::noise::dot;
 use crate::normal::factor;
 use crate::predict::{Channels, Course, smooth};
 use crate::spectrum::{coefficient, line};
@@ -510,43 +510,6 @@ impl<const N: usize> Study<'_, N> {
             }
         }
         list
-    }
-
-    /// Leaves out what a disturbance has touched.
-    pub fn leave_out(&mut self, apart: &Apart) {
-        let Some(trial) = apart.trial else { return };
-        let (start, end) = apart.span();
-        let rate = self.courses[trial].rate;
-        let touched = |&i: &usize| {
-            let time = i as f64 / rate;
-            time >= start - 0.2 && time <= end + 0.5
-        };
-        let stretches: Vec<Vec<usize>> = self.stretches[trial]
-            .0
-            .iter()
-            .flat_map(|s| {
-                let before: Vec<usize> = s
-                    .iter()
-                    .copied()
-                    .take_while(|i| !touched(i) && (*i as f64 / rate) < end)
-                    .collect();
-                let after: Vec<usize> = s
-                    .iter()
-                    .copied()
-                    .filter(|i| !touched(i) && (*i as f64 / rate) >= start)
-                    .collect();
-                if before.len() == s.len() {
-                    vec![before]
-                } else {
-                    vec![before, after]
-                }
-            })
-            .filter(|s| s.len() >= 4)
-            .collect();
-        self.stretches[trial] = Stretches(stretches);
-        if self.stretches[trial].is_empty() {
-            self.fitted.retain(|&t| t != trial);
-        }
     }
 }
 

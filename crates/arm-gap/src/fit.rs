@@ -12,9 +12,9 @@ use crate::spread::spread;
 use crate::study::Study;
 
 /// Most steps of a fit.
-const STEPS: usize = 12;
+const STEPS: usize = 6;
 /// Most halvings of a step.
-const HALVINGS: usize = 6;
+const HALVINGS: usize = 4;
 /// A step that gains less than this, in units of the noise, is the last.
 const ENOUGH: f64 = 0.2;
 /// Share of the cost that a last step gains at most, where the model is far from the data.

@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, Local, Motion};
 
 /// Steps in which a state is carried from one instant to the next.
-const PARTS: usize = 4;
+const PARTS: usize = 2;
 
 /// Whether some effect has a state of its own.
 pub fn is_needed(effects: &[Effect<f64>]) -> bool {

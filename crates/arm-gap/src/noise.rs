@@ -31,7 +31,8 @@ pub struct Stretches(pub Vec<Vec<usize>>);
 impl Stretches {
     /// Of one trial.
     ///
-    /// * `resting` - samples at which a joint with dry friction rests: what holds it there is not known
+    /// * `resting` - samples that are left out: at which a joint with dry friction rests, so that what holds it is not known,
+    ///   or that were disturbed
     pub fn of<const N: usize>(trial: &Trial<N>, course: &Course<N>, resting: &[bool]) -> Self {
         let step = ((course.rate / (SAMPLES_PER_PERIOD * course.band)) as usize).max(1);
         let margin = ((MARGIN * course.rate / course.band) as usize).max(1);

@@ -363,9 +363,7 @@ impl<const N: usize> Session<N> {
 /// # Errors
 /// [`GapError::Numerics`] for channels too short for the filter or not finite.
 pub fn smooth(channels: &[Vec<f64>], band: f64, rate: f64) -> Result<Channels, GapError> {
-    let filter = low_pass(band, rate)?;
-    let passed = channels.iter().map(|c| filter.both_ways(c));
-    Ok(passed.collect::<Result<_, _>>()?)
+    Ok(low_pass(band, rate)?.both_ways_all(channels)?)
 }
 
 /// Channels less channels, over the samples that both have.

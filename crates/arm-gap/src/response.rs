@@ -416,6 +416,10 @@ impl<'a, const N: usize> Linear<'a, N> {
     ) -> Option<Vec<(Joints<f64, N>, Plane<f64>)>> {
         /// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
         const NUDGE: (f64, f64) = (1e-7, 1e-5);
+        /// Steps without a solution, in percent: a contact that closes takes hold in no time.
+        const UNSOLVED: usize = 3;
+        /// Distance from the run at which an arm is lost \[rad\].
+        const ASTRAY: f64 = 1.0;
         let h = self.step;
         let remembers = memory::is_needed(&plant.effects);
         let mut memory = vec![0.0; if remembers { plant.effects.len() } else { 0 }];
@@ -423,6 +427,9 @@ impl<'a, const N: usize> Linear<'a, N> {
         let (mut q, mut qd, mut qdd) = (zero, zero, zero);
         let mut out = Vec::with_capacity(self.states.len());
         let mut before = self.states[0].moved(&q, &qd, &qdd);
+        // The inverse slope of the last step, where that of the run itself was no good.
+        let mut steep = None;
+        let mut unsolved = 0;
         for i in 0..self.states.len() {
             let (own, state) = (&self.balances[i], &self.states[i]);
             let found = if i == 0 {
@@ -432,19 +439,13 @@ impl<'a, const N: usize> Linear<'a, N> {
                     let there = balance(plant, &moved, hands[i], &memory);
                     (own.torque - there.torque, there)
                 };
-                let (angle, there) = newton(zero, &self.rest, missing, NUDGE.0)?;
-                q = angle;
-                there
+                let solved = newton(zero, &self.rest, missing, NUDGE.0)?;
+                q = solved.at;
+                solved.there
             } else {
                 let speed = qd + qdd * (h * (1.0 - THETA));
                 let angle = q + speed * (h * THETA) + qd * (h * (1.0 - THETA));
                 let reach = h * THETA;
-                let carried = |moved: &State<N>| {
-                    let mut memory = memory.clone();
-                    let motions = (&before.motion(), &moved.motion());
-                    memory::advance(&plant.effects, motions, &mut memory, h);
-                    memory
-                };
                 let place = |next: &Joints<f64, N>| {
                     state.moved(
                         &(angle + next * (reach * reach)),
@@ -452,26 +453,38 @@ impl<'a, const N: usize> Linear<'a, N> {
                         next,
                     )
                 };
-                let missing = |next: &Joints<f64, N>| {
-                    let moved = place(next);
-                    let there = if remembers {
-                        balance(plant, &moved, hands[i], &carried(&moved))
-                    } else {
-                        balance(plant, &moved, hands[i], &[])
-                    };
-                    (own.torque - there.torque, there)
+                let carry = |to: &State<N>, memory: &mut Vec<f64>| {
+                    let motions = (&before.motion(), &to.motion());
+                    memory::advance(&plant.effects, motions, memory, h);
                 };
                 let start =
                     -(self.inverse[i] * (self.damping[i] * speed + self.stiffness[i] * angle));
-                let (next, there) = newton(start, &self.inverse[i], missing, NUDGE.1 / reach)?;
+                // States of effects follow slowly: where the step is expected to end is near enough.
+                let mut expected = memory.clone();
+                if remembers {
+                    carry(&place(&start), &mut expected);
+                }
+                let missing = |next: &Joints<f64, N>| {
+                    let there = balance(plant, &place(next), hands[i], &expected);
+                    (own.torque - there.torque, there)
+                };
+                let inverse = *steep.as_ref().unwrap_or(&self.inverse[i]);
+                let solved = newton(start, &inverse, missing, NUDGE.1 / reach)?;
+                let (next, there) = (solved.at, solved.there);
+                steep = solved.steep;
+                unsolved += usize::from(!solved.exact);
                 q = angle + next * (reach * reach);
                 qd = speed + next * reach;
                 qdd = next;
                 if remembers {
-                    memory = carried(&place(&next));
+                    carry(&place(&next), &mut memory);
                 }
                 there
             };
+            let astray = q.iter().any(|v| !v.is_finite() || v.abs() > ASTRAY);
+            if astray || unsolved > UNSOLVED * self.states.len() / 100 {
+                return None;
+            }
             before = state.moved(&q, &qd, &qdd);
             out.push((q, [0, 1].map(|c| found.force[c] - own.force[c])));
         }
@@ -522,10 +535,19 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 }
 
-/// The unknown at which nothing is missing, and the balance there; `None` where it is not found.
+/// The unknown at which nothing is missing, or as little as can be.
+struct Solved<const N: usize> {
+    at: Joints<f64, N>,
+    there: Balance<N>,
+    /// An inverse slope that was needed beyond the given one.
+    steep: Option<SMatrix<f64, N, N>>,
+    exact: bool,
+}
+
+/// Solves for the unknown at which nothing is missing; `None` where that leads beyond all numbers.
 ///
-/// First with the inverse slope of the run itself, which is enough for what is smooth or small; then with slopes of its
-/// own and shorter steps, for friction that reverses and a contact that opens.
+/// First with a given inverse slope, which is enough for what is smooth or small; then with slopes of its own and shorter
+/// steps, for friction that reverses and a contact that opens.
 ///
 /// * `missing` - the torque missing at an unknown
 /// * `nudge` - a change of the unknown that tells a slope
@@ -534,29 +556,23 @@ fn newton<const N: usize>(
     inverse: &SMatrix<f64, N, N>,
     missing: impl Fn(&Joints<f64, N>) -> (Joints<f64, N>, Balance<N>),
     nudge: f64,
-) -> Option<(Joints<f64, N>, Balance<N>)> {
+) -> Option<Solved<N>> {
     /// Torque that may be missing, and that is missing at most where a step finds no better \[N m\].
     const ENOUGH: (f64, f64) = (1e-7, 1e-3);
-    const SIMPLE: usize = 8;
-    const FULL: usize = 20;
+    const ROUNDS: usize = 30;
     const HALVINGS: usize = 6;
     let size = |r: &Joints<f64, N>| r.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let (mut at, (mut left, mut there)) = (start, missing(&start));
-    for _ in 0..SIMPLE {
+    let (mut inverse, mut steep) = (*inverse, None);
+    for _ in 0..ROUNDS {
         if size(&left) < ENOUGH.0 {
-            return Some((at, there));
+            break;
         }
         let next = at + inverse * left;
         let (rest, balance) = missing(&next);
-        // A comparison with what is not a number is false.
-        if !(size(&rest) < 0.3 * size(&left)) {
-            break;
-        }
-        (at, left, there) = (next, rest, balance);
-    }
-    for _ in 0..FULL {
-        if size(&left) < ENOUGH.0 {
-            return Some((at, there));
+        if size(&rest) < 0.3 * size(&left) {
+            (at, left, there) = (next, rest, balance);
+            continue;
         }
         let mut slope = SMatrix::<f64, N, N>::zeros();
         for j in 0..N {
@@ -564,7 +580,9 @@ fn newton<const N: usize>(
             beside[j] += nudge;
             slope.set_column(j, &((left - missing(&beside).0) / nudge));
         }
-        let whole = slope.try_inverse()? * left;
+        inverse = slope.try_inverse()?;
+        steep = Some(inverse);
+        let whole = inverse * left;
         let mut share = 1.0;
         let better = (0..HALVINGS).find_map(|_| {
             let next = at + whole * share;
@@ -577,7 +595,12 @@ fn newton<const N: usize>(
         };
         (at, left, there) = (next, rest, balance);
     }
-    (size(&left) < ENOUGH.1).then_some((at, there))
+    size(&left).is_finite().then(|| Solved {
+        at,
+        there,
+        steep,
+        exact: size(&left) < ENOUGH.1,
+    })
 }
 
 fn hands<const N: usize>(path: &HandlePath<N>, count: usize, step: f64) -> Vec<Hand> {

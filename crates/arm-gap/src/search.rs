@@ -141,7 +141,7 @@ impl<'a, const N: usize> Study<'a, N> {
         }
         let prepared = self.set_apart((calibrated, anchor), progress)?;
         let (mut calibrated, mut anchor) = (prepared.calibrated, prepared.anchor);
-        let (apart, periodic) = (prepared.apart, prepared.periodic);
+        let (mut apart, periodic) = (prepared.apart, prepared.periodic);
         // What the calibration leaves is judged with the samples and the noise that it was fitted with.
         let mut before = lack_of_fit(self, &anchor, &calibrated);
         let mut current = calibrated.clone();
@@ -156,7 +156,8 @@ impl<'a, const N: usize> Study<'a, N> {
             scale = scan.scale;
             ruled = self.ruled(&library, &scan);
             let room = MOST - current.asked.len();
-            let Some((better, rung)) = self.round(&current, &anchor, (&library, &scan), room)?
+            let Some((better, rung)) =
+                self.round((&calibrated, &current), &anchor, (&library, &scan), room)?
             else {
                 break;
             };
@@ -177,6 +178,20 @@ impl<'a, const N: usize> Study<'a, N> {
             if current.asked.len() >= MOST {
                 break;
             }
+        }
+        if apart.iter().any(|a| a.trial.is_some()) && !current.asked.is_empty() {
+            // What looked like a disturbance may have been what was named since.
+            self.take_back();
+            apart.retain(|a| a.trial.is_none());
+            self.measure_noise(&self.anchor(&current.hypothesis)?)?;
+            let settled = self.settle(current.hypothesis, current.asked)?;
+            let found;
+            (current, anchor, found) = self.disturbances(settled)?;
+            apart.extend(found);
+            let from;
+            (calibrated, from) = self.settle(calibrated.hypothesis, Vec::new())?;
+            before = lack_of_fit(self, &from, &calibrated);
+            (current, anchor) = self.pruned((current, anchor), &calibrated, scale)?;
         }
         let settled = (current, anchor);
         let (amended, anchor, named) =
@@ -217,13 +232,9 @@ impl<'a, const N: usize> Study<'a, N> {
                     (calibrated, anchor) = self.calibrate_anew()?;
                 }
             }
-            while apart.len() < DISTURBANCES
-                && let Some(found) = self.disturbance(&anchor, 1.0)
-            {
-                self.leave_out(&found);
-                apart.push(found);
-                (calibrated, anchor) = self.calibrate_anew()?;
-            }
+            let found;
+            (calibrated, anchor, found) = self.disturbances((calibrated, anchor))?;
+            apart.extend(found);
         }
         Ok(Prepared {
             calibrated,
@@ -231,6 +242,25 @@ impl<'a, const N: usize> Study<'a, N> {
             apart,
             periodic,
         })
+    }
+
+    /// Leaves out of single trials what disturbs them, the clearest first.
+    #[allow(clippy::type_complexity)]
+    fn disturbances(
+        &mut self,
+        (mut fitted, mut anchor): Settled<'a, N>,
+    ) -> Result<(Fitted<N>, Anchor<'a, N>, Vec<Apart>), GapError> {
+        let mut found = Vec::new();
+        while found.len() < DISTURBANCES
+            && let Some(one) = self.disturbance(&anchor, 1.0)
+            && let Some(trial) = one.trial
+        {
+            self.leave_out(trial, one.span());
+            found.push(one);
+            self.measure_noise(&self.anchor(&anchor.hypothesis)?)?;
+            (fitted, anchor) = self.settle(fitted.hypothesis, fitted.asked)?;
+        }
+        Ok((fitted, anchor, found))
     }
 
     /// The model as given, with everything refitted that was never exact.
@@ -251,7 +281,7 @@ impl<'a, const N: usize> Study<'a, N> {
     /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price.
     fn round(
         &self,
-        current: &Fitted<N>,
+        (calibrated, current): (&Fitted<N>, &Fitted<N>),
         anchor: &Anchor<N>,
         (library, scan): (&Library, &Scan),
         room: usize,
@@ -265,6 +295,12 @@ impl<'a, const N: usize> Study<'a, N> {
                 && !members.iter().any(|&m| same(&library.candidates[m]))
         };
         let choices = scan.search(&[], AHEAD.min(room), WIDTH, &fresh);
+        // Less than every effect must explain need not be converged.
+        let least = FLOOR * (calibrated.cost - current.cost);
+        let choices: Vec<Choice> = choices
+            .into_iter()
+            .filter(|c| c.gain > least * c.members.len() as f64)
+            .collect();
         let mut contenders: Vec<Choice> = Vec::new();
         let most = choices.first().map_or(0.0, |c| c.worth);
         for choice in choices.iter().filter(|c| c.worth > 0.5 * most) {
@@ -437,7 +473,7 @@ impl<'a, const N: usize> Study<'a, N> {
                     None => Vec::new(),
                 };
                 if exchanges < EXCHANGES
-                    && let Some(better) = rivals.iter().find(|r| r.alternative.worse < -1.0)
+                    && let Some(better) = rivals.iter().find(|r| r.alternative.worse < -0.05)
                 {
                     let better = better.fitted.clone();
                     (fitted, anchor) = self.settle(better.hypothesis, better.asked)?;

@@ -34,6 +34,10 @@ pub struct Study<'a, const N: usize> {
     pub fitted: Vec<usize>,
     /// Joints with dry friction: where they rest, nothing is compared.
     pub dry: [bool; N],
+    /// The samples of each group at which one of them rests.
+    resting: Vec<Vec<bool>>,
+    /// What disturbances have touched: trial, start and end \[s\].
+    touched: Vec<(usize, f64, f64)>,
     /// Threads.
     pub threads: usize,
 }
@@ -74,6 +78,8 @@ impl<'a, const N: usize> Study<'a, N> {
             repeated: false,
             fitted,
             dry: [false; N],
+            resting: Vec::new(),
+            touched: Vec::new(),
             threads,
         };
         let given = study.anchor(&session.given())?;
@@ -160,11 +166,39 @@ impl<'a, const N: usize> Study<'a, N> {
         }
         self.dry = dry;
         let one = |group: usize| self.resting(anchor, group);
-        let resting: Vec<Vec<bool>> = (0..self.references.len()).map(one).collect();
+        self.resting = (0..self.references.len()).map(one).collect();
+        self.cut();
+        true
+    }
+
+    /// Leaves out what a disturbance has touched in one trial.
+    pub fn leave_out(&mut self, trial: usize, (start, end): (f64, f64)) {
+        self.touched.push((trial, start, end));
+        self.cut();
+    }
+
+    /// Takes everything that disturbances have touched back in.
+    pub fn take_back(&mut self) {
+        self.touched.clear();
+        self.cut();
+    }
+
+    /// Chooses the samples that are compared, and the trials that have any.
+    fn cut(&mut self) {
+        /// How long a disturbance is felt before and after, the low-pass included \[s\].
+        const AROUND: (f64, f64) = (0.2, 0.5);
         for i in 0..self.courses.len() {
             let trial = &self.session.trials[i];
-            let rest = &resting[self.group_of[i]];
-            self.stretches[i] = Stretches::of(trial, &self.courses[i], rest);
+            let rest = self.resting.get(self.group_of[i]);
+            let mut out = rest.cloned().unwrap_or_default();
+            out.resize(trial.len(), false);
+            for (_, start, end) in self.touched.iter().filter(|(t, _, _)| *t == i) {
+                for (k, flag) in out.iter_mut().enumerate() {
+                    let time = k as f64 / trial.rate;
+                    *flag |= time >= start - AROUND.0 && time <= end + AROUND.1;
+                }
+            }
+            self.stretches[i] = Stretches::of(trial, &self.courses[i], &out);
         }
         let kept: Vec<usize> = self
             .session
@@ -175,7 +209,6 @@ impl<'a, const N: usize> Study<'a, N> {
         if !kept.is_empty() {
             self.fitted = kept;
         }
-        true
     }
 
     /// The samples of a movement at which a joint with dry friction rests.

@@ -152,6 +152,7 @@ fn linearised_responses_are_those_of_the_simulation() {
         (named("segment_length", 1), first, 1e-3),
         (named("gravity_tilt", 0), first, 0.01),
         (named("contact_compliance", 0), first, 2e-6),
+        (named("shoulder_motion", 0), first, 1e-5),
         (named("motor_inertia", 0), first, 0.01),
         (named("time_delay", 0), first, 0.004),
         (named("force_misalignment", 0), first, 0.01),
@@ -165,10 +166,11 @@ fn linearised_responses_are_those_of_the_simulation() {
             upper: f64::INFINITY,
             step,
         };
+        let anchor = study.anchor(&hypothesis).expect("a run");
         let response = study
-            .responses_to(&hypothesis, &[coordinate])
+            .responses_to(&anchor, &[coordinate])
             .expect("a response");
-        let linear = response[0].0[0].as_ref().expect("this form knows it");
+        let linear = &response[0].0[0];
         let play = |h: &Hypothesis<2>| {
             let run = session.run(h, course).expect("a stable run");
             session.read(h, course, &run).expect("readings")
@@ -199,6 +201,49 @@ fn linearised_responses_are_those_of_the_simulation() {
                 "{target:?} {:?}: {off} of {whole}",
                 hypothesis.named.first().map(|e| e.kind)
             );
+        }
+    }
+}
+
+#[test]
+fn a_changed_hypothesis_is_followed_as_it_is_simulated() {
+    let session = session(&[], (1e-4, 0.01));
+    let study = Study::new(&session, 1).expect("a sound session");
+    let plain = session.given();
+    let anchor = study.anchor(&plain).expect("a run");
+    let strong = [
+        ("viscous", 1, &[0.5][..]),
+        ("coulomb", 0, &[0.4]),
+        ("thixotropy", 1, &[0.3]),
+        ("relaxation", 1, &[2.0, 1.0]),
+        ("contact_compliance", 0, &[1e-4, 1e-4]),
+        ("backlash", 0, &[2e-3, 2e-3]),
+        ("shoulder_motion", 0, &[0.01, 0.01]),
+        ("added_mass", 0, &[0.5]),
+    ];
+    for (kind, index, values) in strong {
+        let mut changed = plain.clone();
+        let effect = Effect::new(Kind::named(kind).expect("known"), index).with(values);
+        changed.named.push(effect);
+        let read = |h: &Hypothesis<2>| {
+            let run = session.run(h, &study.courses[0]).expect("a stable run");
+            session.read(h, &study.courses[0], &run).expect("readings")
+        };
+        let (now, then) = (read(&changed), read(&plain));
+        let followed = study
+            .residuals(&anchor, &changed)
+            .unwrap_or_else(|e| panic!("{kind}: {e}"));
+        for channels in [0..2, 2..4] {
+            let (mut off, mut whole) = (0.0, 0.0);
+            for c in channels {
+                let count = now[c].len();
+                for i in 20..count - 20 {
+                    let seen = study.courses[0].seen[c][i] - followed[0][c][i];
+                    off += (seen - now[c][i]) * (seen - now[c][i]);
+                    whole += (now[c][i] - then[c][i]) * (now[c][i] - then[c][i]);
+                }
+            }
+            assert!(off <= 0.02 * 0.02 * whole, "{kind}: {off} of {whole}");
         }
     }
 }

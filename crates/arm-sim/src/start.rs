@@ -1,7 +1,7 @@
 //! The state in which a run starts.
 
 use arm_core::effect::Motion;
-use arm_core::{Joints, Pose};
+use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
 use crate::model::{Input, Link, Model, State};
@@ -47,10 +47,63 @@ pub(crate) fn given<const N: usize>(
     Ok((state.q, state.qd))
 }
 
-/// The static equilibrium near given angles: `G + R = τ + Jᵀ F` at rest, by Newton's method with halved steps.
+/// The static equilibrium near given angles: `G + R = τ + Jᵀ F` at rest.
+///
+/// A contact with play pushes nowhere inside it, where no search finds a way. There the play is closed first; the tip then
+/// hangs back by the play on the side to which it is pulled.
+pub(crate) fn equilibrium<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    near: &Joints<f64, N>,
+) -> Result<Joints<f64, N>, SimulationError> {
+    let Link::Compliant(contact) = &model.link else {
+        return balanced(model, input, near);
+    };
+    if contact.play == [0.0; 2] {
+        return balanced(model, input, near);
+    }
+    let (play, tight) = (
+        contact.play,
+        Contact {
+            play: [0.0; 2],
+            ..*contact
+        },
+    );
+    let mut closed = model.clone();
+    closed.link = Link::Compliant(tight);
+    let q = balanced(&closed, input, near)?;
+    let stretch = gap(model, input, &q);
+    let back = [0, 1].map(|axis| -play[axis].copysign(stretch[axis]));
+    // The smallest change of the angles that moves the tip so.
+    let terms = Terms::new(
+        &model.chain,
+        model.base.as_ref(),
+        &Pose::new(&q),
+        &Joints::zeros(),
+    );
+    let [along_y, along_z] = [[1.0, 0.0], [0.0, 1.0]].map(|unit| terms.tip_torque(unit));
+    let (yy, yz, zz) = (
+        along_y.dot(&along_y),
+        along_y.dot(&along_z),
+        along_z.dot(&along_z),
+    );
+    let det = yy * zz - yz * yz;
+    // One row of an arm that can move its tip along one line only.
+    let [y, z] = if det > 1e-12 * yy * zz {
+        [
+            (zz * back[0] - yz * back[1]) / det,
+            (yy * back[1] - yz * back[0]) / det,
+        ]
+    } else {
+        back.map(|b| b / (yy + zz))
+    };
+    balanced(model, input, &(q + along_y * y + along_z * z))
+}
+
+/// The equilibrium by Newton's method with halved steps.
 ///
 /// With a rigid coupling the force on the arm is unknown too, and the gap between handle and tip must vanish.
-pub(crate) fn equilibrium<const N: usize>(
+fn balanced<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     near: &Joints<f64, N>,
@@ -65,7 +118,7 @@ pub(crate) fn equilibrium<const N: usize>(
         Link::Free | Link::Forced(_) | Link::Rigid => 0.0,
     };
     // A stiff contact turns the rounding of a position into a force.
-    let balanced = BALANCED + 1e-15 * stiffest;
+    let enough = BALANCED + 1e-15 * stiffest;
     let residual = |x: &[f64]| imbalance(model, input, x);
     let size = |r: &[f64]| {
         r.iter()
@@ -73,7 +126,7 @@ pub(crate) fn equilibrium<const N: usize>(
     };
     let mut r = residual(&x);
     for iteration in 0..ITERATIONS {
-        if size(&r) < balanced {
+        if size(&r) < enough {
             return Ok(Joints::from_fn(|i, _| x[i]));
         }
         let failed = SimulationError::NoEquilibrium {

@@ -23,7 +23,7 @@ impl Law for ShoulderMotion {
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1])
         .shaped(&[(2, Values::Middle)])
-        .stepping(1e-3)]);
+        .stepping(1e-5)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.base_motion[0] += p[0];

@@ -124,6 +124,10 @@ fn equals_scipy() {
         } = reference;
         let filter = Butterworth::low_pass(order, cutoff, rate).expect("in range");
         let y = filter.both_ways(&x).expect("long enough");
+        let together = filter
+            .both_ways_all(&vec![x.to_vec(); 5])
+            .expect("long enough");
+        assert!(together.iter().all(|column| *column == y), "other bits");
         let picked: Vec<f64> = [0, 1, 30, 58, 59].iter().map(|&i| y[i]).collect();
         assert!(
             gap(&picked, &reference.both) < TOLERANCE,
