@@ -90,7 +90,7 @@ def test_identify_without_a_folder_writes_nothing(
     slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["identify", str(slow_arm)]) == 0
+    assert cli.main(["identify", str(slow_arm), "--with", "coulomb"]) == 0
     out = capsys.readouterr().out
     assert "decided by" in out
     assert "kg m" in out
