@@ -12,7 +12,7 @@ import pytest
 from armrs import cli
 from browser import opened
 
-NEEDED = {"3.7", *(f"4.{k}" for k in (9, 10, 37, 38, 39, 40, 41))}
+NEEDED = {"3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
 """Tables and figures that some item has to be about."""
 
 
@@ -42,6 +42,31 @@ def test_every_item_says_what_is_printed_what_we_get_and_why(items: dict[str, di
     for key, item in items.items():
         assert all(len(item[name]) > 20 for name in ("printed", "ours", "why")), key
         assert item["tables"] or item["figures"], key
+
+
+def test_arithmetic_on_what_is_printed(items: dict[str, dict[str, Any]]) -> None:
+    """Against numbers that were found by hand and by interval arithmetic on the printed digits."""
+    values = {key: item["values"] for key, item in items.items()}
+    assert values["table-4.3"] == pytest.approx({"m2·l2": 0.1334, "m1·l1": 0.26496, "m1·l1 + a1·m2": 0.70112})
+    assert values["equations-3.14-3.20"] == pytest.approx({"l3_m": 0.0747, "l1_m": 0.1899, "l1_printed_m": 0.1442}, abs=6e-5)
+    assert values["equations-3.4-3.10"] == pytest.approx({"b11_excess_kgm2": 0.0061, "wrist_torque_Nm": 0.715}, abs=6e-4)
+    assert values["tables-4.6-4.8"] == {"deviations_that_disagree": 14, "errors_that_disagree": 23, "errors_printed": 84}
+
+
+def test_the_virtual_experiments_find_what_was_simulated(items: dict[str, dict[str, Any]]) -> None:
+    values = {key: item["values"] for key, item in items.items()}
+    for key in ("table-4.4", "table-4.5"):
+        assert all(abs(values[key][f"joint_error_percent_{name}"]) < 1.0 for name in ("m1·l1 + a1·m2", "m2·l2"))
+    assert all(abs(values["table-4.5"][f"joint_error_percent_{name}"]) < 3.0 for name in ("τp1", "τp2"))
+    hysteresis = values["figure-3.10"]
+    assert hysteresis["half_width_Nm"] == pytest.approx(hysteresis["half_width_simulated_Nm"], rel=0.05)
+    assert hysteresis["elastic_rms_error_Nm"] < 0.05
+    for key in ("equation-5.3", "passive-moment-uncertainty"):
+        assert values[key]["jacobian_over_monte_carlo_most_off"] < 0.05
+    assert values["tables-4.6-4.8-virtual"]["intervals_that_hold"] >= 0.9 * values["tables-4.6-4.8-virtual"]["intervals"]
+    slow = values["figure-3.7"]
+    assert slow["inertial_most_at_0.25_rad_s_Nm"] == pytest.approx(0.2, abs=0.1)
+    assert 0.0027 < slow["velocity_most_at_0.25_rad_s_Nm"] < 0.0082
 
 
 def test_the_page_is_clicked_through(made: Path, items: dict[str, dict[str, Any]]) -> None:

@@ -69,7 +69,9 @@ class TrialMoments:
 
 @dataclass(frozen=True, eq=False)
 class PassiveCurve:
-    """Passive moment of one joint against its angle, over the repeats of one configuration; shapes (k,), NaN where there are no samples.
+    """Passive moment of one joint against its angle, over the repeats of one configuration.
+
+    Shapes are (k,). Means and deviations stand at angles that all repeats share, where there are such, and are NaN elsewhere.
 
     Attributes
     ----------
@@ -296,41 +298,54 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     ups, downs = (np.array([_binned(m, m.sign[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
     half_width = (rising - falling) / (ups - downs)
     elastic = 0.5 * (rising + falling - half_width * (ups + downs))
-    systematic = _systematic(dataset, repeats[0], joint, edges)
     if not np.isfinite(elastic).any():
         return None
-    kept = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
-    inertial, moment = (np.concatenate(part) for part in zip(*kept, strict=True))
+    # A mean over other repeats at the next angle would jump by what differs between them.
+    shared = np.isfinite(elastic[np.isfinite(elastic).any(axis=1)]).all(axis=0)
+    kept = np.where(shared, 0.0, np.nan) if shared.any() else np.zeros(bins)
+    systematic = _systematic(dataset, repeats, joint, edges)
+    moved = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
+    inertial, moment = (np.concatenate(part) for part in zip(*moved, strict=True))
     return PassiveCurve(
         configuration=repeats[0].trial.configuration,
         joint=joint + 1,
         repeats=len(repeats),
         angle=0.5 * (edges[1:] + edges[:-1]),
-        rising=_mean(rising),
-        falling=_mean(falling),
-        elastic=_mean(elastic),
-        elastic_std=_deviation(elastic),
-        half_width=_mean(half_width),
-        half_width_std=_deviation(half_width),
+        rising=_mean(rising) + kept,
+        falling=_mean(falling) + kept,
+        elastic=_mean(elastic) + kept,
+        elastic_std=_deviation(elastic) + kept,
+        half_width=_mean(half_width) + kept,
+        half_width_std=_deviation(half_width) + kept,
         inertial_share=float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2))),
         elastic_repeats=elastic,
         half_width_repeats=half_width,
-        held=np.array([np.nanmean(m.q, axis=0) for m in repeats]),
+        held=np.array([_mean(m.q) for m in repeats]),
         elastic_systematic=systematic[0],
         half_width_systematic=systematic[1],
     )
 
 
-def _systematic(dataset: Dataset, moments: TrialMoments, joint: int, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return deviations of elastic mean and half width from errors that all samples share; NaN where there are no samples."""
+def _systematic(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return deviations of elastic mean and half width from errors that all samples of all repeats share; NaN where there are none."""
+    deviations = uncertainty.Deviations.of(dataset)
+    parts = [_shifts(dataset, m, joint, edges, deviations) for m in repeats]
+    rising, falling = (np.array([_mean(np.array(errors)) for errors in zip(*(part[k] for part in parts), strict=True)]) for k in (0, 1))
+    return uncertainty.by_jacobian(0.5 * (rising + falling)), uncertainty.by_jacobian(0.5 * (rising - falling))
+
+
+def _shifts(
+    dataset: Dataset, moments: TrialMoments, joint: int, edges: np.ndarray, deviations: uncertainty.Deviations
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what each shared error of its size does to the moment of a repeat, by direction, each (n_errors, n_bins)."""
     model = dataset.model_of(moments.trial.configuration)
     there = np.isfinite(moments.q).all(axis=1) & (moments.direction[:, joint] != 0)
-    parts = np.full((len(uncertainty.Deviations.of(dataset).vector(model.n_joints)), len(moments.q)), np.nan)
-    force = None if moments.force is None else moments.force[there]
+    values = np.full((len(deviations.vector(model.n_joints)), len(moments.q)), np.nan)
     if there.any():
-        parts[:, there] = uncertainty.sensitivity(model, moments.q[there], force, uncertainty.Deviations.of(dataset))[:, :, joint]
-    rising, falling = (np.array([_binned(moments, part, joint, sign, edges) for part in parts]) for sign in (1, -1))
-    return uncertainty.by_jacobian(0.5 * (rising + falling)), uncertainty.by_jacobian(0.5 * (rising - falling))
+        force = None if moments.force is None else moments.force[there]
+        values[:, there] = uncertainty.sensitivity(model, moments.q[there], force, deviations)[:, :, joint]
+    rising, falling = (np.array([_binned(moments, row, joint, sign, edges) for row in values]) for sign in (1, -1))
+    return rising, falling
 
 
 def _dependence(curves: Sequence[PassiveCurve]) -> tuple[dependence.Dependence, ...]:

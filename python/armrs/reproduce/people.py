@@ -14,6 +14,7 @@ from .. import demo
 from ..dataset import Subject
 from ..experiment import JOINTS, THESIS_CONTACT, literature_arm
 from ..model import Effect, Joint, Model, Robot, Segment
+from ..rig import arm as kernel
 from ..simulation import Movement, Sensors, Simulated, simulate
 from ..trial import Trial
 
@@ -88,3 +89,9 @@ def points(model: Model, q: np.ndarray) -> np.ndarray:
     steps = np.stack([np.cos(absolute), np.sin(absolute)], axis=2) * np.array([s.length for s in model.segments])[:, None]
     start = np.broadcast_to(np.array(model.base), (len(absolute), 1, 2))
     return np.concatenate([start, start + np.cumsum(steps, axis=1)], axis=1)
+
+
+def static_torque(model: Model, trial: Trial) -> np.ndarray:
+    """Return Jᵀ F of the force on the robot, shape (n, n_joints): the thesis' τ_end [N m]."""
+    assert trial.force_on_arm is not None
+    return -kernel(model).static_torque(trial.q, trial.force_on_arm)

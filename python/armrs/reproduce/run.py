@@ -10,10 +10,10 @@ from typing import Any
 
 from .. import files, plotting
 from ..results import origin
-from . import dynamics, equations, page, simulation
+from . import dynamics, equations, humans, mechanical, movements, page, passive, propagation, simulation, six
 from .item import Found, Item
 
-GROUPS = (dynamics.GROUP, simulation.GROUP)
+GROUPS = (movements.GROUP, dynamics.GROUP, passive.GROUP, six.GROUP, mechanical.GROUP, humans.GROUP, simulation.GROUP, propagation.GROUP)
 """The parts of the page, in the order of the thesis."""
 
 
