@@ -135,15 +135,14 @@ def recovered(known: list[Configuration], runs: int, scatter: float, coupling: f
         yield name, part, np.array(errors), np.array(inside)
 
 
-def coupled(coupling: float, runs: int, joint: int = 2) -> tuple[float, np.ndarray]:
-    """Return how often a coupling is found at a joint with the thesis' scatter, and the couplings found [N m/rad]."""
+def coupled(coupling: float, runs: int) -> dict[str, tuple[float, np.ndarray]]:
+    """Return how often a coupling is found with the thesis' scatter, by each joint and by both, and the couplings found [N m/rad]."""
     known = configurations(coupling)
-    own = [c for c in known if c.joint == joint]
-    found = [
-        next(d for d in moments.passive_moments(session(own, 10_000 + seed, 1.0, coupling)).dependence if d.joint == joint)
-        for seed in range(runs)
-    ]
-    return float(np.mean([d.coupled for d in found])), np.array([d["coupling"].value for d in found])
+    found = [moments.passive_moments(session(known, 10_000 + seed, 1.0, coupling)) for seed in range(runs)]
+    by = {f"joint {joint}": [next(d for d in f.dependence if d.joint == joint) for f in found] for joint in (1, 2)}
+    shares = {name: (float(np.mean([d.coupled for d in ds])), np.array([d["coupling"].value for d in ds])) for name, ds in by.items()}
+    both = [f.couplings[0] for f in found]
+    return shares | {"both": (float(np.mean([c.coupled for c in both])), np.array([c.value for c in both]))}
 
 
 def main() -> None:
@@ -154,11 +153,11 @@ def main() -> None:
         for name, part, errors, inside in recovered(configurations(1.0), runs, scatter, 1.0):
             spread = f"{100 * np.median(errors):5.1f} %, 95 % of runs below {100 * np.quantile(errors, 0.95):6.1f} %"
             print(f"  {name:22} {part:11} error {spread}; interval holds {100 * inside.mean():5.1f} %")
-    for joint, strengths in ((2, (0.0, 1.0, 1.2)), (1, (0.0, 8.0))):
-        for coupling in strengths:
-            share, values = coupled(coupling, runs, joint)
-            found = f"{values.mean():.3f} ± {values.std():.3f} N m/rad"
-            print(f"coupling {coupling:g} N m/rad, joint {joint}: called so in {100 * share:.1f} %; {found}")
+    for coupling in (0.0, 1.0, 8.0):
+        for name, (share, values) in coupled(coupling, runs).items():
+            print(
+                f"coupling {coupling:g} N m/rad, {name}: called so in {100 * share:.1f} %; {values.mean():.3f} ± {values.std():.3f} N m/rad"
+            )
 
 
 if __name__ == "__main__":

@@ -14,6 +14,8 @@ STEEPNESS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 20.0])
 """Steepnesses of the exponentials that are tried [1/rad]: its bounds and its grid."""
 _NEEDED = 0.01
 """Share of the residual that exponentials must take away to be needed."""
+_SHARED = 5.0
+"""Degrees of freedom with which the scatter of all configurations speaks for that of each: its own are few."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,8 @@ class Dependence:
         Within trials [N m].
     trial_std : float
         Of what differs from trial to trial [N m].
+    freedom : float
+        Degrees of freedom of the coupling's deviation.
     """
 
     joint: int
@@ -75,6 +79,7 @@ class Dependence:
     level: float
     residual_rms: float
     trial_std: float
+    freedom: float
 
     def __getitem__(self, name: str) -> Coefficient:
         return next(c for c in self.coefficients if c.name == name)
@@ -118,11 +123,57 @@ class Course:
         [rad, N m]
     adjacent : float
         Mean of the adjacent angle [rad].
+    configuration : str
+        Trials of one configuration hold the adjacent angle alike, and scatter alike.
     """
 
     angle: np.ndarray
     moment: np.ndarray
     adjacent: float
+    configuration: str
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """How much the elastic moments of two joints depend on the angle of the other, from both.
+
+    Elastic moments come from an energy, so that ∂R_1/∂q_2 = ∂R_2/∂q_1: both joints measure the same number.
+
+    Attributes
+    ----------
+    joints : (int, int)
+        From 1.
+    value, std : float
+        [N m/rad]
+    interval : (float, float)
+    p_value : float
+        Against no coupling.
+    level : float
+        Probability of the interval; 1 − level is the level of the test.
+    """
+
+    joints: tuple[int, int]
+    value: float
+    std: float
+    interval: tuple[float, float]
+    p_value: float
+    level: float
+
+    @property
+    def coupled(self) -> bool:
+        """Whether there is a coupling."""
+        return self.p_value < 1.0 - self.level
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data with units in the names."""
+        return {
+            "joints": list(self.joints),
+            "value_Nm_rad": self.value,
+            "std_Nm_rad": self.std,
+            "interval_Nm_rad": list(self.interval),
+            "p_value": self.p_value,
+            "coupled": self.coupled,
+        }
 
 
 def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.95) -> Dependence | None:
@@ -146,9 +197,8 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     -----
     What differs from trial to trial (tone, the day) shifts whole courses and is far larger than the noise within one.
     So the shape is fitted within trials, each with a level of its own, under bounds; its intervals come from the scatter of the trials'
-    scores. The coupling is the slope of those levels against the adjacent angle, over trials: Student's t, with a deviation that allows
-    for configurations that scatter more than others, and the degrees of freedom that the ends of the line leave. The model without
-    coupling is the one with that slope at zero.
+    scores. The coupling is the slope of those levels against the adjacent angle, over trials, each configuration weighted by its scatter;
+    Student's t tells it from the model without coupling, where it is zero.
     """
     from scipy.optimize import lsq_linear
     from scipy.stats import t as student
@@ -182,10 +232,11 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     ]
     levels = np.array([np.mean(c.moment - _columns(c.angle, k, ends) @ x) for c in courses])
     mean = float(held.mean())
-    slope, offset, spread, p_value, edge = _line(held - mean, levels, level)
+    line = _line(held - mean, levels, [c.configuration for c in courses])
+    edge = float(student.ppf(0.5 + 0.5 * level, line.freedom))
     coefficients += [
-        Coefficient("coupling", slope[0], slope[1], (slope[0] - edge * slope[1], slope[0] + edge * slope[1]), "N m/rad"),
-        Coefficient("moment", offset[0], offset[1], (offset[0] - edge * offset[1], offset[0] + edge * offset[1]), "N m"),
+        Coefficient(name, value, std, (value - edge * std, value + edge * std), unit)
+        for name, value, std, unit in (("coupling", line.slope, line.slope_std, "N m/rad"), ("moment", line.level, line.level_std, "N m"))
     ]
     return Dependence(
         joint=joint,
@@ -195,11 +246,35 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
         range=ends,
         adjacent_mean=mean,
         trials=len(courses),
-        p_value=p_value,
+        p_value=_chance(line.slope, line.slope_std, line.freedom),
         level=level,
         residual_rms=float(np.sqrt(cost / len(target))),
-        trial_std=spread,
+        trial_std=line.spread,
+        freedom=line.freedom,
     )
+
+
+def together(first: Dependence, second: Dependence) -> Coupling:
+    """Return the coupling of two joints that were each moved while the other was held at different angles."""
+    from scipy.stats import t as student
+
+    stds = np.array([first["coupling"].std, second["coupling"].std])
+    values = np.array([first["coupling"].value, second["coupling"].value])
+    known = (stds == 0.0).astype(float) if not stds.all() else stds**-2
+    weights = known / known.sum()
+    shares = (weights * stds) ** 2
+    value, std = float(weights @ values), float(np.sqrt(shares.sum()))
+    freedom = float(shares.sum() ** 2 / np.sum(shares**2 / np.array([first.freedom, second.freedom]))) if std > 0.0 else first.freedom
+    half = float(student.ppf(0.5 + 0.5 * first.level, freedom)) * std
+    pair = (min(first.joint, second.joint), max(first.joint, second.joint))
+    return Coupling(pair, value, std, (value - half, value + half), _chance(value, std, freedom), first.level)
+
+
+def _chance(value: float, std: float, freedom: float) -> float:
+    """Return the probability of a value so far from zero by chance."""
+    from scipy.stats import t as student
+
+    return float(2.0 * student.sf(abs(value) / std, freedom)) if std > 0.0 else float(value == 0.0)
 
 
 def _columns(q: np.ndarray, k: float, ends: tuple[float, float]) -> np.ndarray:
@@ -228,22 +303,45 @@ def _shape_deviations(courses: Sequence[Course], columns: np.ndarray, residual: 
     return stds
 
 
-def _line(x: np.ndarray, y: np.ndarray, level: float) -> tuple[tuple[float, float], tuple[float, float], float, float, float]:
-    """Return slope and mean with deviations, the scatter about the line, the probability of the slope by chance, and the t quantile."""
-    from scipy.stats import t as student
+@dataclass(frozen=True)
+class _Line:
+    """A line through trials: slope and level at zero with deviations, scatter about it, degrees of freedom of the slope's deviation."""
 
-    freedom = len(x) - 2
-    slope = float(x @ y / (x @ x))
-    mean = float(y.mean())
-    rest = y - mean - slope * x
-    spread = float(np.sqrt(np.sum(rest**2) / freedom))
-    # Configurations scatter differently, those at the ends may most: HC3 of MacKinnon and White 1985.
-    outer = rest / (1.0 - 1.0 / len(x) - x**2 / (x @ x))
-    slope_std, mean_std = float(np.sqrt(np.sum((x * outer) ** 2)) / (x @ x)), float(np.sqrt(np.sum(outer**2))) / len(x)
-    # That deviation rests on the ends of the line, and so on fewer trials than there are.
-    ends = min(float(freedom), float((x @ x) ** 2 / np.sum(x**4)))
-    p_value = float(2.0 * student.sf(abs(slope) / slope_std, ends)) if slope_std > 0.0 else float(slope == 0.0)
-    return (slope, slope_std), (mean, mean_std), spread, p_value, float(student.ppf(0.5 + 0.5 * level, ends))
+    slope: float
+    slope_std: float
+    level: float
+    level_std: float
+    spread: float
+    freedom: float
+
+
+def _line(x: np.ndarray, y: np.ndarray, configurations: Sequence[str]) -> _Line:
+    """Fit a line to trials, of which those of one configuration scatter alike; `x` has mean zero.
+
+    The variance of a configuration is that within it, together with that about the common line with the weight of `_SHARED` degrees
+    of freedom. Weights that are estimated make the variance of the slope look too small: the correction is that of Meier 1953, the
+    degrees of freedom are those of Satterthwaite 1946.
+    """
+    _, place, counts = np.unique(np.array(configurations), return_inverse=True, return_counts=True)
+    at, mean = (np.bincount(place, weights=v) / counts for v in (x, y))
+    own = np.bincount(place, weights=(y - mean[place]) ** 2)
+    about = y - y.mean() - (x @ y / (x @ x)) * x
+    common = float(about @ about) / (len(x) - 2)
+    variance = (_SHARED * common + own) / (_SHARED + counts - 1)
+    if common == 0.0:
+        return _Line(float(x @ y / (x @ x)), 0.0, float(y.mean()), 0.0, 0.0, float(len(x) - 2))
+    weights = counts / variance
+    centre = float(weights @ at / weights.sum())
+    part = weights * (at - centre) / float(weights @ (at - centre) ** 2)
+    shares = part**2 * variance / counts
+    total = float(shares.sum())
+    relative = shares / total
+    meier = 1.0 + 4.0 * float(np.sum(relative * (1.0 - relative) * (counts - 1) / (_SHARED + counts - 1) ** 2))
+    slope, slope_variance = float(part @ mean), total * meier
+    level = float(weights @ mean / weights.sum()) - slope * centre
+    level_variance = 1.0 / float(weights.sum()) + centre**2 * slope_variance
+    freedom = min(1.0 / float(np.sum(relative**2 / (_SHARED + counts - 1))), float(len(x) - 2))
+    return _Line(slope, float(np.sqrt(slope_variance)), level, float(np.sqrt(level_variance)), float(np.sqrt(common)), freedom)
 
 
 def _interval(value: float, half: float, least: float | None) -> tuple[float, float]:

@@ -163,6 +163,8 @@ class PassiveMoments:
     dataset : Dataset
     dependence : tuple of Dependence
         For every joint that moved while an adjacent one was held at different angles: the elastic moment as a function of both.
+    couplings : tuple of Coupling
+        For every pair of joints that were each moved while the other was held: what both say of their coupling.
     checks : tuple of Check
         Whether the muscles were silent and the movement slow.
     """
@@ -172,6 +174,7 @@ class PassiveMoments:
     cutoff: float
     warnings: tuple[str, ...]
     dataset: Dataset = field(repr=False)
+    couplings: tuple[dependence.Coupling, ...] = ()
     dependence: tuple[dependence.Dependence, ...] = ()
     checks: tuple[relaxed.Check, ...] = ()
 
@@ -226,7 +229,14 @@ def passive_moments(
     checks = (relaxed.muscles_silent(dataset.trials), relaxed.slow_enough([(c.configuration, c.joint, c.inertial_share) for c in curves]))
     if checks[0].passed is False:
         warnings.append(checks[0].text)
-    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, _dependence(curves), checks)
+    fitted = _dependence(curves)
+    both = tuple(
+        dependence.together(one, other)
+        for one in fitted
+        for other in fitted
+        if (one.joint, one.adjacent) == (other.adjacent, other.joint) and one.joint < other.joint
+    )
+    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, both, fitted, checks)
 
 
 def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
@@ -362,7 +372,7 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[dependence.Dependence, 
             for elastic, held in zip(curve.elastic_repeats, curve.held, strict=True):
                 there = np.isfinite(elastic)
                 if there.sum() >= 4:
-                    courses.append(dependence.Course(curve.angle[there], elastic[there], float(held[adjacent - 1])))
+                    courses.append(dependence.Course(curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration))
         fitted = dependence.fit(courses, joint, adjacent, LEVEL)
         if fitted is not None:
             found.append(fitted)

@@ -242,6 +242,7 @@ def _passive(data: Mapping[str, Any]) -> str:
     out += heading("Passive moments") + paragraph(words.PASSIVE_MEANING, "soft") + table(tables.passive(data))
     if data.get("dependence"):
         out += heading("Own and adjacent angle") + paragraph(words.DEPENDENCE_MEANING, "soft") + table(tables.dependence(data))
+        out += bullets(words.couplings(data))
     out += heading("Assumptions") + bullets(c["text"] for c in data.get("checks", ()))
     return out + (heading("Take care") + bullets(data["warnings"]) if data["warnings"] else "")
 

@@ -211,6 +211,7 @@ def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str
         "dependence": [
             d.to_dict() | {"joint_name": joints[d.joint - 1], "adjacent_name": joints[d.adjacent - 1]} for d in result.dependence
         ],
+        "couplings": [c.to_dict() | {"joint_names": [joints[j - 1] for j in c.joints]} for c in result.couplings],
         "checks": [{"name": c.name, "passed": c.passed, "text": c.text} for c in result.checks],
         "level": LEVEL,
         "warnings": list(result.warnings),

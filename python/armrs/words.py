@@ -176,10 +176,21 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
     if result["dependence"]:
         show("Elastic moment against own and adjacent angle", tables.dependence(result))
+    for line in couplings(result):
+        print(line)
     for check in result["checks"]:
         print(check["text"])
     print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
     files_written(written)
+
+
+def couplings(result: Mapping[str, Any]) -> list[str]:
+    """Say for each pair of joints whether their elastic moments depend on one another."""
+    return [
+        f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: {c['value_Nm_rad']:.3g} ± "
+        f"{c['std_Nm_rad']:.2g} N m/rad from both (p = {c['p_value']:.2g})"
+        for c in result.get("couplings", ())
+    ]
 
 
 def show(title: str, table: tables.Table) -> None:
