@@ -5,6 +5,7 @@
 #   make bench   speed
 #   make hidden  the gap workflow against hidden effects: some hours
 #   make crosscheck  the same bits on other architectures and two microcontrollers; half an hour the first time
+#   make wheel   a wheel for others, in out/wheels; on Linux for glibc 2.17 and newer
 #   make clean   remove what make has made
 PYTHON ?= python3
 VENV   := .venv
@@ -19,7 +20,7 @@ export PIP_QUIET := 1
 # The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test bench hidden crosscheck clean build format rust python
+.PHONY: demo test bench hidden crosscheck wheel clean build format rust python
 .DELETE_ON_ERROR:
 
 demo: build
@@ -77,6 +78,14 @@ format: $(STAMPS)/dev
 
 crosscheck:
 	scripts/crosscheck
+
+# On Linux with Zig's linker, which knows old versions of glibc; elsewhere as it is.
+OLD_GLIBC := $(if $(filter Linux,$(shell uname)),yes)
+
+wheel: $(STAMPS)/venv
+	$(if $(OLD_GLIBC),$(BIN)/python -m pip install ziglang cargo-zigbuild)
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python scripts/fmu_library.py $(if $(OLD_GLIBC),--portable)
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --out out/wheels $(if $(OLD_GLIBC),--zig --compatibility manylinux_2_17)
 
 bench: build
 	cargo bench --quiet -p speed

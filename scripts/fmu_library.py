@@ -1,12 +1,14 @@
-"""Build the shared library that travels in FMUs and put it into the package.
+"""Build the shared library that travels in FMUs, with the licences of what is in it, and put both into the package.
 
-With `--portable`, for a release on Linux, it is linked against glibc 2.17, so that FMUs run on older systems than the one they were
-built on; this needs `pip install ziglang cargo-zigbuild`.
+It says which glibc the library needs: that of the system it is built on, roughly. With `--portable`, for a release on Linux, it is
+linked against glibc 2.17, so that FMUs run on older systems as well; this needs `pip install ziglang cargo-zigbuild`.
 """
 
 from __future__ import annotations
 
+import json
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -14,24 +16,81 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 NAMES = {"win32": "arm_fmu.dll", "darwin": "libarm_fmu.dylib"}
+OLDEST = (2, 17)
 
 
 def main() -> None:
-    """Build and copy what came out."""
-    built = ROOT / "target" / "release"
+    """Build with the profile `fmu` and copy what came out."""
+    portable = "--portable" in sys.argv
+    built = ROOT / "target" / "fmu"
     command = ["cargo", "build"]
-    if "--portable" in sys.argv:
+    if portable:
         target = f"{platform.machine()}-unknown-linux-gnu"
-        command = ["cargo", "zigbuild", "--target", f"{target}.2.17"]
-        built = ROOT / "target" / target / "release"
-    subprocess.run([*command, "--quiet", "--release", "-p", "arm-fmu"], cwd=ROOT, check=True)
+        command = ["cargo", "zigbuild", "--target", f"{target}.{OLDEST[0]}.{OLDEST[1]}"]
+        built = ROOT / "target" / target / "fmu"
+    subprocess.run([*command, "--quiet", "--profile", "fmu", "-p", "arm-fmu"], cwd=ROOT, check=True)
     name = NAMES.get(sys.platform, "libarm_fmu.so")
+    content = (built / name).read_bytes()
+    needed = glibc(content)
+    if portable and needed > OLDEST:
+        sys.exit(f"fmu_library: the library needs glibc {version(needed)}, allowed is {version(OLDEST)} at most")
     place = ROOT / "python" / "armrs" / "fmu" / "lib"
     place.mkdir(exist_ok=True)
+    (place / "license.txt").write_text(licences(), encoding="utf-8")
     # Renamed into its place: a process that has the old one loaded keeps it.
     part = place / f"{name}.part"
-    shutil.copyfile(built / name, part)
+    part.write_bytes(content)
+    shutil.copymode(built / name, part)
     part.replace(place / name)
+    if any(needed):
+        print(f"the library for FMUs needs glibc {version(needed)}")
+
+
+def glibc(library: bytes) -> tuple[int, ...]:
+    """Return the newest version of glibc that a library names among its needs; (0,) for none."""
+    found = re.findall(rb"\0GLIBC_(\d+)\.(\d+)(?:\.\d+)?(?=\0)", library)
+    return max(((int(a), int(b)) for a, b in found), default=(0,))
+
+
+def version(numbers: tuple[int, ...]) -> str:
+    """Return a version as it is written."""
+    return ".".join(map(str, numbers))
+
+
+def licences() -> str:
+    """Return the licences of armrs, and of every package that is compiled into the library, whole; what says the same stands once."""
+    tree = subprocess.run(
+        ["cargo", "tree", "-p", "arm-fmu", "-e", "normal,no-proc-macro", "--prefix", "none", "-f", "{p}", "--no-dedupe"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    inside = {tuple(line.split()[:2]) for line in tree.stdout.splitlines()}
+    metadata = subprocess.run(["cargo", "metadata", "--format-version", "1"], cwd=ROOT, check=True, capture_output=True)
+    packages = [p for p in json.loads(metadata.stdout)["packages"] if (p["name"], f"v{p['version']}") in inside and p["source"]]
+    parts = [
+        "SPDX-License-Identifier: MIT OR Apache-2.0",
+        "armrs, and the library in this FMU, under either of the two licences that follow.",
+    ]
+    seen: set[str] = set()
+
+    def add(paths: list[Path]) -> None:
+        for path in paths:
+            text = path.read_text(encoding="utf-8", errors="replace").strip()
+            if (words := " ".join(text.split())) not in seen:
+                seen.add(words)
+                parts.append(text)
+
+    add(sorted(ROOT.glob("LICENSE*")))
+    parts.append("Compiled into it, besides Rust's standard library (MIT OR Apache-2.0), each with its licence unless that stands above:")
+    for package in sorted(packages, key=lambda p: str(p["name"])):
+        parts.append(f"{package['name']} {package['version']}: {package['license']}, {package['repository']}")
+        folder = Path(package["manifest_path"]).parent
+        texts = sorted(p for p in folder.glob("*") if re.match("(?i)(un)?licen[sc]e|copying|notice", p.name) and p.is_file())
+        # Where there is a choice, MIT: it is short.
+        add([p for p in texts if "MIT" in p.name.upper()] or texts)
+    return "\n\n".join(parts) + "\n"
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ from armrs.fmu.description import read_description, unpack
 from armrs.fmu.export import export_fmu
 from armrs.model import Model, Segment
 
+ROOT = Path(__file__).parents[1]
 START = np.radians([-60.0, 50.0])
 VARIANTS = [(fmi, port) for fmi in (2, 3) for port in ("force", "motion")]
 
@@ -95,6 +96,28 @@ def test_every_function_of_the_standards_is_there_and_no_python() -> None:
             assert f"fmi{version}{name}\0".encode() in content
     assert b"Py_" not in content
     assert b"_Py" not in content
+
+
+def test_the_library_needs_no_newer_glibc_than_the_documentation_says() -> None:
+    from armrs.fmu.export import library
+
+    found = re.findall(rb"\0GLIBC_(\d+)\.(\d+)", library().read_bytes())
+    if not found:
+        pytest.skip("no library for glibc")
+    said = re.search(r"needs glibc (\d+)\.(\d+) as `make build` makes it", (ROOT / "docs" / "cosim.md").read_text(encoding="utf-8"))
+    assert said is not None
+    assert max((int(a), int(b)) for a, b in found) <= tuple(map(int, said.groups()))
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_licences_travel_whole(fmi: int, folder: Path) -> None:
+    """Those of armrs, and of what is compiled into the library, which the MIT licence and Apache's want."""
+    with zipfile.ZipFile(folder / f"force{fmi}.fmu") as files:
+        text = files.read("documentation/licenses/license.txt").decode()
+    for licence in ("LICENSE-MIT", "LICENSE-APACHE"):
+        assert (ROOT / licence).read_text(encoding="utf-8").strip() in text
+    for package in ("libm", "nalgebra", "serde_json"):
+        assert re.search(rf"^{package} \d", text, flags=re.M), package
 
 
 def test_an_arm_of_each_length(tmp_path: Path) -> None:

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armrs import Model, simulate
+from armrs import Joint, Model, simulate
 from armrs.cosim import Partner, Slave, Status
 from armrs.cosim.imported import ImportedSlave
 from armrs.demo import true_model
 from armrs.errors import BadInput, SlaveError
 from armrs.fmu.export import export_fmu
-from armrs.model import Contact, Effect
+from armrs.model import Contact, Effect, Segment
 
 KINDS = ("python", "fmi2", "fmi3")
 START = np.radians([-60.0, 50.0])
@@ -328,6 +328,29 @@ def test_the_bits_are_those_of_the_native_simulator(make: Make) -> None:
             assert [v.hex() for v in slave.get(["q[1]", "q[2]", "qd[1]", "qd[2]"]).tolist()] == [
                 v.hex() for v in [*reference.q[k + 1].tolist(), *reference.qd[k + 1].tolist()]
             ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_at_rest_the_contact_carries_the_weight(kind: str, tmp_path: Path) -> None:
+    """F on the robot = −J⁻ᵀ G, from the textbook's formulas of two links; the same after a second."""
+    (a1, l1, m1), (a2, l2, m2) = (0.322, 0.186, 2.114), (0.264, 0.121, 1.264)
+    segments = (Segment("upper arm", a1, m1, l1, 0.0165), Segment("forearm", a2, m2, l2, 0.0074))
+    arm = Model(segments, (Joint("shoulder"), Joint("elbow")), contact=Contact((10000.0, 10000.0), (25.0, 25.0)))
+    slave: Partner = Slave(arm, port="motion", start=START, rest=True)
+    if kind != "python":
+        slave = ImportedSlave(export_fmu(slave, tmp_path / "arm.fmu", fmi=int(kind[-1])))
+    with slave:
+        ready(slave)
+        for at in range(2):
+            q1, q2 = slave.get(["q[1]", "q[2]"])
+            (c1, s1), (c12, s12) = ((np.cos(q), np.sin(q)) for q in (q1, q1 + q2))
+            gravity = 9.81 * np.array([m1 * l1 * c1 + m2 * (a1 * c1 + l2 * c12), m2 * l2 * c12])
+            jacobian = np.array([[-a1 * s1 - a2 * s12, -a2 * s12], [a1 * c1 + a2 * c12, a2 * c12]])
+            on_arm = np.linalg.solve(jacobian.T, gravity)
+            assert np.abs(on_arm).max() > 5.0
+            np.testing.assert_allclose(slave.get(["contact.F[1]", "contact.F[2]"]), -on_arm, rtol=0.0, atol=1e-9)
+            if at == 0:
+                slave.do_step(0.0, 1.0)
 
 
 def test_free_motion_keeps_its_energy() -> None:

@@ -22,7 +22,7 @@ IDENTIFIER = "ArmRs"
 """Name of the library inside an FMU."""
 _MOMENT = (1980, 1, 1, 0, 0, 0)
 """The earliest time an archive can hold: files in an FMU carry no date of their making."""
-_LICENSE = "SPDX-License-Identifier: MIT OR Apache-2.0\n"
+_SPDX = b"SPDX-License-Identifier: MIT OR Apache-2.0\n"
 _HEAD = ("name", "what it is", "unit", "causality", "variability", "start")
 
 
@@ -87,6 +87,8 @@ def contents(slave: Slave, fmi: int) -> dict[str, bytes]:
     place, suffix = platform_folder(fmi)
     icon = resources.files("armrs.fmu").joinpath("icon.png").read_bytes()
     page = documentation(slave)
+    # Of armrs and of everything that is compiled into the library; made together with it.
+    licence = library().with_name("license.txt").read_bytes()
     listed = {
         "modelDescription.xml": description.encode(),
         f"binaries/{place}/{IDENTIFIER}{suffix}": library().read_bytes(),
@@ -95,14 +97,14 @@ def contents(slave: Slave, fmi: int) -> dict[str, bytes]:
     if terminals is None:
         listed |= {
             "documentation/index.html": page.encode(),
-            "documentation/licenses/license.txt": _LICENSE.encode(),
+            "documentation/licenses/license.txt": licence,
             "model.png": icon,
         }
     else:
         listed |= {
             "documentation/index.html": page.encode(),
-            "documentation/licenses/license.spdx": _LICENSE.encode(),
-            "documentation/licenses/license.txt": _LICENSE.encode(),
+            "documentation/licenses/license.spdx": _SPDX,
+            "documentation/licenses/license.txt": licence,
             "terminalsAndIcons/terminalsAndIcons.xml": terminals.encode(),
             "terminalsAndIcons/icon.png": icon,
         }
@@ -110,13 +112,15 @@ def contents(slave: Slave, fmi: int) -> dict[str, bytes]:
 
 
 def library() -> Path:
-    """Return the shared library that travels in FMUs; it comes with the wheel."""
+    """Return the shared library that travels in FMUs, with its licence beside it; both come with the wheel."""
     suffix = platform_folder(3)[1]
     stem = "arm_fmu" if sys.platform == "win32" else "libarm_fmu"
     found = Path(str(resources.files("armrs.fmu").joinpath("lib", f"{stem}{suffix}")))
-    if not found.is_file():
+    if not (found.is_file() and found.with_name("license.txt").is_file()):
         machine = f"{platform.machine()} {sys.platform}"
-        raise ArmrsError(f"the library for FMUs is missing ({found}; this is {machine}): build it with make, or install the wheel")
+        raise ArmrsError(
+            f"the library for FMUs, or its licence, is missing ({found}; this is {machine}): build it with make, or install the wheel"
+        )
     return found
 
 
