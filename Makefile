@@ -69,7 +69,7 @@ python: $(STAMPS)/build $(STAMPS)/dev
 	$(BIN)/ruff check --quiet python tests scripts examples bench
 	$(BIN)/mypy --no-error-summary
 	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
-	$(BIN)/python -m pytest --quiet
+	$(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile
 
 format: $(STAMPS)/dev
 	cargo fmt --all

@@ -49,18 +49,19 @@ pub(crate) fn given<const N: usize>(
 
 /// The static equilibrium near given angles: `G + R = τ + Jᵀ F` at rest.
 ///
-/// A contact with play pushes nowhere inside it, where no search finds a way. There the play is closed first; the tip then
-/// hangs back by the play on the side to which it is pulled.
+/// A contact with play pushes nowhere inside it, and a search that comes there finds no way out. Then the play is closed
+/// first; the tip hangs back by the play on the side to which it is pulled.
 pub(crate) fn equilibrium<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     near: &Joints<f64, N>,
 ) -> Result<Joints<f64, N>, SimulationError> {
+    let found = balanced(model, input, near);
     let Link::Compliant(contact) = &model.link else {
-        return balanced(model, input, near);
+        return found;
     };
-    if contact.play == [0.0; 2] {
-        return balanced(model, input, near);
+    if found.is_ok() || contact.play == [0.0; 2] {
+        return found;
     }
     let (play, tight) = (
         contact.play,

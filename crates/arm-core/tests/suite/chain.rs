@@ -38,7 +38,7 @@ fn one_broken_value_at_a_time() {
         ),
         (
             |s, _, _| s[2].inertia = -1e-9,
-            "inertia of segment 3 is -0.000000001",
+            "inertia of segment 3 is -1e-9",
         ),
         (
             |s, _, _| s[0].inertia = f64::NAN,
