@@ -38,6 +38,15 @@ pub struct Apart {
     pub sizes: Vec<Vec<f64>>,
 }
 
+/// Where a line is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// In what repeats differ by, where the model's own errors cancel: a rhythm of muscles has another phase in every trial.
+    BetweenRepeats,
+    /// Where tip and handle come apart: only the robot can be behind it.
+    OfTheRobot,
+}
+
 /// Slowest rhythm of muscles \[Hz\]: below it movements have power of their own.
 const SLOWEST_RHYTHM: f64 = 2.0;
 /// Slowest ripple of the robot \[Hz\].
@@ -58,7 +67,7 @@ impl<const N: usize> Study<'_, N> {
     ///
     /// # Errors
     /// [`GapError::Simulation`] where the hypothesis cannot be simulated.
-    pub fn rhythm(&self, anchor: &Anchor<N>) -> Result<Option<Apart>, GapError> {
+    pub fn rhythm(&self, anchor: &Anchor<N>, place: Line) -> Result<Option<Apart>, GapError> {
         let residuals = self.raw_residuals(anchor)?;
         let rate = self.courses[self.fitted[0]].rate;
         if self
@@ -68,25 +77,26 @@ impl<const N: usize> Study<'_, N> {
         {
             return Ok(None);
         }
-        // A rhythm of muscles has another phase in every trial: it is looked for in what repeats differ by, where the
-        // model's own errors cancel. Where tip and handle come apart, only the robot can be behind it.
-        let differences = self.differences(&residuals);
-        let muscles = line(
-            &differences.iter().collect::<Vec<_>>(),
-            rate,
-            SLOWEST_RHYTHM,
-        );
-        let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
-            .map(|(residual, &trial)| self.closure(residual, trial))
-            .collect();
-        let robot = line(&closures.iter().collect::<Vec<_>>(), rate, SLOWEST_RIPPLE)
-            .filter(|f| *f < FASTEST_RIPPLE);
-        let Some(frequency) = muscles.or(robot) else {
+        let found = match place {
+            Line::BetweenRepeats => {
+                let differences = self.differences(&residuals);
+                let all: Vec<&Channels> = differences.iter().collect();
+                line(&all, rate, SLOWEST_RHYTHM)
+            }
+            Line::OfTheRobot => {
+                let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
+                    .map(|(residual, &trial)| self.closure(residual, trial))
+                    .collect();
+                let all: Vec<&Channels> = closures.iter().collect();
+                line(&all, rate, SLOWEST_RIPPLE).filter(|f| *f < FASTEST_RIPPLE)
+            }
+        };
+        let Some(frequency) = found else {
             return Ok(None);
         };
         let mut best: Vec<(f64, Explained)> = Vec::new();
         for columns in self.swings(frequency) {
-            if muscles.is_none() && columns[0].kind.probe().nature != Nature::Periodic {
+            if place == Line::OfTheRobot && columns[0].kind.probe().nature != Nature::Periodic {
                 continue;
             }
             if let Some(explained) = self.explain(anchor, &residuals, frequency, &columns) {
@@ -385,6 +395,12 @@ impl<const N: usize> Study<'_, N> {
                     own > other
                 });
                 let gain = along * along / square / scale;
+                // A sensor that moves within what the calibration promises of it is no finding.
+                let promised = match effect.kind.probe().promise {
+                    Some(_) => self.session.tolerance.angle_offset,
+                    None => 0.0,
+                };
+                let further = further && (along / square).abs() > promised;
                 if further && best.as_ref().is_none_or(|b| gain > b.gain) {
                     let mut effect = effect;
                     effect.parameters[0] = along / square;
@@ -517,11 +533,6 @@ impl Apart {
     /// Frequency \[Hz\] and phase \[rad\] of a rhythm.
     pub fn wave(&self) -> [f64; 2] {
         shapes_of(self.effect.kind).map(|p| self.effect.parameters[p])
-    }
-
-    /// Whether its kind is locked to the start of the trial by nature.
-    pub fn is_periodic(&self) -> bool {
-        self.effect.kind.probe().nature == Nature::Periodic
     }
 
     /// From when to when it lasts \[s\].

@@ -8,6 +8,8 @@ use arm_core::{Chain, Contact, Invalid, Segment, Setup};
 pub struct Hypothesis<const N: usize> {
     /// Relative changes of mass, centre of mass and inertia of each segment.
     pub segments: [[f64; 3]; N],
+    /// Relative changes of compliance and damping of the contact, y and z.
+    pub contact: [[f64; 2]; 2],
     /// Shift of the robot's base against the arm's, y and z \[m\].
     pub shift: [f64; 2],
     /// Where the handle sits in the hand: along the last segment and to its left \[m\].
@@ -25,6 +27,8 @@ pub struct Hypothesis<const N: usize> {
 pub enum Target {
     /// Relative change of a segment's mass (0), centre of mass (1) or inertia (2).
     Segment(usize, usize),
+    /// Relative change of compliance (0) or damping (1) of the contact along y (0) or z (1).
+    Contact(usize, usize),
     /// Shift of the robot's base along y (0) or z (1).
     Shift(usize),
     /// Place of the handle along the last segment (0) or to its left (1).
@@ -57,6 +61,7 @@ impl<const N: usize> Hypothesis<N> {
     pub fn get(&self, target: Target) -> f64 {
         match target {
             Target::Segment(k, part) => self.segments[k][part],
+            Target::Contact(part, axis) => self.contact[part][axis],
             Target::Shift(axis) => self.shift[axis],
             Target::Placement(axis) => self.placement[axis],
             Target::Known(e, p) => self.known[e].parameters[p],
@@ -69,6 +74,7 @@ impl<const N: usize> Hypothesis<N> {
     pub fn with(mut self, target: Target, value: f64) -> Self {
         let place = match target {
             Target::Segment(k, part) => &mut self.segments[k][part],
+            Target::Contact(part, axis) => &mut self.contact[part][axis],
             Target::Shift(axis) => &mut self.shift[axis],
             Target::Placement(axis) => &mut self.placement[axis],
             Target::Known(e, p) => &mut self.known[e].parameters[p],
@@ -104,8 +110,12 @@ impl<const N: usize> Hypothesis<N> {
     pub fn setup(
         &self,
         nominal: &Chain<f64, N>,
-        contact: Contact<f64>,
+        mut contact: Contact<f64>,
     ) -> Result<Setup<f64, N>, Invalid> {
+        for axis in 0..2 {
+            contact.stiffness[axis] /= 1.0 + self.contact[0][axis];
+            contact.damping[axis] *= 1.0 + self.contact[1][axis];
+        }
         let segments = self.believed(nominal.segments());
         let chain = Chain::new(segments, nominal.base(), nominal.gravity())?
             .with_rotor_inertia(*nominal.rotor_inertia())?;

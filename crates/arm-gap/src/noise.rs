@@ -120,7 +120,7 @@ impl Noise {
             let series: Vec<&[f64]> = noisy.iter().map(Vec::as_slice).collect();
             let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
             let model = if varies {
-                AutoRegression::selected(&series, ORDER)?
+                AutoRegression::selected_about_zero(&series, ORDER)?
             } else {
                 AutoRegression {
                     coefficients: Vec::new(),
@@ -179,14 +179,28 @@ impl Noise {
 
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
     pub fn whiten(&self, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
-        let n = self.whiteners.len();
-        let mut rows = vec![Vec::with_capacity(stretches.len()); n];
-        for (c, whitener) in self.whiteners.iter().enumerate() {
-            for mut piece in stretches.pick(&channels[c]) {
+        let whitened = std::iter::zip(&self.whiteners, channels).map(|(whitener, channel)| {
+            let mut row = Vec::with_capacity(stretches.len());
+            for mut piece in stretches.pick(channel) {
                 whitener.apply(&mut piece);
-                rows[c].extend(piece);
+                row.extend(piece);
             }
+            row
+        });
+        self.unmixed(whitened.collect())
+    }
+
+    /// Whitens channels that are thinned already, in one stretch.
+    pub fn whiten_thinned(&self, channels: &[Vec<f64>]) -> Vec<f64> {
+        let mut rows = channels.to_vec();
+        for (row, whitener) in rows.iter_mut().zip(&self.whiteners) {
+            whitener.apply(row);
         }
+        self.unmixed(rows)
+    }
+
+    fn unmixed(&self, mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+        let n = self.whiteners.len();
         // From the last channel up: each row needs those before it unmixed.
         for c in (0..n).rev() {
             for i in 0..rows[c].len() {

@@ -350,7 +350,9 @@ impl<const N: usize> Session<N> {
             )
         };
         match target {
-            Target::Segment(..) | Target::Shift(_) | Target::Placement(_) => false,
+            Target::Segment(..) | Target::Contact(..) | Target::Shift(_) | Target::Placement(_) => {
+                false
+            }
             Target::Known(e, _) => sensing(&hypothesis.known[e]),
             Target::Calibration(_) => true,
             Target::Named(e, _) => sensing(&hypothesis.named[e]),

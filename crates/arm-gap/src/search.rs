@@ -2,7 +2,7 @@
 
 use crate::GapError;
 use crate::anchor::Anchor;
-use crate::apart::Apart;
+use crate::apart::{Apart, Line};
 use crate::candidate::{Candidate, Library};
 use crate::chance::chi_square_tail;
 use crate::fit::{Fitted, Precision};
@@ -12,8 +12,8 @@ use crate::scan::{Choice, Scan};
 use crate::session::Sight;
 use crate::study::Study;
 
-/// Share of all that is explained that an effect must explain: less may be the imperfect shape of another one.
-const FLOOR: f64 = 0.02;
+/// Share of all that is explained that an effect must explain, whatever the others are.
+const FLOOR: f64 = 0.003;
 /// Most disturbances of single trials that are named.
 const DISTURBANCES: usize = 4;
 /// Frequency below which a ripple is asked like other effects \[Hz\]: movements and what a model lacks of them reach that far.
@@ -118,84 +118,91 @@ pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 /// A fitted hypothesis with the simulation that it was followed from.
 type Settled<'a, const N: usize> = (Fitted<N>, Anchor<'a, N>);
 
-/// What the search has in hand once single trials were looked at.
-struct Prepared<'a, const N: usize> {
+/// What was found of effects that last.
+struct Hunt<'a, const N: usize> {
     calibrated: Fitted<N>,
+    /// What the calibrated model leaves, at the same samples and with the same noise.
+    before: Lack,
+    current: Fitted<N>,
     anchor: Anchor<'a, N>,
-    apart: Vec<Apart>,
-    /// Frequency and phase of a ripple that is left to the search.
-    periodic: Option<[f64; 2]>,
+    ladder: Vec<Rung>,
+    ruled: Vec<Ruled>,
+    /// Number of candidates.
+    asked: f64,
+    scale: f64,
 }
 
 impl<'a, const N: usize> Study<'a, N> {
     /// Searches for what the model lacks.
     ///
+    /// First what is not the same in every trial, told by what repeats differ in; then what lasts; then a ripple of the
+    /// robot, in what is left; and whatever was set apart or found on the way is asked once more.
+    ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
     pub fn search(&mut self, progress: Progress<'_>) -> Result<Finding<N>, GapError> {
         progress("calibrating", 0.0);
-        let (mut calibrated, mut anchor) = self.calibrate()?;
+        let mut settled = self.calibrate()?;
         if !self.repeated {
-            self.measure_noise(&anchor)?;
-            (calibrated, anchor) = self.calibrate()?;
+            self.measure_noise(&settled.1)?;
+            settled = self.calibrate()?;
         }
-        let prepared = self.set_apart((calibrated, anchor), progress)?;
-        let (mut calibrated, mut anchor) = (prepared.calibrated, prepared.anchor);
-        let (mut apart, periodic) = (prepared.apart, prepared.periodic);
-        // What the calibration leaves is judged with the samples and the noise that it was fitted with.
-        let mut before = lack_of_fit(self, &anchor, &calibrated);
-        let mut current = calibrated.clone();
-        let mut ladder = Vec::new();
-        let mut asked = 1.0;
-        let (mut scale, mut ruled) = (1.0, Vec::new());
-        for round in 0..MOST {
-            progress("asking the catalogue", 0.1 + 0.1 * round as f64);
-            let library = Library::build(self, &anchor, periodic)?;
-            let scan = Scan::new(self, &current, &anchor, &library)?;
-            asked = library.candidates.len() as f64;
-            scale = scan.scale;
-            ruled = self.ruled(&library, &scan);
-            let room = MOST - current.asked.len();
-            let Some((better, rung)) =
-                self.round((&calibrated, &current), &anchor, (&library, &scan), room)?
-            else {
-                break;
-            };
-            ladder.push(rung);
-            (current, anchor) = self.settle(better.hypothesis, better.asked)?;
-            (current, anchor) = self.pruned((current, anchor), &calibrated, scale)?;
-            if self.leave_out_rest(&anchor) {
-                let from;
-                (calibrated, from) = self.settle(calibrated.hypothesis, Vec::new())?;
-                before = lack_of_fit(self, &from, &calibrated);
-                let settled = self.settle(current.hypothesis, current.asked)?;
-                (current, anchor) = self.pruned(settled, &calibrated, scale)?;
+        let led = self.session.sight == Sight::Led;
+        let mut apart = Vec::new();
+        let mut periodic = None;
+        if led {
+            progress("looking at single trials", 0.05);
+            if let Some(found) = self.rhythm(&settled.1, Line::BetweenRepeats)? {
+                self.take_out(&settled.1, &found)?;
+                apart.push(found);
+                settled = self.calibrate_anew()?;
             }
-            if !self.repeated {
-                self.measure_noise(&anchor)?;
-                (current, anchor) = self.settle(current.hypothesis, current.asked)?;
-            }
-            if current.asked.len() >= MOST {
-                break;
-            }
+            let (fitted, anchor, found) = self.disturbances(settled)?;
+            settled = (fitted, anchor);
+            apart.extend(found);
         }
-        if apart.iter().any(|a| a.trial.is_some()) && !current.asked.is_empty() {
+        let mut hunt = self.hunt(settled, periodic, progress)?;
+        if led && let Some(found) = self.rhythm(&hunt.anchor, Line::OfTheRobot)? {
+            let [frequency, phase] = found.wave();
+            if found.locked && frequency < SLOW {
+                periodic = Some([frequency, phase]);
+            } else {
+                self.take_out(&hunt.anchor, &found)?;
+                apart.push(found);
+            }
+            let again = self.calibrate_anew()?;
+            hunt = self.hunt(again, periodic, progress)?;
+        }
+        if apart.iter().any(|a| a.trial.is_some()) && !hunt.current.asked.is_empty() {
             // What looked like a disturbance may have been what was named since.
             self.take_back();
             apart.retain(|a| a.trial.is_none());
-            self.measure_noise(&self.anchor(&current.hypothesis)?)?;
-            let settled = self.settle(current.hypothesis, current.asked)?;
-            let found;
-            (current, anchor, found) = self.disturbances(settled)?;
+            self.measure_noise(&self.anchor(&hunt.current.hypothesis)?)?;
+            let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
+            let (fitted, anchor, found) = self.disturbances(settled)?;
             apart.extend(found);
             let from;
-            (calibrated, from) = self.settle(calibrated.hypothesis, Vec::new())?;
-            before = lack_of_fit(self, &from, &calibrated);
-            (current, anchor) = self.pruned((current, anchor), &calibrated, scale)?;
+            (hunt.calibrated, from) = self.settle(hunt.calibrated.hypothesis, Vec::new())?;
+            hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
+            (hunt.current, hunt.anchor) =
+                self.pruned((fitted, anchor), &hunt.calibrated, hunt.scale)?;
         }
-        let settled = (current, anchor);
-        let (amended, anchor, named) =
-            self.judged(settled, &calibrated, (asked, scale, periodic), progress)?;
+        let Hunt {
+            calibrated,
+            before,
+            current,
+            anchor,
+            ladder,
+            ruled,
+            asked,
+            scale,
+        } = hunt;
+        let (amended, anchor, named) = self.judged(
+            (current, anchor),
+            &calibrated,
+            (asked, scale, periodic),
+            progress,
+        )?;
         progress("measuring what is left", 0.9);
         let precision = self.precision(&anchor, &amended, scale)?;
         let lack = [before, lack_of_fit(self, &anchor, &amended)];
@@ -213,34 +220,58 @@ impl<'a, const N: usize> Study<'a, N> {
         })
     }
 
-    /// Looks for what is not the same in every trial, and takes it out of what is fitted: a rhythm, then disturbances.
-    fn set_apart(
+    /// Looks for effects that last, round by round.
+    fn hunt(
         &mut self,
         (mut calibrated, mut anchor): Settled<'a, N>,
+        periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<Prepared<'a, N>, GapError> {
-        let (mut apart, mut periodic) = (Vec::new(), None);
-        if self.session.sight == Sight::Led {
-            progress("looking at single trials", 0.05);
-            if let Some(found) = self.rhythm(&anchor)? {
-                let [frequency, phase] = found.wave();
-                if found.locked && found.is_periodic() && frequency < SLOW {
-                    periodic = Some([frequency, phase]);
-                } else {
-                    self.take_out(&anchor, &found)?;
-                    apart.push(found);
-                    (calibrated, anchor) = self.calibrate_anew()?;
-                }
+    ) -> Result<Hunt<'a, N>, GapError> {
+        let mut before = lack_of_fit(self, &anchor, &calibrated);
+        let mut current = calibrated.clone();
+        let mut ladder = Vec::new();
+        let (mut asked, mut scale, mut ruled) = (1.0, 1.0, Vec::new());
+        for round in 0..MOST {
+            progress("asking the catalogue", 0.1 + 0.1 * round as f64);
+            let library = Library::build(self, &anchor, periodic)?;
+            let scan = Scan::new(self, &current, &anchor, &library)?;
+            asked = library.candidates.len() as f64;
+            scale = scan.scale;
+            ruled = self.ruled(&library, &scan);
+            let room = MOST - current.asked.len();
+            let Some((better, rung)) =
+                self.round((&calibrated, &current), &anchor, (&library, &scan), room)?
+            else {
+                break;
+            };
+            ladder.push(rung);
+            (current, anchor) = self.settle(better.hypothesis, better.asked)?;
+            (current, anchor) = self.pruned((current, anchor), &calibrated, scale)?;
+            if self.leave_out_rest(&anchor) {
+                self.measure_noise(&self.anchor(&current.hypothesis)?)?;
+                let from;
+                (calibrated, from) = self.settle(calibrated.hypothesis, Vec::new())?;
+                before = lack_of_fit(self, &from, &calibrated);
+                let settled = self.settle(current.hypothesis, current.asked)?;
+                (current, anchor) = self.pruned(settled, &calibrated, scale)?;
             }
-            let found;
-            (calibrated, anchor, found) = self.disturbances((calibrated, anchor))?;
-            apart.extend(found);
+            if !self.repeated {
+                self.measure_noise(&anchor)?;
+                (current, anchor) = self.settle(current.hypothesis, current.asked)?;
+            }
+            if current.asked.len() >= MOST {
+                break;
+            }
         }
-        Ok(Prepared {
+        Ok(Hunt {
             calibrated,
+            before,
+            current,
             anchor,
-            apart,
-            periodic,
+            ladder,
+            ruled,
+            asked,
+            scale,
         })
     }
 
@@ -296,7 +327,8 @@ impl<'a, const N: usize> Study<'a, N> {
         };
         let choices = scan.search(&[], AHEAD.min(room), WIDTH, &fresh);
         // Less than every effect must explain need not be converged.
-        let least = FLOOR * (calibrated.cost - current.cost);
+        let missed = current.asked.iter().map(|c| c.kind().probe().missed);
+        let least = missed.fold(0.0, f64::max) * (calibrated.cost - current.cost);
         let choices: Vec<Choice> = choices
             .into_iter()
             .filter(|c| c.gain > least * c.members.len() as f64)
@@ -422,12 +454,18 @@ impl<'a, const N: usize> Study<'a, N> {
         calibrated: &Fitted<N>,
         scale: f64,
     ) -> Result<Settled<'a, N>, GapError> {
-        let least = FLOOR * (calibrated.cost - fitted.cost);
         while !fitted.asked.is_empty() {
             let mut weakest: Option<(f64, Fitted<N>)> = None;
-            for slot in 0..fitted.asked.len() {
-                let less = self.without(&fitted, slot, &anchor)?;
-                let gain = less.cost - fitted.cost;
+            let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
+            let without = without.collect::<Result<Vec<_>, _>>()?;
+            let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
+            for (slot, less) in without.into_iter().enumerate() {
+                let gain = gains[slot];
+                // Less may be the imperfect shape of another one.
+                let others = (0..gains.len()).filter(|&o| o != slot);
+                let least = others
+                    .map(|o| fitted.asked[o].kind().probe().missed * gains[o])
+                    .fold(FLOOR * (calibrated.cost - fitted.cost), f64::max);
                 let worth = gain / scale - fitted.asked[slot].price;
                 let worth = if gain < least {
                     worth.min(gain - least)

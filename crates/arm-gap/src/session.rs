@@ -38,8 +38,10 @@ pub enum Sight {
 /// A promise of the calibration is kept within this share of the tolerance (standard deviation): twice as far is the
 /// tolerance itself.
 const KEPT: f64 = 0.5;
-/// Relative standard deviation of what the model says of its own effects.
+/// Relative standard deviation of what the model says of its own effects, and of the compliance of its contact.
 const KNOWN: f64 = 0.05;
+/// Relative standard deviation of what the model says of the damping of its contact.
+const DAMPED: f64 = 0.3;
 
 impl<const N: usize> Session<N> {
     /// Number of channels.
@@ -85,6 +87,7 @@ impl<const N: usize> Session<N> {
         }
         Hypothesis {
             segments: [[0.0; 3]; N],
+            contact: [[0.0; 2]; 2],
             shift: [0.0; 2],
             placement: [0.0; 2],
             known: self.effects.clone(),
@@ -145,6 +148,8 @@ impl<const N: usize> Session<N> {
         if self.sight == Sight::Led {
             let sd = KEPT * self.tolerance.handle_placement;
             for axis in 0..2 {
+                add(Target::Contact(0, axis), KNOWN, -0.9, 9.0);
+                add(Target::Contact(1, axis), DAMPED, -0.9, 9.0);
                 add(Target::Shift(axis), sd, f64::NEG_INFINITY, f64::INFINITY);
             }
         }

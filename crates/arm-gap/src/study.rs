@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use arm_core::effect::{Local, Place};
+use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::groups::groups;
 use crate::hypothesis::Hypothesis;
-use crate::misfit::{orthogonal, project_off};
-use crate::noise::{Noise, Stretches};
+use crate::noise::{Noise, Stretches, dot};
+use crate::normal::factor;
 use crate::predict::{Channels, Course};
 use crate::session::Session;
 use crate::threads;
@@ -95,6 +96,8 @@ impl<'a, const N: usize> Study<'a, N> {
     pub fn measure_noise(&mut self, anchor: &Anchor<N>) -> Result<(), GapError> {
         let channels = self.session.channels();
         let mut deviations = Vec::new();
+        // For each deviation what a trial may differ by without noise.
+        let mut shifts: Vec<Arc<Vec<Vec<Vec<f64>>>>> = Vec::new();
         for group in 0..self.references.len() {
             let members: Vec<usize> = (0..self.fitted.len())
                 .filter(|&m| self.group_of[self.fitted[m]] == group)
@@ -113,13 +116,13 @@ impl<'a, const N: usize> Study<'a, N> {
                 .iter()
                 .map(|&m| flat(&anchor.residuals[m], stretches))
                 .collect();
-            let columns: Vec<Vec<Vec<f64>>> = anchor
-                .own
-                .iter()
-                .map(|r| flat(&r.0[group], stretches))
-                .collect();
+            let own = anchor.own.iter();
+            let columns = Arc::new(
+                own.map(|r| flat(&r.0[group], stretches))
+                    .collect::<Vec<_>>(),
+            );
             for one in &picked {
-                let mut deviation: Vec<Vec<f64>> = (0..channels)
+                let deviation: Vec<Vec<f64>> = (0..channels)
                     .map(|c| {
                         let mean =
                             |i: usize| picked.iter().map(|p| p[c][i]).sum::<f64>() / n as f64;
@@ -128,8 +131,8 @@ impl<'a, const N: usize> Study<'a, N> {
                             .collect()
                     })
                     .collect();
-                remove(&mut deviation, &columns);
                 deviations.push(deviation);
+                shifts.push(Arc::clone(&columns));
             }
         }
         self.repeated = !deviations.is_empty();
@@ -148,11 +151,55 @@ impl<'a, const N: usize> Study<'a, N> {
             })
             .collect();
         self.noise = if self.repeated {
-            Noise::of(&deviations, &range)?
+            self.noise_of(&deviations, &shifts, &range)?
         } else {
             Noise::without_repeats(&deviations, &range)?
         };
         Ok(())
+    }
+
+    /// The noise of deviations, and how far each is shifted, found in turns: as much is taken for a shift as the noise and
+    /// what is known of shifts allow.
+    fn noise_of(
+        &self,
+        deviations: &[Vec<Vec<f64>>],
+        shifts: &[Arc<Vec<Vec<Vec<f64>>>>],
+        range: &[f64],
+    ) -> Result<Noise, GapError> {
+        const TURNS: usize = 3;
+        let known: Vec<f64> = self
+            .session
+            .by_trial()
+            .iter()
+            .map(|c| c.prior.map_or(f64::INFINITY, |(_, sd)| sd))
+            .collect();
+        let mut noise = Noise::of(deviations, range)?;
+        for _ in 0..TURNS {
+            if known.is_empty() {
+                break;
+            }
+            let mut clean = deviations.to_vec();
+            for (deviation, columns) in clean.iter_mut().zip(shifts) {
+                let row = noise.whiten_thinned(deviation);
+                let each = columns.iter().map(|c| noise.whiten_thinned(c));
+                let whitened: Vec<Vec<f64>> = each.collect();
+                let k = known.len();
+                let gram = DMatrix::from_fn(k, k, |a, b| {
+                    let own = if a == b { known[a].powi(-2) } else { 0.0 };
+                    dot(&whitened[a], &whitened[b]) + own
+                });
+                let score = DVector::from_fn(k, |a, _| dot(&whitened[a], &row));
+                let Some(solver) = factor(gram) else { continue };
+                for (share, column) in solver.solve(&score).iter().zip(columns.iter()) {
+                    let values = column.iter().flatten();
+                    for (value, shift) in deviation.iter_mut().flatten().zip(values) {
+                        *value -= share * shift;
+                    }
+                }
+            }
+            noise = Noise::of(&clean, range)?;
+        }
+        Ok(noise)
     }
 
     /// Leaves out the samples at which a joint with dry friction rests, or reverses: there friction is whatever holds it.
@@ -273,33 +320,4 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
 pub fn flat(channels: &Channels, stretches: &Stretches) -> Vec<Vec<f64>> {
     let one = |c: &Vec<f64>| stretches.pick(c).into_iter().flatten().collect();
     channels.iter().map(one).collect()
-}
-
-/// Takes the least-squares share of columns out of a set of channels, each channel weighed by its own size.
-fn remove(channels: &mut [Vec<f64>], columns: &[Vec<Vec<f64>>]) {
-    let weight = |c: &Vec<f64>| {
-        let square: f64 = c.iter().map(|v| v * v).sum();
-        if square > 0.0 {
-            libm::sqrt(c.len() as f64 / square)
-        } else {
-            0.0
-        }
-    };
-    let weights: Vec<f64> = channels.iter().map(weight).collect();
-    let weighed = |channels: &[Vec<f64>]| -> Vec<f64> {
-        let each = std::iter::zip(channels, &weights);
-        each.flat_map(|(c, w)| c.iter().map(move |v| w * v))
-            .collect()
-    };
-    let basis = orthogonal(columns.iter().map(|c| weighed(c)).collect());
-    let mut rows = weighed(channels);
-    project_off(&mut rows, &basis);
-    let mut rest = rows.into_iter();
-    for (channel, weight) in channels.iter_mut().zip(&weights) {
-        for (value, row) in channel.iter_mut().zip(rest.by_ref()) {
-            if *weight > 0.0 {
-                *value = row / weight;
-            }
-        }
-    }
 }

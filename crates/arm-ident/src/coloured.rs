@@ -88,7 +88,8 @@ impl AutoRegression {
     /// # Errors
     /// As [`AutoRegression::yule_walker`].
     pub fn burg(series: &[&[f64]], order: usize) -> Result<Self, IdentError> {
-        Ok(burg_path(series, order)?.pop().unwrap_or(Self {
+        let path = burg_path(prepared(series, order)?, order);
+        Ok(path.last().cloned().unwrap_or(Self {
             coefficients: Vec::new(),
             sd: 0.0,
         }))
@@ -99,6 +100,20 @@ impl AutoRegression {
     /// # Errors
     /// As [`AutoRegression::yule_walker`], with `most` for the order.
     pub fn selected(series: &[&[f64]], most: usize) -> Result<Self, IdentError> {
+        Ok(Self::best(burg_path(prepared(series, most)?, most), series))
+    }
+
+    /// The same for series whose mean is known to be zero. A mean that is taken out of short series takes slow noise with it.
+    ///
+    /// # Errors
+    /// As [`AutoRegression::selected`].
+    pub fn selected_about_zero(series: &[&[f64]], most: usize) -> Result<Self, IdentError> {
+        prepared(series, most)?;
+        let plain = series.iter().map(|s| s.to_vec()).collect();
+        Ok(Self::best(burg_path(plain, most), series))
+    }
+
+    fn best(path: Vec<Self>, series: &[&[f64]]) -> Self {
         let n: usize = series.iter().map(|s| s.len()).sum();
         let criterion = |model: &Self| {
             let k = model.coefficients.len() as f64 + 1.0;
@@ -106,18 +121,18 @@ impl AutoRegression {
             2.0 * n * libm::log(model.sd.max(f64::MIN_POSITIVE))
                 + 2.0 * k * n / (n - k - 1.0).max(1.0)
         };
-        let mut path = burg_path(series, most)?.into_iter();
+        let mut path = path.into_iter();
         let first = path.next().unwrap_or(Self {
             coefficients: Vec::new(),
             sd: 0.0,
         });
-        Ok(path.fold(first, |best, model| {
+        path.fold(first, |best, model| {
             if criterion(&model) < criterion(&best) {
                 model
             } else {
                 best
             }
-        }))
+        })
     }
 
     /// Variance of the mean of many samples times their number: `sd² / (1 − Σ a)²`.
@@ -128,8 +143,7 @@ impl AutoRegression {
 }
 
 /// Burg's models of order 0, 1, … `order`.
-fn burg_path(series: &[&[f64]], order: usize) -> Result<Vec<AutoRegression>, IdentError> {
-    let mut forward = prepared(series, order)?;
+fn burg_path(mut forward: Vec<Vec<f64>>, order: usize) -> Vec<AutoRegression> {
     let mut backward = forward.clone();
     let total: usize = forward.iter().map(Vec::len).sum();
     let mut variance = forward.iter().fold(0.0, |sum, x| sum + dot(x, x)) / total as f64;
@@ -165,7 +179,7 @@ fn burg_path(series: &[&[f64]], order: usize) -> Result<Vec<AutoRegression>, Ide
             sd: variance.max(0.0).sqrt(),
         });
     }
-    Ok(path)
+    path
 }
 
 /// Turns a stationary autoregressive series into white noise of unit variance. Applied alike to the residual (or right-hand side) and to every regressor column

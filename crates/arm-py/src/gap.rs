@@ -277,6 +277,7 @@ fn fitted<'py, const N: usize>(
     let out = PyDict::new(py);
     out.set_item("cost", fitted.cost)?;
     out.set_item("segments", h.segments.map(|s| s.to_vec()).to_vec())?;
+    out.set_item("contact", h.contact)?;
     out.set_item("shift", h.shift)?;
     out.set_item("known", list(&h.known))?;
     out.set_item("calibration", list(&h.calibration))?;
@@ -292,6 +293,7 @@ fn unknown<const N: usize>(
 ) -> Option<(&'static str, usize, usize, f64, f64, f64)> {
     let (what, index, part) = match c.target {
         Target::Segment(k, part) => (["mass", "com", "inertia"][part.min(2)], k, part),
+        Target::Contact(part, axis) => (["compliance", "damping"][part.min(1)], 0, axis),
         Target::Shift(axis) => ("shift", 0, axis),
         Target::Placement(axis) => ("placement", 0, axis),
         Target::Known(e, p) => ("known", e, p),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..catalogue import catalogue
 from ..dataset import Dataset
-from ..model import Effect, Joint, Model, Segment
+from ..model import Contact, Effect, Joint, Model, Segment
 from ..rig import all_effects
 from ..trial import Trial
 from . import maps
@@ -142,6 +142,8 @@ def _absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
             name = f"{parameter.name} of {_worded(effect.kind, effect.joint, effect.channel)}"
             given = effect.parameters.get(parameter.name, parameter.default)
             items.append(Absorbed(name, value / given - 1.0, 2 * before / abs(given), "of its value"))
+        elif what in ("compliance", "damping"):
+            items.append(Absorbed(f"{what} of the contact, {'yz'[part]}", value, 2 * before, "of its value"))
         elif what == "shift":
             items.append(Absorbed(f"place of the robot, {'yz'[part]}", value, 2 * before, "m"))
         elif what in catalogue():
@@ -179,7 +181,14 @@ def _amended(model: Model, amended: Mapping[str, Any]) -> Model:
         if joint.coulomb:
             values["coulomb"] = next(rest).parameters["torque"]
         joints.append(Joint(**values))
-    return model.replace(segments=segments, joints=tuple(joints), effects=(*rest, *map(_effect, amended["named"])))
+    contact = model.contact
+    if contact is not None:
+        compliance, damping = amended["contact"]
+        contact = Contact(
+            (contact.stiffness[0] / (1 + compliance[0]), contact.stiffness[1] / (1 + compliance[1])),
+            (contact.damping[0] * (1 + damping[0]), contact.damping[1] * (1 + damping[1])),
+        )
+    return model.replace(segments=segments, joints=tuple(joints), contact=contact, effects=(*rest, *map(_effect, amended["named"])))
 
 
 def _effect(entry: Sequence[Any]) -> Effect:

@@ -24,7 +24,8 @@ impl Law for Biarticular {
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[1.0, 0.5]))])
-        .resting(2)]);
+        .resting(2)
+        .refining(&[1])]);
     const CROSSES: bool = true;
 
     #[inline]

@@ -21,7 +21,7 @@ impl Law for Coulomb {
         ],
         memory: false,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]);
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

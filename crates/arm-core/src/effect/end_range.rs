@@ -30,7 +30,8 @@ impl Law for EndRange {
         Question::of(&[1])
             .shaped(&[(2, Values::Each(&[5.0, 8.0, 12.0])), (4, Values::Lowest)])
             .refining(&[2]),
-    ]);
+    ])
+    .missing(0.05);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -24,7 +24,7 @@ impl Law for LoadFriction {
         memory: false,
     };
     const FEELS_FORCE: bool = true;
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]);
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -9,6 +9,8 @@ pub struct Probe {
     pub nature: Nature,
     /// What of it the calibration of a rig promises to be small.
     pub promise: Option<Promise>,
+    /// Share of what it shows (as a sum of squares) that its law may miss: much for laws that stand for a family of shapes.
+    pub missed: f64,
 }
 
 /// How an effect comes and goes.
@@ -108,11 +110,17 @@ impl Probe {
             questions,
             nature: Nature::Lasting,
             promise: None,
+            missed: 0.005,
         }
     }
 
     /// Whether its first parameter is there.
     pub const FIRST: Self = Self::lasting(&[Question::of(&[0])]);
+
+    /// With a law that may miss a share of what it shows.
+    pub const fn missing(self, missed: f64) -> Self {
+        Self { missed, ..self }
+    }
 
     /// What the calibration promises to be small.
     pub const fn promised(self, promise: Promise) -> Self {

@@ -26,7 +26,8 @@ impl Law for StretchReflex {
             (1, Values::Each(&[0.15, 0.3, 0.5])),
             (2, Values::Each(&[1.0, -1.0, 0.0])),
         ])
-        .refining(&[1])]);
+        .refining(&[1])])
+    .missing(0.1);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

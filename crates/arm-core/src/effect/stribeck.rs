@@ -26,7 +26,8 @@ impl Law for Stribeck {
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])
-        .refining(&[1, 2])]);
+        .refining(&[1, 2])])
+    .missing(0.05);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

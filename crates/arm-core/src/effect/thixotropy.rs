@@ -32,7 +32,8 @@ impl Law for Thixotropy {
             (3, Values::Each(&[0.03, 0.1, 0.3])),
             (4, Values::Each(&[1.0, 3.0, 10.0])),
         ])
-        .refining(&[3, 4])]);
+        .refining(&[3, 4])])
+    .missing(0.05);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
