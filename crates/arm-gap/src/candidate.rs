@@ -5,8 +5,6 @@ use arm_core::effect::{
 };
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 
-use arm_ident::trial::Trial;
-
 use crate::GapError;
 use crate::anchor::{Anchor, Change, Response};
 use crate::hypothesis::{Coordinate, Target};
@@ -191,7 +189,7 @@ impl Library {
 fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
     let led = session.sight == Sight::Led;
     // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them.
-    let swings_freely = session.trials.iter().all(Trial::is_unloaded);
+    let swings_freely = session.swings_freely();
     match kind.info().place {
         Place::Segment | Place::Hand | Place::Frame if swings_freely => 0..0,
         Place::Joint => usize::from(kind.crosses())..N,

@@ -176,6 +176,44 @@ impl<'a, const N: usize> Study<'a, N> {
         })
     }
 
+    /// Squares of what a fitted hypothesis leaves of each cluster when the others alone decide its numbers, to first order.
+    ///
+    /// # Errors
+    /// As [`Study::equations`].
+    pub fn foretold(&self, anchor: &Anchor<N>, fitted: &Fitted<N>) -> Result<f64, GapError> {
+        let hypothesis = &fitted.hypothesis;
+        let (coordinates, clusters) = self.equations(anchor, fitted, &[])?;
+        let known = priors(hypothesis, &coordinates);
+        let mut sum = 0.0;
+        for (out, cluster) in clusters.iter().enumerate() {
+            let others: Vec<Cluster> = clusters
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| *i != out)
+                .map(|(_, c)| c.clone())
+                .collect();
+            let mut normal = Normal::new(&others, &known);
+            let usable: Vec<usize> = (0..coordinates.len())
+                .filter(|&i| normal.gram[(i, i)] > 0.0)
+                .collect();
+            regularise(&mut normal.gram, hypothesis, &coordinates);
+            let bounds = |i: usize| {
+                let c = &coordinates[usable[i]];
+                let value = hypothesis.get(c.target);
+                (c.lower - value, c.upper - value)
+            };
+            let steps = solve(&normal.gram, &normal.score, &usable, &bounds);
+            let steps = steps.map_or(vec![0.0; usable.len()], |(steps, _)| steps);
+            sum += cluster.square;
+            for (&i, a) in usable.iter().zip(&steps) {
+                let row = usable.iter().zip(&steps);
+                let product = row.fold(0.0, |s, (&j, b)| s + cluster.gram[(i, j)] * b);
+                sum += a * (product - 2.0 * cluster.score[i]);
+            }
+        }
+        Ok(sum)
+    }
+
     /// Fits a hypothesis, simulating it anew from where the fit ended until that changes nothing.
     ///
     /// # Errors

@@ -70,6 +70,27 @@ impl Stretches {
         self.0.is_empty()
     }
 
+    /// Parts of the same number of samples, in order; the last may be shorter.
+    pub fn parts(&self, count: usize) -> Vec<Self> {
+        let size = self.len().div_ceil(count.max(1)).max(1);
+        let mut parts: Vec<Self> = Vec::new();
+        let mut seen = 0;
+        for stretch in &self.0 {
+            let mut rest = stretch.as_slice();
+            while !rest.is_empty() {
+                if seen % size == 0 {
+                    parts.push(Self(Vec::new()));
+                }
+                let (head, tail) = rest.split_at((size - seen % size).min(rest.len()));
+                if let Some(Self(part)) = parts.last_mut() {
+                    part.push(head.to_vec());
+                }
+                (seen, rest) = (seen + head.len(), tail);
+            }
+        }
+        parts
+    }
+
     /// The values of one channel at the samples, stretch by stretch.
     pub fn pick(&self, channel: &[f64]) -> Vec<Vec<f64>> {
         let at = |s: &Vec<usize>| s.iter().map(|&i| channel[i]).collect();

@@ -10,9 +10,15 @@ use crate::normal::{Cluster, factor};
 use crate::predict::Channels;
 use crate::study::Study;
 
+/// Parts of a trial that are predicted from each other where no movement is repeated.
+pub const PARTS: usize = 5;
+
 /// Fitted trials of one movement that are compared at the same samples.
 struct Class {
+    /// The movement, or one part of a trial where no movement is repeated.
     group: usize,
+    /// The movement in whose reference columns are computed.
+    reference: usize,
     stretches: Stretches,
     /// Positions in the list of fitted trials.
     members: Vec<usize>,
@@ -38,6 +44,20 @@ impl Rows {
         let mut classes: Vec<Class> = Vec::new();
         for (m, &trial) in study.fitted.iter().enumerate() {
             let (group, stretches) = (study.group_of[trial], &study.stretches[trial]);
+            if !study.repeated {
+                // Parts of a trial stand in for the repeats that are not there.
+                for part in stretches.parts(PARTS) {
+                    classes.push(Class {
+                        group: classes.len(),
+                        reference: group,
+                        stretches: part,
+                        members: vec![m],
+                        columns: Vec::new(),
+                        products: DMatrix::zeros(0, 0),
+                    });
+                }
+                continue;
+            }
             let known = classes
                 .iter_mut()
                 .find(|c| c.group == group && c.stretches == *stretches);
@@ -45,6 +65,7 @@ impl Rows {
                 Some(class) => class.members.push(m),
                 None => classes.push(Class {
                     group,
+                    reference: group,
                     stretches: stretches.clone(),
                     members: vec![m],
                     columns: Vec::new(),
@@ -168,7 +189,9 @@ impl Rows {
 
 impl Class {
     fn whitened<const N: usize>(&self, study: &Study<N>, response: &Response) -> Vec<f64> {
-        study.noise.whiten(&response.0[self.group], &self.stretches)
+        study
+            .noise
+            .whiten(&response.0[self.reference], &self.stretches)
     }
 }
 

@@ -244,8 +244,12 @@ impl<'a, const N: usize> Study<'a, N> {
             else {
                 break;
             };
+            // What can be followed but not simulated is no answer.
+            let Ok(settled) = self.settle(better.hypothesis, better.asked) else {
+                break;
+            };
             ladder.push(rung);
-            (current, anchor) = self.settle(better.hypothesis, better.asked)?;
+            (current, anchor) = settled;
             (current, anchor) = self.pruned((current, anchor), &calibrated, scale)?;
             if self.leave_out_rest(&anchor) {
                 self.measure_noise(&self.anchor(&current.hypothesis)?)?;
@@ -255,11 +259,8 @@ impl<'a, const N: usize> Study<'a, N> {
                 let settled = self.settle(current.hypothesis, current.asked)?;
                 (current, anchor) = self.pruned(settled, &calibrated, scale)?;
             }
-            if !self.repeated {
-                self.measure_noise(&anchor)?;
-                (current, anchor) = self.settle(current.hypothesis, current.asked)?;
-            }
-            if current.asked.len() >= MOST {
+            // Without repeats a second look has only its own residual to tell noise from what the model lacks.
+            if current.asked.len() >= MOST || !self.repeated {
                 break;
             }
         }
@@ -422,7 +423,7 @@ impl<'a, const N: usize> Study<'a, N> {
         best
     }
 
-    /// A fitted hypothesis without the effect at a place, fitted again.
+    /// A fitted hypothesis without the effect at a place, fitted again; of infinite cost where nothing goes without it.
     fn without(
         &self,
         fitted: &Fitted<N>,
@@ -439,7 +440,18 @@ impl<'a, const N: usize> Study<'a, N> {
                 hypothesis.segments = [[0.0; 3]; N];
                 match self.fit(anchor, hypothesis.clone(), asked.clone()) {
                     // Or too far away to be followed.
-                    Err(GapError::Simulation { .. }) => Ok(self.settle(hypothesis, asked)?.0),
+                    Err(GapError::Simulation { .. }) => {
+                        let settled = self.settle(hypothesis.clone(), asked.clone());
+                        Ok(settled.map_or_else(
+                            |_| Fitted {
+                                hypothesis,
+                                asked,
+                                cost: f64::INFINITY,
+                                residuals: fitted.residuals.clone(),
+                            },
+                            |(less, _)| less,
+                        ))
+                    }
                     other => other,
                 }
             }
@@ -459,10 +471,20 @@ impl<'a, const N: usize> Study<'a, N> {
             let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
             let without = without.collect::<Result<Vec<_>, _>>()?;
             let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
+            // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
+            let foretold = match self.repeated {
+                true => None,
+                false => Some(self.foretold(&anchor, &fitted)?),
+            };
             for (slot, less) in without.into_iter().enumerate() {
-                let gain = gains[slot];
+                let mut gain = gains[slot];
+                if let Some(with) = foretold
+                    && gain.is_finite()
+                {
+                    gain = gain.min(self.foretold(&anchor, &less)? - with);
+                }
                 // Less may be the imperfect shape of another one.
-                let others = (0..gains.len()).filter(|&o| o != slot);
+                let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
                 let least = others
                     .map(|o| fitted.asked[o].kind().probe().missed * gains[o])
                     .fold(FLOOR * (calibrated.cost - fitted.cost), f64::max);
@@ -503,12 +525,12 @@ impl<'a, const N: usize> Study<'a, N> {
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 );
                 let less = self.without(&fitted, slot, &anchor)?;
-                let gain = less.cost - fitted.cost;
+                let gain = (less.cost - fitted.cost).min(f64::MAX);
                 let rivals = match library {
-                    Some(library) => {
+                    Some(library) if less.cost.is_finite() => {
                         self.rivals(&fitted, (slot, &less), (&anchor, library), scale)?
                     }
-                    None => Vec::new(),
+                    _ => Vec::new(),
                 };
                 if exchanges < EXCHANGES
                     && let Some(better) = rivals.iter().find(|r| r.alternative.worse < -0.05)
