@@ -1,6 +1,6 @@
 """Check a plan by repetition: predicted standard deviations beside the scatter of what is identified.
 
-    python scripts/check_plan.py [repetitions] [evaluations]
+    python scripts/check_plan.py [repetitions] [evaluations] [segments]
 
 Each repetition draws the believed masses, centres of mass and inertias and the calibration from what is promised of them, simulates the
 planned trials with noise, and identifies. Shared by tests/test_plan.py.
@@ -23,10 +23,26 @@ UNCERTAINTY = 0.1
 THESIS = Movement(np.radians([[-60.0, 50.0], [-48.6, 61.5], [-60.0, 50.0]]), speed=0.2, acceleration=0.6)
 """The composite movement of thesis figure 3.12: 11.4° and 11.5°."""
 LIMITS = Limits(((-1.4, -0.17), (0.35, 1.92)), speed=2.5, acceleration=10.0)
+THREE_THESIS = Movement(np.radians([[-60.0, 60.0, 0.0], [-48.0, 63.4, 1.8], [-60.0, 60.0, 0.0]]), speed=0.2, acceleration=0.6)
+"""The same of the human arm: 12°, 3.4° and 1.8°."""
+THREE_LIMITS = Limits(((-1.4, -0.17), (0.35, 1.92), (-0.2, 0.2)), speed=2.5, acceleration=10.0)
 
 
-def truth() -> Model:
-    """Return the mechanical arm with brakes and some viscosity, in the fitted effects of which nothing is at a bound."""
+def truth(segments: int = 2) -> Model:
+    """Return an arm with friction and some viscosity, in the fitted effects of which nothing is at a bound.
+
+    Two segments are the mechanical arm with its brakes, three the human arm of table 4.10 with the hand strapped to the handle.
+    """
+    if segments == 3:
+        from armrs.reproduce.people import TABLE_4_10, WORKING_ROBOT
+
+        joints = (
+            Joint("shoulder", viscosity=0.20, coulomb=0.20),
+            Joint("elbow", viscosity=0.15, coulomb=0.15),
+            Joint("wrist", viscosity=0.10, coulomb=0.05, stiffness=12.0),
+        )
+        contact = true_model().contact
+        return Model(TABLE_4_10, joints, segment_uncertainty=UNCERTAINTY, robot=WORKING_ROBOT, contact=contact)
     arm = true_model()
     joints = tuple(Joint(j.name, viscosity=v, coulomb=j.coulomb) for j, v in zip(arm.joints, (0.10, 0.06), strict=True))
     return arm.replace(joints=joints, segment_uncertainty=UNCERTAINTY)
@@ -38,7 +54,7 @@ def repetition(arm: Model, planned: Plan, seed: int) -> dict[tuple[str, int | No
     faults = [
         *(
             Effect("angle_offset", j, parameters={"offset": np.radians(TOLERANCE.angle_offset_deg) * draw.standard_normal()})
-            for j in (1, 2)
+            for j in range(1, arm.n_joints + 1)
         ),
         *(Effect("force_bias", channel=c, parameters={"bias": TOLERANCE.force_bias_N * draw.standard_normal()}) for c in ("Fy", "Fz")),
         *(Effect("force_gain", channel=c, parameters={"gain": TOLERANCE.force_gain * draw.standard_normal()}) for c in ("Fy", "Fz")),
@@ -59,18 +75,20 @@ def repetition(arm: Model, planned: Plan, seed: int) -> dict[tuple[str, int | No
         com = s.mass * s.com * (1 + np.sqrt(2.0) * UNCERTAINTY * b) / mass
         about = (s.inertia + s.mass * s.com**2) * (1 + 2.0 * UNCERTAINTY * c)
         segments.append(Segment(s.name, s.length, mass, min(com, s.length), max(about - mass * com**2, 1e-5)))
-    believed = arm.replace(segments=tuple(segments), joints=tuple(Joint(j.name, viscosity=0.01, coulomb=0.01) for j in arm.joints))
+    joints = tuple(Joint(j.name, viscosity=0.01, coulomb=0.01, stiffness=0.9 * j.stiffness) for j in arm.joints)
+    believed = arm.replace(segments=tuple(segments), joints=joints)
     found = armrs.identify(Dataset("planned", believed, tuple(trials), "robot", tolerance=TOLERANCE, synthetic=True))
     listed = [*found.combinations, *(p for p in found.parameters if p.kind not in ("segment", "combination"))]
     return {(e.name, e.joint if e.kind not in ("segment", "combination") else None): e.value for e in listed}
 
 
-def compare(repetitions: int, evaluations: int) -> tuple[Plan, Plan, list[tuple[str, float, float, float, float]]]:
+def compare(repetitions: int, evaluations: int, segments: int = 2) -> tuple[Plan, Plan, list[tuple[str, float, float, float, float]]]:
     """Return plan, thesis' movement, and for each parameter name, value, predicted and found standard deviation, and bias."""
-    arm = truth()
+    arm = truth(segments)
+    limits, movement = (THREE_LIMITS, THREE_THESIS) if segments == 3 else (LIMITS, THESIS)
     instruments = Instruments(tolerance=TOLERANCE)
-    planned = plan(arm, LIMITS, evaluations=evaluations, instruments=instruments)
-    thesis = forecast(arm, [THESIS], repeats=10, instruments=instruments)
+    planned = plan(arm, limits, evaluations=evaluations, instruments=instruments)
+    thesis = forecast(arm, [movement], repeats=10, instruments=instruments)
     found = [repetition(arm, planned, seed) for seed in range(1, repetitions + 1)]
     rows = []
     for p in planned.predictions:
@@ -82,8 +100,9 @@ def compare(repetitions: int, evaluations: int) -> tuple[Plan, Plan, list[tuple[
 
 def main() -> None:
     """Print the comparison."""
-    repetitions, evaluations = (int(a) for a in (*sys.argv[1:], "200", "300")[:2])
-    planned, thesis, rows = compare(repetitions, evaluations)
+    given = [int(a) for a in sys.argv[1:]]
+    repetitions, evaluations, segments = (*given, *(200, 300, 2)[len(given) :])
+    planned, thesis, rows = compare(repetitions, evaluations, segments)
     for name, p in (("thesis", thesis), ("plan", planned)):
         print(f"{name}: worst relative deviation {p.worst:.4f} in {p.duration:.0f} s")
     for name, value, predicted, scatter, bias in rows:

@@ -415,6 +415,7 @@ def plan(
     ] = "",
     speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint [rad/s].")] = 2.0,
     acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint [rad/s²].")] = 8.0,
+    robot_speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint of the robot [rad/s].")] = 4.0,
     force_n: Annotated[float, typer.Option(help="Largest force on the arm [N].")] = 60.0,
     duration_s: Annotated[float, typer.Option(help="Longest trial [s].")] = 20.0,
     repeats: Annotated[int, typer.Option(help="Trials of each movement.")] = 5,
@@ -433,7 +434,7 @@ def plan(
 
     folder = _folder(out, json)
     arm = load_model(model)
-    limits = planning.Limits(planning.angles_of(angles_deg), speed_rad_s, acceleration_rad_s2, force_n, duration_s)
+    limits = planning.Limits(planning.angles_of(angles_deg), speed_rad_s, acceleration_rad_s2, robot_speed_rad_s, force_n, duration_s)
     other = None if compare is None else load_movement(compare, arm.n_joints)
     kinds = _listed(with_)
     with console.progress("planning"):
@@ -676,6 +677,7 @@ def run() -> None:
 
 _OPTIONS = {
     "with_effects": "--with", "cutoff": "--cutoff-hz", "rate": "--rate-hz", "duration": "--duration-s",
+    "robot_speed": "--robot-speed-rad-s",
     **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "integrator", "level", "method", "motion")},
 }  # fmt: skip
 """What the command line calls an argument of a function."""

@@ -12,6 +12,7 @@ import numpy as np
 from . import _armrs, checks, files, tomlfile
 from .dataset import Tolerance
 from .errors import BadInput, Text
+from .experiment import Safety
 from .identification import core_settings, effects_of
 from .model import Model
 from .rig import rig
@@ -53,6 +54,8 @@ class Limits:
         Smallest and largest angle of each joint [rad].
     speed, acceleration : float
         Largest of any joint [rad/s, rad/s²].
+    robot_speed : float
+        Largest of any joint of the robot, where the model has one [rad/s]; that of the laboratory's supervisor when absent.
     force : float
         Largest force on the arm [N].
     duration : float
@@ -62,6 +65,7 @@ class Limits:
     angles: tuple[tuple[float, float], ...]
     speed: float = 2.0
     acceleration: float = 8.0
+    robot_speed: float = Safety.speed_rad_s
     force: float = 60.0
     duration: float = 20.0
 
@@ -112,8 +116,8 @@ class Plan:
     predictions : tuple of Prediction
     worst : float
         The worst relative standard deviation from the data alone.
-    force, speed : float
-        Largest force on the arm [N] and largest speed of a joint [rad/s].
+    force, speed, robot_speed : float
+        Largest force on the arm [N], largest speed of a joint, and of a joint of the robot, zero without one [rad/s].
     duration : float
         Of all trials together [s].
     model : Model
@@ -125,6 +129,7 @@ class Plan:
     worst: float
     force: float
     speed: float
+    robot_speed: float
     duration: float
     model: Model = field(repr=False)
 
@@ -149,6 +154,7 @@ class Plan:
             "worst_relative_std": self.worst,
             "largest_force_N": self.force,
             "largest_speed_rad_s": self.speed,
+            "largest_robot_speed_rad_s": self.robot_speed,
             "duration_s": self.duration,
         }
 
@@ -220,7 +226,7 @@ def plan(
     model : Model
         The arm as it is believed to be. Its robot, where there is one, has to reach every place of the path.
     limits : Limits
-        Of joints, speed, acceleration, force and duration.
+        Of joints, speed, acceleration, the robot, force and duration.
     speeds : sequence of float
         One movement for each, at this share of the largest speed and acceleration.
     waypoints : int
@@ -255,6 +261,7 @@ def plan(
         "angle": angles,
         "speed": checks.number("speed", limits.speed, above=0.0, most=100.0, unit="rad/s"),
         "acceleration": checks.number("acceleration", limits.acceleration, above=0.0, most=1e4, unit="rad/s²"),
+        "robot_speed": checks.number("robot_speed", limits.robot_speed, above=0.0, most=100.0, unit="rad/s"),
         "force": checks.number("force", limits.force, above=0.0, unit="N"),
         "duration": checks.number("duration", limits.duration, above=0.0, most=600.0, unit="s"),
         "speeds": [checks.number("speeds", v, above=0.0, most=1.0) for v in speeds],
@@ -334,7 +341,7 @@ class _Question:
             repeats=self.repeats,
             predictions=tuple(predictions),
             model=self.model,
-            **{key: raw[key] for key in ("worst", "force", "speed", "duration")},
+            **{key: raw[key] for key in ("worst", "force", "speed", "robot_speed", "duration")},
         )
 
 

@@ -22,6 +22,7 @@ pub mod constraint;
 pub mod design;
 pub mod equation;
 pub mod estimate;
+pub mod forecast;
 pub mod joint;
 pub mod motion;
 pub mod quasi_static;

@@ -1,7 +1,8 @@
 //! Plans: what movements will show, and movements that show much.
 
 use arm_core::{Chain, Joints, Shape};
-use arm_ident::design::{Accuracy, Allowed, Forecast, Question, Task, design, forecast};
+use arm_ident::design::{Allowed, design};
+use arm_ident::forecast::{Accuracy, Forecast, Question, Task, forecast};
 use numpy::{PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -41,6 +42,7 @@ pub struct Bounds {
     angle: Vec<[f64; 2]>,
     speed: f64,
     acceleration: f64,
+    robot_speed: f64,
     force: f64,
     duration: f64,
     speeds: Vec<f64>,
@@ -139,6 +141,7 @@ pub fn design_py<'py>(
             angle,
             speed: bounds.speed,
             acceleration: bounds.acceleration,
+            robot_speed: bounds.robot_speed,
             force: bounds.force,
             duration: bounds.duration,
             speeds: bounds.speeds.clone(),
@@ -190,6 +193,7 @@ fn plain<'py>(py: Python<'py>, found: &Forecast) -> PyResult<Bound<'py, PyDict>>
     out.set_item("worst", found.worst())?;
     out.set_item("force", found.force)?;
     out.set_item("speed", found.speed)?;
+    out.set_item("robot_speed", found.robot_speed)?;
     out.set_item("duration", found.duration)?;
     out.set_item("durations", found.durations.clone())?;
     Ok(out)

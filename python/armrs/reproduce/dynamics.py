@@ -88,15 +88,14 @@ def at_four_speeds() -> Found:
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
     return Found(
         ours=(
-            f"At 0.25 rad/s inertial torques reach {slow[0]:.2f} N m, centrifugal and Coriolis torques together {slow[1]:.4f} N m. "
-            f"At 1 rad/s it is {fast[0]:.2f} and {fast[1]:.3f} N m, beside {np.abs(parts(runs[1.0])['gravity']).max():.1f} N m of gravity."
+            f"At 0.25 rad/s inertial torques reach {slow[0]:.2f} N m, centrifugal and Coriolis torques together {slow[1]:.4f} N m. At 1 "
+            f"rad/s it is {fast[0]:.2f} and {fast[1]:.3f} N m, beside {np.abs(parts(runs[1.0])['gravity']).max():.1f} N m of gravity."
         ),
         why=(
-            f"The inertial torque is of the printed size. That of the velocities is {slow[1] / PRINTED['velocity']:.0f} times the "
-            "printed one; both are "
-            "negligible at this speed. The thesis calls the diagonal of C centrifugal and the rest Coriolis; it is the other way round, "
-            "and "
-            "with the elbow moving alone nearly all is centrifugal. The elbow's range and the ramps are chosen, since they are not printed."
+            f"The inertial torque is of the printed size. That of the velocities is {slow[1] / PRINTED['velocity']:.0f} times the printed "
+            "one; both are negligible at this speed. The thesis calls the diagonal of C centrifugal and the rest Coriolis; it is the other "
+            "way round, and with the elbow moving alone nearly all is centrifugal. The elbow's range and the ramps are chosen, since they "
+            "are not printed."
         ),
         values={
             f"{name}_most_at_{speed:g}_rad_s_Nm": float(value)
@@ -134,9 +133,8 @@ def inertias() -> Found:
         ours="Transverse moments of inertia after de Leva for 77 kg: 0.0155, 0.0055 and 0.0030 kg m² with the handle.",
         why=(
             "The first two that are printed are those about the long axes of the segments, about which nothing turns in the plane; the "
-            "third "
-            "is that of a forearm. With the elbow moving alone this hardly shows, since the forearm's and the hand's errors cancel at the "
-            "elbow; in a movement of the shoulder it would."
+            "third is that of a forearm. With the elbow moving alone this hardly shows, since the forearm's and the hand's errors cancel "
+            "at the elbow; in a movement of the shoulder it would."
         ),
         sheets=[
             Sheet("Moments of inertia about the centre of mass [kg m²]", Table(["segment", "printed", "transverse", "ratio"], rows)),

@@ -128,15 +128,13 @@ def literature() -> Found:
         ]
     return Found(
         ours=(
-            "De Leva's tables for 77, 68 and 82 kg, which are the body masses behind m2_ref, with the handle of 0.277 kg and the "
-            "lengths of "
-            "table 4.10."
+            "De Leva's tables for 77, 68 and 82 kg, which are the body masses behind m2_ref, with the handle of 0.277 kg and the lengths "
+            "of table 4.10."
         ),
         why=(
             "Masses of the forearm agree. The printed hands carry a handle of 0.193 kg. The printed m1·l1 of the first subject (0.393) "
-            "belongs to 78 kg, the rest to 77 kg. First moments differ with the lengths, which are printed for one subject only. In "
-            "table 4.8 "
-            "l3_ref = 0.075 m does not fit m3·l3/m3 = 0.0707 m."
+            "belongs to 78 kg, the rest to 77 kg. First moments differ with the lengths, which are printed for one subject only. In table "
+            "4.8 l3_ref = 0.075 m does not fit m3·l3/m3 = 0.0707 m."
         ),
         sheets=[Sheet("References", Table(["body mass", "parameter", "printed", "ours"], rows, left=2))],
     )
@@ -187,32 +185,18 @@ def printed_tables() -> Found:
                     f"{x2:.3f}", f"{mean:.3f}",
                     f"{std:.3f}", f"{right_std:.4f}", percent, right, note or None,
                 ])  # fmt: skip
-        head = [
-            "configuration",
-            "parameter",
-            "reference",
-            "x1",
-            "x2",
-            "mean",
-            "σ printed",
-            "σ right",
-            "error printed [%]",
-            "right [%]",
-            "disagrees",
-        ]
+        head = ["no.", "parameter", "reference", "x1", "x2", "mean", "σ printed", "σ right", "error [%]", "right [%]", "wrong"]
         sheets.append(Sheet(f"Table {table}, subject {SUBJECTS[table]}", Table(head, rows, left=2)))
         figures += _bars(table, 29 + 2 * SUBJECTS[table])
     return Found(
         ours=(
             f"{bad[0]} of {cells[0]} printed deviations and {bad[1]} of {cells[1]} printed errors do not follow from the printed "
-            "measurements, rounding "
-            "allowed for. Figures 4.31 to 4.36 are drawn from the printed means, with the errors computed again."
+            "measurements, rounding allowed for. Figures 4.31 to 4.36 are drawn from the printed means, with the errors computed again."
         ),
         why=(
-            "The numbers follow (x̄ − x_ref)/x_ref, not the formula above them. The deviations of τp3 are copies of those of τp2 in "
-            "every block. "
-            "Some errors are slips (configuration 2 of table 4.6: m2·l2 is 17 % off, not 1; configuration 3 of table 4.7: m3·l3 188, "
-            "not 90)."
+            "The numbers follow (x̄ − x_ref)/x_ref, not the formula above them. The deviations of τp3 are copies of those of τp2 in every "
+            "block. Some errors are slips (configuration 2 of table 4.6: m2·l2 is 17 % off, not 1; configuration 3 of table 4.7: m3·l3 "
+            "188, not 90)."
         ),
         values={"deviations_that_disagree": int(bad[0]), "errors_that_disagree": int(bad[1]), "errors_printed": int(cells[1])},
         sheets=sheets,
@@ -298,9 +282,8 @@ def fits() -> Found:
             "simulated."
         ),
         why=(
-            "A passive moment that is constant, or goes with the angle, looks like weight over so small a movement, and the fit takes "
-            "it as mass. "
-            "Only what changes sign with the direction, and noise, is left: that is what equation 3.32 calls the passive moment."
+            "A passive moment that is constant, or goes with the angle, looks like weight over so small a movement, and the fit takes it "
+            "as mass. Only what changes sign with the direction, and noise, is left: that is what equation 3.32 calls the passive moment."
         ),
         sheets=[
             Sheet(
@@ -316,8 +299,8 @@ def fits() -> Found:
     "tables-4.6-4.8-virtual",
     "Tables 4.6 to 4.8 on virtual subjects whose masses are known",
     "section 4.2.2",
-    "Errors against the literature of −80 to 189 %, different in every configuration, put down to the subjects, to the rigid model and "
-    "to passive "
+    "Errors against the literature of −80 to 189 %, different in every configuration, put down to the subjects, to the rigid model and to "
+    "passive "
     "moments that differ from place to place.",
 )
 def virtual_subjects() -> Found:
@@ -348,19 +331,15 @@ def virtual_subjects() -> Found:
     return Found(
         ours=(
             f"The cascade as published is off by {median['cascade']:.0f} % in the middle and {max(errors['cascade']):.0f} % at most, in "
-            "sums that slow "
-            "movements determine, and by other amounts in every configuration. The joint method with springs and constant moments is "
-            "off by "
-            f"{median['joint']:.0f} % in the middle; {sum(held)} of {len(held)} of its intervals hold the truth."
+            "sums that slow movements determine, and by other amounts in every configuration. The joint method with springs and constant "
+            f"moments is off by {median['joint']:.0f} % in the middle; {sum(held)} of {len(held)} of its intervals hold the truth."
         ),
         why=(
             "These subjects' masses are within a few per cent of the literature; errors like those that are printed come from passive "
-            "moments "
-            "taken as weight. Over 12° the joint method cannot tell the two apart either, but says so: where it says prior, its value "
-            "is what "
-            "was known before, and no measurement. The spring of the wrist's strap is known to both, so that m3·l3 comes out well. "
-            "Errors that "
-            "change from configuration to configuration are what passive moments look like, and no measure of a subject's masses."
+            "moments taken as weight. Over 12° the joint method cannot tell the two apart either, but says so: where it says prior, its "
+            "value is what was known before, and no measurement. The spring of the wrist's strap is known to both, so that m3·l3 comes out "
+            "well. Errors that change from configuration to configuration are what passive moments look like, and no measure of a "
+            "subject's masses."
         ),
         values={f"median_error_percent_{key}": value for key, value in median.items()}
         | {"intervals_that_hold": sum(held), "intervals": len(held)},
@@ -388,9 +367,9 @@ def appendix_c() -> Found:
     expected = 0.394 + 0.322 * (1.264 + 0.753)
     return Found(
         ours=(
-            f"Two of the printed errors agree with no formula: l3 is {100 * (0.148 / 0.081 - 1):.0f} % off, not 63, and m2·l2 1 %, not "
-            "9. The sum that the "
-            f"shoulder's torque determines comes to {found:.3f} kg m, {100 * (found / expected - 1):+.0f} % against the literature."
+            f"Two of the printed errors agree with no formula: l3 is {100 * (0.148 / 0.081 - 1):.0f} % off, not 63, and m2·l2 1 %, not 9. "
+            f"The sum that the shoulder's torque determines comes to {found:.3f} kg m, {100 * (found / expected - 1):+.0f} % against the "
+            "literature."
         ),
         why="As in tables 4.6 to 4.8: masses and first moments of the single segments are not in the data, only their sums are.",
         values={"sum_kgm": float(found), "sum_literature_kgm": float(expected)},

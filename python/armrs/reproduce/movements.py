@@ -47,8 +47,8 @@ def movements() -> Found:
             f"wrist within {wrist:.1f}° of neutral: “a few degrees”, as the thesis says, with a strap of 12 N m/rad."
         ),
         why=(
-            "Four lists of the fixation angles are printed, and no two agree. Those of figures 4.1 to 4.5 are used here. The range of "
-            "the moving joint is not printed: 25 to 85° for the elbow and −65 to −15° for the shoulder are chosen, where a robot reaches."
+            "Four lists of the fixation angles are printed, and no two agree. Those of figures 4.1 to 4.5 are used here. The range of the "
+            "moving joint is not printed: 25 to 85° for the elbow and −65 to −15° for the shoulder are chosen, where a robot reaches."
         ),
         values={"shoulder_drift_deg": float(drift), "wrist_most_deg": float(wrist)},
         sheets=[Sheet("Fixation angles as printed", Table(["where", "shoulder [°]", "elbow [°]"], rows))],
@@ -132,14 +132,13 @@ def bodies() -> Found:
         ours=(
             f"With the handle at {place:g} m the hand's centre of mass is at {joined(place):.4f} m; at 0.844 m it would be at "
             f"{joined(0.844):.3f} m, far outside a hand of 0.093 m. With the orthosis the upper arm's is at {right:.4f} m from the "
-            "shoulder; as "
-            f"printed it would be {printed:.4f} m, a moment of {9.81 * (right - printed) * (upper.mass + m_uo):.2f} N m less at the "
-            "shoulder."
+            f"shoulder; as printed it would be {printed:.4f} m, a moment of {9.81 * (right - printed) * (upper.mass + m_uo):.2f} N m less "
+            "at the shoulder."
         ),
         why=(
             "0.844 has the decimal point a place too far. Equation 3.20 holds if both centres of mass count from the elbow, while "
-            "everything "
-            "else in the thesis counts the upper arm's from the shoulder. Tables 4.6 to 4.8 rest on a handle of 0.193 kg, not of 0.277."
+            "everything else in the thesis counts the upper arm's from the shoulder. Tables 4.6 to 4.8 rest on a handle of 0.193 kg, not "
+            "of 0.277."
         ),
         values={"l3_m": joined(place), "l1_m": float(right), "l1_printed_m": float(printed)},
         sheets=[

@@ -80,9 +80,8 @@ def hysteresis() -> Found:
         ),
         why=(
             "The method works as described. Nothing descends here, since the virtual elbow has no such part and its masses are exact. "
-            "Masses "
-            f"that are 10 % too large would tilt the loop by {tilt:.2f} N m over its range: enough to make the flat part of a soft elbow "
-            "descend, as the thesis suspects."
+            f"Masses that are 10 % too large would tilt the loop by {tilt:.2f} N m over its range: enough to make the flat part of a soft "
+            "elbow descend, as the thesis suspects."
         ),
         values={
             "half_width_Nm": float(np.nanmean(width)),
@@ -184,8 +183,7 @@ def over_time() -> Found:
         ours="The joint that moves scatters most, since that is where the tone was put; the wrist hardly scatters.",
         why=(
             "The thesis puts larger deviations at the shoulder down to the number of multiplications in Jᵀ F. It is the lever arm: a "
-            "newton "
-            "at the hand is half a newton metre at the shoulder and a tenth of one at the wrist."
+            "newton at the hand is half a newton metre at the shoulder and a tenth of one at the wrist."
         ),
         sheets=[Sheet("Largest standard deviations over six trials [N m]", Table(["configuration", *JOINTS], rows))],
         figures=figures,
@@ -218,10 +216,9 @@ def scatter() -> Found:
         why=(
             "The printed scatter is not that of the sensors: 0.2 N and 0.1° make about a tenth of a newton metre. Nor does a wrong mass or "
             "length show in it, since it is the same in every trial; the last column says how much such errors, promised as 5 % of mass "
-            "and "
-            "centre of mass, 2 mm, 0.3°, 0.2 N and 1 %, would shift all trials together. What is left is what differed between days: tone, "
-            "seat and grip. Appendix B prints the same deviations for other angles of the elbow (20 to 59°). The caption of table 4.2 "
-            "says shoulder where it means elbow."
+            "and centre of mass, 2 mm, 0.3°, 0.2 N and 1 %, would shift all trials together. What is left is what differed between days: "
+            "tone, seat and grip. Appendix B prints the same deviations for other angles of the elbow (20 to 59°). The caption of table "
+            "4.2 says shoulder where it means elbow."
         ),
         values={"sensors_alone_most_share": float(most)},
         sheets=[Sheet("Largest standard deviations [N m]", Table(head, rows, left=2))],

@@ -66,16 +66,13 @@ def torque_errors() -> Found:
     worst = float(np.max(np.abs(curves[:, 1] / curves[:, 0] - 1)))
     return Found(
         ours=(
-            f"The Jacobian agrees with Monte Carlo within {100 * worst:.1f} % everywhere (about {curves[:, 1].mean():.3f} N m). "
-            "Equation 5.3 gives "
-            f"{rows[0][3]} N m at −60° and {rows[-1][3]} N m at −0.01°."
+            f"The Jacobian agrees with Monte Carlo within {100 * worst:.1f} % everywhere (about {curves[:, 1].mean():.3f} N m). Equation "
+            f"5.3 gives {rows[0][3]} N m at −60° and {rows[-1][3]} N m at −0.01°."
         ),
         why=(
             "Relative errors add up for products of the quantities themselves. A torque holds sines and cosines of angles, and an angle "
-            "has no "
-            "relative error: where it crosses zero 5.3 grows without bound, and where the torque does it vanishes. Var f = Σ (∂f/∂x)² "
-            "σ² is right, and is what `armrs "
-            "passive` uses."
+            "has no relative error: where it crosses zero 5.3 grows without bound, and where the torque does it vanishes. Var f = Σ "
+            "(∂f/∂x)² σ² is right, and is what `armrs passive` uses."
         ),
         values={"jacobian_over_monte_carlo_most_off": worst},
         sheets=[
@@ -112,8 +109,7 @@ def parameter_errors() -> Found:
         why=(
             "The printed error grows with the number of samples, has the unit of a torque, and has lost the inverse of the normal matrix. "
             "Cov π = σ²(YᵀY)⁻¹ is right for independent samples; `armrs identify` takes it from the scatter between stretches, since "
-            "samples are "
-            "correlated."
+            "samples are correlated."
         ),
         sheets=[
             Sheet("Standard deviation of m2·l2 [kg m]", Table(["samples", "Monte Carlo", "σ/√(YᵀY)", "equation 5.5 [N m]"], rows, left=0))
@@ -144,9 +140,8 @@ def product_errors() -> Found:
     return Found(
         ours=f"With squares the product's error is {squares:.4f} N m, as Monte Carlo has it; as printed {printed:.3f} N m.",
         why=(
-            "Squares are missing, and the factor 2 follows from nothing. More important than the scatter of equation 3.32 is its bias: "
-            "the mean "
-            "size of noise is 0.8 of its deviation, friction or not."
+            "Squares are missing, and the factor 2 follows from nothing. More important than the scatter of equation 3.32 is its bias: the "
+            "mean size of noise is 0.8 of its deviation, friction or not."
         ),
         sheets=[Sheet("Noise of 0.03 N m, 50 samples", Table(["quantity", "Monte Carlo", "right formula", "as printed"], rows))],
     )
@@ -181,13 +176,11 @@ def passive_uncertainty() -> Found:
     return Found(
         ours=(
             f"At the shoulder masses make {rows[0][1]} N m, centres of mass {rows[1][1]}, lengths {rows[2][1]}; all together "
-            f"{jacobian[0]:.2f} N m. Jacobian "
-            f"and Monte Carlo agree within {100 * ratio:.1f} %."
+            f"{jacobian[0]:.2f} N m. Jacobian and Monte Carlo agree within {100 * ratio:.1f} %."
         ),
         why=(
             "Lengths and centres of mass cancel only if both are wrong by the same factor. A centre of mass alone, which comes from a "
-            "table "
-            "while the length is measured, weighs nearly as much as a mass. J does not contain any l_j, as appendix B says it does."
+            "table while the length is measured, weighs nearly as much as a mass. J does not contain any l_j, as appendix B says it does."
         ),
         values={"jacobian_over_monte_carlo_most_off": ratio},
         sheets=[

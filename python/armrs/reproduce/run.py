@@ -108,8 +108,8 @@ def _data(parts: list[dict[str, Any]], command: str | None) -> dict[str, Any]:
         "verb": "reproduce",
         "verdict": (
             f"{len(items)} items of chapters 3 and 4 and the appendices with {sum(len(i['tables']) for i in items)} tables and "
-            f"{sum(len(i['figures']) + len(i['animations']) for i in items)} figures. The thesis prints no measured samples: "
-            f"{virtual} items rest on virtual experiments, which say how the methods behave, not what these subjects were like."
+            f"{sum(len(i['figures']) + len(i['animations']) for i in items)} figures. The thesis prints no measured samples: {virtual} "
+            "items rest on virtual experiments, which say how the methods behave, not what these subjects were like."
         ),
         "parts": parts,
         "equations": equations.rows(),

@@ -180,9 +180,8 @@ def mechanical_arm() -> Found:
         ),
         why=(
             "The offset is that of the spring: K_e·q has no rest angle, pulls towards the horizontal arm, and the mechanical arm has none. "
-            "K_v = −0.2 drives the arm where it stands in equation 3.1; +0.2 is used. The rest of the difference comes from markers "
-            "that sit "
-            "3 mm beside their joints. Speed and place of the movement are chosen."
+            "K_v = −0.2 drives the arm where it stands in equation 3.1; +0.2 is used. The rest of the difference comes from markers that "
+            "sit 3 mm beside their joints. Speed and place of the movement are chosen."
         ),
         values={f"difference_{k}": v for k, v in with_spring.items()} | {f"difference_without_spring_{k}": v for k, v in without.items()},
         sheets=[
@@ -213,9 +212,9 @@ def human_arm() -> Found:
         ),
         why=(
             "As in the thesis: the robot prescribes the hand's place and with it the angles, while the forces carry every wrong mass and "
-            "every passive moment. The virtual subject has masses up to 8 % off the literature, springs with rest angles, dry friction "
-            "and a spring over both joints, none of which the simulation knows; how large they are is chosen. The wrist has a spring of "
-            "6 N m/rad on both sides, without which a hand held by two forces alone would fall."
+            "every passive moment. The virtual subject has masses up to 8 % off the literature, springs with rest angles, dry friction and "
+            "a spring over both joints, none of which the simulation knows; how large they are is chosen. The wrist has a spring of 6 N "
+            "m/rad on both sides, without which a hand held by two forces alone would fall."
         ),
         values={f"difference_{k}": v for k, v in values.items()},
         sheets=[

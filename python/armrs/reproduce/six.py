@@ -60,8 +60,7 @@ def against_angles() -> Found:
     return Found(
         ours=(
             "Loops that shift with the adjacent angle, larger at the shoulder. Every virtual subject has a spring over both joints; the "
-            "test "
-            f"finds it in {found_by['elbow']} of 6 elbows and {found_by['shoulder']} of 6 shoulders."
+            f"test finds it in {found_by['elbow']} of 6 elbows and {found_by['shoulder']} of 6 shoulders."
         ),
         why=(
             "The shoulder's scatter over trials is three times the elbow's, so that the same spring shows at the elbow and hides at the "

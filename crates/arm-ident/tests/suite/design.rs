@@ -1,9 +1,10 @@
 //! Forecasts and plans: what follows from more trials, less noise and wider limits, and what no plan may do.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Contact, Joints, Shape, models};
+use arm_core::{Contact, Elbow, Joints, Robot, Shape, models};
 use arm_ident::IdentError;
-use arm_ident::design::{Accuracy, Allowed, Question, Task, design, forecast};
+use arm_ident::design::{Allowed, design};
+use arm_ident::forecast::{Accuracy, Question, Task, forecast};
 use arm_ident::trial::{Model, Tolerance};
 
 fn question(tolerance: Tolerance) -> Question<2> {
@@ -54,6 +55,7 @@ fn allowed(evaluations: usize) -> Allowed<2> {
         angle: [[-1.4, -0.2], [0.4, 1.9]],
         speed: 2.0,
         acceleration: 8.0,
+        robot_speed: f64::INFINITY,
         force: 60.0,
         duration: 15.0,
         speeds: vec![1.0, 0.3],
@@ -124,6 +126,25 @@ fn a_longer_search_is_no_worse_and_the_same_seed_gives_the_same_plan() {
         }
     }
     assert!(first.force <= 60.0 && first.speed <= 2.2);
+}
+
+#[test]
+fn a_plan_respects_the_speed_of_the_robot() {
+    let mut question = question(Tolerance::default());
+    question.robot = Some(Robot::new([0.45, 0.45], [1.0, -0.1], Elbow::Up).expect("valid"));
+    let free = design(&question, &allowed(15), || {}).expect("a plan").1;
+    let limit = 0.7 * free.robot_speed;
+    assert!(limit > 0.0);
+    let slow = Allowed {
+        robot_speed: limit,
+        ..allowed(15)
+    };
+    let held = design(&question, &slow, || {}).expect("a plan").1;
+    assert!(held.robot_speed <= limit);
+    // Without a robot there is no such speed.
+    question.robot = None;
+    let none = forecast(&question, &[task(1)]).expect("a forecast");
+    assert_eq!(none.robot_speed.to_bits(), 0.0_f64.to_bits());
 }
 
 #[test]
