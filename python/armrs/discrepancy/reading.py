@@ -18,7 +18,8 @@ from . import maps
 from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Rung, Tried, Value
 
 _MISFIT = 6.0
-"""Lack of fit beyond which something is left, in standard deviations of white rows; coloured noise is never quite white, and nulls reach 4.3."""
+"""Lack of fit beyond which something is left, in standard deviations of white rows; coloured noise is never quite
+white, and nulls reach 4.3."""
 _NEGLIGIBLE = 0.05
 """Share of the calibrated model's lack of fit that may be left where effects were named: shapes are never exact."""
 

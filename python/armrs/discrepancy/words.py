@@ -41,6 +41,9 @@ def chance(effect: Mapping[str, Any]) -> str:
     return f"with probability {effect['p_value']:.0e}" if effect["p_value"] > 1e-12 else "with a probability below 1e-12"
 
 
+_UNTESTED = "Without repeats of a movement, whether what is left is noise cannot be tested."
+
+
 def verdict(result: Mapping[str, Any]) -> str:
     """Return the result in a sentence or two."""
     joints = result["data"]["joints"]
@@ -48,12 +51,16 @@ def verdict(result: Mapping[str, Any]) -> str:
         f"{effect_name(e, joints)}: {e['summary']}, {size(e)}" + (f", in {e['trial']} only" if e.get("trial") else "")
         for e in result["effects"]
     ]
+    is_tested = result["lack_of_fit"]["amended"]["z"] is not None
     if result["verdict"] == "nothing_missing":
+        if not is_tested:
+            return f"No effect was found that these data show. {_UNTESTED}{_judged(result)}"
         return "Nothing is missing: what is left of these data is what repeats of one movement differ by." + _judged(result)
     listed = names[0] if len(names) == 1 else "; ".join(names)
     lacks = f"The model lacks {listed}." if len(names) == 1 else f"The model lacks {len(names)} things: {listed}."
     if result["verdict"] == "explained":
-        return f"{lacks} With {'it' if len(names) == 1 else 'them'}, what is left is noise.{_judged(result)}"
+        rest = f"With {'it' if len(names) == 1 else 'them'}, what is left is noise." if is_tested else _UNTESTED
+        return f"{lacks} {rest}{_judged(result)}"
     rest = "something is missing that the catalogue has no name for"
     looks = result["unexplained"]["looks_like"]
     tail = f" {looks[0].upper()}{looks[1:]}." if looks else ""
@@ -110,7 +117,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
                 f"standard deviations): {verdict}."
             )
     if not lines:
-        lines.append("Without repeats, whether what is left is noise cannot be tested.")
+        lines.append(_UNTESTED)
     if result["unexplained"]["share"]:
         lines.append(f"{result['unexplained']['share']:.1%} of what was beyond noise is still there.")
     if result["unexplained"]["looks_like"]:
