@@ -55,12 +55,25 @@ def against_angles() -> Found:
                 f"{number} ({MASSES[number - 1]:g} kg)", ("shoulder", "elbow")[fitted.joint - 1], f"{c.value:.2f} ± {c.std:.2f}",
                 f"{fitted.p_value:.3f}", "yes" if fitted.coupled else "no", f"{fitted.trial_std:.2f}", f"{np.mean(widths):.2f}",
             ])  # fmt: skip
-    found_by = {joint: sum(row[1] == joint and row[4] == "yes" for row in rows) for joint in ("elbow", "shoulder")}
+        rows += [
+            [
+                f"{number} ({MASSES[number - 1]:g} kg)",
+                "both",
+                f"{b.value:.2f} ± {b.std:.2f}",
+                f"{b.p_value:.3f}",
+                "yes" if b.coupled else "no",
+                "",
+                "",
+            ]
+            for b in found.moments.couplings
+        ]
+    found_by = {joint: sum(row[1] == joint and row[4] == "yes" for row in rows) for joint in ("elbow", "shoulder", "both")}
     head = ["subject", "joint", "coupling [N m/rad]", "p", "found", "tone [N m]", "half width [N m]"]
     return Found(
         ours=(
             "Loops that shift with the adjacent angle, larger at the shoulder. Every virtual subject has a spring over both joints; the "
-            f"test finds it in {found_by['elbow']} of 6 elbows and {found_by['shoulder']} of 6 shoulders."
+            f"test finds it in {found_by['elbow']} of 6 elbows, {found_by['shoulder']} of 6 shoulders and {found_by['both']} of 6 "
+            "subjects by both joints together."
         ),
         why=(
             "The shoulder's scatter over trials is three times the elbow's, so that the same spring shows at the elbow and hides at the "
