@@ -46,6 +46,10 @@ if TYPE_CHECKING:
     from .moments import PassiveCurve as PassiveCurve
     from .moments import PassiveMoments as PassiveMoments
     from .moments import passive_moments as passive_moments
+    from .montecarlo import Sweep as Sweep
+    from .montecarlo import Swept as Swept
+    from .montecarlo import load_sweep as load_sweep
+    from .montecarlo import sweep as sweep
     from .motions import convert_markers as convert_markers
     from .motions import convert_motion as convert_motion
     from .motions import read_markers as read_markers
@@ -78,6 +82,7 @@ _HOMES = {
     "markers": ("Markers", "PlanarMotion", "planar_motion"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
     "moments": ("PassiveCurve", "PassiveMoments", "passive_moments"),
+    "montecarlo": ("Sweep", "Swept", "load_sweep", "sweep"),
     "motions": ("convert_markers", "convert_motion", "read_markers"),
     "planning": ("Instruments", "Limits", "Plan", "forecast", "plan"),
     "report": ("write_report",),

@@ -469,6 +469,42 @@ def record(
 
 
 @app.command()
+def sweep(
+    context: typer.Context,
+    source: Annotated[
+        Path, typer.Argument(metavar="SWEEP", help="SWEEP.toml: an experiment or a data set, how many cases, and what varies.")
+    ],
+    out: OutFolder,
+    jobs: Annotated[int | None, typer.Option(help="Processes; all cores when absent. The results do not depend on it.")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler that does the work, such as tcp://host:8786.")
+    ] = None,
+    json: JsonFile = None,
+) -> int:
+    """Simulate and identify many cases with subjects, sensors and movements drawn at random, or resamples of a data set.
+
+    Writes two Parquet tables, a row a case and a row an estimate. The same command goes on where an interrupted one stopped. Exit status
+    1 when cases failed.
+    """
+    from .montecarlo import load_sweep, words
+    from .montecarlo import sweep as run_sweep
+
+    _folder(out, json)
+    if cluster is not None and jobs is not None:
+        raise BadInput("--jobs", jobs, "no --jobs beside --cluster: the cluster has its own workers")
+    planned = load_sweep(source)
+    count = os.cpu_count() or 1 if jobs is None else jobs
+    with console.progress("cases", planned.cases) as step:
+        result = run_sweep(planned, out, jobs=count, cluster=cluster, step=step, command=_command(context))
+    present(
+        lambda: result.data | {"run": result.run, "files": list(result.files)},
+        json,
+        lambda: words.swept(result.data, result.run, result.files),
+    )
+    return 1 if result.failed else 0
+
+
+@app.command()
 def reproduce(context: typer.Context, out: OutFolder = Path("armrs-thesis"), json: JsonFile = None) -> None:
     """Compute every table and figure of the thesis that a machine can: what is printed, what comes out, and why they differ."""
     from . import words
@@ -678,7 +714,7 @@ def run() -> None:
 _OPTIONS = {
     "with_effects": "--with", "cutoff": "--cutoff-hz", "rate": "--rate-hz", "duration": "--duration-s",
     "robot_speed": "--robot-speed-rad-s",
-    **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "integrator", "level", "method", "motion")},
+    **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "integrator", "jobs", "level", "method", "motion")},
 }  # fmt: skip
 """What the command line calls an argument of a function."""
 

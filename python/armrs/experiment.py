@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -201,7 +201,7 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     """
     document = tomlfile.read(path)
     try:
-        return _experiment(document, Path(path))
+        return experiment_of(document, Path(path))
     except BadInput as error:
         raise error.within(file=error.file or path) from None
 
@@ -233,7 +233,18 @@ def _segments(parts: list[dict[str, Any]], lengths: list[float | None]) -> list[
     return [upper, Segment("forearm and hand", length, mass, min(com, length), inertia)]
 
 
-def _experiment(document: dict[str, Any], path: Path) -> Experiment:
+def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Model], Model] = lambda truth: truth) -> Experiment:
+    """Return the experiment that a document describes.
+
+    Parameters
+    ----------
+    document : mapping
+        As read from `EXPERIMENT.toml`; `model` and `believed` may also be models themselves.
+    path : Path
+        The file, from which the paths of models are seen, and which names an experiment without a name.
+    alter : callable
+        Takes the arm that is simulated, without the handle, and returns it changed. The arm handed over does not follow.
+    """
     tables = [
         "subject",
         "joint",
@@ -250,7 +261,7 @@ def _experiment(document: dict[str, Any], path: Path) -> Experiment:
     ]
     checks.keys("", document, required=["movement"], optional=["name", "seed", "model", "believed", *tables])
     seed = checks.whole("seed", document.get("seed", 1), least=0, most=2**53)
-    subject, truth, believed = _arms(document, path, seed)
+    subject, truth, believed = _arms(document, path, seed, alter)
     n = truth.n_joints
     runs = tuple(_run(f"[[movement]] {k}", t, n) for k, t in enumerate(checks.tables("movement", document["movement"]), 1))
     names = [run.configuration for run in runs]
@@ -281,7 +292,7 @@ def _experiment(document: dict[str, Any], path: Path) -> Experiment:
     )
 
 
-def _arms(document: dict[str, Any], path: Path, seed: int) -> tuple[Subject, Model, Model]:
+def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[Model], Model]) -> tuple[Subject, Model, Model]:
     """Return the subject, the arm that is simulated and the arm that is handed over."""
     table = checks.table("[subject]", document.get("subject", {}))
     own: dict[str, Any] = {key: table.pop(key) for key in ("segments", "lengths_m", "spread") if key in table}
@@ -289,10 +300,10 @@ def _arms(document: dict[str, Any], path: Path, seed: int) -> tuple[Subject, Mod
     if "model" in document:
         for key in [*own, *(k for k in ("joint", "robot", "contact") if k in document)]:
             raise BadInput(key, Text("a value beside model"), "either model, or a subject with joints, robot and contact")
-        truth = load_model(path.parent / checks.text("model", document["model"]))
+        truth = model_at("model", document["model"], path)
         truth = truth.replace(robot=truth.robot or THESIS_ROBOT, contact=truth.contact or THESIS_CONTACT)
         if "believed" in document:
-            believed = load_model(path.parent / checks.text("believed", document["believed"]))
+            believed = model_at("believed", document["believed"], path)
             if believed.n_joints != truth.n_joints:
                 raise BadInput("believed", Text(f"{believed.n_joints} joints"), f"{truth.n_joints}, as in model")
         else:
@@ -304,6 +315,7 @@ def _arms(document: dict[str, Any], path: Path, seed: int) -> tuple[Subject, Mod
     given = checks.tables("effect", document.get("effect", []))
     truth = truth.replace(effects=(*truth.effects, *(effect_of(f"[[effect]] {k}", t) for k, t in enumerate(given, 1))))
     believed = believed.replace(robot=truth.robot, contact=truth.contact)
+    truth = alter(truth)
     handle = checks.table("[handle]", document.get("handle", {}))
     checks.keys("[handle]", handle, optional=["mass"])
     mass = checks.number("[handle], mass", handle.get("mass", 0.0), least=0.0, most=10.0, unit="kg")
@@ -312,7 +324,12 @@ def _arms(document: dict[str, Any], path: Path, seed: int) -> tuple[Subject, Mod
     return subject, truth, believed
 
 
-def _person(document: dict[str, Any], subject: Subject, own: dict[str, Any], seed: int) -> tuple[Model, Model]:
+def model_at(place: str, value: object, path: Path) -> Model:
+    """Return the model that a key of the experiment file `path` names."""
+    return value if isinstance(value, Model) else load_model(path.parent / checks.text(place, value))
+
+
+def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], seed: int) -> tuple[Model, Model]:
     count = checks.whole("[subject], segments", own.get("segments", 2), least=2, most=3)
     spread = checks.number("[subject], spread", own.get("spread", 0.0), least=0.0, most=3.0)
     lengths = own.get("lengths_m", [None] * count)
@@ -400,4 +417,4 @@ def _devices(table: object) -> Devices:
     return made
 
 
-__all__ = ["Controller", "Devices", "Effect", "Experiment", "Fault", "Run", "Safety", "literature_arm", "load_experiment"]
+__all__ = ["Controller", "Devices", "Effect", "Experiment", "Fault", "Run", "Safety", "experiment_of", "literature_arm", "load_experiment"]

@@ -59,7 +59,7 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
         ratios = [sizes[k] for k in column] + ([spare] if spare > 0.5 else [])
         axes = place.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0]
         for ax, k in zip(axes, column, strict=False):
-            plotting.intervals(panels[k], [_named(item, joints) for item in panels[k]], ax)
+            plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], ax)
         for ax in axes[len(column) :]:
             ax.set_axis_off()
     plotting.interval_legend(figure, unique)
@@ -94,7 +94,8 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
     return Drawn("history", "Over the sessions", text, figure)
 
 
-def _named(item: Mapping[str, Any], joints: Sequence[str]) -> str:
+def quantity_name(item: Mapping[str, Any], joints: Sequence[str]) -> str:
+    """Name a quantity beside an axis."""
     if item["kind"] in ("segment", "combination"):
         return plotting.symbol(item["name"])
     return f"{tables.label(item)} {tables.where(item, joints)}".strip()

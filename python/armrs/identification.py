@@ -224,7 +224,7 @@ def identify(
         raise BadInput("cutoff", f"{cutoff:g} Hz", f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
     model = dataset.model
     if method == "cascade":
-        _cascade_can(with_effects, motion)
+        cascade_can(with_effects, motion)
     effects, fitted = effects_of(model, with_effects)
     if not model.segment_uncertainty and not any(fitted):
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
@@ -272,7 +272,7 @@ _IN_CASCADE = ("coulomb", "constant_moment")
 """Effects that the cascade finds; others it holds at what the model says."""
 
 
-def _cascade_can(with_effects: Sequence[str], motion: str) -> None:
+def cascade_can(with_effects: Sequence[str], motion: str) -> None:
     """Refuse what the cascade would silently leave out."""
     for kind in with_effects:
         if kind in _joint_kinds() and kind not in _IN_CASCADE:

@@ -97,35 +97,56 @@ def record(
     if not isinstance(experiment, Experiment):
         experiment = load_experiment(experiment)
     out = files.output_folder(folder)
-    _check_required(experiment)
+    check_required(experiment)
+    measured = measure(experiment, step=step)
+    return Recorded(measured.dataset, experiment, measured.trials, _write(measured, experiment, out))
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A session as the devices saw it, in memory alone.
+
+    Attributes
+    ----------
+    dataset : Dataset
+    trials : tuple of dict
+        As in `Recorded`.
+    markers : dict of str to Markers
+        What the cameras saw, by the file of the trial.
+    """
+
+    dataset: Dataset
+    trials: tuple[dict[str, Any], ...]
+    markers: dict[str, Markers]
+
+
+def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done: None) -> Measured:
+    """Run an experiment without writing anything; errors and `step` are those of `record`, movements are not checked beforehand."""
     session = _Session(experiment)
-    measured = []
+    seen = []
     for number, run in enumerate(experiment.runs):
         for repeat in range(1, run.repeats + run.tests + 1):
-            measured.append(session.measure(run, number, repeat))
+            seen.append(session.measure(run, number, repeat))
             step(1)
-    kept = [m for m in measured if m.trial is not None]
-    if not any(m.trial.role == "fit" for m in kept if m.trial is not None):
-        raise ArmrsError(f"the supervisor stopped every trial to be fitted: {measured[0].story['stop']}")
-    trials = tuple(m.trial for m in kept if m.trial is not None)
-    lengths = np.mean([m.story["lengths_m"] for m in kept], axis=0)
+    kept = [(m.trial, m.markers, m.story) for m in seen if m.trial is not None and m.markers is not None]
+    if not any(trial.role == "fit" for trial, _, _ in kept):
+        raise ArmrsError(f"the supervisor stopped every trial to be fitted: {seen[0].story['stop']}")
+    lengths = np.mean([story["lengths_m"] for _, _, story in kept], axis=0)
     dataset = Dataset(
         name=experiment.name,
         model=_with_lengths(experiment.believed, lengths),
-        trials=trials,
+        trials=tuple(trial for trial, _, _ in kept),
         force_on="robot",
         sample_rate=experiment.devices.rate_Hz,
         subject=experiment.subject,
         tolerance=experiment.tolerance,
         synthetic=True,
-        added=_added(experiment.runs, {t.configuration for t in trials}),
+        added=_added(experiment.runs, {trial.configuration for trial, _, _ in kept}),
     )
-    stories = tuple(m.story for m in measured)
-    written = _write(dataset, experiment, [m for m in kept if m.markers is not None], stories, out)
-    return Recorded(dataset, experiment, stories, written)
+    return Measured(dataset, tuple(m.story for m in seen), {trial.file: markers for trial, markers, _ in kept})
 
 
-def _check_required(experiment: Experiment) -> None:
+def check_required(experiment: Experiment) -> None:
     """Refuse movements that ask more of the robot than its supervisor allows."""
     safety = experiment.safety
     for number, run in enumerate(experiment.runs, start=1):
@@ -139,7 +160,7 @@ def _check_required(experiment: Experiment) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Measured:
+class _Seen:
     trial: Trial | None
     markers: Markers | None
     story: dict[str, Any]
@@ -153,7 +174,7 @@ class _Session:
         draw = np.random.default_rng([experiment.seed, 1])
         self.offsets = experiment.devices.marker_offset_m * draw.standard_normal((experiment.truth.n_joints + 1, 2))
 
-    def measure(self, run: Run, number: int, repeat: int) -> _Measured:
+    def measure(self, run: Run, number: int, repeat: int) -> _Seen:
         """Measure one trial; its random numbers depend on seed, movement and repeat alone."""
         e, devices = self.experiment, self.experiment.devices
         seed = int(np.random.SeedSequence([e.seed, 2, number, repeat]).generate_state(1, np.uint64)[0] >> 11)
@@ -173,7 +194,7 @@ class _Session:
             "stop": _stop(led),
         }
         if story["stop"] is not None:
-            return _Measured(None, None, story)
+            return _Seen(None, None, story)
         every = round(1.0 / (RECORDING_RATE * DEFAULT_DT))
         path = Trial(
             "",
@@ -206,7 +227,7 @@ class _Session:
         start = {"q": [float(v) for v in movement.waypoints[0]], "qd": None}
         return _armrs.control(rig(model), driven(movement, "compliant"), settings | start, watch)
 
-    def _read(self, run: Run, repeat: int, true: Simulated, state: tuple[np.random.Generator, dict[str, Any]]) -> _Measured:
+    def _read(self, run: Run, repeat: int, true: Simulated, state: tuple[np.random.Generator, dict[str, Any]]) -> _Seen:
         """Let every device read the run."""
         draw, story = state
         devices, model = self.experiment.devices, true.model
@@ -231,7 +252,7 @@ class _Session:
             tau=_brakes(true, stamps, devices, draw),
             emg=_emg(true, stamps, draw) if devices.emg else {},
         )
-        return _Measured(trial if len(stamps) >= FEWEST_SAMPLES else None, markers, story)
+        return _Seen(trial if len(stamps) >= FEWEST_SAMPLES else None, markers, story)
 
     def _markers(self, model: Model, t: np.ndarray, q: np.ndarray, draw: np.random.Generator) -> Markers:
         """Return what the cameras see of the joints: positions in x (normal to the plane), y, z [m]."""
@@ -344,17 +365,14 @@ def _added(runs: tuple[Run, ...], kept: set[str]) -> tuple[Added, ...]:
     return tuple(Added(*key, configurations=tuple(names)) for key, names in by_item.items())
 
 
-def _write(
-    dataset: Dataset, experiment: Experiment, measured: list[_Measured], stories: tuple[dict[str, Any], ...], out: Path
-) -> tuple[Path, ...]:
+def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path, ...]:
     from .opensim import write_trc
 
     head = "# SYNTHETIC: what was simulated. No verb reads it.\n"
     truth = out / "truth" / "truth.toml"
     files.write_text(truth, head + experiment.truth.to_toml(), kind=".toml")
-    files.write_json(out / "truth" / "truth.json", {"experiment": experiment.name, "seed": experiment.seed, "trials": list(stories)})
-    written = []
-    for m in measured:
-        assert m.trial is not None and m.markers is not None
-        written.append(write_trc(out / "markers" / Path(m.trial.file).with_suffix(".trc").name, m.markers))
-    return (write_dataset(dataset, out), truth, truth.with_suffix(".json"), *written)
+    files.write_json(
+        out / "truth" / "truth.json", {"experiment": experiment.name, "seed": experiment.seed, "trials": list(measured.trials)}
+    )
+    written = [write_trc(out / "markers" / Path(file).with_suffix(".trc").name, markers) for file, markers in measured.markers.items()]
+    return (write_dataset(measured.dataset, out), truth, truth.with_suffix(".json"), *written)

@@ -58,8 +58,12 @@ KINDS = {
     "demo": "Demonstration",
     "gap": "Gap between model and measurement",
     "fmu run": "Co-simulation",
+    "sweep": "Sweep",
 }
 """What a report can be made of: the `verb` of a result, and its title."""
+INPUT = "SHA-256 of dataset.toml, the model and the trials, one after the other in their order:"
+INPUT_OF = {"sweep": "SHA-256 of what SWEEP.toml and the files that it names say, and of the version of armrs:"}
+"""What the digest of a result's input is made of."""
 
 
 def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -189,10 +193,18 @@ def _result(data: Mapping[str, Any], folder: Path) -> str:
 def _sections(data: Mapping[str, Any], figures: Mapping[str, str]) -> str:
     """Return what is between the verdict and the figures that belong to no section."""
     from .discrepancy import page
+    from .montecarlo import words as sweep
 
     if data["verb"] == "gap":
         return page.sections(data, figures)
-    sections = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
+    sections = {
+        "identify": _identified,
+        "simulate": _simulated,
+        "passive": _passive,
+        "demo": _demo,
+        "fmu run": _coupled,
+        "sweep": sweep.page,
+    }
     return sections[data["verb"]](data)
 
 
@@ -268,6 +280,6 @@ def _origin(data: Mapping[str, Any]) -> str:
             "No random numbers are drawn, and the number of threads changes nothing: the same input gives the same result.", "soft"
         )
     if made.get("input_sha256"):
-        out += paragraph("SHA-256 of dataset.toml, the model and the trials, one after the other in their order:", "soft")
+        out += paragraph(INPUT_OF.get(data["verb"], INPUT), "soft")
         out += f"<p><code>{escape(made['input_sha256'])}</code></p>\n"
     return out

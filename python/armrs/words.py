@@ -37,6 +37,7 @@ def is_synthetic(result: Mapping[str, Any]) -> bool:
 def verdict(result: Mapping[str, Any]) -> str:
     """Return a result in a sentence or two."""
     from .discrepancy import words as gap
+    from .montecarlo import words as sweep
 
     sentences = {
         "identify": _identified,
@@ -45,6 +46,7 @@ def verdict(result: Mapping[str, Any]) -> str:
         "demo": _demo,
         "gap": gap.verdict,
         "fmu run": _coupled,
+        "sweep": sweep.verdict,
     }
     return sentences[result["verb"]](result)
 

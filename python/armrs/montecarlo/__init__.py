@@ -1,0 +1,8 @@
+"""Many virtual sessions, or many resamples of one measured session: `armrs sweep`."""
+
+from __future__ import annotations
+
+from .run import Swept as Swept
+from .run import sweep as sweep
+from .spec import Sweep as Sweep
+from .spec import load_sweep as load_sweep

@@ -1,0 +1,80 @@
+"""Figures of a sweep: what was found against the truth, and how often intervals hold it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .. import plotting
+from ..figures import Drawn, quantity_name
+from .summary import Quantity, Summary
+
+MOST_PANELS = 12
+
+
+def sweep(summary: Summary, data: Mapping[str, Any]) -> list[Drawn]:
+    """Draw every quantity over the cases, and the coverage of the intervals where the truth is known."""
+    if not summary.quantities:
+        return []
+    joints = data["data"]["joints"]
+    with plotting.style():
+        drawn = [_values(summary.quantities, joints)]
+        known = [q for q in data["quantities"] if q["coverage"] is not None]
+        if known:
+            drawn.append(_coverage(known, joints, data["level"]))
+    return drawn
+
+
+def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:
+    shown = sorted(quantities, key=lambda q: q.decided_by["data"] / max(1, q.value.n), reverse=True)[:MOST_PANELS]
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    figure = plotting.figure(3.4 * columns, 2.9 * rows)
+    for ax, quantity in zip(figure.subplots(rows, columns, squeeze=False).ravel(), shown, strict=False):
+        _panel(quantity, ax)
+        ax.set_title(quantity_name({"name": quantity.name, "kind": quantity.kind, "joint": quantity.joint}, joints), fontsize="small")
+    for ax in figure.axes[len(shown) :]:
+        ax.set_axis_off()
+    left = len(quantities) - len(shown)
+    text = "A dot is a case; on the line, what was found is the truth. Where no truth is known, or one for all cases: a histogram."
+    return Drawn("estimates", "Found against the truth", text + (f" {left} more are in the tables." if left else ""), figure)
+
+
+def _panel(quantity: Quantity, ax: Any) -> None:
+    value, truth = np.concatenate(quantity.values), np.concatenate(quantity.truths)
+    there = np.isfinite(value)
+    known = there & np.isfinite(truth)
+    if known.any() and np.ptp(truth[known]) > 0.0:
+        ax.plot(truth[known], value[known], ".", color=plotting.BLUE, markersize=4, alpha=max(0.15, min(1.0, 60.0 / known.sum())))
+        ends = [truth[known].min(), truth[known].max()]
+        ax.plot(ends, ends, color=plotting.ORANGE)
+        ax.set(xlabel=f"truth [{quantity.unit}]", ylabel=f"found [{quantity.unit}]")
+        return
+    ax.hist(value[there], bins=max(5, min(40, round(math.sqrt(there.sum())))), color=plotting.BLUE)
+    if known.any():
+        ax.axvline(float(truth[known][0]), color=plotting.ORANGE)
+    ax.set(xlabel=f"found [{quantity.unit}]", ylabel="cases")
+
+
+def _coverage(known: list[dict[str, Any]], joints: list[str], level: float) -> Drawn:
+    figure = plotting.figure(6.4, 0.34 * len(known) + 1.1)
+    ax = figure.subplots()
+    place = np.arange(len(known))[::-1]
+    share = np.array([q["coverage"] for q in known])
+    chance = np.array([2.0 * math.sqrt(level * (1.0 - level) / q["cases"]) for q in known])
+    ax.barh(place, 200.0 * chance, left=100.0 * (level - chance), color="0.88", height=0.9)
+    ax.axvline(100.0 * level, color=plotting.ORANGE)
+    ax.plot(100.0 * share, place, "o", color=plotting.BLUE)
+    again = [(k, q["bootstrap"]["coverage"]) for k, q in zip(place, known, strict=True) if q["bootstrap"] is not None]
+    if again:
+        ax.plot([100.0 * c for _, c in again], [k for k, _ in again], "o", color=plotting.BLUE, markerfacecolor="white")
+    ax.set_yticks(place, [quantity_name(q, joints) for q in known])
+    ax.set(xlabel="intervals that hold the truth [%]", xlim=(min(100.0 * share.min(), 100.0 * level) - 5.0, 101.0))
+    text = (
+        f"Share of the {100 * level:g} % intervals that hold the truth; the grey bar is what chance makes of so many cases, twice its "
+        "standard deviation to each side." + (" Hollow: the intervals of the bootstrap." if again else "")
+    )
+    return Drawn("coverage", "Do the intervals hold?", text, figure)
