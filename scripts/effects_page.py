@@ -15,7 +15,7 @@ ADDRESS = {"joint": "`joint`", "channel": "`channel`", None: "the whole rig"}
 
 def page() -> str:
     """Return the whole page."""
-    kinds = list(catalogue().values())
+    kinds = [kind for kind in catalogue().values() if not kind.own]
     places = list(dict.fromkeys(kind.where for kind in kinds))
     blocks = [
         "# The catalogue of effects",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ._armrs import Arm as Arm
     from ._armrs import __version__ as __version__
+    from .catalogue import Parameter as Parameter
     from .conversion import convert as convert
     from .dataset import Dataset as Dataset
     from .dataset import Subject as Subject
@@ -53,6 +54,8 @@ if TYPE_CHECKING:
     from .motions import convert_markers as convert_markers
     from .motions import convert_motion as convert_motion
     from .motions import read_markers as read_markers
+    from .own import OwnEffect as OwnEffect
+    from .own import own_effect as own_effect
     from .planning import Instruments as Instruments
     from .planning import Limits as Limits
     from .planning import Plan as Plan
@@ -70,6 +73,7 @@ if TYPE_CHECKING:
 # A module is never named like a public function: importing it would put the module in the place of the function.
 _HOMES = {
     "_armrs": ("Arm", "__version__", "build_profile"),
+    "catalogue": ("Parameter",),
     "conversion": ("convert",),
     "dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
     "demo": ("Demonstration", "run_demo"),
@@ -84,6 +88,7 @@ _HOMES = {
     "moments": ("PassiveCurve", "PassiveMoments", "passive_moments"),
     "montecarlo": ("Sweep", "Swept", "load_sweep", "sweep"),
     "motions": ("convert_markers", "convert_motion", "read_markers"),
+    "own": ("OwnEffect", "own_effect"),
     "planning": ("Instruments", "Limits", "Plan", "forecast", "plan"),
     "report": ("write_report",),
     "simulation": ("Channel", "Movement", "Sensors", "Simulated", "load_movement", "simulate"),

@@ -13,12 +13,15 @@ __all__ = [
     "__version__",
     "build_profile",
     "control",
+    "declare",
     "design",
+    "distances",
     "effects",
     "find_gap",
     "forecast",
     "identify",
     "literature",
+    "look",
     "low_pass_both_ways",
     "play",
     "simulate",
@@ -100,7 +103,22 @@ def control(
     settings: Mapping[str, Any],
     watch: Mapping[str, Any],
 ) -> dict[str, Any]: ...
+def declare(
+    name: str,
+    summary: str,
+    formula: str,
+    parameters: Sequence[tuple[str, str, float, float, float, bool, Sequence[float]]],
+    grid: tuple[float, float, float, float, int, int],
+    tabulate: Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+) -> None: ...
 def design(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]: ...
+def distances(
+    rig: Rig,
+    trials: Sequence[Mapping[str, Any]],
+    settings: Mapping[str, Any],
+    planned: Sequence[Mapping[str, Any]],
+    rivals: Sequence[tuple[str, int, Sequence[float], Sequence[int]]],
+) -> list[list[float] | None]: ...
 def effects() -> list[dict[str, Any]]: ...
 def find_gap(
     rig: Rig,
@@ -121,4 +139,10 @@ def simulate(
 def smooth(
     values: NDArray[np.float64], rate: float, cutoff: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+def look(
+    rig: Rig,
+    trials: Sequence[Mapping[str, Any]],
+    settings: Mapping[str, Any],
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]: ...
 def low_pass_both_ways(values: NDArray[np.float64], rate: float, cutoff: float, order: int) -> NDArray[np.float64]: ...

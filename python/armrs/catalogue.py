@@ -54,6 +54,8 @@ class Kind:
     """What else an effect of this kind must say: "joint", "channel" or nothing (None)."""
     first_joint: int = 1
     """Lowest joint at which it can stand; 2 where it also acts in the joint before."""
+    own: bool = False
+    """Whether it was declared by `armrs.own_effect`, and is no part of the catalogue that every installation has."""
 
     def values(self, numbers: Sequence[float]) -> dict[str, float]:
         """Return numbers in the order of the parameters by name; what rounding has put beyond a bound is at the bound."""

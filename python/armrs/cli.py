@@ -300,6 +300,10 @@ def gap(
     context: typer.Context,
     dataset: Source,
     out: MaybeFolder = None,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="A first answer only: calibrate, and list what may be missing; nothing is named or written below -o."),
+    ] = False,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores when absent. The result does not depend on it.")] = None,
     json: JsonFile = None,
 ) -> int:
@@ -309,11 +313,19 @@ def gap(
     that no effect of the catalogue explains.
     """
     from .dataset import load_dataset
-    from .discrepancy import find_gap, words
+    from .discrepancy import calibrate, find_gap, words
     from .discrepancy.results import gap_data, write_gap
 
+    if quick and out is not None:
+        raise BadInput("--quick", Text("-o beside it"), "--json, or nothing: a first answer has no report")
     folder = _folder(out, json)
     data = load_dataset(dataset)
+    if quick:
+        with console.stages("a first look") as tell:
+            first = calibrate(data, threads=threads, progress=tell)
+        console.warn([*data.warnings, *first.warnings])
+        present(lambda: first.to_dict(_command(context)), json, lambda: words.quick(first.to_dict()))
+        return 0
     with console.stages("looking for what is missing") as tell:
         result = find_gap(data, threads=threads, progress=tell)
     plain = gap_data(result, _command(context))
@@ -429,6 +441,7 @@ def plan(
     Exit status 1 when a parameter will stay uncertain by more than half its value.
     """
     from . import planning, words
+    from .discrepancy import detectable
     from .model import load_model
     from .simulation import load_movement
 
@@ -440,7 +453,11 @@ def plan(
     with console.progress("planning"):
         found = planning.plan(arm, limits, repeats=repeats, with_effects=kinds, evaluations=evaluations, seed=seed)
         beside = None if other is None else planning.forecast(arm, [other], repeats=repeats, with_effects=kinds)
-    plain = planning.plan_data(found, beside)
+    smallest: tuple[Any, ...] = ()
+    if arm.robot is not None and repeats > 1:
+        with console.progress("looking for the smallest effects that they would show"):
+            smallest = detectable(arm, found.movements, repeats=repeats)
+    plain = planning.plan_data(found, beside, smallest)
     written = planning.write_plan(found, plain, folder) if folder else []
     present(lambda: plain, json, lambda: words.planned(plain, written))
     return 0 if found.worst <= 0.5 else 1

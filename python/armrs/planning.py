@@ -290,9 +290,9 @@ def angles_of(text: str) -> tuple[tuple[float, float], ...]:
     return tuple(ranges)
 
 
-def plan_data(found: Plan, beside: Plan | None = None) -> dict[str, Any]:
-    """Return a plan as it is written to JSON, with the forecast of another movement to compare with."""
-    data = {"verb": "plan", **found.to_dict()}
+def plan_data(found: Plan, beside: Plan | None = None, smallest: Sequence[Any] = ()) -> dict[str, Any]:
+    """Return a plan as it is written to JSON, with the forecast of another movement to compare with, and the smallest effects seen."""
+    data: dict[str, Any] = {"verb": "plan", **found.to_dict(), "would_show": [dict(vars(w)) for w in smallest]}
     if beside is not None:
         data["compared"] = beside.to_dict() | {"worst_ratio": beside.worst / found.worst}
     return data

@@ -264,6 +264,11 @@ def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         f"worst relative deviation {100 * result['worst_relative_std']:.2g} %"
         + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
     )
+    if result.get("would_show"):
+        from .discrepancy.words import limits
+
+        print()
+        show("The smallest effects that `armrs gap` would name on such a session", limits({"would_have_seen": result["would_show"]}))
     print("\n".join(str(path) for path in written))
 
 

@@ -79,6 +79,10 @@ impl<const L: usize> Scalar for Lanes<L> {
         Self(self.0.map(f))
     }
     #[inline]
+    fn together<const K: usize>(values: [Self; K], f: impl Fn([f64; K]) -> f64) -> Self {
+        Self(from_fn(|i| f(values.map(|v| v.0[i]))))
+    }
+    #[inline]
     fn sqrt(self) -> Self {
         self.map(libm::sqrt)
     }

@@ -42,6 +42,8 @@ pub trait Scalar:
     }
     /// Each lane through a function of one `f64`.
     fn map(self, f: impl Fn(f64) -> f64) -> Self;
+    /// A function of several values, for each lane.
+    fn together<const K: usize>(values: [Self; K], f: impl Fn([f64; K]) -> f64) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
     /// Sine and cosine of an angle \[rad\].
@@ -162,6 +164,10 @@ impl Scalar for f64 {
         f(self)
     }
     #[inline]
+    fn together<const K: usize>(values: [Self; K], f: impl Fn([f64; K]) -> f64) -> Self {
+        f(values)
+    }
+    #[inline]
     fn sqrt(self) -> Self {
         libm::sqrt(self)
     }
@@ -218,6 +224,10 @@ impl Scalar for f32 {
     #[inline]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {
         f(f64::from(self)) as f32
+    }
+    #[inline]
+    fn together<const K: usize>(values: [Self; K], f: impl Fn([f64; K]) -> f64) -> Self {
+        f(values.map(f64::from)) as f32
     }
     #[inline]
     fn sqrt(self) -> Self {

@@ -1,13 +1,11 @@
 //! The questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
 
-use arm_core::effect::{
-    Effect, KINDS, Kind, Motion, Nature, Place, Question, Values, resisting_torque,
-};
+use arm_core::effect::{Effect, Kind, Motion, Nature, Place, Question, Values, resisting_torque};
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 
 use crate::GapError;
 use crate::anchor::{Anchor, Change, Response};
-use crate::hypothesis::{Coordinate, Target};
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::memory;
 use crate::session::{Session, Sight};
 use crate::study::Study;
@@ -74,6 +72,59 @@ impl Candidate {
             None => effect.parameters[self.free[column]] = size,
         }
         effect
+    }
+
+    /// The changes of a hypothesis whose responses are its columns.
+    pub fn changes<const N: usize>(
+        &self,
+        session: &Session<N>,
+        hypothesis: &Hypothesis<N>,
+    ) -> Vec<Change<N>> {
+        let one = |column: usize| {
+            let mut changed = hypothesis.clone();
+            changed.named.push(self.unit(column, self.step));
+            let target = Target::Named(changed.named.len() - 1, 0);
+            let sensing = session.is_sensing(&changed, target);
+            Change {
+                changed,
+                size: self.step,
+                sensing,
+                moves_handle: false,
+            }
+        };
+        (0..self.width()).map(one).collect()
+    }
+
+    /// The question that an effect was asked by, with its shape: its free parameters are set to zero.
+    ///
+    /// `None` where no question of the kind has these parameters free, or these movements do not excite it.
+    ///
+    pub fn again<const N: usize>(
+        study: &Study<N>,
+        anchor: &Anchor<N>,
+        mut effect: Effect<f64>,
+        free: &[usize],
+    ) -> Option<Self> {
+        let questions = effect.kind.probe().questions;
+        let number = questions.iter().position(|q| q.free == free)?;
+        let question = &questions[number];
+        for &p in free {
+            effect.parameters[p] = 0.0;
+        }
+        let mut candidate = Self {
+            effect,
+            question: number,
+            free: free.to_vec(),
+            rest: question.rest,
+            refined: question.refined,
+            tried: 1,
+            step: question.step,
+            price: 0.0,
+        };
+        if candidate.step == 0.0 {
+            candidate.step = torque_step(&motions(study, anchor), &candidate)?;
+        }
+        Some(candidate)
     }
 
     /// The effect with the coefficients of its columns.
@@ -145,28 +196,17 @@ impl Library {
         let hypothesis = &anchor.hypothesis;
         let motions = motions(study, anchor);
         let mut candidates = Vec::new();
-        for &kind in KINDS {
+        for kind in study.session.kinds() {
             for index in places(study.session, kind) {
                 for asked in kind.probe().questions.iter().enumerate() {
                     candidates.extend(ask(&motions, kind, index, asked, periodic));
                 }
             }
         }
-        let mut changes = Vec::new();
-        for candidate in &candidates {
-            for column in 0..candidate.width() {
-                let mut changed = hypothesis.clone();
-                changed.named.push(candidate.unit(column, candidate.step));
-                let target = Target::Named(changed.named.len() - 1, 0);
-                let sensing = study.session.is_sensing(&changed, target);
-                changes.push(Change {
-                    changed,
-                    size: candidate.step,
-                    sensing,
-                    moves_handle: false,
-                });
-            }
-        }
+        let changes: Vec<_> = candidates
+            .iter()
+            .flat_map(|c| c.changes(study.session, hypothesis))
+            .collect();
         let mut all = study.responses(anchor, &changes)?.into_iter();
         let mut kept = Vec::new();
         let mut responses = Vec::new();

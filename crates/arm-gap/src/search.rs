@@ -1,5 +1,7 @@
 //! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
 
+use arm_core::effect::Effect;
+
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::apart::{Apart, Line};
@@ -51,8 +53,10 @@ pub struct Named {
 /// Another effect that would explain what a named one does.
 #[derive(Clone, Debug)]
 pub struct Alternative {
-    /// The effect.
+    /// The question that it answers.
     pub candidate: Candidate,
+    /// The effect as it fits best.
+    pub effect: Effect<f64>,
     /// How much worse it explains the data, in units of twice the log-likelihood.
     pub worse: f64,
     /// Squared cosine between what the two would show.
@@ -608,9 +612,13 @@ impl<'a, const N: usize> Study<'a, N> {
             };
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
             let likeness = twin.map_or(0.0, |t| scan.likeness(t, choice.members[0]));
+            let Some(&effect) = rival.hypothesis.named.last() else {
+                continue;
+            };
             rivals.push(Rival {
                 alternative: Alternative {
                     candidate: asked,
+                    effect,
                     worse,
                     likeness,
                 },

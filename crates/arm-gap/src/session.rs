@@ -1,6 +1,6 @@
 //! What is challenged and by what: the model as given, the trials, and what the calibration promises.
 
-use arm_core::effect::{Effect, KINDS, Place, Promise};
+use arm_core::effect::{Effect, KINDS, Kind, Place, Promise};
 use arm_core::{Chain, Contact};
 use arm_ident::trial::{Role, Tolerance, Trial};
 
@@ -24,6 +24,8 @@ pub struct Session<const N: usize> {
     pub trials: Vec<Trial<N>>,
     /// What is compared.
     pub sight: Sight,
+    /// Kinds of one's own that are asked besides those of the catalogue.
+    pub own: Vec<Kind>,
 }
 
 /// What is compared with the data.
@@ -44,6 +46,11 @@ const KNOWN: f64 = 0.05;
 const DAMPED: f64 = 0.3;
 
 impl<const N: usize> Session<N> {
+    /// All kinds that are asked.
+    pub fn kinds(&self) -> impl Iterator<Item = Kind> + '_ {
+        KINDS.iter().chain(&self.own).copied()
+    }
+
     /// Number of channels.
     pub fn channels(&self) -> usize {
         match self.sight {

@@ -49,6 +49,23 @@ impl<'a, const N: usize> Study<'a, N> {
     /// # Errors
     /// [`GapError`] for data that cannot be judged, or a model that cannot be simulated.
     pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
+        let noise = Noise::unknown(session.channels())?;
+        let mut study = Self::with_noise(session, noise, threads)?;
+        let given = study.anchor(&session.given())?;
+        study.leave_out_rest(&given);
+        study.measure_noise(&given)?;
+        Ok(study)
+    }
+
+    /// Makes a session ready whose noise is known from another one.
+    ///
+    /// # Errors
+    /// [`GapError`] for data that cannot be judged.
+    pub fn with_noise(
+        session: &'a Session<N>,
+        noise: Noise,
+        threads: usize,
+    ) -> Result<Self, GapError> {
         session.check()?;
         let courses = (0..session.trials.len())
             .map(|i| Ok(Arc::new(session.course(i)?)))
@@ -69,24 +86,20 @@ impl<'a, const N: usize> Study<'a, N> {
             });
         }
         let (group_of, references) = groups(&session.trials, &courses);
-        let mut study = Self {
+        Ok(Self {
             session,
             courses,
             stretches,
             group_of,
             references,
-            noise: Noise::unknown(session.channels())?,
+            noise,
             repeated: false,
             fitted,
             dry: [false; N],
             resting: Vec::new(),
             touched: Vec::new(),
             threads,
-        };
-        let given = study.anchor(&session.given())?;
-        study.leave_out_rest(&given);
-        study.measure_noise(&given)?;
-        Ok(study)
+        })
     }
 
     /// Reads the noise anew: what repeats differ in, or without repeats what a hypothesis leaves.

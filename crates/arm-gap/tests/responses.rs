@@ -116,6 +116,7 @@ fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
         tolerance: Tolerance::default(),
         trials,
         sight: Sight::Led,
+        own: Vec::new(),
     }
 }
 

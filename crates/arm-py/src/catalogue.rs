@@ -1,14 +1,14 @@
 //! The catalogue of effects as Python data.
 
-use arm_core::effect::KINDS;
+use arm_core::effect::{KINDS, Kind};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-/// All kinds of effects: name, where, parameters with units and bounds, formula, reference.
+/// All kinds of effects, those of one's own last: name, where, parameters with units and bounds, formula, reference.
 #[pyfunction]
 pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
-    for kind in KINDS {
+    for kind in KINDS.iter().copied().chain(crate::own::declared()) {
         let info = kind.info();
         let parameters = PyList::empty(py);
         for p in info.parameters {
@@ -30,6 +30,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("parameters", parameters)?;
         entry.set_item("first_joint", if kind.crosses() { 2 } else { 1 })?;
         entry.set_item("address", info.place.address())?;
+        entry.set_item("own", matches!(kind, Kind::Own(_)))?;
         list.append(entry)?;
     }
     Ok(list)

@@ -7,6 +7,7 @@ use arm_gap::fit::Fitted;
 use arm_gap::hypothesis::{Coordinate, Hypothesis, Target};
 use arm_gap::misfit::Lack;
 use arm_gap::search::{Finding, Named};
+use arm_gap::separate::Contest;
 use arm_gap::session::{Session, Sight};
 use arm_gap::study::Study;
 use arm_ident::trial::Tolerance;
@@ -17,6 +18,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::arm::{AnyChain, each_short_length};
 use crate::errors::{bad_input, gap};
 use crate::ident::{Columns, read_trials};
+use crate::own;
 use crate::rig::Rig;
 
 /// What is known beforehand.
@@ -32,6 +34,8 @@ pub struct Settings {
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
     threads: usize,
+    /// Names of kinds of one's own that are asked besides the catalogue.
+    own: Vec<String>,
 }
 
 /// The refusal of an arm that the search is not made for.
@@ -63,6 +67,11 @@ fn session<const N: usize>(
         } else {
             Sight::Torque
         },
+        own: settings
+            .own
+            .iter()
+            .map(|kind| own::kind(kind))
+            .collect::<PyResult<_>>()?,
     })
 }
 
@@ -100,8 +109,9 @@ pub fn play<'py>(
                 one.set_item("given", table(py, &given)?)?;
                 Ok(one.into_any())
             })
-            .collect::<PyResult<Vec<_>>>()?;
-        PyList::new(py, plays)
+            .collect::<PyResult<Vec<_>>>();
+        own::failed()?;
+        PyList::new(py, plays?)
     }
     each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)), Err(too_long()))
 }
@@ -123,24 +133,199 @@ pub fn find_gap<'py>(
         (columns, settings, progress): (&[Columns<'py>], &Settings, Option<&Py<PyAny>>),
     ) -> PyResult<Bound<'py, PyDict>> {
         let session = session::<N>(chain, rig, columns, settings)?;
-        let tell = |what: &str, share: f64| {
-            if let Some(callable) = progress {
-                // What a display does with it is no reason to stop.
-                let _ = Python::attach(|py| callable.call1(py, (what, share)).map(|_| ()));
-            }
-        };
-        let (study, finding) = py
-            .detach(|| {
-                let mut study = Study::new(&session, settings.threads)?;
-                let finding = study.search(&tell)?;
-                Ok((study, finding))
-            })
-            .map_err(gap)?;
+        let outcome = py.detach(|| {
+            let mut study = Study::new(&session, settings.threads)?;
+            let finding = study.search(&tell(progress))?;
+            Ok((study, finding))
+        });
+        own::failed()?;
+        let (study, finding) = outcome.map_err(gap)?;
         result(py, &study, &finding)
     }
     each_short_length!(
         &rig.arm.get().chain,
         c => run(py, c, rig, (&trials, &settings, progress.as_ref())),
+        Err(too_long())
+    )
+}
+
+/// Calibrates a model, and asks every candidate alone to first order; see `armrs.discrepancy.calibrate`.
+#[pyfunction]
+#[pyo3(signature = (rig, trials, settings, progress=None))]
+pub fn look<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    trials: Vec<Columns<'py>>,
+    settings: Settings,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (columns, settings, progress): (&[Columns<'py>], &Settings, Option<&Py<PyAny>>),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let session = session::<N>(chain, rig, columns, settings)?;
+        let outcome = py.detach(|| {
+            let mut study = Study::new(&session, settings.threads)?;
+            let look = study.look(&tell(progress))?;
+            Ok((study, look))
+        });
+        own::failed()?;
+        let (study, look) = outcome.map_err(gap)?;
+        let out = PyDict::new(py);
+        out.set_item("groups", study.group_of.clone())?;
+        out.set_item("calibrated", fitted(py, &look.calibrated)?)?;
+        out.set_item("lack", lack(&look.lack))?;
+        out.set_item("unknowns", unknowns(&study, &look.calibrated))?;
+        let suspects: Vec<_> = look
+            .suspects
+            .iter()
+            .map(|s| {
+                (
+                    entry(&s.effect),
+                    s.candidate.free.clone(),
+                    s.gain,
+                    s.price,
+                    s.smallest,
+                )
+            })
+            .collect();
+        out.set_item("suspects", suspects)?;
+        let given = study.session.given();
+        let plays = [
+            ("given", &given),
+            ("calibrated", &look.calibrated.hypothesis),
+        ];
+        out.set_item("trials", played(py, &study, &plays)?)?;
+        Ok(out)
+    }
+    each_short_length!(
+        &rig.arm.get().chain,
+        c => run(py, c, rig, (&trials, &settings, progress.as_ref())),
+        Err(too_long())
+    )
+}
+
+/// What is told of the work to a callable, where there is one.
+fn tell(progress: Option<&Py<PyAny>>) -> impl Fn(&str, f64) + Sync + '_ {
+    move |what, share| {
+        if let Some(callable) = progress {
+            // What a display does with it is no reason to stop.
+            let _ = Python::attach(|py| callable.call1(py, (what, share)).map(|_| ()));
+        }
+    }
+}
+
+/// The nuisances of a calibrated model, with what was known of them; see [`unknown`].
+fn unknowns<const N: usize>(
+    study: &Study<'_, N>,
+    calibrated: &Fitted<N>,
+) -> Vec<(&'static str, usize, usize, f64, f64, f64)> {
+    let nuisances = study.session.nuisances();
+    let each = nuisances.iter();
+    each.filter_map(|c| unknown(&calibrated.hypothesis, c, f64::NAN))
+        .collect()
+}
+
+fn lack(l: &Lack) -> (f64, f64, f64) {
+    (l.ratio, l.z, l.excess)
+}
+
+/// Measured and simulated channels of every trial, under several hypotheses; `None` where one cannot be simulated.
+fn played<'py, const N: usize>(
+    py: Python<'py>,
+    study: &Study<'_, N>,
+    plays: &[(&str, &Hypothesis<N>)],
+) -> PyResult<Bound<'py, PyList>> {
+    let trials = (0..study.courses.len())
+        .map(|i| {
+            let one = PyDict::new(py);
+            let course = &study.courses[i];
+            one.set_item("measured", table(py, &course.raw)?)?;
+            for (name, hypothesis) in plays {
+                let channels = py.detach(|| {
+                    let run = study.session.run(hypothesis, course).ok()?;
+                    study.session.read_raw(hypothesis, course, &run).ok()
+                });
+                match channels {
+                    Some(channels) => one.set_item(name, table(py, &channels)?)?,
+                    None => one.set_item(name, py.None())?,
+                }
+            }
+            Ok(one)
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    PyList::new(py, trials)
+}
+
+/// Effects that would do instead of a named one, and which of their parameters are free.
+type Rivals = Vec<(String, usize, Vec<f64>, Vec<usize>)>;
+
+/// An effect, and which of its parameters are free.
+type Asked = (Effect<f64>, Vec<usize>);
+
+/// How far apart a named effect and its rivals would be on planned movements, in standard deviations.
+///
+/// Parameters
+/// ----------
+/// rig : Rig
+///     Everything with the named effect, which is the last of the rig's.
+/// trials : list of dict
+///     Those that were made.
+/// settings : dict
+/// planned : list of dict
+///     Movements as they would be recorded.
+/// rivals : list of (kind, index, values, free)
+///
+/// Returns
+/// -------
+/// list of list of float or None
+///     First with the trials that were made alone, then with each planned one besides; None for what cannot be simulated.
+#[pyfunction]
+pub fn distances<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    trials: Vec<Columns<'py>>,
+    settings: Settings,
+    planned: Vec<Columns<'py>>,
+    rivals: Rivals,
+) -> PyResult<Vec<Option<Vec<f64>>>> {
+    fn run<const N: usize>(
+        py: Python<'_>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (columns, settings): (&[Columns<'_>], &Settings),
+        (planned, rivals): (&[Columns<'_>], &[Asked]),
+    ) -> PyResult<Vec<Option<Vec<f64>>>> {
+        let all = session::<N>(chain, rig, columns, settings)?;
+        let planned = read_trials::<N>(planned, rig)?;
+        let mut without = all.clone();
+        let Some(named) = without.effects.pop() else {
+            return Err(bad_input("effects", "none", "a named effect"));
+        };
+        let outcome = py.detach(|| {
+            let noise = Study::new(&all, settings.threads)?.noise;
+            let study = Study::with_noise(&without, noise, settings.threads)?;
+            let contest = Contest::new(study, named, rivals)?;
+            let mut found = vec![Some(contest.distances(None)?)];
+            let one = |i: usize| contest.distances(Some(&planned[i])).ok();
+            let each = contest.study().parallel(planned.len(), one);
+            found.extend(each);
+            Ok(found)
+        });
+        own::failed()?;
+        outcome.map_err(gap)
+    }
+    let rivals = rivals
+        .into_iter()
+        .map(|(kind, index, values, free)| {
+            Ok((Effect::new(own::kind(&kind)?, index).with(&values), free))
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    each_short_length!(
+        &rig.arm.get().chain,
+        c => run(py, c, rig, (&trials, &settings), (&planned, &rivals)),
         Err(too_long())
     )
 }
@@ -156,7 +341,6 @@ fn result<'py, const N: usize>(
     out.set_item("scale", finding.scale)?;
     out.set_item("calibrated", fitted(py, &finding.calibrated)?)?;
     out.set_item("amended", fitted(py, &finding.amended)?)?;
-    let lack = |l: &Lack| (l.ratio, l.z, l.excess);
     out.set_item("lack", finding.lack.each_ref().map(lack))?;
     let known: Vec<_> = std::iter::zip(&finding.precision.coordinates, &finding.precision.sd)
         .filter_map(|(c, sd)| unknown(&finding.amended.hypothesis, c, *sd))
@@ -206,25 +390,7 @@ fn result<'py, const N: usize>(
         ("calibrated", &finding.calibrated.hypothesis),
         ("amended", &finding.amended.hypothesis),
     ];
-    let trials = (0..study.courses.len())
-        .map(|i| {
-            let one = PyDict::new(py);
-            let course = &study.courses[i];
-            one.set_item("measured", table(py, &course.raw)?)?;
-            for (name, hypothesis) in plays {
-                let played = py.detach(|| {
-                    let run = study.session.run(hypothesis, course).ok()?;
-                    study.session.read_raw(hypothesis, course, &run).ok()
-                });
-                match played {
-                    Some(channels) => one.set_item(name, table(py, &channels)?)?,
-                    None => one.set_item(name, py.None())?,
-                }
-            }
-            Ok(one)
-        })
-        .collect::<PyResult<Vec<_>>>()?;
-    out.set_item("trials", PyList::new(py, trials)?)?;
+    out.set_item("trials", played(py, study, &plays)?)?;
     Ok(out)
 }
 
@@ -249,7 +415,10 @@ fn named<'py, const N: usize>(
     let alternatives: Vec<_> = named
         .alternatives
         .iter()
-        .map(|a| (asked(&a.candidate), a.worse, a.likeness))
+        .map(|a| {
+            let fitted = (entry(&a.effect), a.candidate.free.clone());
+            (fitted, a.worse, a.likeness)
+        })
         .collect();
     out.set_item("alternatives", alternatives)?;
     Ok(out)

@@ -8,6 +8,7 @@ mod errors;
 mod gap;
 mod ident;
 mod lab;
+mod own;
 mod plan;
 mod rig;
 mod signal;
@@ -32,7 +33,10 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<cosim::ArmState>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(gap::find_gap, m)?)?;
+    m.add_function(wrap_pyfunction!(gap::distances, m)?)?;
+    m.add_function(wrap_pyfunction!(gap::look, m)?)?;
     m.add_function(wrap_pyfunction!(gap::play, m)?)?;
+    m.add_function(wrap_pyfunction!(own::declare, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;
     m.add_function(wrap_pyfunction!(plan::forecast_py, m)?)?;

@@ -1,6 +1,6 @@
 //! `Rig`: an arm with everything that acts on it, as the core computes with it.
 
-use arm_core::effect::{Effect, Kind, Motion, Place};
+use arm_core::effect::{Effect, Motion, Place};
 use arm_core::{Chain, Contact, Elbow, Joints, Pose, Robot, Setup, joint_force};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use crate::arm::{AnyChain, Arm, each_length};
 use crate::convert::{Numbers, in_order, joints};
 use crate::errors::{bad_input, invalid};
+use crate::own;
 
 /// An arm, its effects, its contact with the robot and the robot itself.
 ///
@@ -45,12 +46,11 @@ impl Rig {
         let effects = effects
             .into_iter()
             .map(|(kind, index, values)| {
-                let effect = Effect::new(Kind::named(&kind)?, index).with(&values);
-                effect.validate(joints)?;
+                let effect = Effect::new(own::kind(&kind)?, index).with(&values);
+                effect.validate(joints).map_err(invalid)?;
                 Ok(effect)
             })
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(invalid)?;
+            .collect::<PyResult<Vec<_>>>()?;
         let (stiffness, damping) = contact;
         let robot = robot
             .map(|(lengths, base, elbow)| {
@@ -95,9 +95,11 @@ impl Rig {
         each_length!(chain, c => {
             let rows = self.arm.get().rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
             let mut along = Along::new(c, &self.effects, interval);
-            in_order(py, rows, self.effects.len(), |[q, qd, qdd], out| {
+            let torques = in_order(py, rows, self.effects.len(), |[q, qd, qdd], out| {
                 along.next(&joints(q), &joints(qd), &joints(qdd), out);
-            })
+            })?;
+            own::failed()?;
+            Ok(torques)
         })
     }
 }

@@ -100,9 +100,9 @@ pub fn simulate<'py>(
             "rapier" => Engine::Rapier,
             other => return Err(bad_input("engine", other, "native or rapier")),
         };
-        let recording = py
-            .detach(|| arm_sim::simulate_with(engine, &experiment))
-            .map_err(simulation)?;
+        let outcome = py.detach(|| arm_sim::simulate_with(engine, &experiment));
+        crate::own::failed()?;
+        let recording = outcome.map_err(simulation)?;
         let out = columns(py, &recording)?;
         if let Some(sensing) = sensing {
             let readings = sensing

@@ -1,6 +1,32 @@
-"""The gap workflow: where simulation and data disagree, which effect is missing, and what adding it gains."""
+"""The gap workflow: where simulation and data disagree, which effect is missing, and what adding it gains.
 
-from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Place, Rung, Value
+`find_gap` does it all. Its stages by themselves: `compare`, `calibrate`, `find_gap(…, separate=False)`, which names, `separate`, `confirm`.
+"""
+
+from .detecting import detectable
+from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Place, Rung, Separation, Suspect, Value
 from .search import find_gap
+from .separating import separate
+from .stages import Calibrated, Compared, calibrate, compare, confirm
 
-__all__ = ["Absorbed", "Alternative", "ChannelGap", "GapFound", "Limit", "Missing", "Place", "Rung", "Value", "find_gap"]
+__all__ = [
+    "Absorbed",
+    "Alternative",
+    "Calibrated",
+    "ChannelGap",
+    "Compared",
+    "GapFound",
+    "Limit",
+    "Missing",
+    "Place",
+    "Rung",
+    "Separation",
+    "Suspect",
+    "Value",
+    "calibrate",
+    "compare",
+    "confirm",
+    "detectable",
+    "find_gap",
+    "separate",
+]

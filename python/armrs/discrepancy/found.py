@@ -27,6 +27,29 @@ class Value:
 
 
 @dataclass(frozen=True)
+class Separation:
+    """A movement that would tell two explanations apart.
+
+    Attributes
+    ----------
+    waypoints_deg : tuple of tuple of float
+        Joint angles [deg].
+    speed_rad_s, acceleration_rad_s2 : float
+        Largest of any joint.
+    shape : {"trapezoid", "smooth"}
+    now, then : float
+        How many standard deviations apart the two are, everything refitted: by the fit trials alone, and with one such trial more.
+    """
+
+    waypoints_deg: tuple[tuple[float, ...], ...]
+    speed_rad_s: float
+    acceleration_rad_s2: float
+    shape: str
+    now: float
+    then: float
+
+
+@dataclass(frozen=True)
 class Alternative:
     """Another effect that would explain what a named one does.
 
@@ -40,6 +63,9 @@ class Alternative:
         How much worse it explains the data, in units of twice the log-likelihood; a few units decide nothing.
     likeness : float
         Squared cosine between what the two would show on these movements: 1 cannot be told apart.
+    separating_movement : str or None
+        A movement that would tell the two apart, in words, and as numbers in `separation`.
+    separation : Separation or None
     """
 
     kind: str
@@ -49,6 +75,7 @@ class Alternative:
     worse: float
     likeness: float
     separating_movement: str | None = None
+    separation: Separation | None = None
 
 
 @dataclass(frozen=True)
@@ -181,6 +208,35 @@ class Limit:
     unit: str
     gain: float = 0.0
     price: float = 0.0
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect alone, to first order.
+
+    Attributes
+    ----------
+    kind : str
+    joint, channel
+        Where it would act.
+    parameters : dict of float
+        What is free in it, as it would be.
+    unit : str
+        Of the first.
+    gain, price : float
+        What it would explain, and what it must explain to be named, in units of twice the log-likelihood.
+    smallest : float
+        Smallest size of the first parameter that would be named.
+    """
+
+    kind: str
+    joint: int | None
+    channel: str | None
+    parameters: Mapping[str, float]
+    unit: str
+    gain: float
+    price: float
+    smallest: float
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,12 @@ def _missing(data: Mapping[str, Any], drawn: str) -> str:
         "An interval holds if the structure of the model is right.",
         "soft",
     )
+    if data["verdict"] == "unexplained":
+        out += paragraph(
+            "Here it is not right: something is left that no effect explains. Intervals were widened by what is left, and may still be too "
+            "narrow.",
+            "soft",
+        )
     lines = words.others(data)
     if lines:
         out += heading("What it may be instead") + bullets(lines)

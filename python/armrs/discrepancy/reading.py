@@ -17,9 +17,11 @@ from ..trial import Trial
 from . import maps
 from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Rung, Tried, Value
 
-_MISFIT = 6.0
-"""Lack of fit beyond which something is left, in standard deviations of white rows; coloured noise is never quite
-white, and nulls reach 4.3."""
+MISFIT = 6.0
+"""Lack of fit beyond which something is left, in standard deviations of white rows.
+
+Coloured noise is never quite white, and nulls reach 4.3.
+"""
 _NEGLIGIBLE = 0.05
 """Share of the calibrated model's lack of fit that may be left where effects were named: shapes are never exact."""
 
@@ -31,7 +33,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
     effects = tuple(sorted((*together, *apart), key=lambda e: -e.share))
     (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
-    if after_z >= _MISFIT and not (effects and share < _NEGLIGIBLE):
+    if after_z >= MISFIT and not (effects and share < _NEGLIGIBLE):
         verdict = "unexplained"
     else:
         verdict = "explained" if effects else "nothing_missing"
@@ -39,15 +41,15 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         verdict=verdict,
         effects=effects,
         where=maps.places(maps.discrepancies(dataset, led, raw["trials"], "calibrated")),
-        gap=_gap(dataset, led, raw),
+        gap=gaps(dataset, led, raw),
         would_have_seen=_limits(raw),
         unexplained=min(share, 1.0) if verdict == "unexplained" or effects else 0.0,
         looks_like=maps.shape(maps.discrepancies(dataset, led, raw["trials"], "amended")) if verdict == "unexplained" else None,
-        absorbed=_absorbed(dataset, raw),
+        absorbed=absorbed(dataset, raw),
         lack=((before_ratio, before_z), (after_ratio, after_z)),
         ladder=tuple(_rung(tried, before, after) for tried, before, after in raw["ladder"]),
         warnings=tuple(warnings),
-        model=_amended(dataset.model, raw["amended"]),
+        model=amended(dataset.model, raw["amended"]),
         dataset=dataset,
         raw=raw,
     )
@@ -125,23 +127,24 @@ def _limits(raw: Mapping[str, Any]) -> tuple[Limit, ...]:
 
 
 def _rung(tried: Sequence[Any], before: float, after: float) -> Rung:
-    def effect(asked: Sequence[Any]) -> tuple[str, int | None, str | None]:
+    def where(asked: Sequence[Any]) -> tuple[str, int | None, str | None]:
         (name, index, _values), _free = asked
         return (name, *catalogue()[name].place(index))
 
-    return Rung(tuple(Tried(tuple(map(effect, members)), float(gain)) for members, gain in tried), float(before), float(after))
+    return Rung(tuple(Tried(tuple(map(where, members)), float(gain)) for members, gain in tried), float(before), float(after))
 
 
-def _absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
+def absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
+    """Return what was refitted, from the core's list of unknowns."""
     items = []
     for what, index, part, value, before, _after in raw["unknowns"]:
         if what in ("mass", "com", "inertia"):
             items.append(Absorbed(f"{what} of segment {index + 1}", value, 2 * before, "of its value"))
         elif what == "known":
-            effect = all_effects(dataset.model)[index]
-            parameter = catalogue()[effect.kind].parameters[part]
-            name = f"{parameter.name} of {_worded(effect.kind, effect.joint, effect.channel)}"
-            given = effect.parameters.get(parameter.name, parameter.default)
+            own = all_effects(dataset.model)[index]
+            parameter = catalogue()[own.kind].parameters[part]
+            name = f"{parameter.name} of {_worded(own.kind, own.joint, own.channel)}"
+            given = own.parameters.get(parameter.name, parameter.default)
             items.append(Absorbed(name, value / given - 1.0, 2 * before / abs(given), "of its value"))
         elif what in ("compliance", "damping"):
             items.append(Absorbed(f"{what} of the contact, {'yz'[part]}", value, 2 * before, "of its value"))
@@ -157,8 +160,8 @@ def _worded(kind: str, joint: int | None, channel: str | None) -> str:
     return kind.replace("_", " ") + (f" of joint {joint}" if joint else f" of {channel}" if channel else "")
 
 
-def _amended(model: Model, amended: Mapping[str, Any]) -> Model:
-    """Return the model with refitted segments and known effects, and the named effects added."""
+def amended(model: Model, fitted: Mapping[str, Any], *, joints: bool = True) -> Model:
+    """Return the model with refitted segments and known effects, and the named effects added; without `joints` no effect of it."""
     segments = tuple(
         Segment(
             s.name,
@@ -168,11 +171,19 @@ def _amended(model: Model, amended: Mapping[str, Any]) -> Model:
             s.inertia * (1 + i),
             com_normal=s.com_normal * (1 + c),
         )
-        for s, (m, c, i) in zip(model.segments, amended["segments"], strict=True)
+        for s, (m, c, i) in zip(model.segments, fitted["segments"], strict=True)
     )
-    known = [_effect(entry) for entry in amended["known"]]
-    joints = []
-    rest = iter(known)
+    contact = model.contact
+    if contact is not None:
+        compliance, damping = fitted["contact"]
+        contact = Contact(
+            (contact.stiffness[0] / (1 + compliance[0]), contact.stiffness[1] / (1 + compliance[1])),
+            (contact.damping[0] * (1 + damping[0]), contact.damping[1] * (1 + damping[1])),
+        )
+    if not joints:
+        return model.replace(segments=segments, contact=contact, joints=tuple(Joint(j.name) for j in model.joints), effects=())
+    rest = iter([effect(entry) for entry in fitted["known"]])
+    listed = []
     for joint in model.joints:
         values = dataclasses.asdict(joint)
         if joint.stiffness:
@@ -181,49 +192,46 @@ def _amended(model: Model, amended: Mapping[str, Any]) -> Model:
             values["viscosity"] = next(rest).parameters["viscosity"]
         if joint.coulomb:
             values["coulomb"] = next(rest).parameters["torque"]
-        joints.append(Joint(**values))
-    contact = model.contact
-    if contact is not None:
-        compliance, damping = amended["contact"]
-        contact = Contact(
-            (contact.stiffness[0] / (1 + compliance[0]), contact.stiffness[1] / (1 + compliance[1])),
-            (contact.damping[0] * (1 + damping[0]), contact.damping[1] * (1 + damping[1])),
-        )
-    return model.replace(segments=segments, joints=tuple(joints), contact=contact, effects=(*rest, *map(_effect, amended["named"])))
+        listed.append(Joint(**values))
+    effects = (*rest, *map(effect, fitted["named"]))
+    return model.replace(segments=segments, joints=tuple(listed), contact=contact, effects=effects)
 
 
-def _effect(entry: Sequence[Any]) -> Effect:
+def effect(entry: Sequence[Any]) -> Effect:
+    """Return an effect of the core."""
     name, index, values = entry
     kind = catalogue()[name]
     return Effect(name, *kind.place(index), parameters=kind.values(values))
 
 
-def _gap(dataset: Dataset, led: bool, raw: Mapping[str, Any]) -> dict[str, ChannelGap]:
+def gaps(dataset: Dataset, led: bool, raw: Mapping[str, Any], last: str = "amended") -> dict[str, ChannelGap]:
+    """Return the gap of every channel on the test trials; `last` is the last model that there is."""
     tests = [k for k, t in enumerate(dataset.trials) if t.role == "test"]
+    trials, plays = [dataset.trials[k] for k in tests], [raw["trials"][k] for k in tests]
     result = {}
     for c, name in enumerate(channel_names(dataset, led)):
-        rms = {}
-        for version in ("given", "calibrated", "amended"):
-            rows = [_difference(dataset.trials[k], raw["trials"][k], version)[:, c] for k in tests if raw["trials"][k][version] is not None]
-            rms[version] = float(np.sqrt(np.mean(np.square(np.concatenate(rows))))) if rows and sum(map(len, rows)) else None
-        result[name] = ChannelGap(rms["given"], rms["calibrated"], rms["amended"], _floor(dataset, raw, c))
+        given, calibrated, after = (size(trials, plays, version, c) for version in ("given", "calibrated", "amended"))
+        result[name] = ChannelGap(given, calibrated, after, _floor(dataset, raw, c, last))
     return result
 
 
-def _difference(trial: Trial, play: Mapping[str, Any], version: str) -> np.ndarray:
-    return (play[version] - play["measured"])[trial.valid]
+def size(trials: Sequence[Trial], plays: Sequence[Mapping[str, Any]], version: str, channel: int) -> float | None:
+    """Return the root mean square of simulated less measured of one channel; None where nothing could be simulated."""
+    pairs = [(t, p) for t, p in zip(trials, plays, strict=True) if p.get(version) is not None]
+    rows = [(p[version] - p["measured"])[t.valid][:, channel] for t, p in pairs]
+    return float(np.sqrt(np.mean(np.square(np.concatenate(rows))))) if rows and sum(map(len, rows)) else None
 
 
-def _floor(dataset: Dataset, raw: Mapping[str, Any], channel: int) -> float | None:
+def _floor(dataset: Dataset, raw: Mapping[str, Any], channel: int, version: str) -> float | None:
     """Return what repeats of one movement differ by, after their own simulated differences; None without repeats."""
     square, freedom = 0.0, 0.0
     groups = np.asarray(raw["groups"])
     for group in np.unique(groups):
-        members = [k for k in np.flatnonzero(groups == group) if raw["trials"][k]["amended"] is not None]
+        members = [k for k in np.flatnonzero(groups == group) if raw["trials"][k][version] is not None]
         if len(members) < 2:
             continue
         length = min(len(dataset.trials[k]) for k in members)
-        rows = np.array([(raw["trials"][k]["measured"] - raw["trials"][k]["amended"])[:length, channel] for k in members])
+        rows = np.array([(raw["trials"][k]["measured"] - raw["trials"][k][version])[:length, channel] for k in members])
         valid = np.all([dataset.trials[k].valid[:length] for k in members], axis=0)
         deviation = (rows - rows.mean(axis=0))[:, valid]
         square += float(np.sum(deviation**2))

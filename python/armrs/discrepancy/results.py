@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import files
+from .. import files, tomlfile
 from ..catalogue import catalogue
 from ..dataset import FILE, Dataset
 from ..results import data_of, origin, write_result
@@ -20,8 +21,24 @@ def gap_data(result: GapFound, command: str | None = None) -> dict[str, Any]:
     for effect in data["effects"]:
         kind = catalogue()[effect["kind"]]
         effect |= {"summary": kind.summary, "formula": kind.formula}
+    for number, alternative in enumerate(_separated(data), start=1):
+        alternative["separation"]["file"] = f"separating-{number}.toml"
     data["made_by"] |= {"input_sha256": digest(result.dataset), "random_numbers": "none"}
     return data
+
+
+def _separated(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the alternatives that a movement was found for."""
+    return [a for e in data["effects"] for a in e["alternatives"] if a["separation"] is not None]
+
+
+def _write_movement(separation: Mapping[str, Any], folder: Path) -> Path:
+    """Write a movement as a file for `armrs simulate`."""
+    table = {key: separation[key] for key in ("waypoints_deg", "speed_rad_s", "acceleration_rad_s2", "shape")}
+    table["waypoints_deg"] = [list(row) for row in table["waypoints_deg"]]
+    path = folder / str(separation["file"])
+    files.write_text(path, "\n".join(["[movement]", *tomlfile.lines(table), ""]), kind=".toml")
+    return path
 
 
 def digest(dataset: Dataset) -> str | None:
@@ -38,7 +55,9 @@ def digest(dataset: Dataset) -> str | None:
 
 
 def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path]:
-    """Write `amended.toml`, `gap.json`, figures and `report.html` below a folder; return the files, the report last.
+    """Write `amended.toml`, movements that separate alternatives, `gap.json`, figures and `report.html` below a folder.
+
+    Returns the files, the report last.
 
     `data` is that of `gap_data`; the list of figures is added to it.
     """
@@ -48,6 +67,7 @@ def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path
 
     def write(out: Path) -> list[Path]:
         result.model.write(out / name)
-        return [out / name, *write_result(out, "gap", data, drawn)]
+        movements = [_write_movement(a["separation"], out) for a in _separated(data)]
+        return [out / name, *movements, *write_result(out, "gap", data, drawn)]
 
     return files.write_whole(folder, write)

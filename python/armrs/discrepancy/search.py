@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from .. import _armrs
 from ..dataset import Dataset, load_dataset
 from ..identification import core_columns
+from ..own import OwnEffect
 from ..rig import all_effects, rig
 from . import reading, suspicion
 from .found import GapFound
@@ -17,6 +18,8 @@ from .found import GapFound
 def find_gap(
     dataset: Dataset | str | os.PathLike[str],
     *,
+    effects: Sequence[OwnEffect] = (),
+    separate: bool = True,
     threads: int | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> GapFound:
@@ -27,6 +30,10 @@ def find_gap(
     Parameters
     ----------
     dataset : Dataset or path
+    effects : sequence of OwnEffect
+        Kinds of one's own (`armrs.own_effect`) that are asked besides the catalogue.
+    separate : bool
+        Whether movements are looked for that would tell a named effect from its alternatives.
     threads : int, optional
         All cores when absent; the result does not depend on it.
     progress : callable, optional
@@ -43,17 +50,20 @@ def find_gap(
     SimulationError
         When the model as given cannot be simulated on a trial.
     """
+    from . import separating
+
     if not isinstance(dataset, Dataset):
         dataset = load_dataset(dataset)
     led = reading.is_led(dataset)
-    settings = core_settings(dataset, led, threads)
+    settings = core_settings(dataset, led, threads, [e.kind for e in effects])
     columns = core_trials(dataset)
     built = rig(dataset.model, all_effects(dataset.model))
     warnings = suspicion.examine(dataset, led)
     suspicion.refuse_wrong_angles(dataset)
     suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
     raw = _armrs.find_gap(built, columns, settings, progress)
-    return reading.found(dataset, led, raw, warnings)
+    result = reading.found(dataset, led, raw, warnings)
+    return separating.separate(result, threads=threads, progress=progress) if separate else result
 
 
 def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
@@ -62,7 +72,7 @@ def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
     return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
 
 
-def core_settings(dataset: Dataset, led: bool, threads: int | None) -> dict[str, Any]:
+def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> dict[str, Any]:
     """Return what is known beforehand, for the core."""
     tolerance = dataset.tolerance
     return {
@@ -73,5 +83,6 @@ def core_settings(dataset: Dataset, led: bool, threads: int | None) -> dict[str,
         "time_delay": tolerance.time_delay_s,
         "handle_placement": tolerance.handle_placement_m,
         "led": led,
+        "own": list(own),
         "threads": threads or os.cpu_count() or 1,
     }

@@ -8,6 +8,12 @@ from typing import Any
 
 from .. import words as common
 from ..tables import Table, number, spread, unit
+from .reading import MISFIT
+
+_FEW = 2
+"""Effects that a verdict describes; of more it only gives the names."""
+_TELLS = 5.0
+"""Standard deviations from which on a movement tells two effects apart."""
 
 
 def place_of(kind: str, joint: int | None, channel: str | None, joints: Sequence[str] = ()) -> str:
@@ -47,8 +53,10 @@ _UNTESTED = "Without repeats of a movement, whether what is left is noise cannot
 def verdict(result: Mapping[str, Any]) -> str:
     """Return the result in a sentence or two."""
     joints = result["data"]["joints"]
+    # Of many things the names are enough in a sentence; a table says the rest.
+    many = len(result["effects"]) > _FEW
     names = [
-        f"{effect_name(e, joints)}: {e['summary']}, {size(e)}" + (f", in {e['trial']} only" if e.get("trial") else "")
+        effect_name(e, joints) + ("" if many else f": {e['summary']}, {size(e)}") + (f", in {e['trial']} only" if e.get("trial") else "")
         for e in result["effects"]
     ]
     is_tested = result["lack_of_fit"]["amended"]["z"] is not None
@@ -81,14 +89,28 @@ def _judged(result: Mapping[str, Any]) -> str:
 
 
 def others(result: Mapping[str, Any]) -> list[str]:
-    """Return what may be there instead, a line for each effect that has alternatives."""
+    """Return what may be there instead, a line for each effect that has alternatives, and what would tell."""
     lines = []
     for effect in result["effects"]:
         listed = [f"{effect_name(a)} ({_how(a)})" for a in effect["alternatives"]]
         if listed:
             lines.append(f"Instead of {effect_name(effect)} it may be {_joined(listed, 'or')}.")
-            lines += [f"{a['separating_movement']}" for a in effect["alternatives"] if a.get("separating_movement")]
+        lines += [
+            f"To tell {effect_name(effect)} from {effect_name(a)}: {_separating(a)}" for a in effect["alternatives"] if _separating(a)
+        ]
     return lines
+
+
+def _separating(alternative: Mapping[str, Any]) -> str:
+    """Say which movement would tell, and how well; nothing where none was looked for."""
+    separation = alternative.get("separation")
+    if separation is None:
+        return ""
+    now, then = (f"{separation[key]:.2g}" for key in ("now", "then"))
+    if separation["then"] < _TELLS:
+        best = alternative["separating_movement"]
+        return f"none of the movements tried would; the best, {best}, leaves them {then} standard deviations apart (now {now})."
+    return f"{alternative['separating_movement']}; with one such trial they would be {then} standard deviations apart (now {now})."
 
 
 def _how(alternative: Mapping[str, Any]) -> str:
@@ -111,7 +133,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
     for which, words in (("calibrated", "The calibrated model"), ("amended", "The model with the named effects")):
         lack = result["lack_of_fit"][which]
         if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
-            verdict = "more than noise" if lack["z"] >= 4.0 else "what noise does"
+            verdict = "more than noise" if lack["z"] >= MISFIT else "what noise does"
             lines.append(
                 f"{words} leaves {lack['ratio']:.3g} times the square of what repeats differ by ({lack['z']:+.1f} "
                 f"standard deviations): {verdict}."
@@ -139,6 +161,33 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     if result["verdict"] == "nothing_missing":
         common.show("The smallest effects that these data would have shown", limits(result))
     common.files_written(written[-1:])
+
+
+def quick(result: Mapping[str, Any]) -> None:
+    """Print a first look."""
+    label = " (synthetic data)" if common.is_synthetic(result) else ""
+    worth = [s for s in result["suspects"] if s["gain"] > s["price"]]
+    z = result["lack_of_fit"]["calibrated"]["z"]
+    if not worth:
+        said = "nothing alone explains enough to be named"
+    elif len(worth) == 1:
+        said = f"{effect_name(worth[0])} may be missing"
+    else:
+        said = f"{effect_name(worth[0])} explains most of {len(worth)} that may be missing, and several of them may be one"
+    noise = "" if z is None or z != z else f"; the calibrated model leaves {'more than' if z >= MISFIT else 'what is'} noise ({z:+.1f})"
+    print(f"{common.name(result)}{label}, a first look: {said}{noise}.\n")
+    common.show("Gap on the test trials, root mean square of simulated less measured", gap({**result, "effects": []}))
+    common.show("What each would explain alone, to first order", suspects(result))
+    print("Nothing is named yet: `armrs gap` without --quick converges by simulation, looks at several together, and confirms.")
+
+
+def suspects(data: Mapping[str, Any], most: int = 10) -> Table:
+    """Return the effects that would explain most, alone and to first order."""
+    rows = []
+    for s in data["suspects"][:most]:
+        sizes = ", ".join(f"{name} {value:.3g}" for name, value in s["parameters"].items())
+        rows.append([s["kind"], s["joint"] or s["channel"], f"{sizes} {unit(s['unit'])}".rstrip(), f"{s['gain']:.3g}", f"{s['price']:.3g}"])
+    return Table(["effect", "at", "size", "would explain", "would have to"], rows, 3)
 
 
 def missing(data: Mapping[str, Any]) -> Table:

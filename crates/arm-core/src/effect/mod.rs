@@ -4,12 +4,15 @@
 //! what it does. An [`Effect`] is one instance: a kind at a joint, segment or channel, with values. Everything outside
 //! this folder works on `Effect`s and never names a kind.
 //!
-//! To add a kind, write its file and add one line to the `catalogue!` below.
+//! To add a kind, write its file and add one line to the `catalogue!` below. A kind of one's own that needs no place in the
+//! catalogue is an [`OwnLaw`].
 
 mod law;
+mod own;
 mod probe;
 
 pub use law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+pub use own::{Own, OwnLaw};
 pub use probe::{Nature, Probe, Promise, Question, Values};
 
 use crate::{Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
@@ -19,35 +22,37 @@ macro_rules! catalogue {
     ($($module:ident :: $law:ident),* $(,)?) => {
         $(mod $module;)*
 
-        /// A kind of effect of the catalogue.
+        /// A kind of effect: one of the catalogue, or one of a user's own.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[non_exhaustive]
         pub enum Kind {
-            $(#[doc = concat!("See `effect/", stringify!($module), ".rs`.")] $law),*
+            $(#[doc = concat!("See `effect/", stringify!($module), ".rs`.")] $law,)*
+            /// One that the catalogue does not hold.
+            Own(Own),
         }
 
-        /// All kinds, in the order in which they are listed.
+        /// All kinds of the catalogue, in the order in which they are listed.
         pub const KINDS: &[Kind] = &[$(Kind::$law),*];
 
         impl Kind {
             /// Name, parameters, formula and reference.
-            pub const fn info(self) -> &'static Info {
-                match self { $(Self::$law => &<$module::$law as Law>::INFO),* }
+            pub fn info(self) -> &'static Info {
+                match self { $(Self::$law => &<$module::$law as Law>::INFO,)* Self::Own(own) => own.law().info() }
             }
         }
 
         impl Kind {
             /// How a search asks for it.
-            pub const fn probe(self) -> Probe {
-                match self { $(Self::$law => <$module::$law as Law>::PROBE),* }
+            pub fn probe(self) -> Probe {
+                match self { $(Self::$law => <$module::$law as Law>::PROBE,)* Self::Own(own) => own.law().probe() }
             }
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {
-                match self { $(Self::$law => <$module::$law as Law>::CROSSES),* }
+                match self { $(Self::$law => <$module::$law as Law>::CROSSES,)* Self::Own(_) => false }
             }
             /// Whether it depends on the force through the joint.
-            pub const fn feels_force(self) -> bool {
-                match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE),* }
+            pub fn feels_force(self) -> bool {
+                match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Own(own) => own.law().feels_force() }
             }
         }
 
@@ -56,47 +61,61 @@ macro_rules! catalogue {
             #[inline]
             pub fn torque(&self, at: &Local<T>) -> T {
                 if !self.on { return T::ZERO; }
-                match self.kind { $(Kind::$law => $module::$law::torque(&self.parameters, at)),* }
+                match self.kind {
+                    $(Kind::$law => $module::$law::torque(&self.parameters, at),)*
+                    Kind::Own(own) => own.torque(&self.parameters, at),
+                }
             }
             /// Derivatives of [`Effect::torque`] to the parameters.
             #[inline]
             pub fn gradient(&self, at: &Local<T>) -> Parameters<T> {
                 if !self.on { return [T::ZERO; MAX_PARAMETERS]; }
-                match self.kind { $(Kind::$law => $module::$law::gradient(&self.parameters, at)),* }
+                match self.kind {
+                    $(Kind::$law => $module::$law::gradient(&self.parameters, at),)*
+                    Kind::Own(_) => [T::ZERO; MAX_PARAMETERS],
+                }
             }
             /// Factor with which the same torque also resists in the joint before.
             #[inline]
             pub fn proximal_share(&self) -> T {
                 if !self.on { return T::ZERO; }
-                match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters)),* }
+                match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters),)* Kind::Own(_) => T::ZERO }
             }
             /// Time derivative of the effect's own state.
             #[inline]
             pub fn memory_rate(&self, at: &Local<T>) -> T {
                 if !self.on { return T::ZERO; }
-                match self.kind { $(Kind::$law => $module::$law::memory_rate(&self.parameters, at)),* }
+                match self.kind {
+                    $(Kind::$law => $module::$law::memory_rate(&self.parameters, at),)*
+                    Kind::Own(own) => own.memory_rate(&self.parameters, at),
+                }
             }
             /// Adds the torque with which the joints of a moving arm resist; nothing for an index beyond the arm.
             #[inline]
             fn resist<const N: usize>(&self, motion: &Motion<T, N>, memory: T, total: &mut Joints<T, N>) {
                 // The view of the joint is made within each arm, so that a kind pays only for what it looks at.
-                match self.kind { $(Kind::$law => {
-                    let torque = $module::$law::torque(&self.parameters, &motion.local(self.index, memory));
-                    total[self.index] += torque;
-                    if $module::$law::CROSSES && self.index > 0 {
-                        total[self.index - 1] += $module::$law::proximal_share(&self.parameters) * torque;
+                match self.kind {
+                    $(Kind::$law => {
+                        let torque = $module::$law::torque(&self.parameters, &motion.local(self.index, memory));
+                        total[self.index] += torque;
+                        if $module::$law::CROSSES && self.index > 0 {
+                            total[self.index - 1] += $module::$law::proximal_share(&self.parameters) * torque;
+                        }
+                    })*
+                    Kind::Own(own) => {
+                        total[self.index] += own.torque(&self.parameters, &motion.local(self.index, memory));
                     }
-                }),* }
+                }
             }
             /// Changes the rig before a run.
             pub fn alter<const N: usize>(&self, setup: &mut Setup<T, N>) {
                 if !self.on { return; }
-                match self.kind { $(Kind::$law => $module::$law::alter(&self.parameters, self.index, setup)),* }
+                match self.kind { $(Kind::$law => $module::$law::alter(&self.parameters, self.index, setup),)* Kind::Own(_) => {} }
             }
             /// Changes what the sensors read.
             pub fn distort<const N: usize>(&self, reading: &mut Reading<T, N>) {
                 if !self.on { return; }
-                match self.kind { $(Kind::$law => $module::$law::distort(&self.parameters, self.index, reading)),* }
+                match self.kind { $(Kind::$law => $module::$law::distort(&self.parameters, self.index, reading),)* Kind::Own(_) => {} }
             }
         }
     };

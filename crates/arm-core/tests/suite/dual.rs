@@ -88,6 +88,9 @@ impl Scalar for Dual {
     fn map(self, _: impl Fn(f64) -> f64) -> Self {
         unimplemented!("the derivative of an unknown function")
     }
+    fn together<const K: usize>(_: [Self; K], _: impl Fn([f64; K]) -> f64) -> Self {
+        unimplemented!("the derivatives of an unknown function")
+    }
     fn sqrt(self) -> Self {
         let root = Scalar::sqrt(self.value);
         self.chain(root, 0.5 / root)

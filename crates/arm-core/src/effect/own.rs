@@ -1,0 +1,157 @@
+use core::cmp::Ordering;
+use core::fmt;
+use core::hash::{Hash, Hasher};
+
+use super::law::{Info, Local, MAX_PARAMETERS, Parameters};
+use super::probe::Probe;
+use crate::Scalar;
+
+/// The law of a joint effect that the catalogue does not hold.
+///
+/// It is simulated, searched for and refitted like those of the catalogue. It computes in double precision, whatever the
+/// precision of the run.
+///
+/// ```
+/// use arm_core::effect::{Effect, Info, Kind, Local, Own, OwnLaw, Parameter, Parameters, Place};
+///
+/// /// Small magnets hold the joint at equal distances.
+/// struct Detent;
+///
+/// impl OwnLaw for Detent {
+///     fn info(&self) -> &'static Info {
+///         const INFO: Info = Info {
+///             kind: "detent",
+///             place: Place::Joint,
+///             summary: "moment of magnets at equal angles",
+///             formula: "R = height · sin(q/pitch)",
+///             reference: "the data sheet",
+///             parameters: &[
+///                 Parameter::linear("height", "N m", 0.0, 10.0, 0.0),
+///                 Parameter::shape("pitch", "rad", 0.01, 1.0, 0.1),
+///             ],
+///             memory: false,
+///         };
+///         &INFO
+///     }
+///     fn torque(&self, p: &Parameters<f64>, at: &Local<f64>) -> f64 {
+///         p[0] * libm::sin(at.q / p[1])
+///     }
+/// }
+///
+/// static DETENT: Detent = Detent;
+/// let kind = Kind::Own(Own::new(&DETENT));
+/// let effect = Effect::<f64>::new(kind, 1).with(&[0.2]);
+/// assert_eq!(effect.validate(2), Ok(()));
+/// let at = Local { time: 0.0, q: 0.05, qd: 0.0, qdd: 0.0, proximal_q: 0.0, joint_force: 0.0, memory: 0.0 };
+/// assert_eq!(effect.torque(&at), 0.2 * libm::sin(0.5));
+/// ```
+pub trait OwnLaw: Sync {
+    /// Name, parameters, formula and reference; parameters in which the torque is linear come first.
+    fn info(&self) -> &'static Info;
+    /// How a search asks for it.
+    fn probe(&self) -> Probe {
+        Probe::FIRST
+    }
+    /// Whether it looks at [`Local::joint_force`].
+    fn feels_force(&self) -> bool {
+        false
+    }
+    /// Torque with which the joint resists \[N m\].
+    fn torque(&self, p: &Parameters<f64>, at: &Local<f64>) -> f64;
+    /// Time derivative of the effect's own state, for a law that has one.
+    fn memory_rate(&self, _p: &Parameters<f64>, _at: &Local<f64>) -> f64 {
+        0.0
+    }
+}
+
+/// A kind of one's own: a law that outlives every run. Two are the same when their names are.
+#[derive(Clone, Copy)]
+pub struct Own(&'static dyn OwnLaw);
+
+impl Own {
+    /// A kind with a law.
+    pub const fn new(law: &'static dyn OwnLaw) -> Self {
+        Self(law)
+    }
+
+    /// Its law.
+    pub fn law(&self) -> &'static dyn OwnLaw {
+        self.0
+    }
+
+    /// Evaluates a function of the law for every lane of a number.
+    fn each<T: Scalar>(
+        p: &Parameters<T>,
+        at: &Local<T>,
+        f: impl Fn(&Parameters<f64>, &Local<f64>) -> f64,
+    ) -> T {
+        const ALL: usize = MAX_PARAMETERS + 7;
+        let mut values = [T::ZERO; ALL];
+        values[..MAX_PARAMETERS].copy_from_slice(p);
+        values[MAX_PARAMETERS..].copy_from_slice(&[
+            at.time,
+            at.q,
+            at.qd,
+            at.qdd,
+            at.proximal_q,
+            at.joint_force,
+            at.memory,
+        ]);
+        T::together(values, |v: [f64; ALL]| {
+            let mut p = [0.0; MAX_PARAMETERS];
+            p.copy_from_slice(&v[..MAX_PARAMETERS]);
+            let [time, q, qd, qdd, proximal_q, joint_force, memory] =
+                core::array::from_fn(|k| v[MAX_PARAMETERS + k]);
+            let at = Local {
+                time,
+                q,
+                qd,
+                qdd,
+                proximal_q,
+                joint_force,
+                memory,
+            };
+            f(&p, &at)
+        })
+    }
+
+    pub(super) fn torque<T: Scalar>(self, p: &Parameters<T>, at: &Local<T>) -> T {
+        Self::each(p, at, |p, at| self.0.torque(p, at))
+    }
+
+    pub(super) fn memory_rate<T: Scalar>(self, p: &Parameters<T>, at: &Local<T>) -> T {
+        Self::each(p, at, |p, at| self.0.memory_rate(p, at))
+    }
+}
+
+impl fmt::Debug for Own {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Own({})", self.0.info().kind)
+    }
+}
+
+impl PartialEq for Own {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.info().kind == other.0.info().kind
+    }
+}
+
+impl Eq for Own {}
+
+impl Hash for Own {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.0.info().kind.hash(state);
+    }
+}
+
+impl PartialOrd for Own {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Own {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.info().kind.cmp(other.0.info().kind)
+    }
+}

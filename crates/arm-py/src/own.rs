@@ -1,0 +1,156 @@
+//! Kinds of effects of one's own: laws that are Python callables.
+
+use std::sync::{Mutex, PoisonError, RwLock};
+
+use arm_core::effect::{
+    Info, Kind, MAX_PARAMETERS, Own, Parameter, Place, Probe, Question, Values,
+};
+use arm_gap::tabulated::{Grid, Tabulated};
+use numpy::ndarray::Array1;
+use numpy::{IntoPyArray, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::errors::{bad_input, invalid};
+
+/// The kinds that were declared; a later one of the same name takes the place of an earlier one.
+static DECLARED: RwLock<Vec<Kind>> = RwLock::new(Vec::new());
+/// What a callable raised while the core asked it.
+static FAILED: Mutex<Option<PyErr>> = Mutex::new(None);
+
+/// The kinds of one's own that were declared.
+pub fn declared() -> Vec<Kind> {
+    DECLARED
+        .read()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clone()
+}
+
+/// The kind of a name: of the catalogue or of one's own.
+pub fn kind(name: &str) -> PyResult<Kind> {
+    let own = declared().into_iter().find(|k| k.info().kind == name);
+    own.map_or_else(|| Kind::named(name).map_err(invalid), Ok)
+}
+
+/// Raises what a callable has raised meanwhile.
+pub fn failed() -> PyResult<()> {
+    let mut last = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
+    last.take().map_or(Ok(()), Err)
+}
+
+/// One parameter: name, unit, smallest and largest value, start, whether the torque is linear in it, and values of a shape
+/// that a search tries.
+type Asked = (String, String, f64, f64, f64, bool, Vec<f64>);
+
+/// Declares a kind of effect whose law is a callable; see `armrs.own_effect`.
+///
+/// Parameters
+/// ----------
+/// name, summary, formula : str
+/// parameters : list of tuple
+///     Those in which the torque is linear first.
+/// grid : (float, float, float, float, int, int)
+///     Smallest and largest angle [rad], largest speed and its knee [rad/s], numbers of angles and speeds.
+/// tabulate : callable
+///     Takes angles [rad], speeds [rad/s] and all parameters, returns an array, shape (n_linear, n_angles, n_speeds) [N m].
+#[pyfunction]
+pub fn declare(
+    name: String,
+    summary: String,
+    formula: String,
+    parameters: Vec<Asked>,
+    grid: (f64, f64, f64, f64, usize, usize),
+    tabulate: Py<PyAny>,
+) -> PyResult<()> {
+    if Kind::named(&name).is_ok() {
+        return Err(bad_input(
+            "kind",
+            &name,
+            "a name that the catalogue does not have",
+        ));
+    }
+    if parameters.len() > MAX_PARAMETERS {
+        return Err(bad_input(
+            "parameters",
+            parameters.len(),
+            &format!("at most {MAX_PARAMETERS}"),
+        ));
+    }
+    let linear = parameters.iter().take_while(|p| p.5).count();
+    // A kind lives as long as the program, like those of the catalogue: models and results refer to it.
+    let free: &'static [usize] = leak((0..linear).collect());
+    let refined: &'static [usize] = leak((linear..parameters.len()).collect());
+    let shapes: Vec<(usize, Values)> = parameters
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| !p.6.is_empty())
+        .map(|(k, p)| (k, Values::Each(leak(p.6.clone()))))
+        .collect();
+    let question = Question::of(free).shaped(leak(shapes)).refining(refined);
+    let info: &'static Info = Box::leak(Box::new(Info {
+        kind: name.leak(),
+        place: Place::Joint,
+        summary: summary.leak(),
+        formula: formula.leak(),
+        reference: "of one's own",
+        parameters: leak(
+            parameters
+                .into_iter()
+                .map(|(name, unit, min, max, default, linear, _)| Parameter {
+                    name: name.leak(),
+                    unit: unit.leak(),
+                    min,
+                    max,
+                    default,
+                    linear,
+                })
+                .collect(),
+        ),
+        memory: false,
+    }));
+    let (low, high, speed, knee, angles, speeds) = grid;
+    let grid = Grid {
+        angle: [low, high],
+        speed,
+        knee,
+        count: [angles.max(4), speeds.max(4)],
+    };
+    let ask = move |p: &[f64]| {
+        Python::attach(|py| match ask(py, &tabulate, grid, p) {
+            Ok(tables) => Some(tables),
+            Err(error) => {
+                *FAILED.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                None
+            }
+        })
+    };
+    let probe = Probe::lasting(leak(vec![question]));
+    let law = Box::leak(Box::new(Tabulated::new(info, probe, grid, Box::new(ask))));
+    let kind = Kind::Own(Own::new(law));
+    let mut declared = DECLARED.write().unwrap_or_else(PoisonError::into_inner);
+    declared.retain(|k| *k != kind);
+    declared.push(kind);
+    Ok(())
+}
+
+fn leak<T>(list: Vec<T>) -> &'static [T] {
+    list.leak()
+}
+
+fn ask(py: Python<'_>, tabulate: &Py<PyAny>, grid: Grid, p: &[f64]) -> PyResult<Vec<Vec<f64>>> {
+    let row = |values: Vec<f64>| Array1::from_vec(values).into_pyarray(py);
+    let arguments = (row(grid.angles()), row(grid.speeds()), row(p.to_vec()));
+    let answer = tabulate.call1(py, arguments)?;
+    let array: PyReadonlyArray3<'_, f64> = answer.extract(py)?;
+    let [layers, ..] = *array.shape() else {
+        return Err(bad_input("law", "no table", "an array"));
+    };
+    let view = array.as_array();
+    Ok((0..layers)
+        .map(|k| {
+            view.index_axis(numpy::ndarray::Axis(0), k)
+                .iter()
+                .copied()
+                .collect()
+        })
+        .collect())
+}

@@ -1,0 +1,203 @@
+"""The stages of the gap workflow by themselves, movements that separate, and effects of one's own."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.dataset import write_dataset
+from armrs.discrepancy import Alternative, calibrate, compare, confirm, detectable, separate
+from armrs.discrepancy.results import gap_data, write_gap
+from armrs.errors import BadInput
+from gap_sessions import session
+
+VISCOUS = armrs.Effect("viscous", 2, parameters={"viscosity": 0.4})
+
+
+@pytest.fixture(scope="module")
+def found() -> armrs.GapFound:
+    return armrs.find_gap(session(VISCOUS), threads=2)
+
+
+def test_nothing_is_fitted_by_a_comparison() -> None:
+    data = session(VISCOUS)
+    seen = compare(data)
+    # Joint 2 resists its motion both ways, and the model does not.
+    signs = {p.condition: np.sign(p.mean) for p in seen.where if p.joint == 2}
+    assert (signs["dq2 > 0"], signs["dq2 < 0"]) == (1.0, -1.0)
+    truth = compare(data, data.model.replace(effects=(VISCOUS,)))
+    # Noise of the force sensor is 0.1 N.
+    assert 0.09 < truth.gap["Fz_N"] < 0.12 < seen.gap["Fz_N"]
+
+
+def test_calibration_and_a_first_look(found: armrs.GapFound) -> None:
+    first = calibrate(found.dataset, threads=2)
+    likeliest = first.suspects[0]
+    assert (likeliest.kind, likeliest.joint) == ("viscous", 2)
+    assert likeliest.gain > 10 * likeliest.price
+    # To first order, from where the segments have taken up part of it.
+    assert 0.2 < likeliest.parameters["viscosity"] < 0.6
+    for name, gap in first.gap.items():
+        assert gap.after is None
+        assert gap.before == pytest.approx(found.gap[name].before, rel=1e-12)
+        assert gap.calibrated == pytest.approx(found.gap[name].calibrated, rel=1e-3)
+
+
+def test_a_result_is_confirmed_on_its_own_test_trials_as_it_was_measured(found: armrs.GapFound) -> None:
+    for name, gap in confirm(found).items():
+        for step in ("before", "calibrated", "after", "floor"):
+            # The simulation starts elsewhere by rounding.
+            assert getattr(gap, step) == pytest.approx(getattr(found.gap[name], step), rel=1e-9), (name, step)
+
+
+def test_a_result_is_confirmed_on_another_day(found: armrs.GapFound) -> None:
+    again = confirm(found, session(VISCOUS, seed=900))["Fy_N"]
+    assert again.after is not None and again.calibrated is not None and again.before is not None and again.floor is not None
+    assert again.after < 1.15 * again.floor < again.calibrated < again.before
+    # Where nothing is missing, the amended model is the worse one.
+    other = confirm(found, session(seed=900))["Fy_N"]
+    assert other.after is not None and other.before is not None
+    assert other.after > 5.0 * other.before
+
+
+def test_a_movement_separates_two_laws_that_are_not_the_same(found: armrs.GapFound, tmp_path: Path) -> None:
+    kinds = {"quadratic_drag": [0.3], "coulomb": [0.15, 0.01], "viscous": [found.effects[0].parameters["viscosity"].value]}
+    alternatives = tuple(Alternative(kind, 2, None, "", 1.0, 0.9) for kind in kinds)
+    raw = [
+        {**item, "alternatives": [(((kind, 1, values), [0]), 1.0, 0.9) for kind, values in kinds.items()]} for item in found.raw["named"]
+    ]
+    rivals = dataclasses.replace(
+        found, effects=(dataclasses.replace(found.effects[0], alternatives=alternatives),), raw={**found.raw, "named": raw}
+    )
+    told = separate(rivals, threads=2)
+    drag, dry, same = (a.separation for a in told.effects[0].alternatives)
+    assert drag is not None and dry is not None and same is not None
+    assert drag.then > drag.now + 5.0
+    assert dry.then > dry.now + 5.0
+    # An effect is not apart from itself, on any movement.
+    assert same.now < 0.1
+    assert same.then < 0.1
+    written = write_gap(told, gap_data(told), tmp_path)
+    assert {p.name for p in written} >= {"separating-1.toml", "separating-2.toml"}
+    movement = armrs.load_movement(tmp_path / "separating-1.toml", 2)
+    assert np.allclose(np.degrees(movement.waypoints), drag.waypoints_deg)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "standard deviations apart" in page
+    assert "none of the movements tried would" in page
+
+
+def detent(angle: np.ndarray, speed: np.ndarray, height: float, pitch: float) -> np.ndarray:
+    return height * np.sin(angle / pitch)
+
+
+def declared() -> armrs.OwnEffect:
+    return armrs.own_effect(
+        "detent",
+        detent,
+        [armrs.Parameter("height", "N m", -5.0, 5.0, 0.0), armrs.Parameter("pitch", "rad", 0.02, 0.5, 0.1, linear=False)],
+        summary="moment of magnets",
+        formula="R = height · sin(q/pitch)",
+        shapes={"pitch": [0.05, 0.08]},
+    )
+
+
+def test_an_effect_of_ones_own_is_simulated_named_and_written(tmp_path: Path) -> None:
+    own = declared()
+    # Cubics through points 0.012 rad apart, at a pitch of 0.1 rad: (0.012/0.1)⁴ · 3/128 = 5e-6.
+    assert own.table_error < 1e-5
+    hidden = armrs.Effect("detent", 2, parameters={"height": 0.3, "pitch": 0.075})
+    found = armrs.find_gap(session(hidden), effects=[own], threads=2)
+    assert [(e.kind, e.joint) for e in found.effects] == [("detent", 2)]
+    for name, true in hidden.parameters.items():
+        value = found.effects[0].parameters[name]
+        assert value.std is not None
+        assert abs(value.value - true) < 4 * value.std < 0.1 * true
+    gap = found.gap["Fz_N"]
+    assert gap.after is not None and gap.floor is not None and gap.calibrated is not None
+    assert gap.after < 1.2 * gap.floor < gap.calibrated
+    write_gap(found, gap_data(found), tmp_path)
+    assert armrs.load_model(tmp_path / "amended.toml").effects[-1].kind == "detent"
+
+
+def test_an_effect_of_ones_own_is_as_in_the_catalogue() -> None:
+    armrs.own_effect("my_coulomb", lambda q, qd, torque: torque * np.tanh(qd / 0.01), [armrs.Parameter("torque", "N m", 0.0, 5.0, 0.0)])
+    movement = armrs.Movement(np.radians([[-60, 50], [-30, 85], [-60, 50]]), speed=0.6, acceleration=2.4, shape="smooth")
+    base = session().model
+    mine, ours = (
+        armrs.simulate(base.replace(effects=(armrs.Effect(kind, 2, parameters={"torque": 0.2}),)), movement, dt=1e-3)
+        for kind in ("my_coulomb", "coulomb")
+    )
+    # The table is good to 2e-6 of the torque, and the arm's stiffness divides it.
+    assert np.abs(mine.force_on_arm - ours.force_on_arm).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("law", "parameters", "message"),
+    [
+        (lambda q, qd, a: a * q, [armrs.Parameter("a", "N m", 0.0, 1.0, 0.0, linear=False)], "one such first"),
+        (lambda q, qd, a: a * a * q, [armrs.Parameter("a", "N m", 0.0, 1.0, 0.0)], "not linear"),
+        (lambda q, qd: q, [armrs.Parameter("a", "N m", 0.0, 1.0, 0.0)], r"allowed law\(angle, speed, a\)"),
+        (lambda q, qd, a: a * np.sqrt(q), [armrs.Parameter("a", "N m", 0.0, 1.0, 0.0)], "allowed a finite torque"),
+        (lambda q, qd, a: a * np.sin(3000.0 * q), [armrs.Parameter("a", "N m", 0.0, 1.0, 0.0)], "a smoother law"),
+        (lambda q, qd, a: a * q, [armrs.Parameter("a", "N m", 1.0, 2.0, 1.0)], "zero where linear"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_a_law_that_cannot_be_used_is_refused(law: object, parameters: list[armrs.Parameter], message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        armrs.own_effect("bad", law, parameters)  # type: ignore[arg-type]
+
+
+def test_a_law_that_fails_later_says_so_itself() -> None:
+    def law(angle: np.ndarray, speed: np.ndarray, size: float, shape: float) -> np.ndarray:
+        if shape != 0.5:
+            raise RuntimeError("no such shape")
+        return size * np.cos(angle)
+
+    armrs.own_effect(
+        "picky", law, [armrs.Parameter("size", "N m", -1.0, 1.0, 0.0), armrs.Parameter("shape", "1", 0.0, 1.0, 0.5, linear=False)]
+    )
+    movement = armrs.Movement(np.radians([[-60, 50], [-30, 85]]))
+    effect = armrs.Effect("picky", 1, parameters={"size": 0.1, "shape": 0.2})
+    with pytest.raises(RuntimeError, match="no such shape"):
+        armrs.simulate(session().model.replace(effects=(effect,)), movement)
+
+
+def test_a_quick_answer_on_the_command_line(found: armrs.GapFound, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_dataset(found.dataset, tmp_path / "data")
+    assert cli.main(["gap", str(tmp_path / "data"), "--quick", "--json", str(tmp_path / "quick.json")]) == 0
+    out = capsys.readouterr().out
+    assert "a first look: viscous in joint 2" in out
+    assert "Nothing is named yet" in out
+    result = json.loads((tmp_path / "quick.json").read_text(encoding="utf-8"))
+    assert (result["suspects"][0]["kind"], result["suspects"][0]["joint"]) == ("viscous", 2)
+    assert cli.main(["gap", str(tmp_path / "data"), "--quick", "-o", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_session_shows_what_was_said_before_it_that_it_would(found: armrs.GapFound) -> None:
+    """The same movements and sensors, planned and then made: limits of the same size."""
+    instruments = armrs.Instruments(rate=100.0, force=0.1, angle=1e-3)
+    movements = [
+        armrs.Movement(np.radians([[-60, 50], [-30, 50], [-30, 85], [-60, 50]]), speed=0.4, acceleration=1.6, shape="smooth"),
+        armrs.Movement(np.radians([[-50, 80], [-20, 40], [-50, 80]]), speed=1.0, acceleration=4.0, shape="smooth"),
+    ]
+    planned = {
+        (w.kind, w.joint, w.channel, w.parameter): w.at_least for w in detectable(found.dataset.model, movements, instruments=instruments)
+    }
+    made = calibrate(session(), threads=2).suspects
+    compared = [
+        planned[key] / s.smallest for s in made for key in [(s.kind, s.joint, s.channel, next(iter(s.parameters)))] if key in planned
+    ]
+    assert len(compared) > 40
+    # What is planned is simulated by the engine that also fits; the session comes from the other one, and a little more is left of it.
+    assert 0.5 < np.median(compared) < 1.2
+    slower = {w.kind: w.at_least for w in detectable(found.dataset.model, movements[:1], instruments=instruments) if w.joint == 2}
+    assert slower["quadratic_drag"] > 2.0 * planned["quadratic_drag", 2, None, "drag"]
