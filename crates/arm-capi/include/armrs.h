@@ -30,27 +30,27 @@
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_arm`.
-#define ARMRS_ARM_WORDS 176
+#define ARMRS_ARM_WORDS 192
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_arm`.
-#define ARMRS_ARM_WORDS 112
+#define ARMRS_ARM_WORDS 132
 #endif
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_compensation`.
-#define ARMRS_COMPENSATION_WORDS 512
+#define ARMRS_COMPENSATION_WORDS 520
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_compensation`.
-#define ARMRS_COMPENSATION_WORDS 288
+#define ARMRS_COMPENSATION_WORDS 300
 #endif
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_estimator`.
-#define ARMRS_ESTIMATOR_WORDS 1344
+#define ARMRS_ESTIMATOR_WORDS 1368
 #endif
 
 #if defined(ARMRS_SINGLE)

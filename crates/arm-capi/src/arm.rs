@@ -63,10 +63,10 @@ pub struct armrs_arm {
 
 /// Size of an `armrs_arm`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_ARM_WORDS: usize = 176;
+pub const ARMRS_ARM_WORDS: usize = 192;
 /// Size of an `armrs_arm`.
 #[cfg(feature = "single")]
-pub const ARMRS_ARM_WORDS: usize = 112;
+pub const ARMRS_ARM_WORDS: usize = 132;
 
 pub(crate) type Core = Equation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 

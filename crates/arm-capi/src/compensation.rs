@@ -19,10 +19,10 @@ pub struct armrs_compensation {
 
 /// Size of an `armrs_compensation`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_COMPENSATION_WORDS: usize = 512;
+pub const ARMRS_COMPENSATION_WORDS: usize = 520;
 /// Size of an `armrs_compensation`.
 #[cfg(feature = "single")]
-pub const ARMRS_COMPENSATION_WORDS: usize = 288;
+pub const ARMRS_COMPENSATION_WORDS: usize = 300;
 
 type Core = Compensation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 

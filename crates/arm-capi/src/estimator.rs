@@ -123,7 +123,7 @@ pub struct armrs_estimator {
 
 /// Size of an `armrs_estimator`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_ESTIMATOR_WORDS: usize = 1344;
+pub const ARMRS_ESTIMATOR_WORDS: usize = 1368;
 /// Size of an `armrs_estimator`.
 #[cfg(feature = "single")]
 pub const ARMRS_ESTIMATOR_WORDS: usize = 736;
