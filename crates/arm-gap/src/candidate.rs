@@ -1,6 +1,8 @@
 //! The questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
 
-use arm_core::effect::{Effect, Kind, Motion, Nature, Place, Question, Values, resisting_torque};
+use arm_core::effect::{
+    Effect, Kind, Local, Motion, Nature, Place, Question, Values, resisting_torque,
+};
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 
 use crate::GapError;
@@ -228,10 +230,12 @@ impl Library {
 /// Where a kind may act in a session.
 fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
     let led = session.sight == Sight::Led;
-    // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them.
+    // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them, nor of what a
+    // weight or an inertia could as well be.
     let swings_freely = session.swings_freely();
     match kind.info().place {
         Place::Segment | Place::Hand | Place::Frame if swings_freely => 0..0,
+        Place::Joint if swings_freely && holds_at_rest(kind) => 0..0,
         Place::Joint => usize::from(kind.crosses())..N,
         Place::Segment | Place::AngleSensor => 0..N,
         Place::Frame | Place::Hand => 0..1,
@@ -239,6 +243,26 @@ fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<u
         Place::Contact | Place::Sensors if led => 0..1,
         Place::ForceSensor | Place::Contact | Place::Sensors => 0..0,
     }
+}
+
+/// Whether a kind resists a joint that does not move yet.
+fn holds_at_rest(kind: Kind) -> bool {
+    let mut effect = Effect::<f64>::new(kind, 1);
+    for question in kind.probe().questions {
+        for &p in question.free {
+            effect.parameters[p] = 1.0;
+        }
+    }
+    let starting = Local {
+        time: 0.0,
+        q: 0.7,
+        qd: 0.0,
+        qdd: 1.0,
+        proximal_q: 0.5,
+        joint_force: 1.0,
+        memory: 0.0,
+    };
+    effect.torque(&starting) != 0.0
 }
 
 /// The joint motion of a group's reference, sample by sample.
