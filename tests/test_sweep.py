@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +100,13 @@ def tables(folder: Path) -> list[bytes]:
     return [(folder / name).read_bytes() for name in TABLES]
 
 
+def wait_until(there: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60.0
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
 def test_a_case_is_its_experiment_recorded_and_identified(source: Path, plain: Path, tmp_path: Path) -> None:
     """Written out and read back by the other verbs, the third case gives the same numbers."""
     spec = load_sweep(source)
@@ -161,6 +172,26 @@ def test_a_killed_process_is_said_and_the_rest_is_done_later(source: Path, plain
     with pytest.raises(armrs.ArmrsError, match="goes on where it stopped"):
         armrs.sweep(source, tmp_path / "out", jobs=2, step=kill)
     assert tables(armrs.sweep(source, tmp_path / "out").cases.parent) == tables(plain)
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="groups of processes are POSIX")
+def test_a_killed_command_leaves_no_process_and_goes_on(source: Path, plain: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "armrs", "sweep", str(source), "-o", str(out), "--jobs", "2"]
+    with subprocess.Popen(command, start_new_session=True) as run:
+        wait_until(lambda: any(out.glob("parts/*-cases.parquet")))
+        run.kill()
+
+    def all_gone() -> bool:
+        try:
+            os.killpg(run.pid, 0)
+        except ProcessLookupError:
+            return True
+        return False
+
+    wait_until(all_gone)
+    done = armrs.sweep(source, out)
+    assert 0 < done.run["computed"] < 5 and tables(out) == tables(plain)
 
 
 @pytest.mark.filterwarnings("default")

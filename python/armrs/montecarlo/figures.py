@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import plotting
+from .. import plotting, tables
 from ..figures import Drawn, quantity_name
 from .summary import Quantity, Summary
 
@@ -45,18 +45,18 @@ def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:
 
 def _panel(quantity: Quantity, ax: Any) -> None:
     value, truth = np.concatenate(quantity.values), np.concatenate(quantity.truths)
-    there = np.isfinite(value)
+    there, unit = np.isfinite(value), tables.unit(quantity.unit)
     known = there & np.isfinite(truth)
     if known.any() and np.ptp(truth[known]) > 0.0:
         ax.plot(truth[known], value[known], ".", color=plotting.BLUE, markersize=4, alpha=max(0.15, min(1.0, 60.0 / known.sum())))
         ends = [truth[known].min(), truth[known].max()]
         ax.plot(ends, ends, color=plotting.ORANGE)
-        ax.set(xlabel=f"truth [{quantity.unit}]", ylabel=f"found [{quantity.unit}]")
+        ax.set(xlabel=f"truth [{unit}]", ylabel=f"found [{unit}]")
         return
     ax.hist(value[there], bins=max(5, min(40, round(math.sqrt(there.sum())))), color=plotting.BLUE)
     if known.any():
         ax.axvline(float(truth[known][0]), color=plotting.ORANGE)
-    ax.set(xlabel=f"found [{quantity.unit}]", ylabel="cases")
+    ax.set(xlabel=f"found [{unit}]", ylabel="cases")
 
 
 def _coverage(known: list[dict[str, Any]], joints: list[str], level: float) -> Drawn:

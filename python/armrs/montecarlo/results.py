@@ -15,7 +15,7 @@ from .summary import Summary
 
 
 def sweep_data(sweep: Sweep, summary: Summary, command: str | None = None) -> dict[str, Any]:
-    """Return the summary as it is written to JSON; the same on every run."""
+    """Return the summary as it is written to JSON; but for the command the same on every run."""
     question = sweep.question
     model = sweep.dataset.model if sweep.dataset is not None else sweep.experiment(sweep.seed_of(1), []).truth
     synthetic = sweep.dataset is None or sweep.dataset.synthetic

@@ -32,7 +32,7 @@ class Swept:
         The summary, as in `sweep.json`.
     files : tuple of Path
     run : dict
-        What this call computed, and what it took. It is not part of `data`, which is the same on every run.
+        What this call computed, and what it took. It is not part of `data`, which a second call makes again as it was.
     """
 
     sweep: Sweep

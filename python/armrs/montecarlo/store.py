@@ -15,11 +15,13 @@ from .case import Row
 from .spec import Sweep
 
 KINDS = ("estimates", "cases")
-"""The two tables; the second is written last, so that where it is, the first is whole."""
+"""The two tables, and their order on the way to the disk; the second is written last, so that where it is, the first is whole."""
 _ROW_GROUP = 1000
 """Cases in a row group of the final files."""
 _PARTS = 200
-_LARGEST_PART = 50
+"""So many parts at least, where there are as many cases: each worker gets its share."""
+_LARGEST_PART = 20
+"""Cases that are lost at most when a worker is; some seconds."""
 
 
 class Store:
@@ -87,13 +89,10 @@ class Store:
         """Write the rows of a part."""
         import pyarrow as pa
 
-        for kind, content in zip(("cases", "estimates"), rows, strict=True):
-            table = pa.Table.from_pylist(content, schema=self.schemas[kind])
-            if kind == "cases":
-                last = table
-            else:
-                write_table(self._part(part, kind), table)
-        write_table(self._part(part, "cases"), last)
+        cases, estimates = rows
+        # In the order of KINDS: a part counts as done when its cases are there.
+        for kind, content in zip(KINDS, (estimates, cases), strict=True):
+            write_table(self._part(part, kind), pa.Table.from_pylist(content, schema=self.schemas[kind]))
 
     def finish(self) -> None:
         """Put all parts together, in the order of the cases, and remove them."""

@@ -38,7 +38,7 @@ def recovered(data: Mapping[str, Any]) -> Table:
             [
                 tables.label(q),
                 tables.where(q, data["data"]["joints"]),
-                q["unit"],
+                tables.unit(q["unit"]),
                 q["cases"],
                 tables.number(value["mean"], spread),
                 tables.spread(spread),
