@@ -187,3 +187,16 @@ def test_what_was_worn_is_in_the_truth_and_named(experiment: Path, tmp_path: Pat
     with pytest.raises(BadInput, match="masses worn in some configurations"):
         armrs.identify(data)
     assert load_experiment(experiment).runs[0].worn[0].mass == 0.191
+
+
+def test_nobody_has_a_centre_of_mass_beyond_the_segment(experiment: Path) -> None:
+    """Three standard deviations from the literature, that of a hand may be; such a draw ends at its end."""
+    far = EXPERIMENT.replace("spread = 0.5", "spread = 3.0\nsegments = 3").replace("lengths_m = [0.322, 0.30]\n", "")
+    far = far.replace("waypoints_deg = [[-60, 60], [-48, 60], [-60, 72], [-60, 60]]", "waypoints_deg = [[-60, 60, 0], [-48, 60, 0]]")
+    far = far.replace("moment_Nm = [0.05, 0.02]", "moment_Nm = [0.05, 0.02, 0.0]").replace("[handle]", "[[joint]]\n\n[handle]")
+    ended = 0
+    for seed in range(30):
+        experiment.write_text(far.replace("seed = 3", f"seed = {seed}").replace("mass = 0.193", "mass = 0.0"), encoding="utf-8")
+        hand = load_experiment(experiment).truth.segments[2]
+        ended += hand.com == hand.length
+    assert 0 < ended < 30

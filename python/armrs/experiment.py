@@ -341,8 +341,8 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
     true_parts = [
         part
         | {
-            key: (max(part[key][0] + d * part[key][1], 0.3 * part[key][0]), 0.0)
-            for key, d in zip(("mass", "com", "inertia"), row, strict=True)
+            key: (min(max(part[key][0] + d * part[key][1], 0.3 * part[key][0]), most), 0.0)
+            for key, d, most in zip(("mass", "com", "inertia"), row, (np.inf, part["length"], np.inf), strict=True)
         }
         for part, row in zip(parts, draw, strict=True)
     ]

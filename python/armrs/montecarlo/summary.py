@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,6 +15,8 @@ from .store import Store
 SAMPLE = 20_000
 """So many values of each quantity are kept, the first ones: for percentiles and figures."""
 _REASONS = 5
+_FOUND = re.compile(r"found [^,]*,")
+"""What differs between cases that failed for one reason."""
 
 
 @dataclass
@@ -150,7 +153,7 @@ def _cases(store: Store) -> dict[str, Any]:
     force, rms, largest = Moments(), Moments(), -math.inf
     for table in store.tables("cases"):
         counts.update(table.column("status").to_pylist())
-        reasons.update(reason for reason in table.column("reason").to_pylist() if reason is not None)
+        reasons.update(_FOUND.sub("found …,", reason) for reason in table.column("reason").to_pylist() if reason is not None)
         counts["stopped"] += sum(table.column("stopped").to_numpy(zero_copy_only=False) > 0)
         if "sound" in table.column_names:
             sound = table.column("sound").to_pylist()
