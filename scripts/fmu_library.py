@@ -20,15 +20,15 @@ OLDEST = (2, 17)
 
 
 def main() -> None:
-    """Build with the profile `fmu` and copy what came out."""
+    """Build and copy what came out."""
     portable = "--portable" in sys.argv
-    built = ROOT / "target" / "fmu"
+    built = ROOT / "target" / "release"
     command = ["cargo", "build"]
     if portable:
         target = f"{platform.machine()}-unknown-linux-gnu"
         command = ["cargo", "zigbuild", "--target", f"{target}.{OLDEST[0]}.{OLDEST[1]}"]
-        built = ROOT / "target" / target / "fmu"
-    subprocess.run([*command, "--quiet", "--profile", "fmu", "-p", "arm-fmu"], cwd=ROOT, check=True)
+        built = ROOT / "target" / target / "release"
+    subprocess.run([*command, "--quiet", "--release", "-p", "arm-fmu"], cwd=ROOT, check=True)
     name = NAMES.get(sys.platform, "libarm_fmu.so")
     content = (built / name).read_bytes()
     needed = glibc(content)

@@ -198,7 +198,11 @@ impl<'a, const N: usize> Study<'a, N> {
                 let whitened: Vec<Vec<f64>> = each.collect();
                 let k = known.len();
                 let gram = DMatrix::from_fn(k, k, |a, b| {
-                    let own = if a == b { known[a].powi(-2) } else { 0.0 };
+                    let own = if a == b {
+                        1.0 / (known[a] * known[a])
+                    } else {
+                        0.0
+                    };
                     dot(&whitened[a], &whitened[b]) + own
                 });
                 let score = DVector::from_fn(k, |a, _| dot(&whitened[a], &row));
