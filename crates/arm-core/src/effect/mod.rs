@@ -5,14 +5,18 @@
 //! this folder works on `Effect`s and never names a kind.
 //!
 //! To add a kind, write its file and add one line to the `catalogue!` below. A kind of one's own that needs no place in the
-//! catalogue is an [`OwnLaw`].
+//! catalogue is an `OwnLaw` (feature `own`).
 
 mod law;
+// Firmware knows the catalogue alone, and pays nothing for what cannot be declared there.
+#[cfg_attr(not(feature = "own"), path = "own_absent.rs")]
 mod own;
 mod probe;
 
 pub use law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
-pub use own::{Own, OwnLaw};
+pub use own::Own;
+#[cfg(feature = "own")]
+pub use own::OwnLaw;
 pub use probe::{Nature, Probe, Promise, Question, Values};
 
 use crate::{Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
@@ -37,14 +41,14 @@ macro_rules! catalogue {
         impl Kind {
             /// Name, parameters, formula and reference.
             pub fn info(self) -> &'static Info {
-                match self { $(Self::$law => &<$module::$law as Law>::INFO,)* Self::Own(own) => own.law().info() }
+                match self { $(Self::$law => &<$module::$law as Law>::INFO,)* Self::Own(own) => own.info() }
             }
         }
 
         impl Kind {
             /// How a search asks for it.
             pub fn probe(self) -> Probe {
-                match self { $(Self::$law => <$module::$law as Law>::PROBE,)* Self::Own(own) => own.law().probe() }
+                match self { $(Self::$law => <$module::$law as Law>::PROBE,)* Self::Own(own) => own.probe() }
             }
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {
@@ -52,7 +56,7 @@ macro_rules! catalogue {
             }
             /// Whether it depends on the force through the joint.
             pub fn feels_force(self) -> bool {
-                match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Own(own) => own.law().feels_force() }
+                match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Own(own) => own.feels_force() }
             }
         }
 

@@ -74,9 +74,16 @@ impl Own {
         Self(law)
     }
 
-    /// Its law.
-    pub fn law(&self) -> &'static dyn OwnLaw {
-        self.0
+    pub(super) fn info(self) -> &'static Info {
+        self.0.info()
+    }
+
+    pub(super) fn probe(self) -> Probe {
+        self.0.probe()
+    }
+
+    pub(super) fn feels_force(self) -> bool {
+        self.0.feels_force()
     }
 
     /// Evaluates a function of the law for every lane of a number.

@@ -1,0 +1,31 @@
+//! Without the feature `own` there is no kind but those of the catalogue: this one has no value.
+
+use super::law::{Info, Local, Parameters};
+use super::probe::Probe;
+use crate::Scalar;
+
+/// A kind of one's own; none can be made without the feature `own`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Own {}
+
+impl Own {
+    pub(super) fn info(self) -> &'static Info {
+        match self {}
+    }
+
+    pub(super) fn probe(self) -> Probe {
+        match self {}
+    }
+
+    pub(super) fn feels_force(self) -> bool {
+        match self {}
+    }
+
+    pub(super) fn torque<T: Scalar>(self, _p: &Parameters<T>, _at: &Local<T>) -> T {
+        match self {}
+    }
+
+    pub(super) fn memory_rate<T: Scalar>(self, _p: &Parameters<T>, _at: &Local<T>) -> T {
+        match self {}
+    }
+}
