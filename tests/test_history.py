@@ -92,10 +92,10 @@ def test_the_date_is_in_the_name_or_today() -> None:
 
 def test_a_session_stays_only_if_everything_else_was_written(identified: Identified, tmp_path: Path) -> None:
     """When an output fails, a new file disappears and an old one keeps what it had."""
-    file = tmp_path / "s.sqlite"
-    with pytest.raises(OSError, match="full"), sessions.adding(file, identified, "2026-01-01"):
+    with pytest.raises(OSError, match="full"), sessions.adding(tmp_path / "a" / "b" / "s.sqlite", identified, "2026-01-01"):
         raise OSError("full")
-    assert not file.exists()
+    assert not (tmp_path / "a").exists()
+    file = tmp_path / "s.sqlite"
     sessions.add(file, identified, "2026-01-01")
     with pytest.raises(OSError, match="full"), sessions.adding(file, identified, "2026-02-01") as courses:
         assert courses[0].dates == ("2026-01-01", "2026-02-01")
@@ -117,12 +117,13 @@ def test_refuses_other_files(slow_arm: Path, tmp_path: Path, capsys: pytest.Capt
         "other.sqlite": "found a database of another program",
         "three.sqlite": "found the history of an arm of 3 joints, allowed one of 2",
         ".": "found a folder",
+        "s.json": "found a name that ends with .json, allowed another, such as .sqlite",
     }
     for name, message in cases.items():
-        before = (tmp_path / name).read_bytes() if name != "." else b""
+        before = (tmp_path / name).read_bytes() if (tmp_path / name).is_file() else b""
         assert main(["identify", str(slow_arm), "--history", str(tmp_path / name), "-o", str(tmp_path / "out")]) == 2
         error = capsys.readouterr().err
         assert message in error and error.count("\n") == 1, error
-        assert name == "." or (tmp_path / name).read_bytes() == before
+        assert not before or (tmp_path / name).read_bytes() == before
     assert main(["identify", str(slow_arm), "--date", "2026-01-01"]) == 2
     assert not (tmp_path / "out").exists()

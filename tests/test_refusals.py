@@ -91,6 +91,9 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "movement that goes nowhere": (
         MOVE, lambda f: (f.path / "movement.toml").write_text("[movement]\nwaypoints_deg = [[-60, 60], [-60, 60]]\n", encoding="utf-8") and None,
         "length of the movement [s]: found 0, allowed a whole number of steps"),
+    "movement of four hundred digits": (
+        MOVE, lambda f: (f.path / "movement.toml").write_text(f"[movement]\nwaypoints_deg = [[{'9' * 400}, 0], [1, 1]]\n", encoding="utf-8") and None,
+        "movement.waypoints_deg: found"),
     "movement of thirty years": (
         MOVE, lambda f: f.edit("movement.toml", "speed_rad_s = 0.1", "speed_rad_s = 1e-9"), "length of the movement [s]: found"),
     "movement with an unknown shape": (MOVE, lambda f: f.edit("movement.toml", '"smooth"', '"sine"'), "movement.shape: found 'sine'"),

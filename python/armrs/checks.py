@@ -91,7 +91,7 @@ def numbers(place: str, value: object, unit: str = "") -> np.ndarray:
     allowed = " ".join(part for part in ("finite numbers", unit) if part)
     try:
         result = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise BadInput(place, value, allowed) from None
     if not np.isfinite(result).all():
         raise BadInput(place, Text("a value that is not finite"), allowed)

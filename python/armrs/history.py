@@ -34,6 +34,7 @@ CREATE TABLE IF NOT EXISTS estimate (
     PRIMARY KEY (session, name, kind, joint)
 );
 """
+_OUTPUTS = (".json", ".toml", ".html", ".png", ".csv", ".parquet")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
@@ -118,6 +119,9 @@ def check(path: str | os.PathLike[str], joints: int) -> None:
     file = Path(path)
     if file.is_dir():
         raise BadInput("--history", Text("a folder"), "the name of a file", file=file)
+    if file.suffix.lower() in _OUTPUTS:
+        # A result of the same command could take its place.
+        raise BadInput("--history", Text(f"a name that ends with {file.suffix}"), "another, such as .sqlite", file=file)
     if file.exists():
         with closing(_open(file)) as connection:
             _same_arm(connection, joints, file)
@@ -150,6 +154,7 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
     file = Path(path)
     check(file, result.dataset.model.n_joints)
     files.must_be_writable(file)
+    made = [folder for folder in file.absolute().parents if not folder.exists()]
     file.parent.mkdir(parents=True, exist_ok=True)
     is_new, is_kept = not file.exists(), False
     try:
@@ -165,6 +170,8 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
     finally:
         if is_new and not is_kept:
             file.unlink(missing_ok=True)
+            for folder in made:
+                folder.rmdir()
 
 
 def _insert(connection: sqlite3.Connection, result: Identified, date: str) -> None:

@@ -337,7 +337,7 @@ def movement_of(table: dict[str, Any], n_joints: int) -> Movement:
             continue
         try:
             numbers = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             raise BadInput(f"movement.{name}", value, "numbers") from None
         if not np.isfinite(numbers).all() or (key != "waypoints" and numbers.ndim):
             raise BadInput(f"movement.{name}", value, "finite numbers" if key == "waypoints" else "one finite number")
