@@ -5,6 +5,7 @@ use std::mem::discriminant;
 use arm_core::effect::Effect;
 use arm_core::{Contact, Joints, Lanes, Plane, Scalar, Segment, Setup};
 
+use crate::breaks::step_in_pieces;
 use crate::model::{Input, Link, Model, State};
 use crate::native::diverged;
 use crate::prepare::{Prepared, Schedule, add_ripple, command, known};
@@ -171,19 +172,23 @@ fn side_by_side<const N: usize>(
         middle: now,
         end: now,
     };
+    // Where the drive of any lane breaks, every lane makes its own step.
+    let mut broken: Vec<usize> = prepared.iter().flat_map(|p| p.breaks.steps()).collect();
+    broken.sort_unstable();
+    broken.dedup();
+    let mut broken = broken.into_iter().peekable();
     for done in 1..=schedule.steps {
         inputs.start = inputs.end;
-        if integrator == Integrator::Rk4 {
-            inputs.middle = input(2 * done - 1);
-        }
         inputs.end = input(2 * done);
-        step(
-            &model,
-            integrator,
-            schedule.dt,
-            &inputs,
-            (&mut state, &mut memory),
-        );
+        if broken.next_if_eq(&done).is_some() {
+            step_apart(prepared, done, (&mut state, &mut memory));
+        } else {
+            if integrator == Integrator::Rk4 {
+                inputs.middle = input(2 * done - 1);
+            }
+            let at = (&mut state, &mut memory);
+            step(&model, integrator, schedule.dt, &inputs, at);
+        }
         if !finite(&state) {
             for (i, stop) in stopped.iter_mut().enumerate() {
                 if let (None, Some(joint)) = (&stop, diverged(&lane_state(&state, i))) {
@@ -207,6 +212,32 @@ fn side_by_side<const N: usize>(
         .zip(stopped)
         .map(|(recording, stopped)| stopped.map_or(Ok(recording), Err))
         .collect())
+}
+
+/// One step of each run by itself.
+fn step_apart<const N: usize>(
+    prepared: &[Prepared<N>],
+    number: usize,
+    (state, memory): (&mut State<Wide, N>, &mut Memory<Wide>),
+) {
+    let mut lane_memory = Memory::new(memory.state.len());
+    for i in 0..LANES {
+        let run = &prepared[i.min(prepared.len() - 1)];
+        let mut lane = lane_state(state, i);
+        for (one, all) in lane_memory.state.iter_mut().zip(&memory.state) {
+            *one = all.0[i];
+        }
+        step_in_pieces(run, number, (&mut lane, &mut lane_memory));
+        for j in 0..N {
+            (state.q[j].0[i], state.qd[j].0[i]) = (lane.q[j], lane.qd[j]);
+        }
+        for (all, one) in state.work.iter_mut().zip(lane.work) {
+            all.0[i] = one;
+        }
+        for (one, all) in lane_memory.state.iter().zip(&mut memory.state) {
+            all.0[i] = *one;
+        }
+    }
 }
 
 /// Whether every angle and speed of every lane is finite: zero times anything else is not zero.

@@ -115,13 +115,24 @@ pub enum Start<const N: usize> {
 }
 
 /// How a step is made. Both have a fixed step; the same run has the same bits everywhere.
+///
+/// Where the drive is not smooth (a ramp of a movement ends, or a sample of a series) inside a step, the step is made in
+/// pieces, so that the order below holds wherever such times lie. It does not hold where the arm itself is not smooth: a
+/// contact with play that opens, an effect with a corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
     /// Speeds from the accelerations at the start of the step, then angles from the new speeds. First order; one
     /// evaluation a step. Without friction the energy error stays bounded, of the order of the step, and does not grow.
+    ///
+    /// [`Recording::energy_error`] of a step h is `h/2 · ( [P − q̇ᵀBq̈] + ∫ (2 ∂T/∂q + Q)·q̈ dt )` and terms in h², with the
+    /// power P that the energy gains and Q all that acts besides its gradient: about 10⁻⁴ of the exchanged energy a second
+    /// at the default step.
     SemiImplicitEuler,
     /// The classical fourth-order method of Kutta; four evaluations a step. Smooth motions lose or gain energy by the
     /// fifth power of the step in each step; vibrations near the stability limit are damped.
+    ///
+    /// [`Recording::energy_error`] is of fourth order too: below 5·10⁻¹² of the exchanged energy a second at the default
+    /// step for movements as slow as those of the thesis, with a compliant and a rigid coupling.
     Rk4,
 }
 

@@ -20,6 +20,7 @@
 //! ```
 
 mod batch;
+mod breaks;
 mod controlled;
 mod digest;
 mod error;

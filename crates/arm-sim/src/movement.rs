@@ -140,6 +140,15 @@ impl<const N: usize> Movement<N> {
         self.end
     }
 
+    /// Times at which a ramp starts or ends, and acceleration or jerk jumps \[s\].
+    pub(crate) fn breaks(&self) -> Vec<f64> {
+        let of_part = |(start, profile): &(f64, Profile<f64>)| {
+            let (ramp, end) = (profile.ramp(), profile.duration());
+            [0.0, ramp, end - ramp, end].map(|time| start + time)
+        };
+        self.parts.iter().flat_map(of_part).collect()
+    }
+
     /// The motion at a time \[s\].
     #[inline]
     pub fn at(&self, time: f64) -> JointMotion<N> {

@@ -1,5 +1,6 @@
 //! The native engine: minimal coordinates, one run at a time.
 
+use crate::breaks::step_in_pieces;
 use crate::model::State;
 use crate::prepare::Prepared;
 use crate::recorder::Recorder;
@@ -27,20 +28,21 @@ pub(crate) fn run<const N: usize>(
         end: now,
     };
     let mut stopped = None;
+    let mut broken = prepared.breaks.steps().peekable();
     for done in 1..=schedule.steps {
         inputs.start = inputs.end;
-        if prepared.integrator() == Integrator::Rk4 {
-            inputs.middle = prepared.input(schedule.half_time(2 * done - 1));
-        }
         inputs.end = prepared.input(schedule.time(done));
         let at = (&mut state, &mut memory);
-        step(
-            &prepared.model,
-            prepared.integrator(),
-            schedule.dt,
-            &inputs,
-            at,
-        );
+        if broken.next_if_eq(&done).is_some() {
+            while broken.next_if_eq(&done).is_some() {}
+            step_in_pieces(&prepared, done, at);
+        } else {
+            if prepared.integrator() == Integrator::Rk4 {
+                inputs.middle = prepared.input(schedule.half_time(2 * done - 1));
+            }
+            let integrator = prepared.integrator();
+            step(&prepared.model, integrator, schedule.dt, &inputs, at);
+        }
         if let Some(joint) = diverged(&state) {
             stopped = Some(SimulationError::Diverged {
                 step: done,

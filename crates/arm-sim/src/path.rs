@@ -94,6 +94,15 @@ impl<const N: usize> HandlePath<N> {
         }
     }
 
+    /// Times at which the path is not smooth \[s\].
+    pub(crate) fn breaks(&self) -> Vec<f64> {
+        match &self.source {
+            Source::Fixed(_) => Vec::new(),
+            Source::Arm(_, movement) => movement.breaks(),
+            Source::Points(series) | Source::Robot(_, series) => series.times().to_vec(),
+        }
+    }
+
     /// The commanded motion of the handle at a time \[s\].
     #[inline]
     pub fn at(&self, time: f64) -> Handle<f64> {

@@ -3,6 +3,7 @@
 use arm_core::effect::{Effect, Place};
 use arm_core::{Joints, Scalar, Setup};
 
+use crate::breaks::Breaks;
 use crate::model::{Input, Link, Model};
 use crate::{
     Coupling, Drive, Experiment, Handle, Integrator, JointMotion, SimulationError, Start,
@@ -90,6 +91,8 @@ pub(crate) struct Prepared<'a, const N: usize> {
     pub setup: Setup<f64, N>,
     pub model: Model<f64, N>,
     pub schedule: Schedule,
+    /// Where the drive is not smooth.
+    pub breaks: Breaks,
     /// Angles and speeds at the start.
     pub start: (Joints<f64, N>, Joints<f64, N>),
     /// Commanded robot motion at each sample; empty without a robot.
@@ -108,6 +111,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
             setup,
             model,
             schedule,
+            breaks: Breaks::of(experiment, &schedule),
             start: (Joints::zeros(), Joints::zeros()),
             robot,
         };

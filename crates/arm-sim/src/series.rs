@@ -103,6 +103,11 @@ impl<const M: usize> Series<M> {
         })
     }
 
+    /// Times of the samples \[s\].
+    pub(crate) fn times(&self) -> &[f64] {
+        &self.times
+    }
+
     /// First time \[s\].
     pub fn start(&self) -> f64 {
         self.times[0]

@@ -174,7 +174,10 @@ fn deviations(misprint: Misprint) -> [f64; 4] {
             - arm.end(&q, force, misprint);
         let found = [b.amax(), c.amax(), g.amax(), end.amax()];
         for (sum, value) in largest.iter_mut().zip(found) {
-            *sum = sum.max(value);
+            // Not a number stays.
+            if !(value <= *sum || sum.is_nan()) {
+                *sum = value;
+            }
         }
     }
     largest

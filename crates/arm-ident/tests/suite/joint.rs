@@ -1,6 +1,6 @@
 //! The joint method on trials whose truth is known.
 
-use super::noise::Noise;
+use super::noise::{Noise, most};
 use super::synthetic::{EXACT, Recipe, State, at_every_joint, effect, sines, wrong};
 use arm_core::{Chain, Joints, Segment, models};
 use arm_ident::IdentError;
@@ -558,9 +558,7 @@ fn each_imperfection_of_the_measurement_is_absorbed_with_its_sign_and_size() {
         let strict = identify(&model, &[trial], &exactly()).expect("a solution");
         let worse = rms(&strict, 0) / rms(&result, 0);
         let pairs = strict.combinations[..2].iter().zip(truth.first_moments());
-        let wrong = pairs
-            .map(|(c, x)| (c.value / x - 1.0).abs())
-            .fold(0.0, f64::max);
+        let wrong = most(pairs.map(|(c, x)| c.value / x - 1.0));
         assert!(
             worse > 1.5 || wrong > 6e-3,
             "{}: {worse} {wrong}",

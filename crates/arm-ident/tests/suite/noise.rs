@@ -52,7 +52,11 @@ impl Noise {
 /// Largest difference of two slices.
 pub fn gap(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
-    a.iter()
-        .zip(b)
-        .fold(0.0, |m, (x, y)| f64::max(m, (x - y).abs()))
+    most(a.iter().zip(b).map(|(x, y)| x - y))
+}
+
+/// Largest of some sizes; one that is not a number is the result, so that no bound holds.
+pub fn most(values: impl IntoIterator<Item = f64>) -> f64 {
+    let sizes = values.into_iter().map(f64::abs);
+    sizes.fold(0.0, |m, d| if d <= m || m.is_nan() { m } else { d })
 }

@@ -1,9 +1,10 @@
 //! Lanes and threads have the bits of single runs.
 
 use arm_core::effect::{Effect, Kind};
+use arm_core::{Limits, Shape, models};
 use arm_sim::{
-    Coupling, Drive, Experiment, Integrator, SimulationError, Start, digest, simulate,
-    simulate_batch,
+    Coupling, Drive, Experiment, HandlePath, Integrator, Interpolation, Movement, Series,
+    SimulationError, Start, digest, simulate, simulate_batch,
 };
 
 use crate::common::{several_effects, smooth};
@@ -72,6 +73,44 @@ fn lanes_have_the_bits_of_single_runs_with_a_rigid_coupling() {
         e.effects = several_effects();
     }
     same_bits(&experiments, 1);
+}
+
+/// Ramps that end inside of steps, in each lane of another one, and torques that jump.
+#[test]
+fn lanes_have_the_bits_of_single_runs_where_drives_break() {
+    let arm = models::human_arm();
+    let [from, to] = [[-68f64, 40.0, 0.0], [-66.0, 43.0, 1.0]].map(|q| q.map(f64::to_radians));
+    for coupling in [Coupling::Compliant, Coupling::Rigid] {
+        let mut base = smooth(0.25);
+        base.effects = several_effects();
+        let mut experiments = perturbed(&base, 8);
+        for (i, e) in experiments.iter_mut().enumerate() {
+            let limits = [Limits {
+                speed: 0.9 + 0.01 * i as f64,
+                acceleration: 7.0,
+            }; 3];
+            let waypoints = [from.into(), to.into()];
+            let movement = Movement::within(Shape::Trapezoid, &waypoints, &limits, 0.0);
+            e.drive = Drive::Handle {
+                path: HandlePath::of_arm(arm, movement.expect("limits")),
+                coupling,
+            };
+            e.start = Start::Given {
+                q: from.into(),
+                qd: [0.0; 3].into(),
+            };
+        }
+        same_bits(&experiments, 1);
+        for (i, e) in experiments.iter_mut().enumerate() {
+            let times: Vec<f64> = (0..10)
+                .map(|k| (0.03 + 1e-3 * i as f64) * f64::from(k))
+                .collect();
+            let values: Vec<[f64; 3]> = (0..10).map(|k| [f64::from(k), -1.0, 0.5]).collect();
+            let held = Series::new("torque", &times, &values, Interpolation::Hold);
+            e.drive = Drive::Torque(Some(held.expect("samples")));
+        }
+        same_bits(&experiments, 1);
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_core::{Invalid, Shape, models};
 use arm_sim::{Drive, Experiment, HandlePath, Movement, SimulationError, simulate};
 
-use crate::common::run;
+use crate::common::{largest, run};
 
 /// There and back every 4 s for a minute.
 fn minute<const N: usize>(mut experiment: Experiment<N>, poses: [[f64; N]; 2]) -> Experiment<N> {
@@ -26,10 +26,7 @@ fn minute<const N: usize>(mut experiment: Experiment<N>, poses: [[f64; N]; 2]) -
 fn does_not_drift<const N: usize>(experiment: &Experiment<N>) {
     let r = run(experiment);
     let period = |i: usize| &r.q[N * i..N * (i + 1)];
-    let apart = |a: usize, b: usize| {
-        let differences = period(a).iter().zip(period(b)).map(|(a, b)| (a - b).abs());
-        differences.fold(0.0, f64::max)
-    };
+    let apart = |a: usize, b: usize| largest(period(a), period(b));
     // The transient of the start dies out; later periods are equal.
     let (early, late) = (apart(1, 15), apart(14, 15));
     let error = r.energy_error();

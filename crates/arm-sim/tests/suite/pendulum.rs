@@ -3,7 +3,7 @@
 use arm_core::{Chain, Contact, Joints, Segment, Setup};
 use arm_sim::{Drive, Experiment, Start};
 
-use crate::common::run;
+use crate::common::{most, run};
 
 const MASS: f64 = 1.5;
 const COM: f64 = 0.2;
@@ -51,10 +51,7 @@ fn the_period_of_a_pendulum_is_the_elliptic_integral() {
         let turns = (at / period(swing)).round();
         let error = (at / turns - period(swing)).abs();
         assert!(error < 1e-9, "swing {swing} rad: {error:e} s in a period");
-        let energy = r
-            .energy_error()
-            .iter()
-            .fold(0.0, |m: f64, e| m.max(e.abs()));
+        let energy = most(r.energy_error());
         assert!(energy < 1e-10, "swing {swing} rad: {energy:e} J");
     }
 }

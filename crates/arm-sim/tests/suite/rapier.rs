@@ -9,7 +9,7 @@ use arm_sim::{
     Series, SimulationError, Start, digest, models, simulate_rapier, simulate_with,
 };
 
-use crate::common::{largest, run, smooth};
+use crate::common::{largest, most, run, smooth};
 
 /// Rest angles of the elastic joints, not those of the path \[rad\].
 const REST: [f64; 3] = [-0.785, 0.6, 0.1];
@@ -276,10 +276,7 @@ fn the_energy_of_a_free_swing_does_not_drift() {
 #[test]
 fn the_energy_balance_of_a_led_arm_closes() {
     let recording = rapier(&smooth(2.0));
-    let worst = recording
-        .energy_error()
-        .into_iter()
-        .fold(0.0, |m: f64, e| m.max(e.abs()));
+    let worst = most(recording.energy_error());
     assert!(worst < 1e-6, "{worst} J");
 }
 
