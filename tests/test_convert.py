@@ -137,7 +137,7 @@ def test_does_not_write_over_its_own_input(session: Session) -> None:
 
 def test_an_output_that_is_a_file_is_refused(session: Session, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("x", encoding="utf-8")
-    with pytest.raises(BadInput, match="-o: found a file, allowed a folder"):
+    with pytest.raises(BadInput, match="folder: found a file, allowed a folder"):
         armrs.convert(session.folder, tmp_path / "out", to="parquet")
 
 

@@ -94,13 +94,13 @@ def test_cascade_is_another_method_and_finds_the_same_sums(data: Path, dfki: arm
 @pytest.mark.parametrize(
     ("choice", "words"),
     [
-        ({"method": "guess"}, "joint or cascade"),
+        ({"method": "guess"}, '"joint" or "cascade"'),
         ({"with_effects": ["coulom"]}, "nearest known: coulomb"),
         ({"with_effects": ["force_bias"]}, "joint effect"),
-        ({"cutoff": -1.0}, "above 0 Hz"),
+        ({"cutoff": -1.0}, "> 0 Hz"),
         ({"cutoff": 1000.0}, "cutoff"),
-        ({"level": 1.5}, "0.5 to 1"),
-        ({"motion": "guessed"}, "auto, measured or simulated"),
+        ({"level": 1.5}, ">= 0.5 and < 1"),
+        ({"motion": "guessed"}, '"auto" or "measured" or "simulated"'),
         ({"motion": "simulated"}, "robot angles"),
         ({"method": "cascade", "with_effects": "viscous"}, "coulomb or constant_moment for the cascade"),
         ({"method": "cascade", "motion": "simulated"}, "measured for the cascade"),

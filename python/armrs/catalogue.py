@@ -12,6 +12,8 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any
 
+from . import checks
+
 FORCE_CHANNELS = ("Fy", "Fz", "Mx")
 """Channels of the force sensor in the order of the core."""
 
@@ -38,6 +40,14 @@ class Parameter:
     max: float
     default: float
     linear: bool = True
+
+    def __post_init__(self) -> None:
+        checks.text("name", self.name)
+        checks.instance("unit", self.unit, str)
+        for name in ("min", "max"):
+            checks.extent(name, getattr(self, name))
+        checks.number("default", self.default)
+        checks.flag("linear", self.linear)
 
 
 @dataclass(frozen=True)

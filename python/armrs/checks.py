@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import operator
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .errors import BadInput, Text, unknown_name
 
 _MISSING = Text("nothing")
+_Kind = TypeVar("_Kind")
 
 
 def number(
@@ -23,6 +25,7 @@ def number(
     above: float | None = None,
     least: float | None = None,
     most: float | None = None,
+    below: float | None = None,
     hint: str | None = None,
 ) -> float:
     """Return a finite number as float.
@@ -35,8 +38,8 @@ def number(
         What was given. A boolean or a text is not a number.
     unit : str
         Unit, for the message.
-    above, least, most : float, optional
-        Bounds: value > above, value >= least, value <= most.
+    above, least, most, below : float, optional
+        Bounds: value > above, value >= least, value <= most, value < below.
     hint : str, optional
         What a value out of these bounds probably means.
     """
@@ -47,8 +50,11 @@ def number(
         bounds.append(f">= {least:g}")
     elif most is not None:
         bounds.append(f"<= {most:g}")
+    if below is not None:
+        bounds.append(f"< {below:g}")
     allowed = " ".join(part for part in ("a finite number", " and ".join(bounds), unit) if part)
-    if isinstance(value, bool) or not hasattr(type(value), "__float__"):
+    plain = value.ndim == 0 and value.dtype.kind in "iuf" if isinstance(value, (np.ndarray, np.generic)) else not isinstance(value, bool)
+    if not plain or not hasattr(type(value), "__float__"):
         raise BadInput(place, value, allowed)
     try:
         result = float(value)  # type: ignore[arg-type]
@@ -59,10 +65,18 @@ def number(
         or (above is not None and not result > above)
         or (least is not None and not result >= least)
         or (most is not None and not result <= most)
+        or (below is not None and not result < below)
     )
     if outside:
         raise BadInput(place, result, allowed, hint=hint)
     return result
+
+
+def extent(place: str, value: object, **limits: Any) -> float:
+    """Return a number that may be infinite: a bound where there is none; `limits` are those of `number`."""
+    if isinstance(value, float) and math.isinf(value) and limits.get("above", -math.inf) < value:
+        return value
+    return number(place, value, **limits)
 
 
 def pair(place: str, value: object, **limits: Any) -> tuple[float, float]:
@@ -78,38 +92,118 @@ def pair(place: str, value: object, **limits: Any) -> tuple[float, float]:
 def whole(place: str, value: object, *, least: int, most: int | None = None) -> int:
     """Return an integer within bounds."""
     allowed = f"a whole number {least} to {most}" if most is not None else f"a whole number >= {least}"
-    if isinstance(value, bool) or not hasattr(type(value), "__index__"):
-        raise BadInput(place, value, allowed)
-    result = value.__index__()  # type: ignore[attr-defined]
-    if result < least or (most is not None and result > most):
-        raise BadInput(place, result, allowed)
-    return int(result)
-
-
-def numbers(place: str, value: object, unit: str = "") -> np.ndarray:
-    """Return an array of finite numbers of any shape; its own copy."""
-    allowed = " ".join(part for part in ("finite numbers", unit) if part)
     try:
-        result = np.array(value, dtype=float)
-    except (OverflowError, TypeError, ValueError):
+        result = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:  # arrays have the method, whatever is in them
         raise BadInput(place, value, allowed) from None
-    if not np.isfinite(result).all():
-        raise BadInput(place, Text("a value that is not finite"), allowed)
+    if isinstance(value, bool) or result < least or (most is not None and result > most):
+        raise BadInput(place, value, allowed)
     return result
 
 
-def path(place: str, value: object) -> Path:
-    """Return the path of a file or folder."""
-    if not isinstance(value, (str, os.PathLike)):
-        raise BadInput(place, value, "a path")
+def numbers(place: str, value: object, unit: str = "", *, shape: Sequence[int | None] | None = None) -> np.ndarray:
+    """Return an array of finite numbers, its own copy; `shape` as for `samples`."""
+    result = samples(place, value, unit, shape=shape, what="finite numbers").copy()
+    if not np.isfinite(result).all():
+        raise BadInput(place, Text("a value that is not finite"), " ".join(part for part in ("finite numbers", unit) if part))
+    return result
+
+
+def samples(place: str, value: object, unit: str = "", *, shape: Sequence[int | None] | None = None, what: str = "numbers") -> np.ndarray:
+    """Return an array of float64, NaN where a sample is missing; the array given when it is one already.
+
+    Parameters
+    ----------
+    place : str
+        Name of the value. Empty for the compiled kernels, which put the name of their argument in front.
+    value : object
+        Anything that NumPy reads as real numbers. Texts, booleans, times and complex numbers are none, and a masked array is not
+        taken for its data.
+    unit : str
+        Unit, for the message.
+    shape : sequence of int or None, optional
+        What the shape has to be; None is any length.
+    what : str
+        What is allowed, for the message.
+    """
+    allowed = " ".join(part for part in (what, unit) if part)
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise BadInput(place, Text("a masked array"), f"{allowed}: NaN where a sample is missing, by .filled(numpy.nan)")
+    try:
+        raw = np.asarray(value)
+        if raw.dtype == object:  # whole numbers of any length, fractions; each must be a number
+            raw = np.array([number(place, item) for item in raw.ravel()]).reshape(raw.shape)
+    except (OverflowError, TypeError, ValueError):
+        raise BadInput(place, value, allowed) from None
+    if raw.dtype.kind not in "iuf":
+        raise BadInput(place, Text(_KINDS.get(raw.dtype.kind, str(raw.dtype))) if raw.ndim else value, allowed)
+    result = np.asarray(raw, dtype=float)
+    if shape is not None:
+        fits = len(shape) == result.ndim and all(want in (None, have) for want, have in zip(shape, result.shape, strict=True))
+        if not fits:
+            wanted = ", ".join("n" if want is None else str(want) for want in shape)
+            raise BadInput(place, Text(f"an array of shape {result.shape}"), f"shape ({wanted}{',' if len(shape) == 1 else ''})")
+    return result
+
+
+_KINDS = {"U": "texts", "S": "bytes", "b": "booleans", "c": "complex numbers", "M": "dates", "m": "times"}
+"""What NumPy's kinds of arrays that are no numbers hold."""
+
+
+def path(place: str, value: object, *kinds: type) -> Path:
+    """Return the path of a file or folder; `kinds` are what else is allowed, for the message."""
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
+        raise BadInput(place, value, " or ".join([*_articles(kinds), "a path"]))
     return Path(value)
+
+
+def loaded(place: str, value: object, kind: type[_Kind], load: Callable[[Any], _Kind]) -> _Kind:
+    """Return an object of a class, or what the file at a path holds."""
+    if isinstance(value, kind):
+        return value
+    path(place, value, kind)
+    return load(value)
 
 
 def instance(place: str, value: object, *kinds: type) -> None:
     """Refuse an object of another class."""
     if not isinstance(value, kinds):
-        names = [kind.__name__ for kind in kinds]
-        raise BadInput(place, value, " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in names))
+        raise BadInput(place, value, " or ".join(_articles(kinds)))
+
+
+def instances(place: str, value: object, kind: type[_Kind]) -> tuple[_Kind, ...]:
+    """Return a sequence of objects of one class."""
+    allowed = f"a sequence of {kind.__name__}"
+    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
+        raise BadInput(place, value, allowed)
+    try:
+        items = tuple(value)
+    except TypeError:  # an array without a dimension says that it can be iterated
+        raise BadInput(place, value, allowed) from None
+    for k, item in enumerate(items):
+        instance(f"{place}[{k}]", item, kind)
+    return items
+
+
+def texts(place: str, value: object, what: str = "names") -> tuple[str, ...]:
+    """Return a sequence of texts; one text holds them with commas between them."""
+    if not isinstance(value, str):
+        return instances(place, value, str)
+    parts = tuple(part.strip() for part in value.split(","))
+    if not all(parts):
+        raise BadInput(place, value, f"{what} with commas between them")
+    return parts
+
+
+def _articles(kinds: Iterable[type]) -> list[str]:
+    names = ["None" if kind is type(None) else kind.__name__ for kind in kinds]
+    return [name if name == "None" else f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in names]
+
+
+def function(place: str, value: object) -> None:
+    """Refuse what cannot be called."""
+    if not callable(value):
+        raise BadInput(place, value, "a function")
 
 
 def flag(place: str, value: object) -> bool:

@@ -541,7 +541,7 @@ def report(
     """Make one self-contained HTML report, report.html, of any results."""
     from .report import write_report
 
-    print(write_report(sources, files.output_folder(out) / "report.html"))
+    print(write_report(sources, files.output_folder(out, "-o") / "report.html"))
 
 
 app.add_typer(fmu)
@@ -688,7 +688,7 @@ def _folder(out: Path | None, json: Path | None = None) -> Path | None:
     if out is None:
         return None
     files.must_be_writable(out)
-    return files.output_folder(out)
+    return files.output_folder(out, "-o")
 
 
 def _command(context: typer.Context) -> str:

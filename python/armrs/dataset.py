@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from . import checks, files, tomlfile
-from .errors import BadInput, Text, unknown_name
+from .errors import ArmrsError, BadInput, Text, unknown_name
 from .model import Model, load_model, part_of
+from .plausibility import still_angles
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Trial, read_trial
 
@@ -154,6 +157,27 @@ class Dataset:
     synthetic: bool = False
     added: tuple[Added, ...] = ()
 
+    def __post_init__(self) -> None:
+        checks.instance("model", self.model, Model)
+        trials = checks.instances("trials", self.trials, Trial)
+        for trial in trials:
+            if trial.q.shape[1] != self.model.n_joints:
+                raise BadInput("angles", Text(f"{trial.q.shape[1]} joints"), f"{self.model.n_joints}, as the model has", file=trial.file)
+        if self.force_on is not None:
+            checks.choice("force_on", self.force_on, ("robot", "arm"))
+        if self.sample_rate is not None:
+            checks.number("sample_rate", self.sample_rate, above=0.0, unit="Hz")
+        checks.instance("subject", self.subject, Subject)
+        checks.instance("tolerance", self.tolerance, Tolerance)
+        for name in ("folder", "model_path"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, checks.path(name, getattr(self, name)))
+        object.__setattr__(self, "name", checks.text("name", self.name))
+        object.__setattr__(self, "trials", trials)
+        object.__setattr__(self, "warnings", checks.instances("warnings", self.warnings, str))
+        object.__setattr__(self, "synthetic", checks.flag("synthetic", self.synthetic))
+        object.__setattr__(self, "added", checks.instances("added", self.added, Added))
+
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
         """Trials on which things may be chosen and fitted."""
@@ -276,15 +300,27 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         tolerance=description.tolerance,
         folder=description.path.parent,
         model_path=model_path,
-        warnings=tuple(warnings),
+        warnings=(*warnings, *still_angles(tuple(trials))),
         synthetic=description.synthetic,
         added=description.added,
     )
 
 
+@contextmanager
+def naming_trials(trials: Sequence[Trial]) -> Iterator[None]:
+    """Let errors of the core, which counts trials, name their files."""
+    try:
+        yield
+    except ArmrsError as error:
+        if error.trial is None:
+            raise
+        file = trials[error.trial].file
+        raise error.within(file=file) if isinstance(error, BadInput) else type(error)(f"{file}: {error}") from None
+
+
 def describe(source: str | os.PathLike[str]) -> Description:
     """Read `dataset.toml` alone."""
-    path = checks.path("data set", source)
+    path = checks.path("source", source)
     path = path / FILE if path.is_dir() else path
     document = tomlfile.read(path)
     try:
@@ -375,6 +411,7 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     -----
     Samples that were missing are written as empty cells, not as measured.
     """
+    checks.instance("dataset", dataset, Dataset)
     out = files.output_folder(folder)
     if suffix is not None:
         checks.choice("suffix", suffix, SUFFIXES)

@@ -12,7 +12,15 @@ _ALIKE = 0.5
 
 
 class ArmrsError(Exception):
-    """Anything armrs refuses or cannot finish. The command line ends with status 1."""
+    """Anything armrs refuses or cannot finish. The command line ends with status 1.
+
+    Attributes
+    ----------
+    trial : int, optional
+        Index of the trial it is about, where the core says so; `armrs.dataset.naming_trials` turns it into the name of a file.
+    """
+
+    trial: int | None = None
 
 
 class BadInput(ArmrsError, ValueError):
@@ -129,7 +137,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     """Return the known name that looks most like `name`, or None when none is like it."""
     known = sorted(known)
     lower = {k.lower(): k for k in reversed(known)}
-    match = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=_ALIKE)
+    match = difflib.get_close_matches(str(name).lower(), lower, n=1, cutoff=_ALIKE)
     return lower[match[0]] if match else None
 
 

@@ -142,11 +142,11 @@ def may_replace(path: PathLike, kind: str) -> None:
         )
 
 
-def output_folder(path: PathLike) -> Path:
-    """Return a folder to write below; it need not exist yet, but it must not be a file."""
-    folder = checks.path("-o", path)
+def output_folder(path: PathLike, place: str = "folder") -> Path:
+    """Return a folder to write below; it need not exist yet, but it must not be a file. `place` is what the caller calls it."""
+    folder = checks.path(place, path)
     if folder.exists() and not folder.is_dir():
-        raise BadInput("-o", Text("a file"), "a folder", file=path)
+        raise BadInput(place, Text("a file"), "a folder", file=path)
     return folder
 
 

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from . import _armrs
+from . import _armrs, checks
 from .catalogue import catalogue
-from .dataset import Dataset, Tolerance, load_dataset
+from .dataset import Dataset, Tolerance, load_dataset, naming_trials
 from .errors import BadInput, Text, unknown_name
 from .model import Effect, Joint, Model, Segment
+from .plausibility import refuse_implausible
 from .rig import all_effects, rig
 from .trial import Trial
 
@@ -205,36 +206,31 @@ def identify(
     IdentificationError
         When no solution exists.
     """
-    if not isinstance(dataset, Dataset):
-        dataset = load_dataset(dataset)
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     if dataset.added:
         raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
-    if method not in ("joint", "cascade"):
-        raise BadInput("method", method, "joint or cascade")
-    if isinstance(with_effects, str):
-        with_effects = [kind.strip() for kind in with_effects.split(",")]
-        if not all(with_effects):
-            raise BadInput("with_effects", ",".join(with_effects), "kinds of effects with commas between them")
-    if not 0.5 <= level < 1.0:
-        raise BadInput("level", level, "0.5 to 1")
-    if cutoff is not None and not cutoff > 0:
-        raise BadInput("cutoff", cutoff, "a frequency above 0 Hz")
+    checks.choice("method", method, ("joint", "cascade"))
+    checks.choice("motion", motion, ("auto", "measured", "simulated"))
+    kinds = checks.texts("with_effects", with_effects, "kinds of effects")
+    checks.number("level", level, least=0.5, below=1.0)
     slowest = min(trial.rate for trial in dataset.trials)
-    if cutoff is not None and cutoff >= 0.4 * slowest:
-        raise BadInput("cutoff", f"{cutoff:g} Hz", f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
+    if cutoff is not None and checks.number("cutoff", cutoff, above=0.0, unit="Hz") >= 0.4 * slowest:
+        raise BadInput("cutoff", Text(f"{cutoff:g} Hz"), f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
     model = dataset.model
     if method == "cascade":
-        cascade_can(with_effects, motion)
-    effects, fitted = effects_of(model, with_effects)
+        cascade_can(kinds, motion)
+    effects, fitted = effects_of(model, kinds)
     if not model.segment_uncertainty and not any(fitted):
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
     settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
     for trial in dataset.trials:
         if trial.force_on_arm is None and trial.tau is None:
             raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
+    refuse_implausible(dataset)
     configurations = sorted({t.configuration for t in dataset.trials})
     columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
-    raw = _armrs.identify(rig(model, effects), columns, settings)
+    with naming_trials(dataset.trials):
+        raw = _armrs.identify(rig(model, effects), columns, settings)
     explained = tuple(
         Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
         for trial, e in zip(dataset.trials, raw["explained"], strict=True)
@@ -289,7 +285,7 @@ def _left_out(method: str, effects: Sequence[Effect]) -> tuple[str, ...]:
 
 def effects_of(model: Model, with_effects: Sequence[str]) -> tuple[list[Effect], list[bool]]:
     """Return the effects of a model with those wanted besides, and which of them are fitted."""
-    effects = [*all_effects(model), *_added(model, with_effects)]
+    effects = [*all_effects(model), *_added(model, checks.texts("with_effects", with_effects, "kinds of effects"))]
     return effects, [e.kind in _joint_kinds() for e in effects]
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _armrs, files
+from . import _armrs, checks, files
 from .dataset import Added, Dataset, write_dataset
 from .errors import ArmrsError, BadInput, Text
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
@@ -94,8 +94,7 @@ def record(
     ArmrsError
         When the supervisor stopped every trial to be fitted.
     """
-    if not isinstance(experiment, Experiment):
-        experiment = load_experiment(experiment)
+    experiment = checks.loaded("experiment", experiment, Experiment, load_experiment)
     out = files.output_folder(folder)
     check_required(experiment)
     measured = measure(experiment, step=step)

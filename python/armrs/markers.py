@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from . import checks
 from .errors import ArmrsError, BadInput, Text, unknown_name
 
 METRES = {"mm": 1e-3, "m": 1.0, "cm": 1e-2}
@@ -49,6 +50,14 @@ class Markers:
     positions: np.ndarray
     up: str
     warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        names, n = list(checks.instances("names", self.names, str)), None
+        t = checks.samples("t", self.t, "s", shape=(n,))
+        shape = (len(t), len(names), 3)
+        positions = checks.samples("positions", self.positions, "m", shape=shape)
+        for name, value in (("names", names), ("t", t), ("positions", positions), ("up", checks.text("up", self.up))):
+            object.__setattr__(self, name, value)
 
     def point(self, text: str) -> np.ndarray:
         """Return the trajectory of a marker, or of the mean of several written `A+B`, shape (n, 3) [m]; NaN where any is missing."""
@@ -209,6 +218,8 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
     The plane is spanned by the directions of all segments at all times, whatever the base does: its normal is the direction in which
     they reach least (singular value decomposition). Lengths and flexion are taken in space, angles from shadows in the plane.
     """
+    checks.instance("markers", markers, Markers)
+    points = checks.instances("points", points, str)
     if len(points) < 2:
         raise BadInput("--points", Text(f"{len(points)} points"), "two or more, from the first joint to the handle")
     at = np.stack([markers.point(text) for text in points], axis=1)
@@ -259,7 +270,7 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
 
 
 def _axis(text: str, option: str) -> np.ndarray:
-    name = text.lower().lstrip("+-")
+    name = checks.text(option, text).lower().lstrip("+-")
     if name not in _AXES or len(text) - len(name) > 1:
         raise BadInput(option, text, "x, y, z, -x, -y or -z")
     result = np.zeros(3)

@@ -18,6 +18,10 @@ from .errors import BadInput, Text, unknown_name
 
 CHANNELS = ("Fy", "Fz", "Mx")
 MOST_SEGMENTS = 6
+MOST_DENSE = 1000.0
+"""Mass of a segment for each metre of its length [kg/m]; an upper arm has 7, and steel as thick as a man 1000."""
+SOFT_CONTACT = 0.2
+"""The weight of an arm that is held at its tip may press the contact in by this part of the arm's length."""
 LARGE_INERTIA = 3.0
 """In mass · length². A point mass at the far end has 1, a rod a twelfth; more than this is probably another unit."""
 
@@ -54,7 +58,7 @@ class Segment:
             self,
             name=checks.text("name", self.name),
             length=length,
-            mass=checks.number("mass", self.mass, above=0.0, unit="kg"),
+            mass=_mass(self.mass, length),
             com=checks.number("com", self.com, least=0.0, most=length, unit="m", hint="at most the length of the segment"),
             inertia=checks.number("inertia", self.inertia, least=0.0, unit="kg m²"),
             com_normal=checks.number("com_normal", self.com_normal, least=-length, most=length, unit="m"),
@@ -221,7 +225,11 @@ class Model:
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
-        segments, joints, effects = tuple(self.segments), tuple(self.joints), tuple(self.effects)
+        segments = checks.instances("segments", self.segments, Segment)
+        joints = checks.instances("joints", self.joints, Joint)
+        effects = checks.instances("effects", self.effects, Effect)
+        checks.instance("robot", self.robot, Robot, type(None))
+        checks.instance("contact", self.contact, Contact, type(None))
         if not 1 <= len(segments) <= MOST_SEGMENTS:
             raise BadInput("[[arm.segment]]", Text(f"{len(segments)} segments"), f"1 to {MOST_SEGMENTS} segments")
         if len(joints) != len(segments):
@@ -240,6 +248,26 @@ class Model:
                 "[arm], segment_uncertainty", self.segment_uncertainty, least=0.0, most=1.0, hint="5 % is 0.05"
             ),
         )
+
+        self._refuse_soft_contact()
+
+    def _refuse_soft_contact(self) -> None:
+        """Refuse a contact into which the arm would sink: its stiffness is then in another unit."""
+        if self.contact is None:
+            return
+        length = sum(s.length for s in self.segments)
+        # Stretched out forward, with its first joint free.
+        before = [sum(s.length for s in self.segments[:k]) for k in range(len(self.segments))]
+        held = self.gravity * sum(s.mass * (at + s.com) for s, at in zip(self.segments, before, strict=True)) / length
+        least = held / (SOFT_CONTACT * length)
+        upward = self.contact.stiffness[1]
+        if upward < least:
+            raise BadInput(
+                "[contact], stiffness[1]",
+                upward,
+                f">= {least:.3g} N/m: {held:.3g} N of the arm's weight would press it in by {held / upward:.3g} m",
+                hint="kN/m or N/mm? 10 kN/m is 10000",
+            )
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -276,8 +304,10 @@ class Model:
         at : float, optional
             From the segment's proximal joint [m]; at its end when absent. The centre of mass stays on the segment.
         """
+        number = checks.whole("number", number, least=1, most=self.n_joints)
+        mass = checks.number("mass", mass, above=0.0, unit="kg")
         old = self.segments[number - 1]
-        place = old.length if at is None else at
+        place = old.length if at is None else checks.number("at", at, least=0.0, most=old.length, unit="m")
         total = old.mass + mass
         com = (old.mass * old.com + mass * place) / total
         normal = old.mass * old.com_normal / total
@@ -288,7 +318,7 @@ class Model:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write `model.toml`; reading it back gives an equal model, to the last bit. The file is replaced at once or not at all."""
-        files.write_text(path, self.to_toml(), kind=".toml")
+        files.write_text(checks.path("path", path), self.to_toml(), kind=".toml")
 
     def to_toml(self) -> str:
         """Return the text of `model.toml`."""
@@ -370,6 +400,13 @@ def effect_of(place: str, table: dict[str, Any]) -> Effect:
         return Effect(kind, parameters.pop("joint", None), parameters.pop("channel", None), parameters)
     except BadInput as error:
         raise error.within(place=named) from None
+
+
+def _mass(value: object, length: float) -> float:
+    mass, most = checks.number("mass", value, above=0.0, unit="kg"), max(1.0, MOST_DENSE * length)
+    if mass > most:
+        raise BadInput("mass", mass, f"at most {most:g} kg for a segment of {length:g} m", hint="grams?")
+    return mass
 
 
 def _parameters_of(kind: Kind, given: Mapping[str, object]) -> dict[str, float]:

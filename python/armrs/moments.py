@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from . import _armrs, dependence, relaxed, uncertainty
+from . import _armrs, checks, dependence, relaxed, uncertainty
 from .dataset import Dataset, load_dataset
 from .errors import BadInput, Text
+from .plausibility import refuse_implausible
 from .rig import arm
 from .trial import FEWEST_SAMPLES, Trial
 
@@ -209,16 +210,16 @@ def passive_moments(
     BadInput
         For settings out of range, and a trial with neither forces nor joint torques.
     """
-    if not isinstance(dataset, Dataset):
-        dataset = load_dataset(dataset)
-    if isinstance(bins, bool) or not 2 <= bins <= 1000:
-        raise BadInput("bins", bins, "2 to 1000")
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    bins = checks.whole("bins", bins, least=2, most=1000)
+    cutoff = checks.number("cutoff", cutoff, above=0.0, unit="Hz")
+    refuse_implausible(dataset, robot_matters=False)
     trials = tuple(_of_trial(dataset, trial, cutoff) for trial in dataset.trials)
     curves, warnings = [], []
     for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
         repeats = [m for m in trials if m.trial.configuration == configuration]
         for joint in range(dataset.model.n_joints):
-            curve = _curve(dataset, repeats, joint, int(bins))
+            curve = _curve(dataset, repeats, joint, bins)
             if curve is not None:
                 curves.append(curve)
             elif any(_moves(m.q[:, joint]) for m in repeats):
@@ -226,9 +227,10 @@ def passive_moments(
                     f"{configuration}: joint {joint + 1} moved, but not long enough in both directions over the same angles for a low-pass "
                     f"at {cutoff:g} Hz: left out"
                 )
-    checks = (relaxed.muscles_silent(dataset.trials), relaxed.slow_enough([(c.configuration, c.joint, c.inertial_share) for c in curves]))
-    if checks[0].passed is False:
-        warnings.append(checks[0].text)
+    slow = [(c.configuration, c.joint, c.inertial_share) for c in curves]
+    assumptions = (relaxed.muscles_silent(dataset.trials), relaxed.slow_enough(slow))
+    if assumptions[0].passed is False:
+        warnings.append(assumptions[0].text)
     fitted = _dependence(curves)
     both = tuple(
         dependence.together(one, other)
@@ -236,7 +238,7 @@ def passive_moments(
         for other in fitted
         if (one.joint, one.adjacent) == (other.adjacent, other.joint) and one.joint < other.joint
     )
-    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, both, fitted, checks)
+    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, both, fitted, assumptions)
 
 
 def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:

@@ -17,6 +17,7 @@ from .opensim import MOTION_SUFFIXES, Motion, read_motion, read_trc, write_motio
 from .samples import SUFFIXES, write_samples
 
 Read = TypeVar("Read")
+_FORMATS = tuple(suffix[1:] for suffix in (*SUFFIXES, *MOTION_SUFFIXES))
 
 
 def read_markers(path: str | os.PathLike[str]) -> Markers:
@@ -64,7 +65,7 @@ def convert_markers(
         What the reader has to tell.
     """
     path = checks.path("source", source)
-    target = files.output_folder(folder) / path.with_suffix(f".{to}").name
+    target = files.output_folder(folder) / path.with_suffix(f".{checks.choice('to', to, _FORMATS)}").name
     markers = read_markers(path)
     try:
         motion = planar_motion(markers, points, up=up, forward=forward)
@@ -94,7 +95,8 @@ def convert_motion(source: str | os.PathLike[str], folder: str | os.PathLike[str
         The file written.
     """
     path = checks.path("source", source)
-    target = files.output_folder(folder) / path.with_suffix(f".{to}").name
+    target = files.output_folder(folder) / path.with_suffix(f".{checks.choice('to', to, _FORMATS)}").name
+    coordinates = checks.instances("coordinates", coordinates, str)
     files.not_an_input([target], [path])
     if path.suffix.lower() in MOTION_SUFFIXES:
         motion = _named(path, read_motion)

@@ -87,7 +87,9 @@ def own_effect(
     table takes 132 thousand values of the law for each linear parameter: some ms for NumPy. Results are as reproducible as the
     callable's own mathematics.
     """
-    listed = tuple(parameters)
+    listed = checks.instances("parameters", parameters, Parameter)
+    for name, said in (("summary", summary), ("formula", formula)):
+        checks.instance(name, said, str)
     _check(kind, listed)
     names = [p.name for p in listed]
     count = len([p for p in listed if p.linear])
@@ -110,7 +112,7 @@ def own_effect(
         angle, rate = np.meshgrid(q, qd, indexing="ij")
         return np.ascontiguousarray([at(angle, rate, _one(values, k, count)) for k in range(count)])
 
-    tried = shapes or {}
+    tried = {} if shapes is None else {n: checks.numbers(f"shapes, {n}", v) for n, v in checks.table("shapes", shapes).items()}
     for name in tried:
         if name not in names[count:]:
             raise BadInput("shapes", name, f"one of the parameters that are not linear: {', '.join(names[count:]) or 'none'}")

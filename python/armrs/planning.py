@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,13 @@ class Instruments:
     angle: float = float(np.radians(0.1))
     tolerance: Tolerance = field(default_factory=Tolerance)
 
+    def __post_init__(self) -> None:
+        checks.number("rate", self.rate, above=0.0, most=10_000.0, unit="Hz")
+        checks.number("cutoff", self.cutoff, above=0.0, most=0.4 * self.rate, unit="Hz")
+        checks.number("force", self.force, above=0.0, most=1e3, unit="N")
+        checks.number("angle", self.angle, above=0.0, most=1.0, unit="rad", hint="degrees?")
+        checks.instance("tolerance", self.tolerance, Tolerance)
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -68,6 +75,23 @@ class Limits:
     robot_speed: float = Safety.speed_rad_s
     force: float = 60.0
     duration: float = 20.0
+
+    def __post_init__(self) -> None:
+        if isinstance(self.angles, (str, bytes, Mapping)) or not isinstance(self.angles, Iterable):
+            raise BadInput("angles", self.angles, "a pair of angles for each joint")
+        angles = []
+        for j, ends in enumerate(self.angles, start=1):
+            place = f"angles of joint {j}"
+            low, high = checks.pair(place, ends, least=-4 * np.pi, most=4 * np.pi, unit="rad", hint="looks like degrees")
+            if not low < high:
+                raise BadInput(place, Text(f"{low:g} to {high:g} rad"), "the smaller angle first")
+            angles.append((low, high))
+        object.__setattr__(self, "angles", tuple(angles))
+        checks.number("speed", self.speed, above=0.0, most=100.0, unit="rad/s")
+        checks.number("acceleration", self.acceleration, above=0.0, most=1e4, unit="rad/s²")
+        checks.number("robot_speed", self.robot_speed, above=0.0, most=100.0, unit="rad/s")
+        checks.number("force", self.force, above=0.0, unit="N")
+        checks.number("duration", self.duration, above=0.0, most=600.0, unit="s")
 
 
 @dataclass(frozen=True)
@@ -203,10 +227,11 @@ def forecast(
     identification from noisy angles is biased by more than they say (`scripts/check_plan.py`).
     """
     asked = _Question(model, with_effects, instruments, repeats)
+    movements = checks.instances("movements", movements, Movement)
     tasks = [_task(m, model, repeats) for m in movements]
     if not tasks:
         raise BadInput("movements", Text("none"), "at least one")
-    return asked.plan(tuple(movements), _armrs.forecast(asked.rig, asked.settings, asked.sensing, tasks))
+    return asked.plan(movements, _armrs.forecast(asked.rig, asked.settings, asked.sensing, tasks))
 
 
 def plan(
@@ -248,29 +273,21 @@ def plan(
         When no movement that was tried respects the limits.
     """
     asked = _Question(model, with_effects, instruments, repeats)
+    checks.instance("limits", limits, Limits)
     n = model.n_joints
     if len(limits.angles) != n:
         raise BadInput("angles", Text(f"{len(limits.angles)} ranges"), f"{n}, one a joint")
-    angles = []
-    for j, ends in enumerate(limits.angles, start=1):
-        low, high = checks.pair(f"angles of joint {j}", ends, least=-4 * np.pi, most=4 * np.pi, unit="rad", hint="looks like degrees")
-        if not low < high:
-            raise BadInput(f"angles of joint {j}", Text(f"{low:g} to {high:g} rad"), "the smaller angle first")
-        angles.append([low, high])
-    if not speeds:
+    shares = checks.numbers("speeds", speeds, shape=(None,)).tolist()
+    if not shares:
         raise BadInput("speeds", Text("none"), "at least one share")
     bounds = {
-        "angle": angles,
-        "speed": checks.number("speed", limits.speed, above=0.0, most=100.0, unit="rad/s"),
-        "acceleration": checks.number("acceleration", limits.acceleration, above=0.0, most=1e4, unit="rad/s²"),
-        "robot_speed": checks.number("robot_speed", limits.robot_speed, above=0.0, most=100.0, unit="rad/s"),
-        "force": checks.number("force", limits.force, above=0.0, unit="N"),
-        "duration": checks.number("duration", limits.duration, above=0.0, most=600.0, unit="s"),
-        "speeds": [checks.number("speeds", v, above=0.0, most=1.0) for v in speeds],
+        "angle": [list(ends) for ends in limits.angles],
+        **{name: float(getattr(limits, name)) for name in ("speed", "acceleration", "robot_speed", "force", "duration")},
+        "speeds": [checks.number("speeds", v, above=0.0, most=1.0) for v in shares],
         "waypoints": checks.whole("waypoints", waypoints, least=2, most=100),
         "repeats": repeats,
         "evaluations": checks.whole("evaluations", evaluations, least=1, most=100_000),
-        "seed": checks.whole("seed", seed, least=0),
+        "seed": checks.whole("seed", seed, least=0, most=2**64 - 1),
     }
     raw = _armrs.design(asked.rig, asked.settings, asked.sensing, bounds)
     found = tuple(Movement(t["waypoints"], speed=t["speed"], acceleration=t["acceleration"], shape="smooth") for t in raw["tasks"])
@@ -316,8 +333,8 @@ class _Question:
     """What forecast and plan ask of the core."""
 
     def __init__(self, model: Model, with_effects: Sequence[str], instruments: Instruments, repeats: int) -> None:
-        for name, most in (("rate", 10_000.0), ("cutoff", 0.4 * instruments.rate), ("force", 1e3), ("angle", 1.0)):
-            checks.number(name, getattr(instruments, name), above=0.0, most=most)
+        checks.instance("model", model, Model)
+        checks.instance("instruments", instruments, Instruments)
         self.model, self.repeats = model, checks.whole("repeats", repeats, least=1, most=10_000)
         self.effects, fitted = effects_of(model, with_effects)
         self.rig = rig(model, self.effects)

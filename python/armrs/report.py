@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from . import files, tables, words
+from . import checks, files, tables, words
 from .errors import BadInput, Text
 
 _CSS = """
@@ -103,8 +103,11 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
     BadInput
         For a file that is no result; nothing is written then.
     """
-    write_page(path, [_part(source) for source in sources])
-    return Path(path)
+    target = checks.path("path", path)
+    if isinstance(sources, (str, bytes)) or not isinstance(sources, Iterable):
+        raise BadInput("sources", sources, "a sequence of paths")
+    write_page(target, [_part(checks.path(f"sources[{k}]", source)) for k, source in enumerate(sources)])
+    return target
 
 
 def _part(source: str | os.PathLike[str]) -> str:

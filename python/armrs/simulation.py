@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,7 +49,7 @@ class Movement:
 
     def __post_init__(self) -> None:
         points = checks.numbers("waypoints", self.waypoints, "rad")
-        if points.ndim != 2 or len(points) < 2:
+        if points.ndim != 2 or len(points) < 2 or not points.size:
             raise BadInput("waypoints", f"an array of shape {points.shape}", "two or more rows of joint angles")
         if np.abs(points).max(initial=0.0) > 4 * np.pi:
             raise BadInput("waypoints", float(np.abs(points).max()), "angles within two turns, in radians", hint="looks like degrees")
@@ -86,8 +85,7 @@ class Channel:
     def __post_init__(self) -> None:
         checks.number("deviation", self.deviation, least=0.0)
         checks.number("correlation_time", self.correlation_time, least=0.0, unit="s")
-        if self.range != np.inf:
-            checks.number("range", self.range, above=0.0)
+        checks.extent("range", self.range, above=0.0)
         if self.bits is not None:
             checks.whole("bits", self.bits, least=1, most=32)
 
@@ -206,8 +204,7 @@ def simulate(
     SimulationError
         When the run stops early.
     """
-    if not isinstance(model, Model):
-        model = load_model(model)
+    model = checks.loaded("model", model, Model, load_model)
     checks.choice("coupling", coupling, ("compliant", "rigid"))
     checks.choice("engine", engine, ("native", "rapier"))
     checks.choice("integrator", integrator, ("rk4", "euler"))
@@ -234,8 +231,7 @@ def simulate(
         "q": None if start is None else checks.numbers("start", start, "rad").reshape(-1).tolist(),
         "qd": None if start_speed is None else checks.numbers("start_speed", start_speed, "rad/s").reshape(-1).tolist(),
     }
-    if sensors is not None:
-        checks.instance("sensors", sensors, Sensors)
+    checks.instance("sensors", sensors, Sensors, type(None))
     sensing = None if sensors is None else _sensing(sensors, seeds)
     try:
         raw = _armrs.simulate(rig(model), led, settings, sensing)
@@ -266,7 +262,8 @@ def simulate(
 
 def _check_duration(duration: float, dt: float, rate: float) -> None:
     """Refuse a length of a run that is no whole number of steps, or holds no sample interval."""
-    if not (np.isfinite(duration) and 1.0 / rate <= duration < _MOST_STEPS * dt):
+    checks.number("duration", duration, above=0.0, unit="s")
+    if not 1.0 / rate <= duration < _MOST_STEPS * dt:
         raise BadInput("duration", duration, f"{1.0 / rate:g} s (one interval between samples) to {_MOST_STEPS * dt:g} s")
     steps = duration / dt
     if abs(steps - round(steps)) > 1e-9 * steps:
@@ -310,7 +307,8 @@ def _sensing(sensors: Sensors, seeds: Sequence[int]) -> dict[str, Any]:
 
 def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
     """Read a movement file: a TOML table `[movement]` with `waypoints_deg` (or `_rad`), speed, acceleration, pause, shape."""
-    document = tomlfile.read(Path(path))
+    document = tomlfile.read(checks.path("path", path))
+    checks.whole("n_joints", n_joints, least=1)
     try:
         checks.keys("", document, required=["movement"])
         return movement_of(checks.table("movement", document["movement"]), n_joints)

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from . import columns, resample
+from . import checks, columns, resample
 from .errors import BadInput, Text
 from .samples import Samples, read_samples
 
@@ -86,6 +86,20 @@ class Trial:
     resampled: bool = False
 
     def __post_init__(self) -> None:
+        for name in ("file", "configuration"):
+            checks.instance(name, getattr(self, name), str)
+        checks.whole("repeat", self.repeat, least=1)
+        checks.choice("role", self.role, ("fit", "test"))
+        n = len(checks.numbers("t", self.t, "s", shape=(None,)))
+        if n < 2:
+            raise BadInput("t", Text(f"{n} samples"), "two or more")
+        joints = checks.samples("q", self.q, "rad", shape=(n, None)).shape[1]
+        shapes: dict[str, tuple[int, ...]] = {
+            "force_on_arm": (n, 2), "moment_on_arm": (n,), "robot_q": (n, 2), "tau": (n, joints), "dq": (n, joints),
+        }  # fmt: skip
+        for name, shape in {"t": (n,), "q": (n, joints), **shapes}.items():
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, checks.samples(name, getattr(self, name), shape=shape))
         if self.valid.size == 0:
             measured = [a for a in (self.q, self.force_on_arm, self.moment_on_arm, self.robot_q, self.tau) if a is not None]
             rows = [np.isfinite(a).reshape(len(a), -1).all(axis=1) for a in measured]

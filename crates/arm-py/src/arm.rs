@@ -132,24 +132,42 @@ impl Arm {
 #[pymethods]
 impl Arm {
     #[new]
-    #[pyo3(signature = (lengths, masses, coms, inertias, *, com_normals=None, gravity=9.81, base=(0.0, 0.0), rotor_inertia=None))]
+    #[pyo3(
+        signature = (lengths, masses, coms, inertias, *, com_normals=None, gravity=None, base=None, rotor_inertia=None),
+        text_signature = "(lengths, masses, coms, inertias, *, com_normals=None, gravity=9.81, base=(0.0, 0.0), rotor_inertia=None)"
+    )]
     #[expect(
         clippy::too_many_arguments,
         reason = "keyword arguments of a Python constructor"
     )]
     fn new(
-        lengths: Vec<f64>,
-        masses: Vec<f64>,
-        coms: Vec<f64>,
-        inertias: Vec<f64>,
-        com_normals: Option<Vec<f64>>,
-        gravity: f64,
-        base: (f64, f64),
-        rotor_inertia: Option<Vec<f64>>,
+        lengths: Numbers<'_>,
+        masses: Numbers<'_>,
+        coms: Numbers<'_>,
+        inertias: Numbers<'_>,
+        com_normals: Option<Numbers<'_>>,
+        gravity: Option<Numbers<'_>>,
+        base: Option<Numbers<'_>>,
+        rotor_inertia: Option<Numbers<'_>>,
     ) -> PyResult<Self> {
+        let lengths = lengths.list("lengths")?;
         let n = lengths.len();
-        let com_normals = com_normals.unwrap_or_else(|| vec![0.0; n]);
-        let rotor = rotor_inertia.unwrap_or_else(|| vec![0.0; n]);
+        let (masses, coms) = (masses.list("masses")?, coms.list("coms")?);
+        let inertias = inertias.list("inertias")?;
+        let or_zero = |name, given: Option<Numbers<'_>>| {
+            given.map_or_else(|| Ok(vec![0.0; n]), |values| values.list(name))
+        };
+        let com_normals = or_zero("com_normals", com_normals)?;
+        let rotor = or_zero("rotor_inertia", rotor_inertia)?;
+        let gravity = gravity.map_or(Ok(9.81), |value| value.number("gravity"))?;
+        let base = base.map_or_else(|| Ok(vec![0.0; 2]), |values| values.list("base"))?;
+        if base.len() != 2 {
+            return Err(bad_input(
+                "base",
+                format!("{} values", base.len()),
+                "two numbers, y and z [m]",
+            ));
+        }
         let named = [
             ("masses", &masses),
             ("coms", &coms),
@@ -174,7 +192,7 @@ impl Arm {
                 inertia: inertias[i],
             })
             .collect();
-        let chain = AnyChain::new(&segments, [base.0, base.1], [0.0, -gravity], &rotor)?;
+        let chain = AnyChain::new(&segments, [base[0], base[1]], [0.0, -gravity], &rotor)?;
         Ok(Self { chain })
     }
 

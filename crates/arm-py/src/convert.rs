@@ -5,15 +5,85 @@ use std::borrow::Cow;
 use arm_core::Joints;
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{
-    AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyReadonlyArray2,
+    IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
 use crate::errors::bad_input;
 
-/// Anything NumPy can read as numbers.
-pub type Numbers<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
+/// Anything NumPy can read as real numbers; what is none is refused where the name of the argument is known.
+pub struct Numbers<'py>(PyResult<PyReadonlyArrayDyn<'py, f64>>);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Numbers<'py> {
+    type Error = std::convert::Infallible;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> Result<Self, Self::Error> {
+        // A subclass of arrays may mean something else than its data: a masked one does.
+        if let Ok(array) = given.cast_exact::<PyArrayDyn<f64>>()
+            && let Ok(array) = array.try_readonly()
+        {
+            return Ok(Self(Ok(array)));
+        }
+        let read = || {
+            let checks = given.py().import("armrs.checks")?;
+            let array = checks.getattr("samples")?.call1(("", given))?;
+            Ok(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?)
+        };
+        Ok(Self(read()))
+    }
+}
+
+impl<'py> Numbers<'py> {
+    /// The array, or its refusal under the argument's name.
+    fn array(&self, name: &str) -> PyResult<&PyReadonlyArrayDyn<'py, f64>> {
+        self.0.as_ref().map_err(|refused| named(refused, name))
+    }
+
+    /// The numbers of a one-dimensional argument, all finite.
+    pub fn list(&self, name: &'static str) -> PyResult<Vec<f64>> {
+        let array = self.array(name)?;
+        if array.ndim() != 1 {
+            let found = format!("an array of shape {:?}", array.shape());
+            return Err(bad_input(name, found, "a list of numbers, one a segment"));
+        }
+        let values: Vec<f64> = array.as_array().iter().copied().collect();
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            return Err(bad_input(
+                &format!("{name}[{at}]"),
+                values[at],
+                "a finite number",
+            ));
+        }
+        Ok(values)
+    }
+
+    /// A single finite number.
+    pub fn number(&self, name: &'static str) -> PyResult<f64> {
+        let array = self.array(name)?;
+        match array.as_array().iter().copied().next() {
+            Some(value) if array.ndim() == 0 && value.is_finite() => Ok(value),
+            Some(value) if array.ndim() == 0 => Err(bad_input(name, value, "a finite number")),
+            _ => {
+                let found = format!("an array of shape {:?}", array.shape());
+                Err(bad_input(name, found, "a finite number"))
+            }
+        }
+    }
+}
+
+/// A refusal from further inside, with the name of the argument in front.
+fn named(refused: &PyErr, name: &str) -> PyErr {
+    Python::attach(|py| {
+        let arguments = pyo3::types::PyDict::new(py);
+        let outer = arguments.set_item("place", name).and_then(|()| {
+            refused
+                .value(py)
+                .call_method("within", (), Some(&arguments))
+        });
+        outer.map_or_else(|_| refused.clone_ref(py), PyErr::from_value)
+    })
+}
 
 /// Rows of `width` numbers: a single one or a batch.
 pub struct Rows<'a> {
@@ -25,7 +95,8 @@ pub struct Rows<'a> {
 
 impl<'a> Rows<'a> {
     /// Reads an argument of shape `(width,)` or `(n, width)`.
-    pub fn new(name: &'static str, array: &'a Numbers<'_>, width: usize) -> PyResult<Self> {
+    pub fn new(name: &'static str, given: &'a Numbers<'_>, width: usize) -> PyResult<Self> {
+        let array = given.array(name)?;
         let batch = match *array.shape() {
             [last] if last == width => None,
             [n, last] if last == width => Some(n),
@@ -104,6 +175,15 @@ pub fn over_rows<'py, const K: usize>(
         py.detach(run)
     } else {
         run()
+    }
+    if let Some(at) = out.iter().position(|v| !v.is_finite()) {
+        let names = inputs.each_ref().map(|r| r.name).join(", ");
+        let row = batch.map_or(String::new(), |_| format!(" in row {}", at / size));
+        return Err(bad_input(
+            &names,
+            format!("values of which the result is not finite{row}"),
+            "numbers that an arm can have, in SI units and radians",
+        ));
     }
     let shape: Vec<usize> = batch.into_iter().chain(inner.iter().copied()).collect();
     let array =

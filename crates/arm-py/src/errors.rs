@@ -1,6 +1,6 @@
 //! The one place that turns errors of the core into Python's.
 
-use arm_core::Invalid;
+use arm_core::{Invalid, Shown};
 use arm_gap::GapError;
 use arm_ident::IdentError;
 use arm_sim::SimulationError;
@@ -35,12 +35,17 @@ pub fn invalid(error: Invalid) -> PyErr {
             min,
             max,
         } => {
-            let allowed = match (min, max) {
-                (f64::MIN_POSITIVE, f64::INFINITY) => "more than 0".to_owned(),
-                (min, f64::INFINITY) => format!("at least {min}"),
-                (min, max) => format!("{min} to {max}"),
+            // The smallest positive number of either precision stands for "above zero", the largest for "any".
+            let positive = min > 0.0 && min <= f64::from(f32::MIN_POSITIVE);
+            let any = max >= f64::from(f32::MAX);
+            let (low, high) = (Shown(min), Shown(max));
+            let allowed = match (positive, any) {
+                (true, true) => "more than 0".to_owned(),
+                (true, false) => format!("more than 0, at most {high}"),
+                (false, true) => format!("at least {low}"),
+                (false, false) => format!("{low} to {high}"),
             };
-            bad_input(&format!("{name} {}", index + 1), found, &allowed)
+            bad_input(&format!("{name} {}", index + 1), Shown(found), &allowed)
         }
         Invalid::OutOfReach { distance, min, max } => bad_input(
             "handle",
@@ -53,26 +58,26 @@ pub fn invalid(error: Invalid) -> PyErr {
 
 /// A refusal or failure of an identification: bad data are `BadInput`, the rest is `IdentificationError`.
 pub fn identification(error: IdentError) -> PyErr {
-    let (trial, error) = match error {
-        IdentError::InTrial { number, error } => (format!("trial {number}: "), *error),
-        error => (String::new(), error),
+    let (number, error) = match error {
+        IdentError::InTrial { number, error } => (Some(number), *error),
+        error => (None, error),
     };
-    match error {
+    let refused = match error {
         IdentError::TooFew {
             name,
             found,
             expected,
-        } => bad_input(
-            &format!("{trial}{name}"),
-            found,
-            &format!("at least {expected}"),
-        ),
+        } => bad_input(name, found, &format!("at least {expected}")),
         IdentError::OutOfRange {
             name,
             found,
             min,
             max,
-        } => bad_input(&format!("{trial}{name}"), found, &format!("{min} to {max}")),
+        } => bad_input(
+            name,
+            Shown(found),
+            &format!("{} to {}", Shown(min), Shown(max)),
+        ),
         IdentError::Rank {
             found, expected, ..
         } => in_python(
@@ -82,8 +87,20 @@ pub fn identification(error: IdentError) -> PyErr {
                  leave out effects that these movements do not show"
             ),
         ),
-        other => in_python("IdentificationError", &format!("{trial}{other}")),
+        other => in_python("IdentificationError", &other.to_string()),
+    };
+    match number {
+        Some(number) => of_trial(refused, number - 1),
+        None => refused,
     }
+}
+
+/// An error that says which trial it is of, from 0; Python, which knows the files, names it.
+fn of_trial(error: PyErr, index: usize) -> PyErr {
+    Python::attach(|py| match error.value(py).setattr("trial", index) {
+        Ok(()) => error.clone_ref(py),
+        Err(other) => other,
+    })
 }
 
 /// A call that a co-simulation slave did not do, as `SlaveError`.
@@ -155,7 +172,7 @@ pub fn gap(error: GapError) -> PyErr {
         } => bad_input(what, found, allowed),
         GapError::Numerics(error) => identification(error),
         GapError::Simulation { trial, source } => {
-            in_python("SimulationError", &format!("trial {}: {source}", trial + 1))
+            of_trial(in_python("SimulationError", &source.to_string()), trial)
         }
         other => in_python("IdentificationError", &other.to_string()),
     }

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from ..fmu.description import Description, read_description, unpack
 from .partner import Partner, Status, StepResult, listed
@@ -157,9 +158,9 @@ class ImportedSlave(Partner):
     """
 
     def __init__(self, path: str | os.PathLike[str], *, name: str | None = None, logging: bool = False) -> None:
-        self.path = Path(path)
+        self.path = checks.path("path", path)
         self.description = read_description(path)
-        self.name = name or self.path.stem
+        self.name = self.path.stem if name is None else checks.text("name", name)
         self.variables = {v.name: v for v in self.description.variables}
         self.can_rollback = self.description.flag(f"canGetAndSetFMU{'S' if self.fmi == 3 else 's'}tate")
         self.can_vary_step = self.description.flag("canHandleVariableCommunicationStepSize")

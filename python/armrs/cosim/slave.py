@@ -67,12 +67,12 @@ class Slave(Partner):
         name: str | None = None,
     ) -> None:
         if not isinstance(model, Model):
-            name = name or os.path.splitext(os.path.basename(os.fspath(model)))[0]  # noqa: PTH119, PTH122 (only the name)
-            model = load_model(model)
+            name = name or checks.path("model", model, Model).stem
+        model = checks.loaded("model", model, Model, load_model)
         checks.choice("port", port, PORTS)
         self.internal_step = checks.number("step", step, above=0.0, unit="s")
         self.model = model
-        self.name = checks.text("name", name or "arm")
+        self.name = checks.text("name", "arm" if name is None else name)
         coupling = {
             "name": self.name,
             "port": port,
@@ -80,7 +80,7 @@ class Slave(Partner):
             "q": _joints("start", start, model.n_joints),
             "qd": _joints("start_speed", start_speed, model.n_joints),
             "handle": None if handle is None else list(checks.pair("handle", handle, unit="m")),
-            "rest": bool(rest),
+            "rest": checks.flag("rest", rest),
         }
         self.port = port
         self.compiled = _armrs.ArmSlave(rig(model), coupling)
@@ -169,10 +169,10 @@ class Slave(Partner):
 def _joints(place: str, values: Any, n: int) -> list[float]:
     if values is None:
         return [0.0] * n
-    given = [values] if np.ndim(values) == 0 else list(values)
+    given: list[float] = checks.numbers(place, values).reshape(-1).tolist()
     if len(given) != n:
         raise BadInput(place, Text(f"{len(given)} values"), f"{n}, one a joint")
-    return [checks.number(f"{place}[{k}]", value) for k, value in enumerate(given)]
+    return given
 
 
 def _variable(row: dict[str, Any]) -> Variable:

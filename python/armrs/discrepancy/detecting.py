@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .. import _armrs
+from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..dataset import Dataset
 from ..errors import BadInput, Text
@@ -54,11 +54,14 @@ def detectable(
     The session is simulated with white noise of the sensors and nothing hidden in it, calibrated, and every candidate is asked to first
     order, as on measured data. Tone, slips and whatever else differs between trials of a living arm make the limits larger.
     """
+    checks.instance("model", model, Model)
+    checks.instance("instruments", instruments, Instruments, type(None))
     instruments = instruments or Instruments()
+    movements = checks.instances("movements", movements, Movement)
+    checks.whole("repeats", repeats, least=2)
+    checks.whole("seed", seed, least=0, most=2**32)
     if model.robot is None:
         raise BadInput("[robot]", Text("none"), "a robot: what a session shows depends on how the arm is led")
-    if repeats < 2:
-        raise BadInput("repeats", repeats, "at least 2")
     sensors = Sensors(rate=instruments.rate, angle=Channel(instruments.angle), force=Channel(instruments.force))
     step = 1.0 / (instruments.rate * -(-1.0 // (instruments.rate * _STEP)))
     trials = []

@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from .. import _armrs
-from ..dataset import Dataset, load_dataset
+from .. import _armrs, checks
+from ..dataset import Dataset, load_dataset, naming_trials
 from ..identification import core_columns
 from ..own import OwnEffect
 from ..rig import all_effects, rig
@@ -52,16 +52,19 @@ def find_gap(
     """
     from . import separating
 
-    if not isinstance(dataset, Dataset):
-        dataset = load_dataset(dataset)
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    checks.flag("separate", separate)
+    if progress is not None:
+        checks.function("progress", progress)
+    effects = checks.instances("effects", effects, OwnEffect)
     led = reading.is_led(dataset)
     settings = core_settings(dataset, led, threads, [e.kind for e in effects])
     columns = core_trials(dataset)
     built = rig(dataset.model, all_effects(dataset.model))
     warnings = suspicion.examine(dataset, led)
-    suspicion.refuse_wrong_angles(dataset)
-    suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
-    raw = _armrs.find_gap(built, columns, settings, progress)
+    with naming_trials(dataset.trials):
+        suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
+        raw = _armrs.find_gap(built, columns, settings, progress)
     result = reading.found(dataset, led, raw, warnings)
     return separating.separate(result, threads=threads, progress=progress) if separate else result
 
@@ -84,5 +87,5 @@ def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequenc
         "handle_placement": tolerance.handle_placement_m,
         "led": led,
         "own": list(own),
-        "threads": threads or os.cpu_count() or 1,
+        "threads": (os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),
     }

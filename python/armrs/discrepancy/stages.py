@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .. import _armrs
+from .. import _armrs, checks
 from ..catalogue import catalogue
-from ..dataset import Dataset, load_dataset
+from ..dataset import Dataset, load_dataset, naming_trials
 from ..model import Contact, Model, Robot
 from ..own import OwnEffect
 from ..results import data_of, origin
@@ -135,9 +135,9 @@ def calibrate(
     warnings = suspicion.examine(data, led)
     settings = core_settings(data, led, threads, [e.kind for e in effects])
     built, columns = rig(data.model, all_effects(data.model)), core_trials(data)
-    suspicion.refuse_wrong_angles(data)
-    suspicion.refuse_mislabelled(data, led, _armrs.play(built, columns, settings))
-    raw = _armrs.look(built, columns, settings, progress)
+    with naming_trials(data.trials):
+        suspicion.refuse_mislabelled(data, led, _armrs.play(built, columns, settings))
+        raw = _armrs.look(built, columns, settings, progress)
     return Calibrated(
         model=reading.amended(data.model, raw["calibrated"]),
         absorbed=reading.absorbed(data, raw),
@@ -205,5 +205,6 @@ def suspect(item: Sequence[Any]) -> Suspect:
 
 
 def _loaded(dataset: Source, model: Model | None) -> Dataset:
-    data = dataset if isinstance(dataset, Dataset) else load_dataset(dataset)
+    data = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    checks.instance("model", model, Model, type(None))
     return data if model is None else data.replace(model=model)

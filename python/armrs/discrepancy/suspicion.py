@@ -9,6 +9,7 @@ import numpy as np
 
 from ..dataset import Dataset
 from ..errors import BadInput, Text
+from ..plausibility import constant, refuse_implausible
 
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
@@ -18,7 +19,6 @@ _OFTEN = 3.0
 """A saturated channel is that much oftener at its extreme than next to it."""
 _ALIKE = 0.9
 """Correlation above which two signals are the same movement."""
-_VARIES = 1e-9
 
 
 def examine(dataset: Dataset, led: bool) -> list[str]:
@@ -37,15 +37,13 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
         lines.append("no movement was repeated: what is noise and what is missing cannot be told apart; names after the first are guesses")
     if not dataset.test_trials:
         lines.append('no trial with role = "test": the gap cannot be measured on data that were kept apart')
+    refuse_implausible(dataset)
     for trial in dataset.trials:
         for name, values in _channels(trial, led):
-            finite = values[np.isfinite(values)]
-            if len(finite) and np.ptp(finite) <= _VARIES:
-                if name.startswith("tau") and not finite.any():
-                    continue  # an arm that swings freely
-                raise BadInput(
-                    "channel", Text(f"{name} is {finite[0]:g} throughout"), "a channel that changes with the movement", file=trial.file
-                )
+            level = constant(values)
+            if level:  # zero is an arm that swings freely
+                found = Text(f"{level:g} N m in every sample")
+                raise BadInput(f"column {name}", found, "a torque that changes with the movement", file=trial.file, hint="a dead sensor?")
     return lines + _saturated(dataset, led)
 
 
@@ -119,51 +117,6 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
         raise BadInput("force_on", Text(found), '"arm" or "robot", whichever the force acts on')
     if min(cross) > _ALIKE and max(own) < 0.7:
         raise BadInput("Fy_N, Fz_N", Text("each follows what the other should be"), "Fy along the horizontal, Fz up: swapped columns?")
-
-
-def refuse_wrong_angles(dataset: Dataset) -> None:
-    """Compare where the measured angles put the hand with where the robot's put its handle.
-
-    Raises
-    ------
-    BadInput
-        Where they lie far apart and another unit of the angles brings them together.
-    """
-    model = dataset.model
-    if model.robot is None:
-        return
-    for trial in dataset.trials:
-        if trial.robot_q is None:
-            continue
-        good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
-        handle = _handle(model.robot, trial.robot_q[good])
-        apart = {factor: _apart(model, trial.q[good] * factor, handle) for factor in (1.0, 57.29577951308232, 1 / 57.29577951308232)}
-        reach = sum(s.length for s in model.segments)
-        if apart[1.0] < 0.3 * reach:
-            continue
-        for factor, unit in ((57.29577951308232, "radians labelled as degrees"), (1 / 57.29577951308232, "degrees labelled as radians")):
-            if apart[factor] < 0.1 * reach:
-                found = Text(f"angles that put the hand {apart[1.0]:.3g} m from the handle")
-                raise BadInput("q1 …", found, f"angles in the unit of their column ({unit}?)", file=trial.file)
-        found = Text(f"the hand {apart[1.0]:.3g} m from the robot's handle")
-        raise BadInput(
-            "q1 …, qr1, qr2", found, "angles of arm and robot that meet: lengths, bases, elbow and units of the model?", file=trial.file
-        )
-
-
-def _handle(robot: Any, q: np.ndarray) -> np.ndarray:
-    first, second = q[:, 0], q[:, 0] + q[:, 1]
-    near, far = robot.lengths
-    return np.column_stack(
-        [robot.base[0] + near * np.cos(first) + far * np.cos(second), robot.base[1] + near * np.sin(first) + far * np.sin(second)]
-    )
-
-
-def _apart(model: Any, q: np.ndarray, handle: np.ndarray) -> float:
-    angles = np.cumsum(q, axis=1)
-    lengths = np.array([s.length for s in model.segments])
-    tip = np.column_stack([model.base[0] + np.cos(angles) @ lengths, model.base[1] + np.sin(angles) @ lengths])
-    return float(np.sqrt(np.mean(np.sum((tip - handle) ** 2, axis=1))))
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:

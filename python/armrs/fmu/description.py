@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from .. import checks
 from ..cosim.partner import Variable
 from ..errors import BadInput, Text
 
@@ -107,9 +108,11 @@ def read_description(path: str | os.PathLike[str]) -> Description:
 def archive(path: str | os.PathLike[str]) -> zipfile.ZipFile:
     """Open an FMU as an archive."""
     try:
-        return zipfile.ZipFile(path)
+        return zipfile.ZipFile(checks.path("path", path))
     except zipfile.BadZipFile as error:
         raise BadInput("archive", Text(str(error)), "an FMU, which is a zip archive", file=path) from None
+    except BadInput:
+        raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "a name no file can have"
         raise BadInput("file", Text(reason), "an FMU that can be read", file=path) from None

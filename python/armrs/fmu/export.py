@@ -64,12 +64,12 @@ def export_fmu(
     BadInput
         For an arm or a name that cannot be used; nothing is written.
     """
-    target = Path(path)
-    checks.text("name", target.stem)
+    target = checks.path("path", path)
+    checks.text("path", target.stem)
     files.may_replace(target, ".fmu")
-    if not isinstance(model, Slave):
-        model = Slave(model, port=port, start=start, rest=rest, name=name or target.stem)
     fmi = checks.whole("fmi", fmi, least=2, most=3)
+    if not isinstance(model, Slave):
+        model = Slave(model, port=port, start=start, rest=rest, name=target.stem if name is None else name)
     content = contents(model, fmi)
     with files.replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as packed:
         for inside, data in content.items():

@@ -85,7 +85,7 @@ def sweep(
         When workers were lost; what is done stays, and the same call goes on.
     """
     jobs = checks.whole("jobs", jobs, least=1, most=MOST_JOBS)
-    spec = source if isinstance(source, Sweep) else load_sweep(source)
+    spec = checks.loaded("sweep", source, Sweep, load_sweep)
     out = files.output_folder(folder)
     files.must_be_writable(out)
     store = Store(spec, out)

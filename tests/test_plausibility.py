@@ -1,0 +1,120 @@
+"""Data that cannot be what they say: dead sensors, swapped columns, other units. Each is named before any physics, with its file."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import BadInput
+from armrs.cli import main
+from armrs.demo import true_model
+
+FIRST = "trials/slow_1.csv"
+
+
+def changed(data: armrs.Dataset, every: bool = False, **changes: Callable[[np.ndarray], np.ndarray]) -> armrs.Dataset:
+    """Return a data set with columns of the first trial, or of all, put through functions."""
+
+    def of(trial: armrs.Trial) -> armrs.Trial:
+        arrays: dict[str, Any] = {name: np.array(change(np.array(getattr(trial, name)))) for name, change in changes.items()}
+        return dataclasses.replace(trial, **arrays)
+
+    return data.replace(trials=tuple(of(trial) if every or trial is data.trials[0] else trial for trial in data.trials))
+
+
+def held(column: int) -> Callable[[np.ndarray], np.ndarray]:
+    def change(values: np.ndarray) -> np.ndarray:
+        values[:, column] = values[0, column]
+        return values
+
+    return change
+
+
+FORCES: dict[str, tuple[dict[str, Callable[[np.ndarray], np.ndarray]], str]] = {
+    "force of zero": ({"force_on_arm": lambda f: 0.0 * f}, "column Fy: found 0 N in every sample, allowed a force that changes"),
+    "stuck force": ({"force_on_arm": held(1)}, "column Fz: found "),
+}
+ANGLES: dict[str, tuple[dict[str, Callable[[np.ndarray], np.ndarray]], str]] = {
+    "swapped angles": ({"q": lambda q: q[:, ::-1]}, "columns q1 …: found angles that put the hand "),
+    "swapped robot angles": ({"robot_q": lambda q: q[:, ::-1]}, "columns qr1, qr2: found "),
+    "angles in degrees": ({"q": np.degrees}, "degrees labelled as radians"),
+    "robot angles in degrees": ({"robot_q": np.degrees}, "columns qr1, qr2: found "),
+}
+STILL: dict[str, tuple[dict[str, Callable[[np.ndarray], np.ndarray]], str]] = {
+    "still angle": ({"q": held(0)}, "column q1: found -1.0"),
+    "still angles": ({"q": lambda q: 0.0 * q + q[0]}, "column q1: found -1.0"),
+}
+
+
+@pytest.mark.parametrize("verb", [armrs.identify, armrs.find_gap, armrs.passive_moments])
+@pytest.mark.parametrize("name", [*FORCES, *ANGLES, *STILL])
+def test_what_is_wrong_is_named_with_its_file(verb: Callable[..., object], name: str, slow_arm: Path) -> None:
+    if name in STILL and verb is armrs.passive_moments:
+        pytest.skip("passive moments do not need the robot, without which a still joint may be a held one")
+    changes, message = {**FORCES, **ANGLES, **STILL}[name]
+    with pytest.raises(BadInput) as refused:
+        verb(changed(armrs.load_dataset(slow_arm), **changes))
+    assert str(refused.value).startswith(f"{FIRST}: ")
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("verb", [armrs.identify, armrs.passive_moments])
+def test_no_angle_that_changes_is_refused_without_a_robot_too(verb: Callable[..., object], slow_arm: Path) -> None:
+    data = armrs.load_dataset(slow_arm)
+    data = data.replace(model=data.model.replace(robot=None), trials=tuple(dataclasses.replace(t, robot_q=None) for t in data.trials))
+    with pytest.raises(BadInput, match="angles: found none that changes in any trial"):
+        verb(changed(data, every=True, q=lambda q: 0.0 * q))
+
+
+def test_one_joint_that_is_still_may_be_held(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = armrs.load_dataset(slow_arm)
+    data = data.replace(model=data.model.replace(robot=None), trials=tuple(dataclasses.replace(t, robot_q=None) for t in data.trials))
+    armrs.write_dataset(changed(data, every=True, q=lambda q: np.column_stack([q[:, 0], 0.0 * q[:, 1]])), tmp_path / "held")
+    assert main(["passive", str(tmp_path / "held")]) == 0
+    assert "q2 is 0 rad in every sample of every trial: a joint that is held, or a dead sensor?" in capsys.readouterr().err
+
+
+def test_sound_data_pass(slow_arm: Path) -> None:
+    from armrs.plausibility import refuse_implausible
+
+    refuse_implausible(armrs.load_dataset(slow_arm))
+
+
+def test_grams_are_not_kilograms() -> None:
+    for mass in (2114.0, 380.0):
+        with pytest.raises(BadInput, match=r"mass: found .*, allowed at most .* kg for a segment of .* m \(grams\?\)"):
+            armrs.Segment("upper arm", length=0.322, mass=mass, com=0.186, inertia=0.0165)
+    armrs.Segment("boom of an excavator", length=5.0, mass=2000.0, com=2.0, inertia=4000.0)
+
+
+@pytest.mark.parametrize("stiffness", [10.0, 1.0])
+def test_stiffness_in_kilonewtons_is_named(stiffness: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = true_model()
+    with pytest.raises(BadInput, match=r"\[contact\], stiffness\[1\]: found .* \(kN/m or N/mm\? 10 kN/m is 10000\)"):
+        model.replace(contact=armrs.Contact((stiffness, stiffness)))
+    file = tmp_path / "model.toml"
+    file.write_text(model.to_toml().replace("stiffness = [10000.0, 10000.0]", f"stiffness = [{stiffness}, {stiffness}]"), encoding="utf-8")
+    assert main(["simulate", str(file), "--movement", "none.toml"]) == 2
+    assert capsys.readouterr().err.startswith(f"armrs: {file}: [contact], stiffness[1]: found {stiffness}, allowed >= ")
+
+
+def test_a_soft_contact_is_a_contact() -> None:
+    model = true_model().replace(contact=armrs.Contact((300.0, 300.0)))
+    model.replace(gravity=0.0, contact=armrs.Contact((1.0, 1.0)))  # nothing presses it in
+
+
+def test_the_core_counts_trials_and_the_message_names_the_file(slow_arm: Path) -> None:
+    data = armrs.load_dataset(slow_arm)
+    second = dataclasses.replace(data.trials[1], valid=np.arange(len(data.trials[1])) < 12)
+    data = data.replace(trials=(data.trials[0], second, *data.trials[2:]))
+    with pytest.raises(armrs.ArmrsError) as refused:
+        armrs.identify(data)
+    assert "trials/slow_2.csv: " in str(refused.value)
+    assert "trial 2" not in str(refused.value)
