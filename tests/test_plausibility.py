@@ -112,9 +112,8 @@ def test_a_soft_contact_is_a_contact() -> None:
 
 def test_the_core_counts_trials_and_the_message_names_the_file(slow_arm: Path) -> None:
     data = armrs.load_dataset(slow_arm)
-    second = dataclasses.replace(data.trials[1], valid=np.arange(len(data.trials[1])) < 12)
-    data = data.replace(trials=(data.trials[0], second, *data.trials[2:]))
+    stiff = data.model.replace(contact=armrs.Contact((1e13, 1e13), (0.0, 0.0)))
     with pytest.raises(armrs.ArmrsError) as refused:
-        armrs.identify(data)
-    assert "trials/slow_2.csv: " in str(refused.value)
-    assert "trial 2" not in str(refused.value)
+        armrs.identify(data.replace(model=stiff), motion="simulated")
+    assert str(refused.value).startswith(f"{FIRST}: ")
+    assert "trial 1" not in str(refused.value)
