@@ -2,7 +2,7 @@
 #
 #   make demo    build, run the main job on built-in data, print where the report is
 #   make test    every check: formatting, lints, Rust and Python tests, types, examples
-#   make bench   speed
+#   make bench   speed, beside other tools; make bench-kernels: of every part by itself
 #   make hidden  the gap workflow against hidden effects: some hours
 #   make crosscheck  the same bits on other architectures and two microcontrollers; half an hour the first time
 #   make wheel   a wheel for others, in out/wheels; on Linux for glibc 2.17 and newer
@@ -20,7 +20,7 @@ export PIP_QUIET := 1
 # The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: demo test bench hidden crosscheck wheel clean build format rust python
+.PHONY: demo test bench bench-kernels hidden crosscheck wheel clean build format rust python
 .DELETE_ON_ERROR:
 
 demo: build
@@ -87,9 +87,18 @@ wheel: $(STAMPS)/venv
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python scripts/fmu_library.py $(if $(OLD_GLIBC),--portable)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --out out/wheels $(if $(OLD_GLIBC),--zig --compatibility manylinux_2_17)
 
-bench: build
+# What armrs is compared with goes into an environment of its own.
+$(STAMPS)/peers: bench/peers/requirements.txt | $(STAMPS)/venv
+	$(PYTHON) -m venv $(VENV)/peers
+	$(VENV)/peers/bin/python -m pip install -r bench/peers/requirements.txt
+	@touch $@
+
+bench: build $(STAMPS)/peers
+	cargo build --quiet --release -p speed --example peer
+	PYTHONPATH=python $(VENV)/peers/bin/python bench/peers/compare.py -o out/bench
+
+bench-kernels:
 	cargo bench --quiet -p speed
-	$(BIN)/python scripts/bench_import.py
 
 # ---- the judge of the gap workflow. Seeds from 100000 on are scored, and only here; those below are for development.
 HIDDEN   := out/hidden

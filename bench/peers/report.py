@@ -1,0 +1,114 @@
+"""The comparison as a table in Markdown and as plots."""
+
+from __future__ import annotations
+
+import statistics
+from pathlib import Path
+from typing import Any
+
+import problem
+from workloads import GROUPS, JOINTS, MEASURED
+
+TITLES = {
+    "W1": "W1: kernels of the arm with three joints, a call",
+    "W2": "W2: one run of 20 s, a step",
+    "W3": "W3: 1000 runs of 2 s, a step of one run",
+    "W4": "W4: the cascade, the whole of it",
+    "W6": "W6: six parameters of the joints fitted to 20 s by simulation",
+}
+
+
+def medians(times: dict[str, list[float]]) -> dict[str, float]:
+    """Return the median of every measurement."""
+    return {key: statistics.median(values) for key, values in times.items()}
+
+
+def time_of(seconds: float) -> str:
+    """Return a time with three digits and the unit that suits it."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def words(result: dict[str, Any]) -> str:
+    """Return the report as Markdown."""
+    middle = medians(result["seconds"])
+    lines = ["# armrs beside other tools", "", "Medians of processor time unless a line says wall clock; all in one run, in turn.", ""]
+    lines += ["## Goals", "", "| line | ratio | found | aimed at | |", "| --- | --- | --- | --- | --- |"]
+    for goal in result["goals"]:
+        found = "not measured" if goal["found"] is None else f"{goal['found']:.3g}"
+        mark = {None: "", True: "met", False: "**not met**"}[goal["met"]]
+        lines.append(f"| {goal['line']} | {goal['what']} | {found} | {'≤' if goal['at_most'] else '≥'} {goal['limit']:g} | {mark} |")
+    lines += _imports(middle)
+    for workload, title in TITLES.items():
+        lines += ["", f"## {title}", "", "| what | tool | time |", "| --- | --- | --- |"]
+        for item in MEASURED:
+            if item.workload == workload and item.key in middle:
+                kernel = item.task.split(":")[0].replace("_", " ") if workload == "W1" else ""
+                size = f"{int(item.task.split(':')[-1]):,} samples".replace(",", " ") if workload == "W4" else ""
+                what = ", ".join(part for part in (kernel, size, item.name) if part)
+                lines.append(f"| {what} | {item.tool} | {time_of(middle[item.key])} |")
+    lines += [
+        "",
+        "## Do all solve the same problem?",
+        "",
+        "Each against armrs.",
+        "",
+        "| what | tool | found | allowed |",
+        "| --- | --- | --- | --- |",
+    ]
+    for check in result["checks"]:
+        mark = "" if check["agrees"] else " **no**"
+        lines.append(f"| {check['what']} | {check['tool']} | {check['found']:.2g}{mark} | {check['allowed']:.2g} |")
+    lines += ["", "## Versions", "", *(f"- {name}: {value}" for name, value in result["versions"].items())]
+    if result["missing"]:
+        lines += ["", "## Skipped", "", *(f"- {tool}: {reason}" for tool, reason in result["missing"].items())]
+    return "\n".join(lines) + "\n"
+
+
+def _imports(middle: dict[str, float]) -> list[str]:
+    empty = middle["import/empty"]
+    lines = ["", "## W5: import, beyond an empty start of Python", "", "| module | time |", "| --- | --- |"]
+    for key, seconds in middle.items():
+        if key.startswith("import/") and key != "import/empty":
+            lines.append(f"| {key.removeprefix('import/')} | {time_of(max(seconds - empty, 0.0))} |")
+    return lines
+
+
+def plots(result: dict[str, Any], folder: Path) -> None:
+    """Write the plots of cost against size."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    middle = medians(result["seconds"])
+    series = {
+        "SciPy least_squares": "cascade:least_squares:{}/SciPy",
+        "SciPy lsq_linear": "cascade:lsq_linear:{}/SciPy",
+        "armrs": "cascade:{}/armrs, Rust",
+        "one AVX2 pass": "gram:avx2:{}/limit",
+    }
+    panels = [
+        ("cascade", "samples", "Cascade: wrist, elbow, shoulder [s]", series, problem.SIZES),
+        ("joints", "joints", "Forward dynamics, a call [s]", {"armrs": "forward_dynamics:joints:{}/armrs, Rust"}, JOINTS),
+        ("runs", "runs in a batch", "A step of one run [s]", {"armrs": "batch:runs:{}/armrs, Rust"}, GROUPS),
+    ]
+    for name, size, title, curves, sizes in panels:
+        figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+        for label, key in curves.items():
+            points = [(n, middle[key.format(n)]) for n in sizes if key.format(n) in middle]
+            if points:
+                axes.plot(*zip(*points, strict=True), "o-", label=label)
+        axes.set(xlabel=size, ylabel="processor time", title=title)
+        if name != "joints":
+            axes.set_xscale("log")
+        if name == "cascade":
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0)
+        axes.legend()
+        axes.grid(alpha=0.3)
+        figure.savefig(folder / f"{name}.svg")
+        plt.close(figure)

@@ -1,0 +1,35 @@
+"""What the tools in Python share: the clock, and the conversation. A line comes in, a line of JSON goes out."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+Task = Callable[..., Any]
+
+
+def seconds_of(call: Callable[[], Any], least: float = 0.1, warm: bool = True) -> dict[str, float]:
+    """Repeat a call for about `least` seconds and return the processor time of one, after one that does not count."""
+    if warm:
+        call()
+    repeats, start = 0, time.process_time()
+    while True:
+        call()
+        repeats += 1
+        passed = time.process_time() - start
+        if passed >= least:
+            return {"seconds": passed / repeats}
+
+
+def serve(tasks: dict[str, Task]) -> None:
+    """Answer each line `name` or `name:argument` with what the task returns; with null where there is none."""
+    for line in sys.stdin:
+        words = line.strip()
+        task, arguments = tasks.get(words), []
+        if task is None and ":" in words:
+            name, _, argument = words.rpartition(":")
+            task, arguments = tasks.get(name), [argument]
+        print(json.dumps(None if task is None else task(*arguments)), flush=True)

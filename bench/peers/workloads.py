@@ -1,0 +1,196 @@
+"""What is measured, and what is aimed at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import problem
+
+STEPS = round(problem.LONG / problem.STEP)
+BATCH_STEPS = problem.RUNS * round(problem.SHORT / problem.STEP)
+MOST = problem.SIZES[-1]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One time of one tool."""
+
+    workload: str
+    tool: str
+    task: str
+    name: str = ""
+    units: float = 1.0
+    slow: bool = False
+
+    @property
+    def key(self) -> str:
+        """Return how results name it."""
+        return f"{self.task}/{self.tool}"
+
+
+def _kernels() -> list[Measured]:
+    callers = ("armrs, Rust", "limit", "Pinocchio, C++", "MuJoCo, C", "armrs, Python", "Pinocchio, Python", "MuJoCo, Python", "numba")
+    once = [Measured("W1", tool, kernel) for kernel in ("inverse_dynamics", "forward_dynamics") for tool in callers]
+    clock = [
+        Measured("W1", "MuJoCo, Python", f"{kernel}:clock", "profiling clock on") for kernel in ("inverse_dynamics", "forward_dynamics")
+    ]
+    lanes = [
+        Measured("W1", "armrs, Rust", f"{kernel}:lanes", "eight states side by side") for kernel in ("inverse_dynamics", "forward_dynamics")
+    ]
+    batch = [
+        Measured("W1", "armrs, Python", f"{kernel}:batch", "100 000 states a call") for kernel in ("inverse_dynamics", "forward_dynamics")
+    ]
+    return once + clock + lanes + batch
+
+
+def _runs() -> list[Measured]:
+    def of(tool: str, task: str, name: str, slow: bool = False) -> Measured:
+        return Measured("W2", tool, task, name, STEPS, slow)
+
+    return [
+        of("limit", "run", "one loop, the handle's path computed in every step"),
+        of("limit", "run:table", "one loop, the path from a table"),
+        of("armrs, Rust", "run", "recorded at 50 Hz"),
+        of("armrs, Rust", "run:ends", "first and last sample only"),
+        of("armrs, Rust", "run:fourth", "fourth order, recorded at 50 Hz"),
+        of("armrs, Python", "run", "armrs.simulate, recorded at 50 Hz"),
+        of("numba", "run", "a loop compiled from Python, 50 Hz"),
+        of("Pinocchio, C++", "run", "aba, path from a table"),
+        of("MuJoCo, C", "run", "mj_step, path from a table"),
+        of("MuJoCo, Python", "run", "rollout, profiling clock off"),
+        of("MuJoCo, Python", "run:clock", "rollout, profiling clock on"),
+    ]
+
+
+def _batches() -> list[Measured]:
+    def of(tool: str, task: str, name: str) -> Measured:
+        return Measured("W3", tool, task, name, BATCH_STEPS, slow=True)
+
+    return [
+        of("limit", "batch:scalar", "one run after another"),
+        of("limit", "batch:avx2", "four runs in a register"),
+        of("limit", "batch:avx512", "eight runs in a register or two"),
+        of("armrs, Rust", "batch", "simulate_batch, one thread"),
+        of("armrs, Rust", "batch:wall:1", "simulate_batch, one thread, wall clock"),
+        of("armrs, Rust", "batch:wall:2", "simulate_batch, two threads, wall clock"),
+        of("MuJoCo, Python", "batch", "rollout of 20 of the runs, profiling clock off"),
+        of("MuJoCo, Python", "batch:clock", "rollout of 20 of the runs, profiling clock on"),
+    ]
+
+
+def _cascades() -> list[Measured]:
+    found = []
+    for size in problem.SIZES:
+        slow = size == MOST
+        found += [
+            Measured("W4", "limit", f"gram:scalar:{size}", "one pass over the data, scalar"),
+            Measured("W4", "limit", f"gram:avx2:{size}", "one pass over the data, AVX2"),
+            Measured("W4", "armrs, Rust", f"cascade:{size}", "the whole cascade"),
+            Measured("W4", "SciPy", f"cascade:lsq_linear:{size}", "lsq_linear, bvls", slow=slow),
+            Measured("W4", "SciPy", f"cascade:least_squares:{size}", "least_squares, 2-point", slow=slow),
+        ]
+    return found
+
+
+JOINTS = tuple(range(1, 7))
+GROUPS = (1, 8, 64, 512)
+"""Runs of the batches whose cost is plotted."""
+
+
+def _sizes() -> list[Measured]:
+    joints = [Measured("joints", "armrs, Rust", f"forward_dynamics:joints:{n}") for n in JOINTS]
+    return joints + [Measured("runs", "armrs, Rust", f"batch:runs:{n}", units=n * BATCH_STEPS / problem.RUNS) for n in GROUPS]
+
+
+MEASURED = [
+    *_kernels(),
+    *_runs(),
+    *_batches(),
+    *_cascades(),
+    *_sizes(),
+    Measured("W6", "armrs, Python", "fit", "armrs.fit_by_simulation"),
+    Measured("W6", "numba", "fit", "with SciPy least_squares", slow=True),
+    Measured("W6", "MuJoCo, Python", "fit", "rollout with SciPy least_squares, profiling clock off", slow=True),
+    Measured("W6", "MuJoCo, Python", "fit:clock", "rollout with SciPy least_squares, profiling clock on", slow=True),
+]
+"""Every measurement but those of imports."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One time over another, or beyond another, or alone; and what it should be."""
+
+    line: int
+    what: str
+    over: str
+    under: str | None
+    limit: float
+    at_most: bool
+    beyond: str | None = None
+
+    def judge(self, medians: dict[str, float]) -> dict[str, object]:
+        """Return the goal with what was found; None where a tool is missing."""
+        value = None
+        if all(key in medians for key in (self.over, self.under, self.beyond) if key):
+            value = (medians[self.over] - (medians[self.beyond] if self.beyond else 0.0)) / (medians[self.under] if self.under else 1.0)
+        met = None if value is None else (value <= self.limit if self.at_most else value >= self.limit)
+        return {"line": self.line, "what": self.what, "found": value, "limit": self.limit, "at_most": self.at_most, "met": met}
+
+
+def _most(line: int, what: str, over: str, under: str | None, limit: float) -> Goal:
+    return Goal(line, what, over, under, limit, True)
+
+
+def _least(line: int, what: str, over: str, under: str, limit: float) -> Goal:
+    return Goal(line, what, over, under, limit, False)
+
+
+GOALS = [
+    _most(1, "single run: armrs / limit", "run/armrs, Rust", "run/limit", 1.5),
+    _most(1, "single run: armrs / limit with the path from a table", "run/armrs, Rust", "run:table/limit", 1.5),
+    _least(1, "single run: MuJoCo from C / armrs", "run/MuJoCo, C", "run/armrs, Rust", 12),
+    _least(1, "single run: Pinocchio from C++ / armrs", "run/Pinocchio, C++", "run/armrs, Rust", 12),
+    _most(1, "single run from Python, 50 Hz: armrs / numba", "run/armrs, Python", "run/numba", 1),
+    _least(1, "single run from Python: MuJoCo's rollout / armrs", "run/MuJoCo, Python", "run/armrs, Python", 10),
+    _most(2, "batch: armrs / limit with AVX2", "batch/armrs, Rust", "batch:avx2/limit", 1.5),
+    _least(2, "batch: MuJoCo's rollout / armrs", "batch/MuJoCo, Python", "batch/armrs, Rust", 80),
+    _least(2, "batch: one thread / two threads, wall clock", "batch:wall:1/armrs, Rust", "batch:wall:2/armrs, Rust", 1.7),
+    _most(3, "inverse dynamics: armrs / limit", "inverse_dynamics/armrs, Rust", "inverse_dynamics/limit", 2),
+    _most(3, "forward dynamics: armrs / limit", "forward_dynamics/armrs, Rust", "forward_dynamics/limit", 2),
+    _most(
+        3,
+        "inverse dynamics, a call from Python: armrs / Pinocchio",
+        "inverse_dynamics/armrs, Python",
+        "inverse_dynamics/Pinocchio, Python",
+        1,
+    ),
+    _most(
+        3,
+        "forward dynamics, a call from Python: armrs / Pinocchio",
+        "forward_dynamics/armrs, Python",
+        "forward_dynamics/Pinocchio, Python",
+        1,
+    ),
+    _least(
+        3,
+        "inverse dynamics from Python: Pinocchio / armrs in a batch",
+        "inverse_dynamics/Pinocchio, Python",
+        "inverse_dynamics:batch/armrs, Python",
+        30,
+    ),
+    _least(
+        3,
+        "forward dynamics from Python: Pinocchio / armrs in a batch",
+        "forward_dynamics/Pinocchio, Python",
+        "forward_dynamics:batch/armrs, Python",
+        30,
+    ),
+    _least(4, "cascade of a million samples: lsq_linear / armrs", f"cascade:lsq_linear:{MOST}/SciPy", f"cascade:{MOST}/armrs, Rust", 30),
+    _least(
+        4, "cascade of a million samples: least_squares / armrs", f"cascade:least_squares:{MOST}/SciPy", f"cascade:{MOST}/armrs, Rust", 100
+    ),
+    _most(4, "cascade of a million samples: armrs / one AVX2 pass", f"cascade:{MOST}/armrs, Rust", f"gram:avx2:{MOST}/limit", 4),
+    _most(5, "fit by simulation: armrs [s]", "fit/armrs, Python", None, 0.15),
+    _least(5, "fit by simulation: MuJoCo with SciPy / armrs", "fit/MuJoCo, Python", "fit/armrs, Python", 30),
+    Goal(6, "import armrs beyond import numpy [s]", "import/armrs", None, 0.010, True, beyond="import/numpy"),
+]
