@@ -244,7 +244,7 @@ fn joints<const N: usize>() -> String {
     })
 }
 
-fn load<T: Scalar>(torque: Joints<T, 3>) -> Load<T, 3> {
+fn load<T: Scalar, const N: usize>(torque: Joints<T, N>) -> Load<T, N> {
     Load {
         torque,
         ..Load::none()
