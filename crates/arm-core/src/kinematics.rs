@@ -17,7 +17,8 @@ pub struct Pose<T, const N: usize> {
 
 impl<T: Scalar, const N: usize> Pose<T, N> {
     /// The pose at joint angles `q` \[rad\].
-    #[inline]
+    // Always, so that a loop which is compiled for wider vectors takes it along.
+    #[inline(always)]
     pub fn new(q: &Joints<T, N>) -> Self {
         let mut angle = T::ZERO;
         let (mut sin, mut cos) = ([T::ZERO; N], [T::ONE; N]);

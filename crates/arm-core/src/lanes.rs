@@ -86,7 +86,7 @@ impl<const L: usize> Scalar for Lanes<L> {
     fn sqrt(self) -> Self {
         self.map(libm::sqrt)
     }
-    #[inline]
+    #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         // One loop over lanes and not lanes within each operation: the compiler then uses the widest vectors.
         let (mut sin, mut cos) = ([0.0; L], [0.0; L]);

@@ -9,6 +9,7 @@
 use crate::error::{IdentError, check_len};
 use crate::factor::Factor;
 use crate::matrix::Matrix;
+use crate::widest::{Computation, widest};
 
 /// Rows in a panel.
 pub const BLOCK: usize = 128;
@@ -140,7 +141,7 @@ impl Condenser {
         }
         write(&mut self.panel);
         for column in &self.panel {
-            if !acceptable(column) {
+            if !widest(Accept(column)) {
                 let bad = |v: &&f64| v.abs() >= LARGEST || v.is_nan();
                 return Err(IdentError::NotFinite {
                     name: "rows",
@@ -268,28 +269,10 @@ impl Condenser {
             }
         }
         self.waiting = 0;
-        let width = self.p + 1;
-        for k in 0..width {
-            let (head, rest) = self.panel.split_at_mut(k + 1);
-            let v = &head[k];
-            let below = dot(v, v);
-            if below < NOTHING {
-                continue;
-            }
-            let row = &mut self.triangle[k * width + k..(k + 1) * width];
-            let alpha = row[0];
-            let length = (alpha * alpha + below).sqrt();
-            let beta = if alpha > 0.0 { -length } else { length };
-            row[0] = beta;
-            // The reflection is I − u uᵀ / (β(β−α)) with u = [α−β; v]: no division of the panel, no cancellation.
-            let first = alpha - beta;
-            let factor = 1.0 / (beta * (beta - alpha));
-            for (x, r) in rest.iter_mut().zip(&mut row[1..]) {
-                let s = (first * *r + dot(v, x)) * factor;
-                *r -= s * first;
-                subtract(x, s, v);
-            }
-        }
+        widest(Reflect {
+            panel: &mut self.panel,
+            triangle: &mut self.triangle,
+        });
     }
 
     #[cold]
@@ -314,6 +297,55 @@ impl Condenser {
                 found: rhs,
             },
         }
+    }
+}
+
+/// Reflects a panel into a triangle, a column after another.
+struct Reflect<'a> {
+    panel: &'a mut [Column],
+    triangle: &'a mut [f64],
+}
+
+impl Computation for Reflect<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { panel, triangle } = self;
+        let width = panel.len();
+        for k in 0..width {
+            let (head, rest) = panel.split_at_mut(k + 1);
+            let v = &head[k];
+            let below = dot(v, v);
+            if below < NOTHING {
+                continue;
+            }
+            let row = &mut triangle[k * width + k..(k + 1) * width];
+            let alpha = row[0];
+            let length = (alpha * alpha + below).sqrt();
+            let beta = if alpha > 0.0 { -length } else { length };
+            row[0] = beta;
+            // The reflection is I − u uᵀ / (β(β−α)) with u = [α−β; v]: no division of the panel, no cancellation.
+            let first = alpha - beta;
+            let factor = 1.0 / (beta * (beta - alpha));
+            for (x, r) in rest.iter_mut().zip(&mut row[1..]) {
+                let s = (first * *r + dot(v, x)) * factor;
+                *r -= s * first;
+                subtract(x, s, v);
+            }
+        }
+    }
+}
+
+/// Whether a column is [`acceptable`].
+struct Accept<'a>(&'a Column);
+
+impl Computation for Accept<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        acceptable(self.0)
     }
 }
 

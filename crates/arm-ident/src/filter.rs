@@ -1,6 +1,7 @@
 //! Butterworth low-pass filters, once or without phase.
 
 use crate::error::{IdentError, check_finite, check_least, check_len, check_range};
+use crate::widest::{Computation, widest};
 use std::f64::consts::PI;
 
 /// Highest order; beyond it no measurement asks for a steeper edge.
@@ -167,19 +168,22 @@ impl Butterworth {
         }
         let mut out = Vec::with_capacity(columns.len());
         for group in columns.chunks(WIDTH) {
-            let row = |at: &dyn Fn(&Vec<f64>) -> f64| {
-                let mut row = [0.0; WIDTH];
-                for (value, column) in row.iter_mut().zip(group) {
-                    *value = at(column);
+            let mut long = vec![[0.0; WIDTH]; n + 2 * edge];
+            for (c, column) in group.iter().enumerate() {
+                let (first, last) = (column[0], column[n - 1]);
+                for i in 1..=edge {
+                    long[edge - i][c] = 2.0 * first - column[i];
+                    long[edge + n - 1 + i][c] = 2.0 * last - column[n - 1 - i];
                 }
-                row
-            };
-            let mut long: Vec<[f64; WIDTH]> = Vec::with_capacity(n + 2 * edge);
-            long.extend((1..=edge).rev().map(|i| row(&|c| 2.0 * c[0] - c[i])));
-            long.extend((0..n).map(|i| row(&|c| c[i])));
-            long.extend((1..=edge).map(|i| row(&|c| 2.0 * c[n - 1] - c[n - 1 - i])));
+                for (row, value) in long[edge..].iter_mut().zip(column) {
+                    row[c] = *value;
+                }
+            }
             for _ in 0..2 {
-                self.pass_all(&mut long);
+                widest(SideBySide {
+                    sections: &self.sections,
+                    rows: &mut long,
+                });
                 long.reverse();
             }
             for c in 0..group.len() {
@@ -187,24 +191,6 @@ impl Butterworth {
             }
         }
         Ok(out)
-    }
-
-    fn pass_all<const W: usize>(&self, rows: &mut [[f64; W]]) {
-        let Some(&first) = rows.first() else { return };
-        for Section { b, a } in &self.sections {
-            // As in `pass`. The next section starts on the first value as it was, which this one passes on.
-            let mut z0 = first.map(|first| (1.0 - b[0]) * first);
-            let mut z1 = first.map(|first| (b[2] - a[1]) * first);
-            for row in rows.iter_mut() {
-                for c in 0..W {
-                    let x = row[c];
-                    let y = b[0] * x + z0[c];
-                    z0[c] = b[1] * x - a[0] * y + z1[c];
-                    z1[c] = b[2] * x - a[1] * y;
-                    row[c] = y;
-                }
-            }
-        }
     }
 
     fn pass(&self, column: &mut [f64]) {
@@ -216,6 +202,37 @@ impl Butterworth {
                 let y = b[0] * *x + z[0];
                 z = [b[1] * *x - a[0] * y + z[1], b[2] * *x - a[1] * y];
                 *x = y;
+            }
+        }
+    }
+}
+
+/// A pass over columns side by side.
+struct SideBySide<'a, const W: usize> {
+    sections: &'a [Section],
+    rows: &'a mut [[f64; W]],
+}
+
+impl<const W: usize> Computation for SideBySide<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Some(&first) = self.rows.first() else {
+            return;
+        };
+        for Section { b, a } in self.sections {
+            // As in `pass`. The next section starts on the first value as it was, which this one passes on.
+            let mut z0 = first.map(|first| (1.0 - b[0]) * first);
+            let mut z1 = first.map(|first| (b[2] - a[1]) * first);
+            for row in self.rows.iter_mut() {
+                for c in 0..W {
+                    let x = row[c];
+                    let y = b[0] * x + z0[c];
+                    z0[c] = b[1] * x - a[0] * y + z1[c];
+                    z1[c] = b[2] * x - a[1] * y;
+                    row[c] = y;
+                }
             }
         }
     }

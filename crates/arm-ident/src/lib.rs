@@ -29,6 +29,7 @@ pub mod quasi_static;
 pub mod simulated;
 pub mod trial;
 pub mod unknown;
+mod widest;
 
 mod summary;
 

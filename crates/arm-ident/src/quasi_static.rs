@@ -13,9 +13,10 @@ use crate::factor::Factor;
 use crate::matrix::{Matrix, add_scaled, dot};
 use crate::trial::Model;
 use crate::unknown::{Moment, Source, Unknown};
+use crate::widest::{Computation, widest};
 
 /// Samples that are computed with together.
-const WIDTH: usize = 8;
+const WIDTH: usize = 4;
 
 /// Folds samples as they come. Memory is fixed when it is made; pushing never allocates.
 #[derive(Clone, Debug)]
@@ -52,9 +53,14 @@ impl<const N: usize> Stream<N> {
         while !q.is_empty() {
             let wide = &self.wide;
             if q.len() >= BLOCK
-                && self
-                    .condenser
-                    .push_panel(|panel| fill(wide, &q[..BLOCK], &force[..BLOCK], panel))?
+                && self.condenser.push_panel(|panel| {
+                    widest(Fill {
+                        chain: wide,
+                        q: &q[..BLOCK],
+                        force: &force[..BLOCK],
+                        panel,
+                    });
+                })?
             {
                 (q, force) = (&q[BLOCK..], &force[BLOCK..]);
                 continue;
@@ -82,7 +88,7 @@ impl<const N: usize> Stream<N> {
 }
 
 /// Gravity column of every link \[N m/(kg m)\] and contact torque of every joint \[N m\], known normal moments taken off.
-#[inline]
+#[inline(always)]
 fn sample<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     q: &Joints<T, N>,
@@ -101,26 +107,38 @@ fn sample<T: Scalar, const N: usize>(
 }
 
 /// Writes the columns of a whole panel, several samples at a time.
-#[inline]
-fn fill<const N: usize>(
-    chain: &Chain<Lanes<WIDTH>, N>,
-    q: &[Joints<f64, N>],
-    force: &[Plane<f64>],
-    panel: &mut [Column],
-) {
-    panel[0].fill(1.0);
-    for (at, (q, force)) in q
-        .chunks_exact(WIDTH)
-        .zip(force.chunks_exact(WIDTH))
-        .enumerate()
-    {
-        let angles = Joints::from_fn(|j, _| Lanes(core::array::from_fn(|l| q[l][j])));
-        let force = core::array::from_fn(|c| Lanes(core::array::from_fn(|l| force[l][c])));
-        let (columns, torque) = sample(chain, &angles, force);
-        let place = at * WIDTH..(at + 1) * WIDTH;
-        for k in 0..N {
-            panel[1 + k][place.clone()].copy_from_slice(&columns[N - 1 - k].0);
-            panel[1 + N + k][place.clone()].copy_from_slice(&torque[N - 1 - k].0);
+struct Fill<'a, const N: usize> {
+    chain: &'a Chain<Lanes<WIDTH>, N>,
+    q: &'a [Joints<f64, N>],
+    force: &'a [Plane<f64>],
+    panel: &'a mut [Column],
+}
+
+impl<const N: usize> Computation for Fill<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self {
+            chain,
+            q,
+            force,
+            panel,
+        } = self;
+        panel[0].fill(1.0);
+        for (at, (q, force)) in q
+            .chunks_exact(WIDTH)
+            .zip(force.chunks_exact(WIDTH))
+            .enumerate()
+        {
+            let angles = Joints::from_fn(|j, _| Lanes(core::array::from_fn(|l| q[l][j])));
+            let force = core::array::from_fn(|c| Lanes(core::array::from_fn(|l| force[l][c])));
+            let (columns, torque) = sample(chain, &angles, force);
+            let place = at * WIDTH..(at + 1) * WIDTH;
+            for k in 0..N {
+                panel[1 + k][place.clone()].copy_from_slice(&columns[N - 1 - k].0);
+                panel[1 + N + k][place.clone()].copy_from_slice(&torque[N - 1 - k].0);
+            }
         }
     }
 }
