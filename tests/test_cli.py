@@ -80,7 +80,10 @@ def test_convert(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture
         (["convert"], "Missing"),
         (["convert", "x", "--to", "c3d", "-o", "out"], "c3d"),
         (["effects", "coulom"], "KIND: found unknown kind of effect 'coulom', allowed"),
-        (["convert", "nothing", "-o", "out"], "nothing: file: found No such file or directory, allowed a TOML file that can be read"),
+        (
+            ["convert", "nothing", "-o", "out"],
+            "nothing: file: found No such file or directory, allowed a folder with dataset.toml, or that file",
+        ),
         (["convert", "nothing.csv", "-o", "out"], "nothing.csv: file: found No such file or directory"),
         (["convert", "nul\0l.csv", "-o", "out"], "embedded null"),
     ],

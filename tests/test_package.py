@@ -68,3 +68,11 @@ def test_every_command_of_the_readme_exists() -> None:
 
     named = set(re.findall(r"^\| `armrs ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.M))
     assert named == set(get_command(app).commands)
+
+
+def test_modules_of_use_by_themselves_are_attributes() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", "import armrs; print(armrs.demo.true_model().n_joints, armrs.cosim.Slave.__name__)"],
+        capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert done.stdout == "2 Slave\n"

@@ -220,6 +220,51 @@ def test_a_folder_with_something_else_under_a_name_is_left_alone(slow_arm: Path,
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["report.html"]
 
 
+def test_a_full_disk_is_said_of_the_file_that_was_asked_for(
+    slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is written goes to a temporary folder first, whose name means nothing to the user."""
+
+    def full(*_: object, **__: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_bytes", full)
+        assert cli.main(["passive", str(slow_arm), "-o", str(tmp_path / "out")]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"armrs: {tmp_path / 'out'}")
+    assert ".part" not in err
+    assert err.endswith(": file: found No space left on device, allowed a place that can be written\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["identify", "nope"], "nope: file: found No such file or directory, allowed a folder with dataset.toml, or that file"),
+        (["identify", "data", "--metod", "joint"], "(see armrs identify --help)"),
+        (["fmu", "export", "data/model.toml", "--fmi", "1"], "'1' is not one of '2', '3' (see armrs fmu export --help)"),
+        (["nonsense"], "(see armrs --help)"),
+    ],
+)
+def test_the_line_points_to_what_helps(
+    arguments: list[str], line: str, slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(slow_arm, tmp_path / "data")
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == 2
+    assert capsys.readouterr().err.rstrip("\n").endswith(line)
+
+
+def test_a_unit_like_no_other_gets_no_guess(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(slow_arm, tmp_path / "data")
+    Folder(tmp_path / "data").edit("trials/slow_1.csv", "Fy_N", "Fy_lbf")
+    assert cli.main(["identify", str(tmp_path / "data")]) == 2
+    err = capsys.readouterr().err
+    assert "found 'Fy_lbf', allowed a known unit: Fy_N" in err
+    assert "None" not in err
+
+
 ARM = ([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])
 
 

@@ -96,10 +96,15 @@ _HOMES = {
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
+_MODULES = ("cosim", "demo", "discrepancy", "plotting")
+"""Modules that are of use by themselves; `armrs.demo` loads the module."""
+
 __all__ = sorted(_HOME_OF)
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
     module = _HOME_OF.get(name)
     if module is None:
         raise AttributeError(f"module 'armrs' has no attribute {name!r}")
@@ -109,4 +114,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *_MODULES})

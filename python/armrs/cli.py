@@ -94,6 +94,13 @@ class Port(str, enum.Enum):
     motion = "motion"
 
 
+class Fmi(str, enum.Enum):
+    """Versions of the FMI standard."""
+
+    two = "2"
+    three = "3"
+
+
 class Motion(str, enum.Enum):
     """Sources of speeds and accelerations."""
 
@@ -502,7 +509,19 @@ def sweep(
 
     Writes two Parquet tables, a row a case and a row an estimate. The same command goes on where an interrupted one stopped. Exit status
     1 when cases failed.
-    """
+
+    A SWEEP.toml; docs/files.md has every key:
+
+    \b
+      cases = 200
+      seed = 1
+      experiment = "EXPERIMENT.toml"    # as for `armrs record`
+      [identify]
+      with = ["coulomb"]
+      [[vary]]
+      key = "joint[2].coulomb"
+      range = [0.0, 0.3]                # uniform
+    """  # noqa: D301 (click reads this backspace as: leave the lines as they are)
     from .montecarlo import load_sweep, words
     from .montecarlo import sweep as run_sweep
 
@@ -551,7 +570,7 @@ app.add_typer(fmu)
 def fmu_export(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="The FMU to write; MODEL.fmu when absent.")] = None,
-    version: Annotated[int, typer.Option("--fmi", min=2, max=3, help="Version of the standard, 2 or 3.")] = 3,
+    version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard: FMI 2.0 or 3.0.")] = Fmi.three,
     port: Annotated[Port, typer.Option(help="Force on the arm in, or motion of the robot's handle in.")] = Port.force,
     start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; zero when absent.")] = "",
     rest: Annotated[bool, typer.Option("--rest", help="Start in equilibrium near these angles.")] = False,
@@ -569,8 +588,8 @@ def fmu_export(
     target = out if out is not None else Path(model.with_suffix(".fmu").name)
     start = _angles("--start-deg", start_deg)
     slave = Slave(model, port=port.value, start=start, rest=rest, step=dt, name=model.stem)
-    written = export_fmu(slave, target, fmi=version)
-    data = {"verb": "fmu export", "file": written, "fmi": version, "port": port.value, "token": slave.token}
+    written = export_fmu(slave, target, fmi=int(version.value))
+    data = {"verb": "fmu export", "file": written, "fmi": int(version.value), "port": port.value, "token": slave.token}
     present(lambda: data, json, lambda: print(written))
 
 
@@ -712,7 +731,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"armrs: {one_line(error)}", file=sys.stderr)
         return 1
     except _USAGE as error:
-        return _refuse(f"{_usage_text(error)} (see armrs --help)")
+        inside = getattr(error, "ctx", None)
+        return _refuse(f"{_usage_text(error)} (see {inside.command_path if inside else 'armrs'} --help)")
     except (KeyboardInterrupt, typer.Abort):
         print("armrs: interrupted", file=sys.stderr)
         return 130

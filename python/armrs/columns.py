@@ -114,7 +114,8 @@ def _parse_one(name: str, n_joints: int) -> Column:
         raise unknown_name("header", name, _known(n_joints), what="column")
     if unit not in quantity.units:
         allowed = ", ".join(f"{symbol}_{u}" for u in quantity.units)
-        raise BadInput("header", name, f"a known unit: {allowed}", hint=f"nearest known: {symbol}_{nearest(unit, quantity.units)}")
+        near = nearest(unit, quantity.units)
+        raise BadInput("header", name, f"a known unit: {allowed}", hint=f"nearest known: {symbol}_{near}" if near else None)
     if numbered:
         most = 2 if numbered[1] == "qr" else n_joints
         if int(numbered[2]) > most:

@@ -321,15 +321,13 @@ def naming_trials(trials: Sequence[Trial]) -> Iterator[None]:
 def describe(source: str | os.PathLike[str]) -> Description:
     """Read `dataset.toml` alone."""
     path = checks.path("source", source)
+    if not os.path.lexists(path):
+        raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)
     path = path / FILE if path.is_dir() else path
-    document = tomlfile.read(path)
-    try:
-        return _description(path, document)
-    except BadInput as error:
-        raise error.within(file=path) from None
+    return tomlfile.load(path, _description)
 
 
-def _description(path: Path, document: dict[str, Any]) -> Description:
+def _description(document: dict[str, Any], path: Path) -> Description:
     optional = ["name", "force_on", "sample_rate", "synthetic", "subject", "tolerance", "added"]
     checks.keys("", document, required=["model", "trial"], optional=optional)
     tables = checks.tables("trial", document["trial"])

@@ -199,11 +199,7 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     BadInput
         Names the file, the key, the value found and the value allowed.
     """
-    document = tomlfile.read(path)
-    try:
-        return experiment_of(document, Path(path))
-    except BadInput as error:
-        raise error.within(file=error.file or path) from None
+    return tomlfile.load(path, experiment_of)
 
 
 def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple[Segment, ...], list[dict[str, Any]]]:

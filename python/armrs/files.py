@@ -77,6 +77,10 @@ def write_whole(folder: PathLike, write: Callable[[Path], list[Path]]) -> list[P
         _move(temporary, target)
     except OSError as error:
         raise _unwritable(folder, error) from None
+    except BadInput as error:
+        if error.file is None or not Path(error.file).is_relative_to(temporary):
+            raise
+        raise error.within(file=target / Path(error.file).relative_to(temporary)) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return [target / name for name in written]

@@ -9,6 +9,7 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -351,14 +352,10 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     BadInput
         Names the file, the key, the value found and the value allowed. A key that is not known is refused with the nearest known one.
     """
-    document = tomlfile.read(path)
-    try:
-        return _model(document)
-    except BadInput as error:
-        raise error.within(file=path) from None
+    return tomlfile.load(path, _model)
 
 
-def _model(document: dict[str, Any]) -> Model:
+def _model(document: dict[str, Any], path: Path) -> Model:
     checks.keys("", document, required=["arm"], optional=["robot", "contact", "effect"])
     arm = checks.table("[arm]", document["arm"])
     checks.keys("[arm]", arm, required=["segment"], optional=["joint", "gravity", "base", "segment_uncertainty"])

@@ -226,9 +226,11 @@ def _identified(data: Mapping[str, Any]) -> str:
     if lines:
         out += heading("What cannot be told apart") + bullets(lines)
     if data["calibration"]:
-        out += heading("Absorbed by the calibration")
+        out += heading("Calibration of the sensors")
         out += paragraph(
-            "Small imperfections of the sensors, refitted together with the arm within the tolerance that the data set declares.", "soft"
+            "Small imperfections of the sensors, refitted together with the arm. The tolerance that the data set declares is what was "
+            "believed of them beforehand, their prior; a value far beyond it says that the model lacks something.",
+            "soft",
         )
         out += table(tables.estimates(data["calibration"], joints, level))
     out += heading("What is left")

@@ -307,13 +307,14 @@ def _sensing(sensors: Sensors, seeds: Sequence[int]) -> dict[str, Any]:
 
 def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
     """Read a movement file: a TOML table `[movement]` with `waypoints_deg` (or `_rad`), speed, acceleration, pause, shape."""
-    document = tomlfile.read(checks.path("path", path))
+    checks.path("path", path)
     checks.whole("n_joints", n_joints, least=1)
-    try:
+
+    def made(document: dict[str, Any], _: object) -> Movement:
         checks.keys("", document, required=["movement"])
         return movement_of(checks.table("movement", document["movement"]), n_joints)
-    except BadInput as error:
-        raise error.within(file=path) from None
+
+    return tomlfile.load(path, made)
 
 
 def movement_of(table: dict[str, Any], n_joints: int) -> Movement:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
 
 from . import checks
 from .errors import BadInput, Text
@@ -16,6 +17,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+_Made = TypeVar("_Made")
 _LIMIT = 16 * 1024 * 1024
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -29,6 +31,15 @@ def read(path: str | os.PathLike[str]) -> dict[str, Any]:
         message, _, position = str(error).partition(" (at ")
         place = position.rstrip(")") or "TOML"
         raise BadInput(place, Text(message), "TOML", file=path) from None
+
+
+def load(path: str | os.PathLike[str], make: Callable[[dict[str, Any], Path], _Made]) -> _Made:
+    """Return what `make` builds of the tables of a TOML file and its path; a refusal without a file names this one."""
+    document = read(path)
+    try:
+        return make(document, Path(path))
+    except BadInput as error:
+        raise error.within(file=error.file or path) from None
 
 
 def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> str:

@@ -23,6 +23,11 @@ DEPENDENCE_MEANING = (
     "a slope, and a coupling: how much it changes with the adjacent angle. The coupling is tested against a model without it, over trials."
 )
 
+WRONG_MASS = (
+    "A mass or centre of mass that is wrong in the model looks like a coupling too: its weight depends on the sum of both angles, and so "
+    "does what is left of it."
+)
+
 
 def name(result: Mapping[str, Any]) -> str:
     """Return what a result is about."""
@@ -129,7 +134,10 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     head(result)
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
-    show("Absorbed by the calibration, within the tolerance declared", tables.estimates(result["calibration"], joints, level))
+    show(
+        "Calibration of the sensors, what was believed beforehand being the tolerance declared",
+        tables.estimates(result["calibration"], joints, level),
+    )
     show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
     lines = cannot_tell(result)
     if lines:
@@ -151,6 +159,9 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     print()
     print(verdict(result))
     files_written(written[-1:])
+    if written:
+        data = written[0].parent
+        print(f"The session is in {data}. Go on with: armrs identify {data} --with coulomb, or armrs gap {data}")
 
 
 def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
@@ -188,11 +199,13 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def couplings(result: Mapping[str, Any]) -> list[str]:
     """Say for each pair of joints whether their elastic moments depend on one another."""
-    return [
+    found = result.get("couplings", ())
+    lines = [
         f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: {c['value_Nm_rad']:.3g} ± "
         f"{c['std_Nm_rad']:.2g} N m/rad from both (p = {c['p_value']:.2g})"
-        for c in result.get("couplings", ())
+        for c in found
     ]
+    return [*lines, WRONG_MASS] if any(c["coupled"] for c in found) else lines
 
 
 def show(title: str, table: tables.Table) -> None:

@@ -185,7 +185,10 @@ def load_system(path: str | os.PathLike[str]) -> System:
     BadInput
         Names the file, the key, the value found and the value allowed.
     """
-    document = tomlfile.read(path)
+    return tomlfile.load(path, _system)
+
+
+def _system(document: dict[str, Any], path: Path) -> System:
     made: list[Partner] = []
     try:
         checks.keys("", document, required=["system", "slave"], optional=["connection"])
@@ -194,17 +197,15 @@ def load_system(path: str | os.PathLike[str]) -> System:
         starts = {}
         for number, table in enumerate(checks.tables("slave", document["slave"]), start=1):
             try:
-                made.append(_slave(table, Path(path).parent))
+                made.append(_slave(table, path.parent))
             except BadInput as error:
                 raise error if error.file else error.within(place=f"[[slave]] {number}") from None
             starts[made[-1].name] = checks.table("start", table.get("start", {}))
         settings = {key.removesuffix("_s"): value for key, value in settings.items()}
         return couple(made, checks.tables("connection", document.get("connection", [])), starts=starts, **settings)
-    except BaseException as error:
+    except BaseException:
         for slave in made:
             slave.free()
-        if isinstance(error, BadInput) and error.file is None:
-            raise error.within(file=path) from None
         raise
 
 

@@ -119,11 +119,7 @@ def load_sweep(path: str | os.PathLike[str]) -> Sweep:
     BadInput
         Names the file, the key, the value found and the value allowed.
     """
-    document = tomlfile.read(path)
-    try:
-        return _sweep(document, Path(path))
-    except BadInput as error:
-        raise error.within(file=error.file or path) from None
+    return tomlfile.load(path, _sweep)
 
 
 def _sweep(table: dict[str, Any], path: Path) -> Sweep:
