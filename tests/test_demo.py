@@ -100,3 +100,22 @@ def test_the_terminal_ends_with_the_report(tmp_path: Path, monkeypatch: pytest.M
     )
     assert cli.main(["demo", "-o", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "report.html")
+
+
+def test_the_terminal_says_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from armrs import words
+
+    plain = {
+        "story": ["a"],
+        "comparison": [],
+        "comparison_text": "",
+        "missing_text": "b",
+        "verdict": "c",
+        "data": {"joints": []},
+        "level": 0.95,
+    }
+    words.demo(plain, [tmp_path / "data" / "dataset.toml", tmp_path / "report.html"])
+    go_on, last = capsys.readouterr().out.splitlines()[-2:]
+    assert last == str(tmp_path / "report.html")
+    assert f"armrs identify {tmp_path / 'data'} --with coulomb" in go_on
+    assert f"armrs gap {tmp_path / 'data'}" in go_on

@@ -158,10 +158,9 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     print(result["missing_text"])
     print()
     print(verdict(result))
-    files_written(written[-1:])
-    if written:
-        data = written[0].parent
+    for data in (path.parent for path in written if path.name == "dataset.toml"):
         print(f"The session is in {data}. Go on with: armrs identify {data} --with coulomb, or armrs gap {data}")
+    files_written(written[-1:])
 
 
 def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
