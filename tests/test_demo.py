@@ -106,6 +106,7 @@ def test_the_terminal_says_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFi
     from armrs import words
 
     plain = {
+        "verb": "demo",
         "story": ["a"],
         "comparison": [],
         "comparison_text": "",
