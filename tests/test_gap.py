@@ -134,7 +134,7 @@ def changed(data: Dataset, **columns: object) -> Dataset:
         ({"force_on_arm": lambda f: 1000.0 * f}, "mN"),
         ({"force_on_arm": lambda f: f[:, ::-1]}, "swapped"),
         ({"q": lambda q: q * [57.29578, 57.29578]}, "degrees"),
-        ({"force_on_arm": lambda f: f * [1.0, 0.0]}, "throughout"),
+        ({"force_on_arm": lambda f: f * [1.0, 0.0]}, "in every sample"),
     ],
 )
 def test_what_only_a_label_can_explain_is_refused(columns: dict[str, object], word: str) -> None:
