@@ -14,6 +14,9 @@ pub struct Hypothesis<const N: usize> {
     pub shift: [f64; 2],
     /// Where the handle sits in the hand: along the last segment and to its left \[m\].
     pub placement: [f64; 2],
+    /// Once-per-turn error of each joint's encoder, as multiples of the cosine and the sine of its angle \[rad\]: a disc that sits
+    /// off its shaft.
+    pub eccentricity: [[f64; 2]; N],
     /// Effects of the model.
     pub known: Vec<Effect<f64>>,
     /// Small imperfections of the sensors, as effects.
@@ -33,6 +36,8 @@ pub enum Target {
     Shift(usize),
     /// Place of the handle along the last segment (0) or to its left (1).
     Placement(usize),
+    /// Part of an encoder's once-per-turn error that goes with the cosine (0) or the sine (1) of its angle.
+    Eccentricity(usize, usize),
     /// A parameter of a known effect.
     Known(usize, usize),
     /// The first parameter of an imperfection.
@@ -64,6 +69,7 @@ impl<const N: usize> Hypothesis<N> {
             Target::Contact(part, axis) => self.contact[part][axis],
             Target::Shift(axis) => self.shift[axis],
             Target::Placement(axis) => self.placement[axis],
+            Target::Eccentricity(j, part) => self.eccentricity[j][part],
             Target::Known(e, p) => self.known[e].parameters[p],
             Target::Calibration(e) => self.calibration[e].parameters[0],
             Target::Named(e, p) => self.named[e].parameters[p],
@@ -77,6 +83,7 @@ impl<const N: usize> Hypothesis<N> {
             Target::Contact(part, axis) => &mut self.contact[part][axis],
             Target::Shift(axis) => &mut self.shift[axis],
             Target::Placement(axis) => &mut self.placement[axis],
+            Target::Eccentricity(j, part) => &mut self.eccentricity[j][part],
             Target::Known(e, p) => &mut self.known[e].parameters[p],
             Target::Calibration(e) => &mut self.calibration[e].parameters[0],
             Target::Named(e, p) => &mut self.named[e].parameters[p],

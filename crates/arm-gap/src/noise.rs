@@ -8,12 +8,10 @@ use arm_ident::coloured::{AutoRegression, Whitener, effective_samples};
 use arm_ident::trial::Trial;
 
 use crate::GapError;
-use crate::predict::{Channels, Course};
+use crate::predict::{Channels, Course, away_from_gaps, margin};
 
 /// Samples kept for each period of the cutoff.
 const SAMPLES_PER_PERIOD: f64 = 2.5;
-/// Periods of the cutoff that are dropped next to an end or a gap.
-const MARGIN: f64 = 1.5;
 /// Periods of the cutoff that are dropped next to rest where dry friction holds a joint.
 const NEAR_REST: f64 = 0.6;
 /// Fewest samples in a stretch that is used.
@@ -35,16 +33,11 @@ impl Stretches {
     ///   or that were disturbed
     pub fn of<const N: usize>(trial: &Trial<N>, course: &Course<N>, resting: &[bool]) -> Self {
         let step = ((course.rate / (SAMPLES_PER_PERIOD * course.band)) as usize).max(1);
-        let margin = ((MARGIN * course.rate / course.band) as usize).max(1);
+        let sound = away_from_gaps(&trial.valid, margin(course.rate, course.band));
         let near = ((NEAR_REST * course.rate / course.band) as usize).max(1);
         let n = trial.len();
         let around = |i: usize, reach: usize| i.saturating_sub(reach)..(i + reach + 1).min(n);
-        let usable = |i: usize| {
-            i >= margin
-                && i + margin < n
-                && around(i, margin).all(|k| trial.valid[k])
-                && !around(i, near).any(|k| resting.get(k) == Some(&true))
-        };
+        let usable = |i: usize| sound[i] && !around(i, near).any(|k| resting.get(k) == Some(&true));
         // On one grid for all trials, so that repeats have the same samples.
         let mut all = Vec::new();
         let mut current = Vec::new();
@@ -102,6 +95,8 @@ impl Stretches {
 #[derive(Clone, Debug)]
 pub struct Noise {
     whiteners: Vec<Whitener>,
+    /// What each sample weighs, by trial; nothing where all weigh the same.
+    weights: Vec<Channels>,
     /// Inverse of the lower Cholesky factor of the innovations' correlation, row-major.
     mix: Vec<f64>,
 }
@@ -121,6 +116,7 @@ impl Noise {
             .collect();
         Ok(Self {
             whiteners: vec![Whitener::new(&white)?; channels],
+            weights: Vec::new(),
             mix,
         })
     }
@@ -169,6 +165,7 @@ impl Noise {
         }
         Ok(Self {
             whiteners,
+            weights: Vec::new(),
             mix: inverse_factor(&correlation, channels),
         })
     }
@@ -177,10 +174,20 @@ impl Noise {
     ///
     /// An autoregression of what is left would take slow effects for noise.
     ///
+    /// * `deviations` - what is left, already weighed
+    /// * `weights` - of every sample, by trial and channel
+    ///
     /// # Errors
     /// [`GapError::Numerics`] for series too short.
-    pub fn without_repeats(deviations: &[Vec<Vec<f64>>], range: &[f64]) -> Result<Self, GapError> {
-        let mut noise = Self::unknown(range.len())?;
+    pub fn without_repeats(
+        deviations: &[Vec<Vec<f64>>],
+        range: &[f64],
+        weights: Vec<Channels>,
+    ) -> Result<Self, GapError> {
+        let mut noise = Self {
+            weights,
+            ..Self::unknown(range.len())?
+        };
         for (c, range) in range.iter().enumerate() {
             let (mut square, mut count, mut effective) = (0.0, 0.0, 0.0);
             for series in deviations {
@@ -209,6 +216,18 @@ impl Noise {
             row
         });
         self.unmixed(whitened.collect())
+    }
+
+    /// Whitens a set of channels of one trial, whose samples weigh as they do there.
+    pub fn whiten_in(&self, trial: usize, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
+        let mut row = self.whiten(channels, stretches);
+        if let Some(weights) = self.weights.get(trial) {
+            let each = weights.iter().flat_map(|w| stretches.pick(w)).flatten();
+            for (value, weight) in row.iter_mut().zip(each) {
+                *value *= weight;
+            }
+        }
+        row
     }
 
     /// Whitens channels that are thinned already, in one stretch.

@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, Motion, Place, resisting_torque};
 use arm_core::{Joints, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque};
 use arm_ident::equation::Kinematics;
-use arm_ident::motion::{low_pass, measured};
+use arm_ident::motion::{is_quiet, low_pass, measured, relative_speed_noise};
 use arm_ident::trial::Trial;
 use arm_sim::{
     Coupling, Drive, Experiment, HandlePath, Recording, Sensors, SimulationError, Start, simulate,
@@ -17,15 +17,16 @@ use crate::session::{Session, Sight};
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
 pub type Channels = Vec<Vec<f64>>;
 
-/// Bandwidth in which led arms are compared \[Hz\], the thesis' own.
-const LED_BAND: f64 = 5.0;
-/// Bandwidth in which torques of motors are compared \[Hz\].
-const TORQUE_BAND: f64 = 10.0;
+/// Bandwidth in which channels are compared \[Hz\], the thesis' own.
+///
+/// Torques as well: an inverse dynamics of encoder angles that is low-passed as a whole is the equation of motion tested against smooth
+/// functions, so that what two differentiations add above the band drops out.
+const BAND: f64 = 5.0;
 /// Bandwidth of the handle's path, in bandwidths of the comparison: a robot that shakes at the edge of the comparison must
 /// keep its whole swing, or its forces are missed by newtons.
 const HANDLE_BAND: f64 = 4.0;
 /// Steps that are tried, longest first \[s\]; the last one is taken even where dry friction would like it shorter.
-const STEPS: [f64; 3] = [1e-3, 5e-4, 2.5e-4];
+pub(crate) const STEPS: [f64; 3] = [1e-3, 5e-4, 2.5e-4];
 /// Samples at the start whose mean tells where the arm was at rest.
 const START: usize = 5;
 
@@ -40,6 +41,9 @@ pub struct Course<const N: usize> {
     pub rate: f64,
     /// Cutoff of the low-pass \[Hz\].
     pub band: f64,
+    /// Samples over which a gap is measured: those that were measured. Where torques are compared, those [`MARGIN`] away from ends
+    /// and gaps, next to which filters and differences have guessed.
+    pub counted: Vec<bool>,
     times: Vec<f64>,
     handle: Vec<Plane<f64>>,
     /// Cosine and sine of the last segment's angle.
@@ -108,11 +112,7 @@ impl<const N: usize> Session<N> {
     /// [`GapError::Numerics`] for a trial too short for the filters.
     pub fn course(&self, trial: usize) -> Result<Course<N>, GapError> {
         let trial = &self.trials[trial];
-        let band = match self.sight {
-            Sight::Led => LED_BAND,
-            Sight::Torque => TORQUE_BAND,
-        }
-        .min(0.2 * trial.rate);
+        let band = BAND.min(0.2 * trial.rate);
         let raw = self.measured(trial);
         let seen = smooth(&raw, band, trial.rate)?;
         let handle = match &trial.handle {
@@ -140,13 +140,18 @@ impl<const N: usize> Session<N> {
         let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
         let motion = match self.sight {
             Sight::Led => None,
-            Sight::Torque => Some(measured(trial, band)?),
+            Sight::Torque => Some(motion(trial, band)?),
+        };
+        let margin = match self.sight {
+            Sight::Led => 0,
+            Sight::Torque => margin(trial.rate, band),
         };
         Ok(Course {
             raw,
             seen,
             rate: trial.rate,
             band,
+            counted: away_from_gaps(&trial.valid, margin),
             times: (0..trial.len()).map(|i| i as f64 / trial.rate).collect(),
             handle,
             hand,
@@ -301,6 +306,31 @@ impl<const N: usize> Session<N> {
         Ok(angles.chain(forces).collect())
     }
 
+    /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led; torques in the common band, for
+    /// what differentiated angles say above it is noise.
+    pub fn measured_in<'c>(&self, course: &'c Course<N>) -> &'c Channels {
+        match self.sight {
+            Sight::Led => &course.raw,
+            Sight::Torque => &course.seen,
+        }
+    }
+
+    /// What a hypothesis shows in the place of [`Session::measured_in`].
+    ///
+    /// # Errors
+    /// As [`Session::run`] and [`Session::read`].
+    pub fn shown_in(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Channels, SimulationError> {
+        let run = self.run(hypothesis, course)?;
+        match self.sight {
+            Sight::Led => self.read_raw(hypothesis, course, &run),
+            Sight::Torque => self.read(hypothesis, course, &run),
+        }
+    }
+
     /// Joint torques by inverse dynamics of the measured motion.
     ///
     /// # Errors
@@ -325,7 +355,8 @@ impl<const N: usize> Session<N> {
         let mut before: Option<Motion<f64, N>> = None;
         let mut channels = vec![Vec::with_capacity(course.times.len()); N];
         for (i, &time) in course.times.iter().enumerate() {
-            let (q, qd, qdd) = (motion.q[i] - offset, motion.qd[i], motion.qdd[i]);
+            let (q, qd, qdd) = true_motion(hypothesis, motion, i);
+            let q = q - offset;
             let pose = Pose::new(&q);
             let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);
             let mut at = Motion::new(time, q, qd).with_joint_force(&through);
@@ -351,14 +382,50 @@ impl<const N: usize> Session<N> {
             )
         };
         match target {
-            Target::Segment(..) | Target::Contact(..) | Target::Shift(_) | Target::Placement(_) => {
-                false
-            }
+            Target::Segment(..)
+            | Target::Contact(..)
+            | Target::Shift(_)
+            | Target::Placement(_)
+            | Target::Eccentricity(..) => false,
             Target::Known(e, _) => sensing(&hypothesis.known[e]),
             Target::Calibration(_) => true,
             Target::Named(e, _) => sensing(&hypothesis.named[e]),
         }
     }
+}
+
+/// Periods of the cutoff that are dropped next to an end or a gap.
+const MARGIN: f64 = 1.5;
+
+/// Samples next to an end or a gap that are no measurement any more once filters have passed.
+pub fn margin(rate: f64, band: f64) -> usize {
+    ((MARGIN * rate / band) as usize).max(1)
+}
+
+/// Samples that are at least so many away from ends and gaps.
+pub fn away_from_gaps(valid: &[bool], margin: usize) -> Vec<bool> {
+    let n = valid.len();
+    // How many samples without a gap end at each.
+    let mut run = 0;
+    let mut behind: Vec<usize> = Vec::with_capacity(n);
+    for &v in valid {
+        run = if v { run + 1 } else { 0 };
+        behind.push(run);
+    }
+    (0..n)
+        .map(|i| i >= margin && i + margin < n && behind[i + margin] > 2 * margin)
+        .collect()
+}
+
+/// Motion of the joints from measured angles, and from measured speeds only where the angles are too noisy for it.
+///
+/// A controller's speed is the derivative of its angles behind a filter that nobody knows. What it is late by works against viscous
+/// friction: 0.8 ms take all damping away from a pendulum of 0.3 m that rings for a minute.
+fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, GapError> {
+    let mut angles = trial.clone();
+    angles.speed = None;
+    let quiet = is_quiet(&relative_speed_noise(&[&angles], band)?);
+    Ok(measured(if quiet { &angles } else { trial }, band)?)
 }
 
 /// Low-passes every channel without phase.
@@ -375,8 +442,41 @@ pub fn difference(a: &Channels, b: &Channels) -> Channels {
     std::iter::zip(a, b).map(one).collect()
 }
 
+/// Angles, speeds and accelerations at a sample, without what an eccentric encoder adds to them.
+fn true_motion<const N: usize>(
+    hypothesis: &Hypothesis<N>,
+    motion: &Kinematics<N>,
+    i: usize,
+) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
+    let (mut q, mut qd, mut qdd) = (motion.q[i], motion.qd[i], motion.qdd[i]);
+    for (j, [cosine, sine]) in hypothesis.eccentricity.into_iter().enumerate() {
+        if cosine != 0.0 || sine != 0.0 {
+            let (sin, cos) = libm::sincos(q[j]);
+            // The error, and its first and second derivative with respect to the angle.
+            let error = cosine * cos + sine * sin;
+            let slope = sine * cos - cosine * sin;
+            qdd[j] -= slope * qdd[j] - error * qd[j] * qd[j];
+            qd[j] -= slope * qd[j];
+            q[j] -= error;
+        }
+    }
+    (q, qd, qdd)
+}
+
+/// Angles without what an eccentric encoder adds to them.
+pub(crate) fn unbent<const N: usize>(
+    hypothesis: &Hypothesis<N>,
+    q: &Joints<f64, N>,
+) -> Joints<f64, N> {
+    Joints::from_fn(|j, _| {
+        let [cosine, sine] = hypothesis.eccentricity[j];
+        let (sin, cos) = libm::sincos(q[j]);
+        q[j] - cosine * cos - sine * sin
+    })
+}
+
 /// What the sensors of the angles add to them.
-fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N> {
+pub(crate) fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N> {
     let mut reading = Reading::<f64, N> {
         time: 0.0,
         q: Joints::zeros(),

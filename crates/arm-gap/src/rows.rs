@@ -107,7 +107,7 @@ impl Rows {
             let residuals: Vec<Vec<f64>> = class
                 .members
                 .iter()
-                .map(|&m| study.noise.whiten(&residuals[m], &class.stretches))
+                .map(|&m| class.white(study, &residuals[m]))
                 .collect();
             self.condense(class, (&class.columns, &more), gram, &residuals)
         });
@@ -130,7 +130,7 @@ impl Rows {
             let residuals: Vec<Vec<f64>> = class
                 .members
                 .iter()
-                .map(|&m| study.noise.whiten(&residuals[m], &class.stretches))
+                .map(|&m| class.white(study, &residuals[m]))
                 .collect();
             let gram = class.products.view((0, 0), (k, k)).into_owned();
             self.condense(class, (&class.columns[..k], &[]), gram, &residuals)
@@ -189,9 +189,13 @@ impl Rows {
 
 impl Class {
     fn whitened<const N: usize>(&self, study: &Study<N>, response: &Response) -> Vec<f64> {
-        study
-            .noise
-            .whiten(&response.0[self.reference], &self.stretches)
+        self.white(study, &response.0[self.reference])
+    }
+
+    fn white<const N: usize>(&self, study: &Study<N>, channels: &Channels) -> Vec<f64> {
+        // Trials of which several share their columns are repeats, and weigh the same.
+        let trial = study.fitted[self.members[0]];
+        study.noise.whiten_in(trial, channels, &self.stretches)
     }
 }
 

@@ -1,5 +1,7 @@
 //! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
 
+use std::cmp::Ordering;
+
 use arm_core::effect::Effect;
 
 use crate::GapError;
@@ -16,6 +18,9 @@ use crate::study::Study;
 
 /// Share of all that is explained that an effect must explain, whatever the others are.
 const FLOOR: f64 = 0.003;
+/// The same without repeats: what sensors and a rigid model get wrong cannot be told from noise then, and an effect may be no more
+/// than what comes nearest to it.
+const FLOOR_UNREPEATED: f64 = 0.03;
 /// Most disturbances of single trials that are named.
 const DISTURBANCES: usize = 4;
 /// Frequency below which a ripple is asked like other effects \[Hz\]: movements and what a model lacks of them reach that far.
@@ -192,7 +197,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 self.pruned((fitted, anchor), &hunt.calibrated, hunt.scale)?;
         }
         let Hunt {
-            calibrated,
+            mut calibrated,
             before,
             current,
             anchor,
@@ -201,15 +206,21 @@ impl<'a, const N: usize> Study<'a, N> {
             asked,
             scale,
         } = hunt;
-        let (amended, anchor, named) = self.judged(
+        let (mut amended, anchor, named) = self.judged(
             (current, anchor),
             &calibrated,
             (asked, scale, periodic),
             progress,
         )?;
         progress("measuring what is left", 0.9);
-        let precision = self.precision(&anchor, &amended, scale)?;
+        let mut precision = self.precision(&anchor, &amended, scale)?;
         let lack = [before, lack_of_fit(self, &anchor, &amended)];
+        if let Some((hypothesis, _)) = self.refined(&calibrated) {
+            calibrated.hypothesis = hypothesis;
+        }
+        if let Some((hypothesis, known)) = self.refined(&amended) {
+            (amended.hypothesis, precision) = (hypothesis, known);
+        }
         progress("done", 1.0);
         Ok(Finding {
             calibrated,
@@ -470,6 +481,10 @@ impl<'a, const N: usize> Study<'a, N> {
         calibrated: &Fitted<N>,
         scale: f64,
     ) -> Result<Settled<'a, N>, GapError> {
+        let floor = match self.repeated {
+            true => FLOOR,
+            false => FLOOR_UNREPEATED,
+        };
         while !fitted.asked.is_empty() {
             let mut weakest: Option<(f64, Fitted<N>)> = None;
             let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
@@ -491,7 +506,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
                 let least = others
                     .map(|o| fitted.asked[o].kind().probe().missed * gains[o])
-                    .fold(FLOOR * (calibrated.cost - fitted.cost), f64::max);
+                    .fold(floor * (calibrated.cost - fitted.cost), f64::max);
                 let worth = gain / scale - fitted.asked[slot].price;
                 let worth = if gain < least {
                     worth.min(gain - least)
@@ -537,7 +552,9 @@ impl<'a, const N: usize> Study<'a, N> {
                     _ => Vec::new(),
                 };
                 if exchanges < EXCHANGES
-                    && let Some(better) = rivals.iter().find(|r| r.alternative.worse < -0.05)
+                    && let Some(better) = rivals.iter().find(|r| {
+                        self.takes_over(&r.alternative, (&fitted.asked[slot], gain / scale))
+                    })
                 {
                     let better = better.fitted.clone();
                     (fitted, anchor) = self.settle(better.hypothesis, better.asked)?;
@@ -553,13 +570,42 @@ impl<'a, const N: usize> Study<'a, N> {
                     alternatives: rivals
                         .into_iter()
                         .map(|r| r.alternative)
-                        .filter(|a| a.worse <= TIE)
+                        .filter(|a| a.worse <= self.tie(candidate, gain / scale))
                         .collect(),
                 });
             }
             named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
             return Ok((fitted, anchor, named));
         }
+    }
+
+    /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
+    ///
+    /// Without repeats nothing tells a law that is not exact from another one: what its kind may miss of what it shows decides nothing.
+    fn tie(&self, own: &Candidate, gain: f64) -> f64 {
+        match self.repeated {
+            true => TIE,
+            false => TIE.max(own.kind().probe().missed * gain),
+        }
+    }
+
+    /// Whether another effect takes the place of a named one.
+    ///
+    /// The better one does. Without repeats a tie goes to the plainer law, the one with fewer parameters or, with as many, the one that
+    /// stands before it in the catalogue: an intricate one bends itself to what sensors and a rigid model get wrong.
+    fn takes_over(&self, rival: &Alternative, (own, gain): (&Candidate, f64)) -> bool {
+        const BETTER: f64 = 0.05;
+        let plain = |c: &Candidate| {
+            let place = self.session.kinds().position(|k| k == c.kind());
+            (c.kind().info().parameters.len(), place)
+        };
+        let handicap = match plain(&rival.candidate).cmp(&plain(own)) {
+            _ if self.repeated => 0.0,
+            Ordering::Less => self.tie(own, gain),
+            Ordering::Equal => 0.0,
+            Ordering::Greater => -self.tie(own, gain),
+        };
+        rival.worse < handicap - BETTER
     }
 
     /// Other effects in the place of one, fitted, the best first.

@@ -97,6 +97,7 @@ impl<const N: usize> Session<N> {
             contact: [[0.0; 2]; 2],
             shift: [0.0; 2],
             placement: [0.0; 2],
+            eccentricity: [[0.0; 2]; N],
             known: self.effects.clone(),
             calibration,
             named: Vec::new(),
@@ -129,8 +130,8 @@ impl<const N: usize> Session<N> {
         };
         for k in 0..N {
             for part in 0..3 {
-                // Where no torque acts, everything is known up to one common factor: the first segment's weight sets it.
-                if k == 0 && part < 2 && self.swings_freely() {
+                // Where no torque acts, everything is known up to one common factor: the first segment's mass sets it.
+                if k == 0 && part == 0 && self.swings_freely() {
                     continue;
                 }
                 add(
@@ -154,6 +155,13 @@ impl<const N: usize> Session<N> {
             if let Some(promise) = effect.kind.probe().promise {
                 let sd = KEPT * self.promised(promise);
                 add(Target::Calibration(e), sd, f64::NEG_INFINITY, f64::INFINITY);
+            }
+        }
+        if self.sight == Sight::Torque {
+            let sd = KEPT * self.tolerance.angle_offset;
+            for (j, part) in (0..N).flat_map(|j| [(j, 0), (j, 1)]) {
+                let target = Target::Eccentricity(j, part);
+                add(target, sd, f64::NEG_INFINITY, f64::INFINITY);
             }
         }
         if self.sight == Sight::Led {

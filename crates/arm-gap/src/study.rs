@@ -12,7 +12,7 @@ use crate::hypothesis::Hypothesis;
 use crate::noise::{Noise, Stretches, dot};
 use crate::normal::factor;
 use crate::predict::{Channels, Course};
-use crate::session::Session;
+use crate::session::{Session, Sight};
 use crate::threads;
 
 /// A session made ready.
@@ -149,9 +149,6 @@ impl<'a, const N: usize> Study<'a, N> {
             }
         }
         self.repeated = !deviations.is_empty();
-        if !self.repeated {
-            deviations = self.unexplained(anchor)?;
-        }
         let range: Vec<f64> = (0..channels)
             .map(|c| {
                 // An arm that swings freely has no torque to show, but its inertia has.
@@ -166,7 +163,7 @@ impl<'a, const N: usize> Study<'a, N> {
         self.noise = if self.repeated {
             self.noise_of(&deviations, &shifts, &range)?
         } else {
-            Noise::without_repeats(&deviations, &range)?
+            self.noise_of_residuals(anchor, &range)?
         };
         Ok(())
     }
@@ -290,8 +287,20 @@ impl<'a, const N: usize> Study<'a, N> {
         for j in (0..N).filter(|&j| self.dry[j]) {
             let fastest = (0..count).map(|i| speed(i, j)).fold(0.0, f64::max);
             let limit = f64::min(SLOW.0 * fastest, SLOW.1);
-            for (i, flag) in rest.iter_mut().enumerate() {
-                *flag |= speed(i, j) <= limit;
+            // Where torques are compared a joint that reverses on the way does not rest: the law of its friction holds through zero.
+            let shortest = match self.session.sight {
+                Sight::Led => 1,
+                Sight::Torque => (course.rate / course.band) as usize,
+            };
+            let mut start = 0;
+            for i in 0..=count {
+                if i < count && speed(i, j) <= limit {
+                    continue;
+                }
+                if i - start >= shortest {
+                    rest[start..i].fill(true);
+                }
+                start = i + 1;
             }
         }
         rest

@@ -4,17 +4,66 @@ use crate::GapError;
 use crate::anchor::{Anchor, Response};
 use crate::candidate::Library;
 use crate::fit::priors;
-use crate::noise::dot;
+use crate::noise::{Noise, dot};
 use crate::normal::solve;
 use crate::predict::Channels;
 use crate::study::{Study, flat};
 
+/// Samples of the common band, on either side, among which the size of what is left is measured.
+const AROUND: usize = 32;
+
 impl<const N: usize> Study<'_, N> {
+    /// The noise by what no question could explain of a hypothesis' residuals.
+    ///
+    /// A swing that dies out is seen ever more clearly: what encoders and a rigid model get wrong grows with the motion. Every
+    /// sample weighs by what is left around it, with the mean over all as one sample more.
+    ///
+    /// * `range` - size of each channel, below a share of which no noise is believed
+    pub(crate) fn noise_of_residuals(
+        &self,
+        anchor: &Anchor<N>,
+        range: &[f64],
+    ) -> Result<Noise, GapError> {
+        let mut left = self.unexplained(anchor)?;
+        let mut weights = vec![Channels::new(); self.courses.len()];
+        let mean: Vec<f64> = (0..range.len())
+            .map(|c| {
+                let all = left.iter().flat_map(|l| &l[c]);
+                let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+                f64::max(sum / f64::max(count, 1.0), f64::MIN_POSITIVE)
+            })
+            .collect();
+        for (own, &trial) in left.iter_mut().zip(&self.fitted) {
+            let samples: Vec<usize> = self.stretches[trial].0.iter().flatten().copied().collect();
+            let length = self.courses[trial].counted.len();
+            for (channel, mean) in own.iter_mut().zip(&mean) {
+                let weigh = |i: usize| {
+                    let near = i.saturating_sub(AROUND)..(i + AROUND + 1).min(channel.len());
+                    let count = near.len() as f64;
+                    let square = channel[near].iter().map(|v| v * v).sum::<f64>();
+                    libm::sqrt(mean * (count + 1.0) / (square + mean))
+                };
+                let local: Vec<f64> = (0..channel.len()).map(weigh).collect();
+                for (value, weight) in channel.iter_mut().zip(&local) {
+                    *value *= weight;
+                }
+                // Samples between are not compared; they get what stands before them.
+                let mut whole = vec![1.0; length];
+                for (k, weight) in local.iter().enumerate() {
+                    let next = samples.get(k + 1).copied().unwrap_or(length);
+                    whole[samples[k]..next].fill(*weight);
+                }
+                weights[trial].push(whole);
+            }
+        }
+        Noise::without_repeats(&left, range, weights)
+    }
+
     /// What is left of residuals when everything that the catalogue could explain is taken out, to first order.
     ///
     /// Without repeats this is all that tells of the noise: a residual that still holds what is missing would make the
     /// missing look like noise.
-    pub(crate) fn unexplained(&self, anchor: &Anchor<N>) -> Result<Vec<Vec<Vec<f64>>>, GapError> {
+    fn unexplained(&self, anchor: &Anchor<N>) -> Result<Vec<Vec<Vec<f64>>>, GapError> {
         let nuisances = self.responses_to(anchor, &anchor.coordinates)?;
         let library = Library::build(self, anchor, None)?;
         let columns: Vec<&Response> = nuisances

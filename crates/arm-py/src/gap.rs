@@ -94,19 +94,14 @@ pub fn play<'py>(
         let given = session.given();
         let plays = (0..session.trials.len())
             .map(|i| {
-                let played = py.detach(|| {
-                    let course = session.course(i)?;
-                    let run = session.run(&given, &course).ok();
-                    let channels = run.and_then(|r| session.read_raw(&given, &course, &r).ok());
-                    Ok((course.raw, channels))
-                });
-                let (measured, given) = played.map_err(gap)?;
-                let Some(given) = given else {
+                let course = session.course(i).map_err(gap)?;
+                let Ok(shown) = py.detach(|| session.shown_in(&given, &course)) else {
                     return Ok(py.None().into_bound(py));
                 };
                 let one = PyDict::new(py);
-                one.set_item("measured", table(py, &measured)?)?;
-                one.set_item("given", table(py, &given)?)?;
+                one.set_item("measured", table(py, session.measured_in(&course))?)?;
+                one.set_item("counted", course.counted.to_pyarray(py))?;
+                one.set_item("given", table(py, &shown)?)?;
                 Ok(one.into_any())
             })
             .collect::<PyResult<Vec<_>>>();
@@ -242,17 +237,21 @@ fn played<'py, const N: usize>(
         .map(|i| {
             let one = PyDict::new(py);
             let course = &study.courses[i];
-            one.set_item("measured", table(py, &course.raw)?)?;
+            let free = PyDict::new(py);
+            one.set_item("measured", table(py, study.session.measured_in(course))?)?;
+            one.set_item("counted", course.counted.to_pyarray(py))?;
             for (name, hypothesis) in plays {
-                let channels = py.detach(|| {
-                    let run = study.session.run(hypothesis, course).ok()?;
-                    study.session.read_raw(hypothesis, course, &run).ok()
-                });
-                match channels {
-                    Some(channels) => one.set_item(name, table(py, &channels)?)?,
-                    None => one.set_item(name, py.None())?,
+                match py.detach(|| study.session.shown_in(hypothesis, course)) {
+                    Ok(channels) => one.set_item(name, table(py, &channels)?)?,
+                    Err(_) => one.set_item(name, py.None())?,
+                }
+                let place = (i, course.as_ref());
+                match py.detach(|| study.session.free_run(hypothesis, place)) {
+                    Ok(angles) => free.set_item(name, table(py, &angles)?)?,
+                    Err(_) => free.set_item(name, py.None())?,
                 }
             }
+            one.set_item("free", free)?;
             Ok(one)
         })
         .collect::<PyResult<Vec<_>>>()?;
@@ -465,6 +464,7 @@ fn unknown<const N: usize>(
         Target::Contact(part, axis) => (["compliance", "damping"][part.min(1)], 0, axis),
         Target::Shift(axis) => ("shift", 0, axis),
         Target::Placement(axis) => ("placement", 0, axis),
+        Target::Eccentricity(j, part) => ("eccentricity", j, part),
         Target::Known(e, p) => ("known", e, p),
         Target::Calibration(e) => {
             let effect = &hypothesis.calibration[e];

@@ -13,7 +13,6 @@ from ..catalogue import catalogue
 from ..dataset import Dataset
 from ..model import Contact, Effect, Joint, Model, Segment
 from ..rig import all_effects
-from ..trial import Trial
 from . import maps
 from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Rung, Tried, Value
 
@@ -150,6 +149,9 @@ def absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
             items.append(Absorbed(f"{what} of the contact, {'yz'[part]}", value, 2 * before, "of its value"))
         elif what == "shift":
             items.append(Absorbed(f"place of the robot, {'yz'[part]}", value, 2 * before, "m"))
+        elif what == "eccentricity":
+            wave = ("cosine", "sine")[part]
+            items.append(Absorbed(f"once-per-turn error of angle {index + 1}, {wave}", value, 2 * before, "rad"))
         elif what in catalogue():
             kind = catalogue()[what]
             items.append(Absorbed(_worded(what, *kind.place(index)), value, 2 * before, kind.parameters[0].unit))
@@ -205,20 +207,40 @@ def effect(entry: Sequence[Any]) -> Effect:
 
 
 def gaps(dataset: Dataset, led: bool, raw: Mapping[str, Any], last: str = "amended") -> dict[str, ChannelGap]:
-    """Return the gap of every channel on the test trials; `last` is the last model that there is."""
+    """Return the gap of every channel on the test trials; `last` is the last model that there is.
+
+    Of a rig without a robot these are joint torques by inverse dynamics of the measured angles, both low-passed at the common band, away
+    from ends and gaps, reversals and rests included; and the angles of a run from the state that explains the first second best: a free
+    swing to the end of the trial, a driven arm for that second, with the measured torques.
+    """
     tests = [k for k, t in enumerate(dataset.trials) if t.role == "test"]
-    trials, plays = [dataset.trials[k] for k in tests], [raw["trials"][k] for k in tests]
+    plays = [raw["trials"][k] for k in tests]
     result = {}
     for c, name in enumerate(channel_names(dataset, led)):
-        given, calibrated, after = (size(trials, plays, version, c) for version in ("given", "calibrated", "amended"))
+        given, calibrated, after = (size(plays, version, c) for version in ("given", "calibrated", "amended"))
         result[name] = ChannelGap(given, calibrated, after, _floor(dataset, raw, c, last))
+    if not led:
+        for j in range(dataset.model.n_joints):
+            sizes = (_free_size(dataset, raw, version, j) for version in ("given", "calibrated", "amended"))
+            result[f"q{j + 1}_rad"] = ChannelGap(*sizes, None)
     return result
 
 
-def size(trials: Sequence[Trial], plays: Sequence[Mapping[str, Any]], version: str, channel: int) -> float | None:
+def _free_size(dataset: Dataset, raw: Mapping[str, Any], version: str, joint: int) -> float | None:
+    """Return the root mean square of free runs less measured angles over the test trials; None where nothing could be simulated."""
+    rows = []
+    for trial, play in zip(dataset.trials, raw["trials"], strict=True):
+        angles = play["free"].get(version) if trial.role == "test" else None
+        if angles is not None:
+            off = (angles - trial.q)[:, joint]
+            rows.append(off[np.isfinite(off)])
+    return float(np.sqrt(np.mean(np.square(np.concatenate(rows))))) if rows and sum(map(len, rows)) else None
+
+
+def size(plays: Sequence[Mapping[str, Any]], version: str, channel: int) -> float | None:
     """Return the root mean square of simulated less measured of one channel; None where nothing could be simulated."""
-    pairs = [(t, p) for t, p in zip(trials, plays, strict=True) if p.get(version) is not None]
-    rows = [(p[version] - p["measured"])[t.valid][:, channel] for t, p in pairs]
+    known = [p for p in plays if p.get(version) is not None]
+    rows = [(p[version] - p["measured"])[p["counted"]][:, channel] for p in known]
     return float(np.sqrt(np.mean(np.square(np.concatenate(rows))))) if rows and sum(map(len, rows)) else None
 
 
@@ -232,7 +254,7 @@ def _floor(dataset: Dataset, raw: Mapping[str, Any], channel: int, version: str)
             continue
         length = min(len(dataset.trials[k]) for k in members)
         rows = np.array([(raw["trials"][k]["measured"] - raw["trials"][k][version])[:length, channel] for k in members])
-        valid = np.all([dataset.trials[k].valid[:length] for k in members], axis=0)
+        valid = np.all([raw["trials"][k]["counted"][:length] for k in members], axis=0)
         deviation = (rows - rows.mean(axis=0))[:, valid]
         square += float(np.sum(deviation**2))
         freedom += deviation.shape[1] * (len(members) - 1)

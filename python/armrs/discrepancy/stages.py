@@ -104,7 +104,7 @@ def compare(dataset: Source, model: Model | None = None) -> Compared:
     known = [p for p in plays if p["given"] is not None]
     trials = [t for t, p in zip(data.trials, plays, strict=True) if p["given"] is not None]
     found = maps.discrepancies(data.replace(trials=tuple(trials)), led, known, "given") if trials else []
-    gap = {name: reading.size(trials, known, "given", c) for c, name in enumerate(reading.channel_names(data, led))}
+    gap = {name: reading.size(known, "given", c) for c, name in enumerate(reading.channel_names(data, led))}
     return Compared({n: g for n, g in gap.items() if g is not None}, maps.places(found), tuple(found), tuple(warnings))
 
 
@@ -177,8 +177,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
     for c, name in enumerate(reading.channel_names(data, led)):
         size = {}
         for version, listed in plays.items():
-            good = [(t, p) for t, p in zip(data.trials, listed, strict=True) if p is not None]
-            size[version] = reading.size([t for t, _ in good], [p for _, p in good], "given", c)
+            size[version] = reading.size([p for p in listed if p is not None], "given", c)
         gap[name] = ChannelGap(size["given"], size["calibrated"], size["amended"], result.gap[name].floor)
     return gap
 
