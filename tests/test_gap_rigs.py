@@ -57,7 +57,7 @@ def test_dry_friction_of_a_double_pendulum(data: Path) -> None:
 
 
 def swing(hidden: Callable[[float], float], seed: int) -> Dataset:
-    """Return a pendulum of 0.3 m that rings down for 25 s, seen by an encoder of 0.1 mrad that sits 1.5 mrad off its shaft."""
+    """Return a pendulum of 0.3 m that rings down for 40 s, seen by an encoder of 0.1 mrad that sits 1.5 mrad off its shaft."""
     mass, com, inertia, rate, parts = 0.15, 0.15, 1e-4, 250.0, 4
     about, weight, step = inertia + mass * com**2, 9.81 * mass * com, 1.0 / rate / parts
     angle, speed, angles = -np.pi / 2 + 1.4, 0.0, []
@@ -65,7 +65,7 @@ def swing(hidden: Callable[[float], float], seed: int) -> Dataset:
     def rate_of(q: float, v: float) -> float:
         return float((-weight * np.cos(q) - hidden(v)) / about)
 
-    for i in range(int(25.0 * rate) * parts):
+    for i in range(int(40.0 * rate) * parts):
         if i % parts == 0:
             angles.append(angle)
         # The midpoint rule.
