@@ -31,13 +31,30 @@ impl<T: Scalar> Contact<T> {
     /// The force pulls the arm towards the handle (thesis 3.33 with the sign that makes the contact stable).
     #[inline]
     pub fn force_on_arm(&self, gap: Plane<T>, gap_rate: Plane<T>) -> Plane<T> {
-        core::array::from_fn(|i| {
-            let beyond = (gap[i].abs() - self.play[i]).max(T::ZERO);
-            let stretch = T::if_less(gap[i], T::ZERO, -beyond, beyond);
-            let touching = T::if_less(self.play[i], gap[i].abs(), T::ONE, T::ZERO);
-            let always = T::if_less(T::ZERO, self.play[i], touching, T::ONE);
-            self.stiffness[i] * stretch + always * self.damping[i] * gap_rate[i]
-        })
+        let [spring, damper] = self.spring_and_damper(gap, gap_rate);
+        [spring[0] + damper[0], spring[1] + damper[1]]
+    }
+
+    /// The parts of [`Contact::force_on_arm`]: of the springs, and of the dampers \[N\].
+    #[inline(always)]
+    pub fn spring_and_damper(&self, gap: Plane<T>, gap_rate: Plane<T>) -> [Plane<T>; 2] {
+        let (mut stretch, mut rate) = (gap, gap_rate);
+        // Without play what follows would change nothing, to the last bit.
+        if !self.play.iter().all(|play| play.every(|play| play == 0.0)) {
+            for i in 0..2 {
+                let beyond = (gap[i].abs() - self.play[i]).max(T::ZERO);
+                stretch[i] = T::if_less(gap[i], T::ZERO, -beyond, beyond);
+                let touching = T::if_less(self.play[i], gap[i].abs(), T::ONE, T::ZERO);
+                rate[i] = T::if_less(T::ZERO, self.play[i], touching, T::ONE) * gap_rate[i];
+            }
+        }
+        [
+            [
+                self.stiffness[0] * stretch[0],
+                self.stiffness[1] * stretch[1],
+            ],
+            [self.damping[0] * rate[0], self.damping[1] * rate[1]],
+        ]
     }
 
     /// Time derivative of [`Contact::force_on_arm`] \[N/s\], where the contact neither closes nor opens.

@@ -6,12 +6,13 @@ use arm_core::effect::Effect;
 use arm_core::{Contact, Joints, Lanes, Plane, Scalar, Segment, Setup};
 
 use crate::breaks::step_in_pieces;
+use crate::feed::Feed;
 use crate::model::{Input, Link, Model, State};
 use crate::native::diverged;
-use crate::prepare::{Prepared, Schedule, add_ripple, command, known};
+use crate::prepare::{Prepared, add_ripple, commands};
 use crate::recorder::Recorder;
-use crate::step::{Inputs, Memory, step};
-use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
+use crate::step::{Memory, step};
+use crate::{Experiment, Handle, Recording, SimulationError, simulate};
 
 /// Runs in one group.
 const LANES: usize = 8;
@@ -28,8 +29,6 @@ pub fn simulate_batch<const N: usize>(
     threads: usize,
 ) -> Outcomes<N> {
     let groups: Vec<&[Experiment<N>]> = experiments.chunks(LANES).collect();
-    let table = Commands::shared_by(experiments);
-    let group = |experiments: &[Experiment<N>]| group(experiments, table.as_ref());
     let threads = threads.clamp(1, groups.len().max(1));
     let mut done: Vec<Outcomes<N>> = Vec::new();
     if threads == 1 {
@@ -58,44 +57,16 @@ pub fn simulate_batch<const N: usize>(
 }
 
 /// Up to eight runs: in lanes where they are alike, else one by one.
-fn group<const N: usize>(
-    experiments: &[Experiment<N>],
-    table: Option<&Commands<N>>,
-) -> Outcomes<N> {
+fn group<const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
     let prepared: Result<Vec<_>, _> = experiments.iter().map(Prepared::new).collect();
     match prepared {
         Ok(prepared) if prepared.len() > 1 && prepared.iter().all(|p| alike(p, &prepared[0])) => {
-            match side_by_side(&prepared, table) {
+            match side_by_side(&prepared) {
                 Ok(outcomes) => outcomes,
                 Err(error) => vec![Err(error); prepared.len()],
             }
         }
         _ => experiments.iter().map(simulate).collect(),
-    }
-}
-
-/// What the drive commands at every half step, computed once where all runs share it.
-struct Commands<const N: usize>(Vec<Input<f64, N>>);
-
-/// Most entries of a table, some 30 MB for three joints.
-const MOST_COMMANDS: usize = 300_000;
-
-impl<const N: usize> Commands<N> {
-    /// The table of a batch whose runs have one drive and one schedule.
-    fn shared_by(experiments: &[Experiment<N>]) -> Option<Self> {
-        let first = experiments.first()?;
-        let schedule = Schedule::of(first).ok()?;
-        let entries = 2 * schedule.steps + 1;
-        let shared = entries <= MOST_COMMANDS
-            && experiments.len() > LANES
-            && known(first, &schedule).is_ok()
-            && experiments.iter().all(|e| {
-                e.drive == first.drive && Schedule::of(e).is_ok_and(|other| other == schedule)
-            });
-        shared.then(|| {
-            let times = (0..entries).map(|half_steps| schedule.half_time(half_steps));
-            Self(times.map(|time| command(&first.drive, time)).collect())
-        })
     }
 }
 
@@ -113,10 +84,7 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
 }
 
 /// The runs in the lanes of one. A group of fewer than eight repeats its last run in the lanes left over.
-fn side_by_side<const N: usize>(
-    prepared: &[Prepared<N>],
-    table: Option<&Commands<N>>,
-) -> Result<Outcomes<N>, SimulationError> {
+fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>, SimulationError> {
     let lane = |i: usize| &prepared[i.min(prepared.len() - 1)];
     let first = &prepared[0];
     let (schedule, integrator) = (first.schedule, first.integrator());
@@ -133,18 +101,22 @@ fn side_by_side<const N: usize>(
     let effects =
         (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
     let model = Model::new(&setup, link, effects.collect())?;
-    let input = |half_steps: usize| {
-        let mut input = match table {
-            Some(table) => broadcast(&table.0[half_steps]),
-            None => {
-                let time = schedule.half_time(half_steps);
-                pack_input(|i| command(&lane(i).experiment.drive, time))
-            }
-        };
-        add_ripple(&mut input, &setup);
-        input
+    let one_drive = prepared
+        .iter()
+        .all(|p| p.experiment.drive == first.experiment.drive);
+    let mut each: [Vec<Input<f64, N>>; LANES] = Default::default();
+    let drives = if one_drive { 1 } else { LANES };
+    let mut compute = |half_steps: &[usize], out: &mut Vec<Input<Wide, N>>| {
+        for (i, inputs) in each[..drives].iter_mut().enumerate() {
+            inputs.clear();
+            commands(&lane(i).experiment.drive, &schedule, half_steps, inputs);
+        }
+        for at in 0..half_steps.len() {
+            let mut input = pack_input(|i| each[i.min(drives - 1)][at]);
+            add_ripple(&mut input, &setup);
+            out.push(input);
+        }
     };
-
     let mut memory = Memory::<Wide>::new(model.effects.len());
     let mut lane_memory = vec![0.0; model.effects.len()];
     let mut state = State {
@@ -166,30 +138,22 @@ fn side_by_side<const N: usize>(
             }
         };
     sample(0, &state, &memory.state, &stopped);
-    let now = input(0);
-    let mut inputs = Inputs {
-        start: now,
-        middle: now,
-        end: now,
-    };
+    let mut feed = Feed::new(integrator);
     // Where the drive of any lane breaks, every lane makes its own step.
     let mut broken: Vec<usize> = prepared.iter().flat_map(|p| p.breaks.steps()).collect();
     broken.sort_unstable();
     broken.dedup();
     let mut broken = broken.into_iter().peekable();
+    let mut sampled = 0;
     for done in 1..=schedule.steps {
-        inputs.start = inputs.end;
-        inputs.end = input(2 * done);
         if broken.next_if_eq(&done).is_some() {
             step_apart(prepared, done, (&mut state, &mut memory));
         } else {
-            if integrator == Integrator::Rk4 {
-                inputs.middle = input(2 * done - 1);
-            }
             let at = (&mut state, &mut memory);
-            step(&model, integrator, schedule.dt, &inputs, at);
+            let inputs = feed.step(done, &mut compute);
+            step(&model, integrator, schedule.dt, inputs, at);
         }
-        if !finite(&state) {
+        if !state.is_finite() {
             for (i, stop) in stopped.iter_mut().enumerate() {
                 if let (None, Some(joint)) = (&stop, diverged(&lane_state(&state, i))) {
                     *stop = Some(SimulationError::Diverged {
@@ -203,7 +167,8 @@ fn side_by_side<const N: usize>(
                 break;
             }
         }
-        if done % schedule.every == 0 {
+        if done == sampled + schedule.every {
+            sampled = done;
             sample(done, &state, &memory.state, &stopped);
         }
     }
@@ -240,16 +205,6 @@ fn step_apart<const N: usize>(
     }
 }
 
-/// Whether every angle and speed of every lane is finite: zero times anything else is not zero.
-#[inline]
-fn finite<const N: usize>(state: &State<Wide, N>) -> bool {
-    let mut sum = Wide::ZERO;
-    for i in 0..N {
-        sum += Wide::ZERO * state.q[i] + Wide::ZERO * state.qd[i];
-    }
-    sum.every(|s| s == 0.0)
-}
-
 fn pack(value: impl Fn(usize) -> f64) -> Wide {
     Lanes(core::array::from_fn(value))
 }
@@ -278,20 +233,6 @@ fn pack_input<const N: usize>(input: impl Fn(usize) -> Input<f64, N>) -> Input<W
             acceleration: pack_plane(|i| inputs[i].handle.acceleration),
         },
         torque: Joints::from_fn(|j, _| pack(|i| inputs[i].torque[j])),
-    }
-}
-
-/// The same input in every lane.
-fn broadcast<const N: usize>(input: &Input<f64, N>) -> Input<Wide, N> {
-    let plane = |v: Plane<f64>| v.map(Wide::of);
-    Input {
-        time: Wide::of(input.time),
-        handle: Handle {
-            position: plane(input.handle.position),
-            velocity: plane(input.handle.velocity),
-            acceleration: plane(input.handle.acceleration),
-        },
-        torque: Joints::from_fn(|j, _| Wide::of(input.torque[j])),
     }
 }
 

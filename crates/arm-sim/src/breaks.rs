@@ -84,15 +84,20 @@ pub(crate) fn step_in_pieces<const N: usize>(
     let Prepared {
         schedule, model, ..
     } = prepared;
-    let mut make = |h, inputs: Inputs<f64, N>| {
-        step(model, prepared.integrator(), h, &inputs, (state, memory));
+    let mut make = |h, [start, middle, end]: [Input<f64, N>; 3]| {
+        let inputs = Inputs {
+            start: &start,
+            middle: &middle,
+            end: &end,
+        };
+        step(model, prepared.integrator(), h, inputs, (state, memory));
     };
     let (begin, end) = (schedule.time(number - 1), schedule.time(number));
     let touched = prepared.breaks.within(number);
     if touched.is_empty() {
         let middle = prepared.input(schedule.half_time(2 * number - 1));
         let (start, end) = (prepared.input(begin), prepared.input(end));
-        return make(schedule.dt, Inputs { start, middle, end });
+        return make(schedule.dt, [start, middle, end]);
     }
     let inside = touched.iter().map(|b| b.inside).filter(|t| *t < end);
     let mut from = begin;
@@ -101,11 +106,11 @@ pub(crate) fn step_in_pieces<const N: usize>(
         if h < ON_GRID * schedule.dt {
             continue;
         }
-        let inputs = Inputs {
-            start: seen_from(prepared, from, from + INWARD * h),
-            middle: prepared.input(from + 0.5 * h),
-            end: seen_from(prepared, to, to - INWARD * h),
-        };
+        let inputs = [
+            seen_from(prepared, from, from + INWARD * h),
+            prepared.input(from + 0.5 * h),
+            seen_from(prepared, to, to - INWARD * h),
+        ];
         make(h, inputs);
         from = to;
     }

@@ -25,6 +25,7 @@ mod controlled;
 mod digest;
 mod error;
 mod experiment;
+mod feed;
 mod model;
 pub mod models;
 mod movement;

@@ -27,6 +27,10 @@ pub(crate) struct Model<T, const N: usize> {
     pub link: Link<T>,
     /// The joint effects that are switched on.
     pub effects: Vec<Effect<T>>,
+    /// Sums over those that are linear in the motion of their joint: constant, to the angle, to the speed.
+    affine: [[T; 3]; N],
+    /// All again with those switched off; empty where none is left.
+    others: Vec<Effect<T>>,
     /// Whether an effect depends on the force through its joint.
     feels_joint_force: bool,
     /// Whether an effect has a state of its own.
@@ -51,6 +55,18 @@ pub(crate) struct State<T, const N: usize> {
     pub work: [T; 4],
 }
 
+impl<T: Scalar, const N: usize> State<T, N> {
+    /// Whether every angle and speed of every lane is finite: zero times anything else is not zero.
+    #[inline(always)]
+    pub fn is_finite(&self) -> bool {
+        let mut sum = T::ZERO;
+        for i in 0..N {
+            sum += T::ZERO * self.q[i] + T::ZERO * self.qd[i];
+        }
+        sum.every(|s| s == 0.0)
+    }
+}
+
 /// What follows from state and input.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outcome<T, const N: usize> {
@@ -73,7 +89,22 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         link: Link<T>,
         effects: Vec<Effect<T>>,
     ) -> Result<Self, Invalid> {
+        let mut affine = [[T::ZERO; 3]; N];
+        let mut others = effects.clone();
+        for effect in &mut others {
+            if let (Some(terms), Some(sums)) = (effect.affine(), affine.get_mut(effect.index)) {
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    *sum += term;
+                }
+                effect.on = false;
+            }
+        }
+        if others.iter().all(|effect| !effect.on) {
+            others.clear();
+        }
         Ok(Self {
+            affine,
+            others,
             chain: setup.chain()?,
             base: MovingBase::of(setup)?,
             link,
@@ -138,9 +169,23 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 
     /// Sum of what all effects resist with \[N m\].
-    #[inline]
+    #[inline(always)]
     pub fn resisting(&self, motion: &Motion<T, N>, memory: &[T]) -> Joints<T, N> {
-        resisting_torque(&self.effects, motion, memory)
+        let mut total = Joints::<T, N>::repeat(T::ZERO);
+        for i in 0..N {
+            let [constant, to_angle, to_speed] = self.affine[i];
+            total[i] = constant + to_angle * motion.q[i] + to_speed * motion.qd[i];
+        }
+        if !self.others.is_empty() {
+            self.resist_otherwise(motion, memory, &mut total);
+        }
+        total
+    }
+
+    /// Apart, so that the usual case stays small.
+    #[inline(never)]
+    fn resist_otherwise(&self, motion: &Motion<T, N>, memory: &[T], total: &mut Joints<T, N>) {
+        *total = sum(total, &resisting_torque(&self.others, motion, memory));
     }
 
     /// Time derivatives of the effects' own states.
@@ -154,7 +199,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     ///
     /// Friction that depends on the force through its joint changes the motion and so that force: a fixed-point iteration of
     /// [`PASSES`] passes from the motion without it, each of which takes one more order of the friction into account.
-    #[inline]
+    #[inline(always)]
     pub fn evaluate(
         &self,
         input: &Input<T, N>,
@@ -166,31 +211,16 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let mut motion = Motion::new(input.time, *q, *qd);
         let mut resisting = self.resisting(&motion, memory);
         let (mut force, lost) = self.contact(input, q, qd, &pose);
-        let mut qdd = Joints::<T, N>::repeat(T::ZERO);
-        if self.in_link_form() {
-            let mut load = Load {
-                torque: difference(&input.torque, &resisting),
-                force_on_arm: force,
-                moment_on_arm: T::ZERO,
-            };
-            qdd = forward_dynamics(&self.chain, &pose, qd, &load);
-            for _ in 1..self.passes() {
-                motion.joint_force = self.joint_force(&pose, (qd, &qdd), force);
-                resisting = self.resisting(&motion, memory);
-                load.torque = difference(&input.torque, &resisting);
-                qdd = forward_dynamics(&self.chain, &pose, qd, &load);
-            }
+        let qdd = if self.in_link_form() && !self.feels_joint_force {
+            self.forward(&pose, qd, &difference(&input.torque, &resisting), force)
         } else {
-            let terms = Terms::new(&self.chain, self.base.as_ref(), &pose, qd);
-            for pass in 0..self.passes() {
-                if pass > 0 {
-                    motion.joint_force = self.joint_force(&pose, (qd, &qdd), force);
-                    resisting = self.resisting(&motion, memory);
-                }
-                let torque = difference(&input.torque, &resisting);
-                (qdd, force) = self.accelerations(input, &torque, force, &terms);
-            }
-        }
+            self.coupled(
+                input,
+                &pose,
+                &mut motion,
+                (memory, &mut resisting, &mut force),
+            )
+        };
         let v = match &self.link {
             Link::Forced(_) => self.tip_velocity(qd, &pose),
             _ => input.handle.velocity,
@@ -206,6 +236,51 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             power: [force[0] * v[0] + force[1] * v[1], drive, resisted, lost],
             joint_force: motion.joint_force,
         }
+    }
+
+    /// Accelerations where they depend on forces that depend on them; those forces, and the torques that follow them, are
+    /// put in place of what they were. Apart, so that the usual case stays small.
+    #[inline(never)]
+    fn coupled(
+        &self,
+        input: &Input<T, N>,
+        pose: &Pose<T, N>,
+        motion: &mut Motion<T, N>,
+        (memory, resisting, force): (&[T], &mut Joints<T, N>, &mut Plane<T>),
+    ) -> Joints<T, N> {
+        let qd = motion.qd;
+        let terms =
+            (!self.in_link_form()).then(|| Terms::new(&self.chain, self.base.as_ref(), pose, &qd));
+        let mut qdd = Joints::<T, N>::repeat(T::ZERO);
+        for pass in 0..self.passes() {
+            if pass > 0 {
+                motion.joint_force = self.joint_force(pose, (&qd, &qdd), *force);
+                *resisting = self.resisting(motion, memory);
+            }
+            let torque = difference(&input.torque, resisting);
+            match &terms {
+                Some(terms) => (qdd, *force) = self.accelerations(input, &torque, *force, terms),
+                None => qdd = self.forward(pose, &qd, &torque, *force),
+            }
+        }
+        qdd
+    }
+
+    /// Accelerations of an arm in link form under net torques of its joints and a force at its tip.
+    #[inline(always)]
+    fn forward(
+        &self,
+        pose: &Pose<T, N>,
+        qd: &Joints<T, N>,
+        torque: &Joints<T, N>,
+        force_on_arm: Plane<T>,
+    ) -> Joints<T, N> {
+        let load = Load {
+            torque: *torque,
+            force_on_arm,
+            moment_on_arm: T::ZERO,
+        };
+        forward_dynamics(&self.chain, pose, qd, &load)
     }
 
     /// Evaluations of the dynamics for one state.
@@ -235,7 +310,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 
     /// Force of a compliant contact on the arm, and the power lost in its damping.
-    #[inline]
+    #[inline(always)]
     pub fn contact(
         &self,
         input: &Input<T, N>,
@@ -252,10 +327,9 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let handle = &input.handle;
         let gap = [handle.position[0] - at[0], handle.position[1] - at[1]];
         let rate = [handle.velocity[0] - v[0], handle.velocity[1] - v[1]];
-        let force = contact.force_on_arm(gap, rate);
-        let spring = contact.force_on_arm(gap, [T::ZERO; 2]);
-        let lost = (force[0] - spring[0]) * rate[0] + (force[1] - spring[1]) * rate[1];
-        (force, lost)
+        let [spring, damper] = contact.spring_and_damper(gap, rate);
+        let force = [spring[0] + damper[0], spring[1] + damper[1]];
+        (force, damper[0] * rate[0] + damper[1] * rate[1])
     }
 
     /// Accelerations and the force on the arm, which for a rigid coupling follows from the constraint.

@@ -152,25 +152,70 @@ impl<const N: usize> Movement<N> {
     /// The motion at a time \[s\].
     #[inline]
     pub fn at(&self, time: f64) -> JointMotion<N> {
-        let part = self.parts.partition_point(|(start, _)| *start <= time);
         let mut motion = JointMotion {
-            q: self.waypoints[part.saturating_sub(1)],
+            q: self.waypoints[0],
             qd: Joints::zeros(),
             qdd: Joints::zeros(),
         };
-        let Some((start, profile)) = part.checked_sub(1).and_then(|p| self.parts.get(p)) else {
-            return motion;
-        };
-        let s = profile.at(time - start);
-        let [from, to] = [&self.waypoints[part - 1], &self.waypoints[part]];
-        let left = 1.0 - s.position;
-        for i in 0..N {
-            let way = to[i] - from[i];
-            // A weighted mean: exact in both waypoints.
-            motion.q[i] = left * from[i] + s.position * to[i];
-            motion.qd[i] = s.velocity * way;
-            motion.qdd[i] = s.acceleration * way;
+        if let Some(way) = self.way(&[time]) {
+            for i in 0..N {
+                [motion.q[i], motion.qd[i], motion.qdd[i]] = way.joint(i, 0);
+            }
         }
         motion
+    }
+
+    /// How far on which way it is at increasing times \[s\], where all of them are on the same one, as a single time is.
+    #[inline(always)]
+    pub(crate) fn way<const P: usize>(&self, times: &[f64; P]) -> Option<Way<'_, P, N>> {
+        // Before the first part it is at that part's start.
+        let begun = |time: f64| {
+            self.parts
+                .partition_point(|(start, _)| *start <= time)
+                .max(1)
+        };
+        let to = begun(times[0]);
+        if begun(times[P - 1]) != to {
+            return None;
+        }
+        let mut way = Way {
+            fraction: [[0.0; P]; 3],
+            from: &self.waypoints[to - 1],
+            to: self.waypoints.get(to).unwrap_or(&self.waypoints[0]),
+        };
+        if let Some((start, profile)) = self.parts.get(to - 1) {
+            let [position, velocity, acceleration] = &mut way.fraction;
+            for i in 0..P {
+                let s = profile.at(times[i] - start);
+                position[i] = s.position;
+                velocity[i] = s.velocity;
+                acceleration[i] = s.acceleration;
+            }
+        }
+        Some(way)
+    }
+}
+
+/// A way from one waypoint to the next at some times.
+pub(crate) struct Way<'a, const P: usize, const N: usize> {
+    /// The fraction of it that is behind, and its derivatives.
+    fraction: [[f64; P]; 3],
+    from: &'a Joints<f64, N>,
+    to: &'a Joints<f64, N>,
+}
+
+impl<const P: usize, const N: usize> Way<'_, P, N> {
+    /// Angle, speed and acceleration of a joint at one of the times.
+    #[inline(always)]
+    pub fn joint(&self, joint: usize, time: usize) -> [f64; 3] {
+        let [position, velocity, acceleration] = self.fraction.each_ref().map(|of| of[time]);
+        let (from, to) = (self.from[joint], self.to[joint]);
+        let way = to - from;
+        // A weighted mean: exact in both waypoints.
+        [
+            (1.0 - position) * from + position * to,
+            velocity * way,
+            acceleration * way,
+        ]
     }
 }

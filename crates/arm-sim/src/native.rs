@@ -1,11 +1,12 @@
 //! The native engine: minimal coordinates, one run at a time.
 
 use crate::breaks::step_in_pieces;
+use crate::feed::Feed;
 use crate::model::State;
 use crate::prepare::Prepared;
 use crate::recorder::Recorder;
-use crate::step::{Inputs, Memory, step};
-use crate::{Experiment, Integrator, Partial, SimulationError};
+use crate::step::{Memory, step};
+use crate::{Experiment, Partial, SimulationError};
 
 /// Runs an experiment; the loop does not allocate.
 pub(crate) fn run<const N: usize>(
@@ -21,27 +22,24 @@ pub(crate) fn run<const N: usize>(
         work: [0.0; 4],
     };
     recorder.push(0, &state, &memory.state);
-    let now = prepared.input(0.0);
-    let mut inputs = Inputs {
-        start: now,
-        middle: now,
-        end: now,
-    };
+    let mut feed = Feed::new(prepared.integrator());
     let mut stopped = None;
     let mut broken = prepared.breaks.steps().peekable();
+    let mut sampled = 0;
     for done in 1..=schedule.steps {
-        inputs.start = inputs.end;
-        inputs.end = prepared.input(schedule.time(done));
         let at = (&mut state, &mut memory);
         if broken.next_if_eq(&done).is_some() {
             while broken.next_if_eq(&done).is_some() {}
             step_in_pieces(&prepared, done, at);
         } else {
-            if prepared.integrator() == Integrator::Rk4 {
-                inputs.middle = prepared.input(schedule.half_time(2 * done - 1));
-            }
-            let integrator = prepared.integrator();
-            step(&prepared.model, integrator, schedule.dt, &inputs, at);
+            let inputs = feed.step(done, |half_steps, out| prepared.inputs(half_steps, out));
+            step(
+                &prepared.model,
+                prepared.integrator(),
+                schedule.dt,
+                inputs,
+                at,
+            );
         }
         if let Some(joint) = diverged(&state) {
             stopped = Some(SimulationError::Diverged {
@@ -51,7 +49,8 @@ pub(crate) fn run<const N: usize>(
             });
             break;
         }
-        if done % schedule.every == 0 {
+        if done == sampled + schedule.every {
+            sampled = done;
             recorder.push(done, &state, &memory.state);
         }
     }
@@ -64,5 +63,8 @@ pub(crate) fn run<const N: usize>(
 /// The first joint whose angle or speed is not finite.
 #[inline]
 pub(crate) fn diverged<const N: usize>(state: &State<f64, N>) -> Option<usize> {
+    if state.is_finite() {
+        return None;
+    }
     (0..N).find(|&i| !(state.q[i].is_finite() && state.qd[i].is_finite()))
 }

@@ -1,7 +1,10 @@
 //! Where the robot's handle is at any time.
 
-use arm_core::{Chain, Plane, Robot, Scalar};
+use core::array::from_fn;
 
+use arm_core::{Chain, Plane, Robot, sines_and_cosines};
+
+use crate::movement::Way;
 use crate::{Interpolation, Jet, JointMotion, Movement, Series, SimulationError};
 
 /// Motion of the handle at one instant.
@@ -120,7 +123,10 @@ impl<const N: usize> HandlePath<N> {
                     acceleration: jet.curvature,
                 }
             }
-            Source::Arm(arm, movement) => tip_motion(arm, &movement.at(time)),
+            Source::Arm(..) => {
+                let [handle] = self.abreast(&[time]);
+                handle
+            }
             Source::Robot(robot, series) => {
                 let JointMotion { q, qd, qdd } = joints(series.at(time));
                 Handle {
@@ -129,6 +135,17 @@ impl<const N: usize> HandlePath<N> {
                     acceleration: robot.handle_acceleration(&q, &qd, &qdd),
                 }
             }
+        }
+    }
+
+    /// [`HandlePath::at`] for several increasing times at once; the same bits.
+    pub(crate) fn abreast<const P: usize>(&self, times: &[f64; P]) -> [Handle<f64>; P] {
+        match &self.source {
+            Source::Arm(arm, movement) => match movement.way(times) {
+                Some(way) => tip_motion(arm, &way),
+                None => times.map(|time| self.at(time)),
+            },
+            _ => times.map(|time| self.at(time)),
         }
     }
 
@@ -170,28 +187,38 @@ fn joints(jet: Jet<2>) -> JointMotion<2> {
     }
 }
 
-/// Position, velocity and acceleration of an arm's tip: the sums over its links.
+/// Position, velocity and acceleration of an arm's tip at some times: the sums over its links, each for all times.
 #[inline]
-fn tip_motion<const N: usize>(arm: &Chain<f64, N>, motion: &JointMotion<N>) -> Handle<f64> {
-    let mut handle = Handle {
-        position: arm.base(),
-        velocity: [0.0; 2],
-        acceleration: [0.0; 2],
-    };
-    let (mut angle, mut speed, mut acceleration) = (0.0, 0.0, 0.0);
-    for (i, segment) in arm.segments().iter().enumerate() {
-        angle += motion.q[i];
-        speed += motion.qd[i];
-        acceleration += motion.qdd[i];
-        let (sin, cos) = Scalar::sin_cos(angle);
-        let [y, z] = [segment.length * cos, segment.length * sin];
-        let inward = speed * speed;
-        handle.position[0] += y;
-        handle.position[1] += z;
-        handle.velocity[0] -= speed * z;
-        handle.velocity[1] += speed * y;
-        handle.acceleration[0] -= acceleration * z + inward * y;
-        handle.acceleration[1] += acceleration * y - inward * z;
+fn tip_motion<const P: usize, const N: usize>(
+    arm: &Chain<f64, N>,
+    way: &Way<'_, P, N>,
+) -> [Handle<f64>; P] {
+    let [mut angle, mut speed, mut acceleration] = [[0.0; P]; 3];
+    let mut sums = [[0.0; P]; 6];
+    let [y0, z0] = arm.base();
+    (sums[0], sums[1]) = ([y0; P], [z0; P]);
+    for (joint, segment) in arm.segments().iter().enumerate() {
+        for t in 0..P {
+            let [q, qd, qdd] = way.joint(joint, t);
+            angle[t] += q;
+            speed[t] += qd;
+            acceleration[t] += qdd;
+        }
+        let [sin, cos] = sines_and_cosines(&angle);
+        for t in 0..P {
+            let [y, z] = [segment.length * cos[t], segment.length * sin[t]];
+            let inward = speed[t] * speed[t];
+            sums[0][t] += y;
+            sums[1][t] += z;
+            sums[2][t] -= speed[t] * z;
+            sums[3][t] += speed[t] * y;
+            sums[4][t] -= acceleration[t] * z + inward * y;
+            sums[5][t] += acceleration[t] * y - inward * z;
+        }
     }
-    handle
+    from_fn(|t| Handle {
+        position: [sums[0][t], sums[1][t]],
+        velocity: [sums[2][t], sums[3][t]],
+        acceleration: [sums[4][t], sums[5][t]],
+    })
 }

@@ -137,6 +137,15 @@ impl<'a, const N: usize> Prepared<'a, N> {
         input
     }
 
+    /// [`Prepared::input`] after each of some numbers of half steps, appended to `out`.
+    pub fn inputs(&self, half_steps: &[usize], out: &mut Vec<Input<f64, N>>) {
+        let from = out.len();
+        commands(&self.experiment.drive, &self.schedule, half_steps, out);
+        for input in &mut out[from..] {
+            add_ripple(input, &self.setup);
+        }
+    }
+
     pub fn integrator(&self) -> Integrator {
         self.experiment.integrator
     }
@@ -149,20 +158,52 @@ impl<'a, const N: usize> Prepared<'a, N> {
 /// What the drive commands at a time, without ripple.
 #[inline]
 pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64, N> {
-    let still = Handle {
-        position: [0.0; 2],
-        velocity: [0.0; 2],
-        acceleration: [0.0; 2],
-    };
-    let (handle, torque) = match drive {
-        Drive::Handle { path, .. } => (path.at(time), Joints::zeros()),
-        Drive::Torque(Some(series)) => (still, Joints::from(series.at(time).value)),
-        Drive::Torque(None) => (still, Joints::zeros()),
-    };
-    Input {
+    let mut input = Input {
         time,
-        handle,
-        torque,
+        handle: Handle {
+            position: [0.0; 2],
+            velocity: [0.0; 2],
+            acceleration: [0.0; 2],
+        },
+        torque: Joints::zeros(),
+    };
+    match drive {
+        Drive::Handle { path, .. } => input.handle = path.at(time),
+        Drive::Torque(Some(series)) => input.torque = series.at(time).value.into(),
+        Drive::Torque(None) => {}
+    }
+    input
+}
+
+/// Points of time whose commands are computed side by side.
+const ABREAST: usize = 16;
+
+/// [`command`] after each of some numbers of half steps, appended to `out`; the same bits.
+pub(crate) fn commands<const N: usize>(
+    drive: &Drive<N>,
+    schedule: &Schedule,
+    half_steps: &[usize],
+    out: &mut Vec<Input<f64, N>>,
+) {
+    let times = half_steps.iter().map(|&half| schedule.half_time(half));
+    let Drive::Handle { path, .. } = drive else {
+        out.extend(times.map(|time| command(drive, time)));
+        return;
+    };
+    let torque = Joints::zeros();
+    let mut group = [0.0; ABREAST];
+    for halves in half_steps.chunks(ABREAST) {
+        for (i, time) in group.iter_mut().enumerate() {
+            // A last group that is not full repeats its end.
+            *time = schedule.half_time(halves[i.min(halves.len() - 1)]);
+        }
+        let handles = path.abreast(&group);
+        let inputs = group.iter().zip(handles).take(halves.len());
+        out.extend(inputs.map(|(&time, handle)| Input {
+            time,
+            handle,
+            torque,
+        }));
     }
 }
 

@@ -12,10 +12,11 @@ const PROJECTIONS: usize = 2;
 
 /// What drives the arm in a step: at its start, its middle and its end.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Inputs<T, const N: usize> {
-    pub start: Input<T, N>,
-    pub middle: Input<T, N>,
-    pub end: Input<T, N>,
+pub(crate) struct Inputs<'a, T, const N: usize> {
+    pub start: &'a Input<T, N>,
+    /// Not looked at by semi-implicit Euler.
+    pub middle: &'a Input<T, N>,
+    pub end: &'a Input<T, N>,
 }
 
 /// States of the effects, and room for those of the stages.
@@ -40,12 +41,12 @@ impl<T: Scalar> Memory<T> {
 }
 
 /// Advances a state by one step of length `h`.
-#[inline]
+#[inline(always)]
 pub(crate) fn step<T: Scalar, const N: usize>(
     model: &Model<T, N>,
     integrator: Integrator,
     h: f64,
-    inputs: &Inputs<T, N>,
+    inputs: Inputs<T, N>,
     (state, memory): (&mut State<T, N>, &mut Memory<T>),
 ) {
     match integrator {
@@ -53,22 +54,22 @@ pub(crate) fn step<T: Scalar, const N: usize>(
         Integrator::Rk4 => rk4(model, h, inputs, state, memory),
     }
     if matches!(model.link, Link::Rigid) {
-        model.project(&inputs.end, state, PROJECTIONS);
+        model.project(inputs.end, state, PROJECTIONS);
     }
 }
 
-#[inline]
+#[inline(always)]
 fn semi_implicit_euler<T: Scalar, const N: usize>(
     model: &Model<T, N>,
     h: f64,
-    inputs: &Inputs<T, N>,
+    inputs: Inputs<T, N>,
     state: &mut State<T, N>,
     memory: &mut Memory<T>,
 ) {
     let h = T::of(h);
-    let now = model.evaluate(&inputs.start, &state.q, &state.qd, &memory.state);
+    let now = model.evaluate(inputs.start, &state.q, &state.qd, &memory.state);
     if model.has_memory {
-        let motion = motion(&inputs.start, &state.q, &state.qd, &now);
+        let motion = motion(inputs.start, &state.q, &state.qd, &now);
         model.memory_rates(&motion, &memory.state, &mut memory.rate);
         for (m, rate) in memory.state.iter_mut().zip(&memory.rate) {
             *m += h * *rate;
@@ -86,15 +87,15 @@ fn semi_implicit_euler<T: Scalar, const N: usize>(
 fn rk4<T: Scalar, const N: usize>(
     model: &Model<T, N>,
     h: f64,
-    inputs: &Inputs<T, N>,
+    inputs: Inputs<T, N>,
     state: &mut State<T, N>,
     memory: &mut Memory<T>,
 ) {
     let stages = [
-        (&inputs.start, 0.0, 1.0),
-        (&inputs.middle, 0.5 * h, 2.0),
-        (&inputs.middle, 0.5 * h, 2.0),
-        (&inputs.end, h, 1.0),
+        (inputs.start, 0.0, 1.0),
+        (inputs.middle, 0.5 * h, 2.0),
+        (inputs.middle, 0.5 * h, 2.0),
+        (inputs.end, h, 1.0),
     ];
     let zero = Joints::<T, N>::repeat(T::ZERO);
     // Slopes of the stage before, and the weighted sums of all.

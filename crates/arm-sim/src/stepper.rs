@@ -305,20 +305,19 @@ impl<const N: usize> Stepper<N> {
             let time = from + 0.5 * (first + half) as f64 * h;
             input(setup, outside, (time, 0.5 * half as f64 * h))
         };
-        let now = input_at(0);
-        let mut inputs = Inputs {
-            start: now,
-            middle: now,
-            end: now,
-        };
+        let mut next = input_at(0);
         for done in 1..=count {
-            inputs.start = inputs.end;
-            inputs.middle = input_at(2 * done - 1);
-            inputs.end = input_at(2 * done);
+            let start = next;
+            next = input_at(2 * done);
+            let inputs = Inputs {
+                start: &start,
+                middle: &input_at(2 * done - 1),
+                end: &next,
+            };
             let at = (&mut self.state, &mut self.memory);
-            step(&self.model, Integrator::Rk4, h, &inputs, at);
+            step(&self.model, Integrator::Rk4, h, inputs, at);
             if let Some(joint) = diverged(&self.state) {
-                let time = inputs.end.time;
+                let time = next.time;
                 self.undo();
                 return Err(SimulationError::Diverged {
                     step: done as usize,

@@ -20,6 +20,10 @@ impl Law for ConstantMoment {
         p[0]
     }
 
+    fn affine<T: Scalar>(p: &Parameters<T>) -> Option<[T; 3]> {
+        Some([p[0], T::ZERO, T::ZERO])
+    }
+
     fn gradient<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> Parameters<T> {
         leading([T::ONE])
     }

@@ -27,6 +27,10 @@ impl Law for Elastic {
         p[0] * (at.q - p[1])
     }
 
+    fn affine<T: Scalar>(p: &Parameters<T>) -> Option<[T; 3]> {
+        Some([-(p[0] * p[1]), p[0], T::ZERO])
+    }
+
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
         leading([at.q - p[1], -p[0]])
     }

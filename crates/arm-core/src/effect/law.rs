@@ -159,6 +159,11 @@ pub trait Law {
     fn torque<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
         T::ZERO
     }
+    /// `[constant, to the angle, to the speed]` of a torque that is no more than a linear function of its joint's motion; a
+    /// simulation adds those of one joint up before it starts. Nothing for other laws.
+    fn affine<T: Scalar>(_p: &Parameters<T>) -> Option<[T; 3]> {
+        None
+    }
     /// Derivatives to the parameters of the torque that the motion needs at the joint: of [`Law::torque`], and for a kind
     /// that alters the rig in one joint, of what inverse dynamics gains there. A state of its own counts as given.
     fn gradient<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> Parameters<T> {

@@ -70,6 +70,11 @@ macro_rules! catalogue {
                     Kind::Own(own) => own.torque(&self.parameters, at),
                 }
             }
+            /// `[constant, to the angle, to the speed]` of the torque, where it is no more than that.
+            pub fn affine(&self) -> Option<[T; 3]> {
+                if !self.on { return None; }
+                match self.kind { $(Kind::$law => $module::$law::affine(&self.parameters),)* Kind::Own(_) => None }
+            }
             /// Derivatives of [`Effect::torque`] to the parameters.
             #[inline]
             pub fn gradient(&self, at: &Local<T>) -> Parameters<T> {

@@ -20,6 +20,10 @@ impl Law for Viscous {
         p[0] * at.qd
     }
 
+    fn affine<T: Scalar>(p: &Parameters<T>) -> Option<[T; 3]> {
+        Some([T::ZERO, T::ZERO, p[0]])
+    }
+
     fn gradient<T: Scalar>(_p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
         leading([at.qd])
     }
