@@ -55,17 +55,19 @@ static inline void handle_at(double time, double duration, double out[2]) {
     }
 }
 
-// Repeats `call` for about a fifth of a second of processor time and gives the time of one, after one that does not count.
-#define SECONDS_OF(result, call)                                     \
-    do {                                                             \
-        call;                                                        \
-        long repeats_ = 0;                                           \
-        const double start_ = cpu_seconds();                         \
-        double now_;                                                 \
-        do {                                                         \
-            call;                                                    \
-            ++repeats_;                                              \
-            now_ = cpu_seconds();                                    \
-        } while (now_ - start_ < 0.1);                               \
-        (result) = (now_ - start_) / (double)repeats_;               \
+// Repeats `call` for about a tenth of a second of processor time and gives the time of one, after one that does not count. A look at the clock costs
+// as much as some kernels: one for many calls where they are short.
+#define SECONDS_OF(result, call)                                 \
+    do {                                                         \
+        call;                                                    \
+        long calls_ = 0, between_ = 1;                           \
+        const double start_ = cpu_seconds();                     \
+        double passed_;                                          \
+        do {                                                     \
+            for (long i_ = 0; i_ < between_; ++i_) call;         \
+            calls_ += between_;                                  \
+            passed_ = cpu_seconds() - start_;                    \
+            if (passed_ < 0.01) between_ *= 2;                   \
+        } while (passed_ < 0.1);                                 \
+        (result) = passed_ / (double)calls_;                     \
     } while (0)
