@@ -11,7 +11,7 @@ use arm_sim::SimulationError;
 use crate::GapError;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::predict::{Channels, Course, difference, smooth};
-use crate::response::Linear;
+use crate::response::{ASTRAY, Linear};
 use crate::rows::Rows;
 use crate::session::Sight;
 use crate::study::Study;
@@ -50,13 +50,6 @@ pub struct Anchor<'a, const N: usize> {
     /// Rows of the nuisances.
     pub rows: Rows,
 }
-
-/// The refusal of a hypothesis that the arm cannot follow.
-const ASTRAY: SimulationError = SimulationError::Setting {
-    name: "distance from a simulated run",
-    found: f64::NAN,
-    allowed: "a hypothesis that can be followed from there",
-};
 
 impl<'a, const N: usize> Study<'a, N> {
     /// Simulates a hypothesis, and linearises around it.
@@ -125,7 +118,7 @@ impl<'a, const N: usize> Study<'a, N> {
         (group, course): (usize, &Course<N>),
     ) -> Result<Channels, SimulationError> {
         match anchor.lines.get(group) {
-            Some(line) => line.play(hypothesis, course).ok_or(ASTRAY),
+            Some(line) => line.play(hypothesis, course),
             None => self.session.torques(hypothesis, course),
         }
     }
@@ -184,7 +177,6 @@ impl<'a, const N: usize> Study<'a, N> {
                 Some(line) => {
                     let reach = (change.sensing, change.moves_handle);
                     line.response(&change.changed, change.size, reach)
-                        .ok_or(ASTRAY)
                 }
                 None => self
                     .follow(anchor, &change.changed, (group, &self.courses[trial]))

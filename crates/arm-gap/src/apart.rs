@@ -88,7 +88,7 @@ impl<const N: usize> Study<'_, N> {
                     .map(|(residual, &trial)| self.closure(residual, trial))
                     .collect();
                 let all: Vec<&Channels> = closures.iter().collect();
-                line(&all, rate, SLOWEST_RIPPLE).filter(|f| *f < FASTEST_RIPPLE)
+                line(&all, rate, SLOWEST_RIPPLE)
             }
         };
         let Some(frequency) = found else {
@@ -106,9 +106,13 @@ impl<const N: usize> Study<'_, N> {
         }
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut list = best.into_iter();
+        // The steps of encoders sound in the springs of the contact: what looks like a fast ripple is that.
+        let sounds = |e: &Explained| {
+            e.effect.kind.probe().nature == Nature::Periodic && frequency >= FASTEST_RIPPLE
+        };
         let Some((most, first)) = list
             .next()
-            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN)
+            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && !sounds(e))
         else {
             return Ok(None);
         };
@@ -191,7 +195,7 @@ impl<const N: usize> Study<'_, N> {
                     let size = sizes[2 * k + usize::from(quarter)];
                     let mut changed = anchor.hypothesis.clone();
                     changed.named.push(small(column, apart.wave()[0], quarter));
-                    let Some(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
+                    let Ok(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
                         continue;
                     };
                     for (channel, swing) in course.raw.iter_mut().zip(&swing) {
@@ -261,7 +265,7 @@ impl<const N: usize> Study<'_, N> {
                 .map(|effect| {
                     let mut changed = anchor.hypothesis.clone();
                     changed.named.push(small(effect, frequency, false));
-                    let response = line.response_raw(&changed, UNIT, (false, false))?;
+                    let response = line.response_raw(&changed, UNIT, (false, false)).ok()?;
                     let swings = response.iter().map(|c| coefficient(c, frequency, rate));
                     Some(swings.collect())
                 })
@@ -500,7 +504,7 @@ impl<const N: usize> Study<'_, N> {
         let answered = self.parallel(bursts.len(), |i| {
             let mut changed = anchor.hypothesis.clone();
             changed.named.push(bursts[i]);
-            line.response(&changed, UNIT, (false, false))
+            line.response(&changed, UNIT, (false, false)).ok()
         });
         let mut list: Vec<(Effect<f64>, Channels)> = std::iter::zip(bursts, answered)
             .filter_map(|(effect, response)| Some((effect, response?)))
@@ -533,6 +537,15 @@ impl Apart {
     /// Frequency \[Hz\] and phase \[rad\] of a rhythm.
     pub fn wave(&self) -> [f64; 2] {
         shapes_of(self.effect.kind).map(|p| self.effect.parameters[p])
+    }
+
+    /// Whether another is the same rhythm.
+    pub fn is_like(&self, other: &Self) -> bool {
+        /// Difference of two frequencies that are one \[Hz\].
+        const NEAR: f64 = 0.3;
+        let (a, b) = (&self.effect, &other.effect);
+        let same = a.kind == b.kind && a.index == b.index && self.trial == other.trial;
+        same && (self.wave()[0] - other.wave()[0]).abs() < NEAR
     }
 
     /// From when to when it lasts \[s\].

@@ -34,8 +34,11 @@ pub struct Candidate {
     pub tried: usize,
     /// Change of the free parameters with which responses are taken.
     pub step: f64,
-    /// What it must earn to be named, in units of twice the log-likelihood; zero before a scan has set it.
+    /// What it must earn to be named where scores scatter as the noise tells, in units of twice the log-likelihood; zero
+    /// before a scan has set it.
     pub price: f64,
+    /// How much more its score scatters between repeats than the noise tells.
+    pub spread: f64,
 }
 
 impl Candidate {
@@ -47,6 +50,11 @@ impl Candidate {
     /// Number of columns.
     pub fn width(&self) -> usize {
         self.free.len() + usize::from(self.rest.is_some())
+    }
+
+    /// Number of shapes that a fit refines: of two explanations that are as good, the one with fewer is meant.
+    pub fn shapes(&self) -> f64 {
+        (usize::from(self.rest.is_some()) + self.refined.len()) as f64
     }
 
     /// Whether it is about the same kind at the same place.
@@ -122,6 +130,7 @@ impl Candidate {
             tried: 1,
             step: question.step,
             price: 0.0,
+            spread: 1.0,
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(&motions(study, anchor), &candidate)?;
@@ -377,6 +386,7 @@ fn ask<const N: usize>(
             tried,
             step: question.step,
             price: 0.0,
+            spread: 1.0,
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(movements, &candidate)?;
@@ -386,7 +396,8 @@ fn ask<const N: usize>(
     shapes.into_iter().filter_map(candidate).collect()
 }
 
-/// The amplitude with which the effect's torque is a small share of what its joint carries; `None` where it has none.
+/// The amplitude with which the effect's torque is a small share of what its joint carries, or the largest that the kind
+/// allows; `None` where it has none.
 fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate) -> Option<f64> {
     const LEAST: f64 = 1e-6;
     let joint = candidate.effect.index;
@@ -406,5 +417,7 @@ fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate)
         let size = libm::sqrt(square / movement.motion.len().max(1) as f64);
         largest = f64::max(largest, size / movement.torque[joint]);
     }
-    (largest > LEAST).then(|| SHARE / largest)
+    // A slow movement hardly feels what grows with speed: no step beyond what the parameter may be.
+    let info = &candidate.effect.kind.info().parameters[candidate.free[0]];
+    (largest > LEAST).then(|| f64::min(SHARE / largest, 0.5 * info.max))
 }

@@ -127,18 +127,8 @@ impl<'a, const N: usize> Study<'a, N> {
         for _ in 0..STEPS {
             let hypothesis = &fitted.hypothesis;
             let (coordinates, clusters) = self.equations(anchor, &fitted, &[])?;
-            let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
-            let usable: Vec<usize> = (0..coordinates.len())
-                .filter(|&i| normal.gram[(i, i)] > 0.0)
-                .collect();
-            regularise(&mut normal.gram, hypothesis, &coordinates);
-            let bounds = |i: usize| {
-                let c = &coordinates[usable[i]];
-                let value = hypothesis.get(c.target);
-                (c.lower - value, c.upper - value)
-            };
             // Where nothing decides an unknown, what was found so far stands.
-            let Some((step, _)) = solve(&normal.gram, &normal.score, &usable, &bounds) else {
+            let Some((usable, step)) = stepped(&clusters, hypothesis, &coordinates) else {
                 break;
             };
             let moves: Vec<(Coordinate, f64)> = std::iter::zip(&usable, step)
@@ -183,7 +173,6 @@ impl<'a, const N: usize> Study<'a, N> {
     pub fn foretold(&self, anchor: &Anchor<N>, fitted: &Fitted<N>) -> Result<f64, GapError> {
         let hypothesis = &fitted.hypothesis;
         let (coordinates, clusters) = self.equations(anchor, fitted, &[])?;
-        let known = priors(hypothesis, &coordinates);
         let mut sum = 0.0;
         for (out, cluster) in clusters.iter().enumerate() {
             let others: Vec<Cluster> = clusters
@@ -192,18 +181,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 .filter(|(i, _)| *i != out)
                 .map(|(_, c)| c.clone())
                 .collect();
-            let mut normal = Normal::new(&others, &known);
-            let usable: Vec<usize> = (0..coordinates.len())
-                .filter(|&i| normal.gram[(i, i)] > 0.0)
-                .collect();
-            regularise(&mut normal.gram, hypothesis, &coordinates);
-            let bounds = |i: usize| {
-                let c = &coordinates[usable[i]];
-                let value = hypothesis.get(c.target);
-                (c.lower - value, c.upper - value)
-            };
-            let steps = solve(&normal.gram, &normal.score, &usable, &bounds);
-            let steps = steps.map_or(vec![0.0; usable.len()], |(steps, _)| steps);
+            let (usable, steps) = stepped(&others, hypothesis, &coordinates).unwrap_or_default();
             sum += cluster.square;
             for (&i, a) in usable.iter().zip(&steps) {
                 let row = usable.iter().zip(&steps);
@@ -244,6 +222,27 @@ impl<'a, const N: usize> Study<'a, N> {
         }
         Ok((before, anchor))
     }
+}
+
+/// The unknowns that the equations decide anything about, and the step of each that lowers the cost most within its bounds;
+/// `None` where they are singular.
+fn stepped<const N: usize>(
+    clusters: &[Cluster],
+    hypothesis: &Hypothesis<N>,
+    coordinates: &[Coordinate],
+) -> Option<(Vec<usize>, Vec<f64>)> {
+    let mut normal = Normal::new(clusters, &priors(hypothesis, coordinates));
+    let usable: Vec<usize> = (0..coordinates.len())
+        .filter(|&i| normal.gram[(i, i)] > 0.0)
+        .collect();
+    regularise(&mut normal.gram, hypothesis, coordinates);
+    let bounds = |i: usize| {
+        let c = &coordinates[usable[i]];
+        let value = hypothesis.get(c.target);
+        (c.lower - value, c.upper - value)
+    };
+    let (steps, _) = solve(&normal.gram, &normal.score, &usable, &bounds)?;
+    Some((usable, steps))
 }
 
 /// Shapes that the data hardly decide move no further than their own size in one step.

@@ -55,7 +55,8 @@ pub fn lack_of_fit<const N: usize>(
             .collect();
         let n = rows.len() as f64;
         let size = rows[0].len();
-        let free = (size - columns.len().min(size)) as f64;
+        let told: usize = stretches.told(study.session.channels()).iter().sum();
+        let free = told.saturating_sub(columns.len()) as f64;
         for i in 0..size {
             let mean = rows.iter().map(|r| r[i]).sum::<f64>() / n;
             common += n * mean * mean;

@@ -5,91 +5,16 @@
 //! fit takes their place: what the model lacks is in it too, so that less is seen, not more.
 
 use arm_ident::coloured::{AutoRegression, Whitener, effective_samples};
-use arm_ident::trial::Trial;
 
 use crate::GapError;
-use crate::predict::{Channels, Course, away_from_gaps, margin};
+use crate::predict::Channels;
+use crate::stretches::Stretches;
 
-/// Samples kept for each period of the cutoff.
-const SAMPLES_PER_PERIOD: f64 = 2.5;
-/// Periods of the cutoff that are dropped next to rest where dry friction holds a joint.
-const NEAR_REST: f64 = 0.6;
-/// Fewest samples in a stretch that is used.
-const SHORTEST: usize = 8;
 /// Highest order of the autoregressions.
 const ORDER: usize = 4;
 /// White noise of this share of a channel's range is always believed in: the path between samples, quantisation and the
 /// model's own simplifications are no better, however smooth the noise of the sensors is.
 const LEAST: f64 = 5e-4;
-
-/// The samples of a trial that are compared: stretches without a gap, thinned to the common band.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Stretches(pub Vec<Vec<usize>>);
-
-impl Stretches {
-    /// Of one trial.
-    ///
-    /// * `resting` - samples that are left out: at which a joint with dry friction rests, so that what holds it is not known,
-    ///   or that were disturbed
-    pub fn of<const N: usize>(trial: &Trial<N>, course: &Course<N>, resting: &[bool]) -> Self {
-        let step = ((course.rate / (SAMPLES_PER_PERIOD * course.band)) as usize).max(1);
-        let sound = away_from_gaps(&trial.valid, margin(course.rate, course.band));
-        let near = ((NEAR_REST * course.rate / course.band) as usize).max(1);
-        let n = trial.len();
-        let around = |i: usize, reach: usize| i.saturating_sub(reach)..(i + reach + 1).min(n);
-        let usable = |i: usize| sound[i] && !around(i, near).any(|k| resting.get(k) == Some(&true));
-        // On one grid for all trials, so that repeats have the same samples.
-        let mut all = Vec::new();
-        let mut current = Vec::new();
-        for i in (0..n).step_by(step) {
-            if usable(i) {
-                current.push(i);
-            } else if !current.is_empty() {
-                all.push(core::mem::take(&mut current));
-            }
-        }
-        all.push(current);
-        all.retain(|stretch| stretch.len() >= SHORTEST);
-        Self(all)
-    }
-
-    /// Number of samples.
-    pub fn len(&self) -> usize {
-        self.0.iter().map(Vec::len).sum()
-    }
-
-    /// Whether nothing is left.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// Parts of the same number of samples, in order; the last may be shorter.
-    pub fn parts(&self, count: usize) -> Vec<Self> {
-        let size = self.len().div_ceil(count.max(1)).max(1);
-        let mut parts: Vec<Self> = Vec::new();
-        let mut seen = 0;
-        for stretch in &self.0 {
-            let mut rest = stretch.as_slice();
-            while !rest.is_empty() {
-                if seen % size == 0 {
-                    parts.push(Self(Vec::new()));
-                }
-                let (head, tail) = rest.split_at((size - seen % size).min(rest.len()));
-                if let Some(Self(part)) = parts.last_mut() {
-                    part.push(head.to_vec());
-                }
-                (seen, rest) = (seen + head.len(), tail);
-            }
-        }
-        parts
-    }
-
-    /// The values of one channel at the samples, stretch by stretch.
-    pub fn pick(&self, channel: &[f64]) -> Vec<Vec<f64>> {
-        let at = |s: &Vec<usize>| s.iter().map(|&i| channel[i]).collect();
-        self.0.iter().map(at).collect()
-    }
-}
 
 /// What makes rows white.
 #[derive(Clone, Debug)]
@@ -125,10 +50,11 @@ impl Noise {
     ///
     /// * `deviations` - `[series][channel]`, already scaled for the freedom that their mean took
     /// * `range` - size of each channel, below a share of which no noise is believed
+    /// * `told` - share of the samples of each channel that tell anything; the others are zero
     ///
     /// # Errors
     /// [`GapError::Numerics`] for series too short.
-    pub fn of(deviations: &[Vec<Vec<f64>>], range: &[f64]) -> Result<Self, GapError> {
+    pub fn of(deviations: &[Vec<Vec<f64>>], range: &[f64], told: &[f64]) -> Result<Self, GapError> {
         let channels = range.len();
         let mut whiteners = Vec::with_capacity(channels);
         for (c, range) in range.iter().enumerate() {
@@ -137,7 +63,9 @@ impl Noise {
             let series: Vec<&[f64]> = noisy.iter().map(Vec::as_slice).collect();
             let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
             let model = if varies {
-                AutoRegression::selected_about_zero(&series, ORDER)?
+                let mut model = AutoRegression::selected_about_zero(&series, ORDER)?;
+                model.sd /= told[c].max(1e-6).sqrt();
+                model
             } else {
                 AutoRegression {
                     coefficients: Vec::new(),
@@ -160,8 +88,11 @@ impl Noise {
                 }
             }
         }
-        for value in &mut correlation {
-            *value /= f64::max(count, 1.0);
+        for a in 0..channels {
+            for b in 0..channels {
+                let both = count * f64::min(told[a], told[b]);
+                correlation[a * channels + b] /= f64::max(both, 1.0);
+            }
         }
         Ok(Self {
             whiteners,
@@ -182,7 +113,7 @@ impl Noise {
     pub fn without_repeats(
         deviations: &[Vec<Vec<f64>>],
         range: &[f64],
-        weights: Vec<Channels>,
+        (told, weights): (&[f64], Vec<Channels>),
     ) -> Result<Self, GapError> {
         let mut noise = Self {
             weights,
@@ -192,10 +123,10 @@ impl Noise {
             let (mut square, mut count, mut effective) = (0.0, 0.0, 0.0);
             for series in deviations {
                 square += dot(&series[c], &series[c]);
-                count += series[c].len() as f64;
-                effective += effective_samples(&series[c])?.max(1.0);
+                count += told[c] * series[c].len() as f64;
+                effective += told[c] * effective_samples(&series[c])?.max(1.0);
             }
-            let variance = square / f64::max(count, 1.0) * count / effective;
+            let variance = square / f64::max(count, 1.0) * count / f64::max(effective, 1.0);
             let model = AutoRegression {
                 coefficients: Vec::new(),
                 sd: libm::sqrt(variance).max((LEAST * range).max(1e-12)),
@@ -207,9 +138,10 @@ impl Noise {
 
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
     pub fn whiten(&self, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
-        let whitened = std::iter::zip(&self.whiteners, channels).map(|(whitener, channel)| {
+        let picked = stretches.pick(channels);
+        let whitened = std::iter::zip(&self.whiteners, picked).map(|(whitener, pieces)| {
             let mut row = Vec::with_capacity(stretches.len());
-            for mut piece in stretches.pick(channel) {
+            for mut piece in pieces {
                 whitener.apply(&mut piece);
                 row.extend(piece);
             }
@@ -222,7 +154,9 @@ impl Noise {
     pub fn whiten_in(&self, trial: usize, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
         let mut row = self.whiten(channels, stretches);
         if let Some(weights) = self.weights.get(trial) {
-            let each = weights.iter().flat_map(|w| stretches.pick(w)).flatten();
+            let each = weights
+                .iter()
+                .flat_map(|w| stretches.samples().map(|i| w[i]));
             for (value, weight) in row.iter_mut().zip(each) {
                 *value *= weight;
             }

@@ -62,10 +62,11 @@ impl Normal {
     }
 }
 
-/// Steps for the chosen columns that reduce the cost most, within bounds on each step.
+/// Steps for the chosen columns that reduce the cost most, within bounds on each step; no step at all is within them.
 ///
-/// By an active set: columns whose step would leave its bounds are held there and the others solved again. Returns the
-/// steps and the reduction of the cost; `None` where the equations are singular.
+/// The primal active set of bounded least squares (Stark and Parker 1995): every move reduces the cost, and a column is let
+/// go of its bound when that reduces it further. Returns the steps and the reduction of the cost; `None` where the equations
+/// are singular.
 pub fn solve(
     gram: &DMatrix<f64>,
     score: &DVector<f64>,
@@ -73,42 +74,68 @@ pub fn solve(
     bounds: &dyn Fn(usize) -> (f64, f64),
 ) -> Option<(Vec<f64>, f64)> {
     let n = columns.len();
+    let limits: Vec<(f64, f64)> = (0..n).map(bounds).collect();
+    let entry = |a: usize, b: usize| gram[(columns[a], columns[b])];
     let mut steps = vec![0.0; n];
     let mut held = vec![false; n];
-    for _ in 0..=n {
+    // What is left of the score of a column at the present steps.
+    let left = |steps: &[f64], a: usize| {
+        let product = (0..n).fold(0.0, |s, b| s + entry(a, b) * steps[b]);
+        score[columns[a]] - product
+    };
+    for _ in 0..4 * n + 4 {
         let free: Vec<usize> = (0..n).filter(|&i| !held[i]).collect();
+        let mut aim = Vec::new();
         if !free.is_empty() {
-            let right = DVector::from_fn(free.len(), |a, _| {
-                let i = free[a];
-                let taken = (0..n)
-                    .filter(|&b| held[b])
-                    .fold(0.0, |s, b| s + gram[(columns[i], columns[b])] * steps[b]);
-                score[columns[i]] - taken
-            });
-            let left = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-                gram[(columns[free[a]], columns[free[b]])]
-            });
-            let solution = factor(left)?.solve(&right);
-            for (a, &i) in free.iter().enumerate() {
-                steps[i] = solution[a];
+            let right = DVector::from_fn(free.len(), |a, _| left(&steps, free[a]));
+            let matrix = DMatrix::from_fn(free.len(), free.len(), |a, b| entry(free[a], free[b]));
+            aim = factor(matrix)?.solve(&right).iter().copied().collect();
+        }
+        // As far as the first bound in the way.
+        let mut share = 1.0;
+        let mut first = None;
+        for (&i, &by) in free.iter().zip(&aim) {
+            let (lower, upper) = limits[i];
+            let room = if by < 0.0 { lower } else { upper } - steps[i];
+            if by != 0.0 && room / by < share {
+                (share, first) = ((room / by).max(0.0), Some(i));
             }
         }
-        let mut worst = None;
-        for &i in &free {
-            let (lower, upper) = bounds(i);
-            let beyond = (lower - steps[i]).max(steps[i] - upper);
-            if beyond > 0.0 && worst.is_none_or(|(_, most)| beyond > most) {
-                worst = Some((i, beyond));
-            }
+        for (&i, &by) in free.iter().zip(&aim) {
+            steps[i] = (steps[i] + share * by).clamp(limits[i].0, limits[i].1);
         }
-        let Some((i, _)) = worst else { break };
-        let (lower, upper) = bounds(i);
-        steps[i] = steps[i].clamp(lower, upper);
-        held[i] = true;
+        if let Some(i) = first {
+            let (lower, upper) = limits[i];
+            // Exactly there, whatever the rounding.
+            steps[i] = if (steps[i] - lower).abs() < (upper - steps[i]).abs() {
+                lower
+            } else {
+                upper
+            };
+            held[i] = true;
+            continue;
+        }
+        let pull = |i: usize| {
+            let (lower, upper) = limits[i];
+            let inward = match (steps[i] <= lower, steps[i] >= upper) {
+                (true, true) => 0.0,
+                (true, false) => left(&steps, i),
+                _ => -left(&steps, i),
+            };
+            inward / entry(i, i).max(f64::MIN_POSITIVE).sqrt()
+        };
+        let freed = (0..n)
+            .filter(|&i| held[i])
+            .map(|i| (pull(i), i))
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        match freed {
+            Some((most, i)) if most > 1e-9 => held[i] = false,
+            _ => break,
+        }
     }
     let mut reduction = 0.0;
     for a in 0..n {
-        let product = (0..n).fold(0.0, |s, b| s + gram[(columns[a], columns[b])] * steps[b]);
+        let product = (0..n).fold(0.0, |s, b| s + entry(a, b) * steps[b]);
         reduction += steps[a] * (2.0 * score[columns[a]] - product);
     }
     Some((steps, reduction))
@@ -160,5 +187,54 @@ impl Scaled {
         let n = self.scale.len();
         let inverse = self.factor.inverse();
         DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] * self.scale[a] * self.scale[b])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers between -1 and 1 that look random.
+    fn numbers(seed: u64, count: usize) -> Vec<f64> {
+        let mut state = seed;
+        (0..count)
+            .map(|_| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+            })
+            .collect()
+    }
+
+    #[test]
+    fn bounded_steps_meet_the_conditions_of_an_optimum() {
+        let mut bounded = 0;
+        for seed in 1..300 {
+            let n = 2 + seed as usize % 6;
+            let a = DMatrix::from_vec(2 * n, n, numbers(seed, 2 * n * n));
+            let gram = a.transpose() * &a;
+            let score = DVector::from_vec(numbers(seed + 1000, n)) * 3.0;
+            let limits: Vec<(f64, f64)> = numbers(seed + 2000, n)
+                .iter()
+                .map(|v| (-0.3 * v.abs(), if *v > 0.0 { 0.2 } else { 0.0 }))
+                .collect();
+            let columns: Vec<usize> = (0..n).collect();
+            let (steps, reduction) = solve(&gram, &score, &columns, &|i| limits[i]).unwrap();
+            assert!(reduction >= 0.0);
+            let x = DVector::from_vec(steps.clone());
+            let left = &score - &gram * &x;
+            for i in 0..n {
+                let (lower, upper) = limits[i];
+                assert!(steps[i] >= lower && steps[i] <= upper);
+                let up = steps[i] < upper;
+                let down = steps[i] > lower;
+                bounded += usize::from(!up || !down);
+                // Moving where there is room must not help.
+                let better = up && left[i] > 1e-7 || down && left[i] < -1e-7;
+                assert!(!better, "{seed}");
+            }
+        }
+        assert!(bounded > 300);
     }
 }

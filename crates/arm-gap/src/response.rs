@@ -26,6 +26,13 @@ const PARTS: usize = 2;
 /// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
 const THETA: f64 = 0.55;
 
+/// The refusal of a hypothesis that cannot be followed from a simulated run.
+pub const ASTRAY: SimulationError = SimulationError::Setting {
+    name: "angle beside the simulated run",
+    found: f64::INFINITY,
+    allowed: "one within 1 rad of it",
+};
+
 /// What moves a led arm, besides its own state.
 struct Plant<const N: usize> {
     setup: Setup<f64, N>,
@@ -312,39 +319,42 @@ impl<'a, const N: usize> Linear<'a, N> {
         self.balances.push(middle);
     }
 
-    /// What the sensors would read more, for one unit of a change; `None` where the rig cannot be.
+    /// What the sensors would read more, for one unit of a change.
     ///
     /// * `changed` - the hypothesis with the change made
     /// * `size` - of the change
     /// * `moves_handle` - whether the path of the handle is another
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig that cannot be.
     pub fn response(
         &self,
         changed: &Hypothesis<N>,
         size: f64,
         (sensing, moves_handle): (bool, bool),
-    ) -> Option<Channels> {
+    ) -> Result<Channels, SimulationError> {
         let raw = self.response_raw(changed, size, (sensing, moves_handle))?;
-        smooth(&raw, self.course.band, self.course.rate).ok()
+        smooth(&raw, self.course.band, self.course.rate).map_err(|_| ASTRAY)
     }
 
     /// The same before the low-pass.
+    ///
+    /// # Errors
+    /// As [`Linear::response`].
     pub fn response_raw(
         &self,
         changed: &Hypothesis<N>,
         size: f64,
         (sensing, moves_handle): (bool, bool),
-    ) -> Option<Channels> {
-        let plant = Plant::new(self.session, changed).ok()?;
+    ) -> Result<Channels, SimulationError> {
+        let plant = Plant::new(self.session, changed)?;
         let sensed = if sensing {
             self.sensed(&plant, None)
         } else {
             let own;
             let hands = if moves_handle {
-                own = hands(
-                    &self.course.handle_path(changed).ok()?,
-                    self.states.len(),
-                    self.step,
-                );
+                let path = self.course.handle_path(changed)?;
+                own = hands(&path, self.states.len(), self.step);
                 &own
             } else {
                 &self.hands
@@ -358,7 +368,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                 *value = (*value - base) / size;
             }
         }
-        Some(out)
+        Ok(out)
     }
 
     /// Changes of angles and forces along the run when another plant takes its place.
@@ -399,13 +409,20 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 
     /// What the sensors would read under another hypothesis, which need not be near, on a trial of the same movement;
-    /// before the low-pass. `None` where it cannot be followed.
-    pub fn play(&self, changed: &Hypothesis<N>, course: &Course<N>) -> Option<Channels> {
-        let plant = Plant::new(self.session, changed).ok()?;
-        let path = course.handle_path(changed).ok()?;
+    /// before the low-pass.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig that cannot be, and an arm that leaves the run.
+    pub fn play(
+        &self,
+        changed: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Channels, SimulationError> {
+        let plant = Plant::new(self.session, changed)?;
+        let path = course.handle_path(changed)?;
         let hands = hands(&path, self.states.len(), self.step);
-        let answer = self.follow(&plant, &hands)?;
-        Some(self.sensed(&plant, Some(&answer)))
+        let answer = self.follow(&plant, &hands).ok_or(ASTRAY)?;
+        Ok(self.sensed(&plant, Some(&answer)))
     }
 
     /// Changes of angles and forces along the run when another plant takes its place, however large.

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::anchor::Response;
-use crate::noise::{Stretches, dot};
+use crate::noise::dot;
 use crate::normal::{Cluster, factor};
 use crate::predict::Channels;
+use crate::stretches::Stretches;
 use crate::study::Study;
 
 /// Parts of a trial that are predicted from each other where no movement is repeated.
@@ -20,6 +21,8 @@ struct Class {
     /// The movement in whose reference columns are computed.
     reference: usize,
     stretches: Stretches,
+    /// Number of rows of one trial that tell anything.
+    rows: usize,
     /// Positions in the list of fitted trials.
     members: Vec<usize>,
     /// Whitened columns: first those whose coefficients belong to each trial alone, then the common ones.
@@ -50,6 +53,7 @@ impl Rows {
                     classes.push(Class {
                         group: classes.len(),
                         reference: group,
+                        rows: part.told(study.session.channels()).iter().sum(),
                         stretches: part,
                         members: vec![m],
                         columns: Vec::new(),
@@ -66,6 +70,7 @@ impl Rows {
                 None => classes.push(Class {
                     group,
                     reference: group,
+                    rows: stretches.told(study.session.channels()).iter().sum(),
                     stretches: stretches.clone(),
                     members: vec![m],
                     columns: Vec::new(),
@@ -180,7 +185,7 @@ impl Rows {
                     gram: Arc::clone(&reduced),
                     score: common,
                     square,
-                    rows: residual.len(),
+                    rows: class.rows,
                 }
             })
             .collect()

@@ -62,9 +62,14 @@ impl Scan {
         prior.resize(known.len() + asked.len(), None);
         let mut normal = Normal::new(&clusters, &prior);
         regularise(&mut normal.gram, hypothesis, &known);
-        // Columns that nothing excites drop out of the projection.
+        // Columns that nothing excites drop out of the projection, and so does what would leave its bounds.
         let base: Vec<usize> = (0..known.len())
             .filter(|&i| normal.gram[(i, i)] > 0.0)
+            .filter(|&i| {
+                let value = hypothesis.get(known[i].target);
+                let pull = normal.score[i];
+                !(value <= known[i].lower && pull < 0.0 || value >= known[i].upper && pull > 0.0)
+            })
             .collect();
         let first = known.len();
         let count = asked.len();
@@ -249,7 +254,8 @@ impl<const N: usize> Study<'_, N> {
         for &trial in &self.fitted {
             if !seen.contains(&self.group_of[trial]) {
                 seen.push(self.group_of[trial]);
-                rows += self.stretches[trial].len() * self.session.channels();
+                let told = self.stretches[trial].told(self.session.channels());
+                rows += told.iter().sum::<usize>();
             }
         }
         rows.max(1)

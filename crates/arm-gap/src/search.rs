@@ -1,29 +1,20 @@
 //! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
 
-use std::cmp::Ordering;
-
-use arm_core::effect::Effect;
-
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::apart::{Apart, Line};
 use crate::candidate::{Candidate, Library};
-use crate::chance::chi_square_tail;
 use crate::fit::{Fitted, Precision};
-use crate::hypothesis::Hypothesis;
+use crate::judge::{FLOOR, Named};
 use crate::misfit::{Lack, lack_of_fit};
 use crate::scan::{Choice, Scan};
 use crate::session::Sight;
 use crate::study::Study;
 
-/// Share of all that is explained that an effect must explain, whatever the others are.
-const FLOOR: f64 = 0.003;
-/// The same without repeats: what sensors and a rigid model get wrong cannot be told from noise then, and an effect may be no more
-/// than what comes nearest to it.
-const FLOOR_UNREPEATED: f64 = 0.03;
 /// Most disturbances of single trials that are named.
 const DISTURBANCES: usize = 4;
-/// Frequency below which a ripple is asked like other effects \[Hz\]: movements and what a model lacks of them reach that far.
+/// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
+/// what a model lacks of them reach that far.
 const SLOW: f64 = 3.0;
 /// Most effects that are named.
 const MOST: usize = 6;
@@ -33,46 +24,6 @@ const CONTENDERS: usize = 4;
 const AHEAD: usize = 3;
 /// Choices that are kept while looking ahead.
 const WIDTH: usize = 12;
-/// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
-const TIE: f64 = 10.0;
-/// Alternatives that are converged by simulation for each named effect.
-const RIVALS: usize = 5;
-/// Share of what a named effect gains that another must gain to first order to be converged in its place.
-const RIVAL: f64 = 0.6;
-/// Times that a better alternative may take the place of a named effect.
-const EXCHANGES: usize = 4;
-
-/// One effect that was named.
-#[derive(Clone, Debug)]
-pub struct Named {
-    /// Its place in the hypothesis.
-    pub slot: usize,
-    /// Probability of such a gain by chance, with all candidates that were asked.
-    pub p_value: f64,
-    /// Share of what can be explained that is lost without it.
-    pub share: f64,
-    /// What would explain the same: the candidate, and how much worse it does.
-    pub alternatives: Vec<Alternative>,
-}
-
-/// Another effect that would explain what a named one does.
-#[derive(Clone, Debug)]
-pub struct Alternative {
-    /// The question that it answers.
-    pub candidate: Candidate,
-    /// The effect as it fits best.
-    pub effect: Effect<f64>,
-    /// How much worse it explains the data, in units of twice the log-likelihood.
-    pub worse: f64,
-    /// Squared cosine between what the two would show.
-    pub likeness: f64,
-}
-
-/// An alternative, fitted.
-struct Rival<const N: usize> {
-    alternative: Alternative,
-    fitted: Fitted<N>,
-}
 
 /// One round of the search.
 #[derive(Clone, Debug)]
@@ -125,7 +76,7 @@ pub struct Finding<const N: usize> {
 pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
 /// A fitted hypothesis with the simulation that it was followed from.
-type Settled<'a, const N: usize> = (Fitted<N>, Anchor<'a, N>);
+pub(crate) type Settled<'a, const N: usize> = (Fitted<N>, Anchor<'a, N>);
 
 /// What was found of effects that last.
 struct Hunt<'a, const N: usize> {
@@ -139,6 +90,14 @@ struct Hunt<'a, const N: usize> {
     /// Number of candidates.
     asked: f64,
     scale: f64,
+}
+
+impl<const N: usize> Hunt<'_, N> {
+    /// What a further effect must gain so as not to be the imperfect shape of a named one.
+    fn least(&self) -> f64 {
+        let missed = self.current.asked.iter().map(|c| c.kind().probe().missed);
+        missed.fold(FLOOR, f64::max) * (self.calibrated.cost - self.current.cost)
+    }
 }
 
 impl<'a, const N: usize> Study<'a, N> {
@@ -157,8 +116,9 @@ impl<'a, const N: usize> Study<'a, N> {
             settled = self.calibrate()?;
         }
         let led = self.session.sight == Sight::Led;
-        let mut apart = Vec::new();
+        let mut apart: Vec<Apart> = Vec::new();
         let mut periodic = None;
+        let measured = self.courses.clone();
         if led {
             progress("looking at single trials", 0.05);
             if let Some(found) = self.rhythm(&settled.1, Line::BetweenRepeats)? {
@@ -166,14 +126,31 @@ impl<'a, const N: usize> Study<'a, N> {
                 apart.push(found);
                 settled = self.calibrate_anew()?;
             }
-            let (fitted, anchor, found) = self.disturbances(settled)?;
-            settled = (fitted, anchor);
-            apart.extend(found);
+            settled = self.disturbances(settled, &mut apart)?;
         }
         let mut hunt = self.hunt(settled, periodic, progress)?;
-        if led && let Some(found) = self.rhythm(&hunt.anchor, Line::OfTheRobot)? {
+        if let Some(before) = apart.iter().position(|a| a.trial.is_none())
+            && !hunt.current.asked.is_empty()
+        {
+            // What rang may have been what was named since.
+            let without = std::mem::replace(&mut self.courses, measured);
+            let again = self.rhythm(&hunt.anchor, Line::BetweenRepeats)?;
+            if again.is_some_and(|a| a.is_like(&apart[before])) {
+                self.courses = without;
+            } else {
+                apart.remove(before);
+                let settled = self.calibrate_anew()?;
+                hunt = self.hunt(settled, periodic, progress)?;
+            }
+        }
+        if led
+            && let Some(found) = self.rhythm(&hunt.anchor, Line::OfTheRobot)?
+            && (found.locked || found.wave()[0] > SLOW)
+            && found.gain > hunt.least()
+            && !apart.iter().any(|a| a.is_like(&found))
+        {
             let [frequency, phase] = found.wave();
-            if found.locked && frequency < SLOW {
+            if frequency < SLOW {
                 periodic = Some([frequency, phase]);
             } else {
                 self.take_out(&hunt.anchor, &found)?;
@@ -188,13 +165,11 @@ impl<'a, const N: usize> Study<'a, N> {
             apart.retain(|a| a.trial.is_none());
             self.measure_noise(&self.anchor(&hunt.current.hypothesis)?)?;
             let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
-            let (fitted, anchor, found) = self.disturbances(settled)?;
-            apart.extend(found);
+            let settled = self.disturbances(settled, &mut apart)?;
             let from;
             (hunt.calibrated, from) = self.settle(hunt.calibrated.hypothesis, Vec::new())?;
             hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
-            (hunt.current, hunt.anchor) =
-                self.pruned((fitted, anchor), &hunt.calibrated, hunt.scale)?;
+            (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
         }
         let Hunt {
             mut calibrated,
@@ -292,22 +267,22 @@ impl<'a, const N: usize> Study<'a, N> {
     }
 
     /// Leaves out of single trials what disturbs them, the clearest first.
-    #[allow(clippy::type_complexity)]
     fn disturbances(
         &mut self,
         (mut fitted, mut anchor): Settled<'a, N>,
-    ) -> Result<(Fitted<N>, Anchor<'a, N>, Vec<Apart>), GapError> {
-        let mut found = Vec::new();
-        while found.len() < DISTURBANCES
+        apart: &mut Vec<Apart>,
+    ) -> Result<Settled<'a, N>, GapError> {
+        let most = apart.len() + DISTURBANCES;
+        while apart.len() < most
             && let Some(one) = self.disturbance(&anchor, 1.0)
             && let Some(trial) = one.trial
         {
             self.leave_out(trial, one.span());
-            found.push(one);
+            apart.push(one);
             self.measure_noise(&self.anchor(&anchor.hypothesis)?)?;
             (fitted, anchor) = self.settle(fitted.hypothesis, fitted.asked)?;
         }
-        Ok((fitted, anchor, found))
+        Ok((fitted, anchor))
     }
 
     /// The model as given, with everything refitted that was never exact.
@@ -381,19 +356,20 @@ impl<'a, const N: usize> Study<'a, N> {
                 .iter()
                 .map(|&m| {
                     let mut candidate = library.candidates[m].clone();
-                    candidate.price = scan.price[m] * scan.spread[m];
+                    (candidate.price, candidate.spread) = (scan.price[m], scan.spread[m]);
                     candidate
                 })
                 .collect();
             let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), anchor) else {
                 continue;
             };
-            let price: f64 = asked.iter().map(|c| c.price).sum();
+            let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
             let gain = current.cost - fitted.cost;
             let worth = gain / scan.scale - price;
+            let simple = worth - self.price_of_shapes(&asked);
             tried.push((asked, gain));
-            if worth > 0.0 && best.as_ref().is_none_or(|(most, _)| worth > *most) {
-                best = Some((worth, fitted));
+            if worth > 0.0 && best.as_ref().is_none_or(|(most, _)| simple > *most) {
+                best = Some((simple, fitted));
             }
         }
         tried.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -410,7 +386,7 @@ impl<'a, const N: usize> Study<'a, N> {
     /// A hypothesis with further effects, fitted; `None` where it cannot be followed.
     ///
     /// The first-order coefficients are halved until they lower the cost: effects that are strong are not linear.
-    fn attempt(
+    pub(crate) fn attempt(
         &self,
         current: &Fitted<N>,
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
@@ -436,243 +412,6 @@ impl<'a, const N: usize> Study<'a, N> {
             }
         }
         best
-    }
-
-    /// A fitted hypothesis without the effect at a place, fitted again; of infinite cost where nothing goes without it.
-    fn without(
-        &self,
-        fitted: &Fitted<N>,
-        slot: usize,
-        anchor: &Anchor<N>,
-    ) -> Result<Fitted<N>, GapError> {
-        let mut hypothesis: Hypothesis<N> = fitted.hypothesis.clone();
-        let mut asked = fitted.asked.clone();
-        hypothesis.named.remove(slot);
-        asked.remove(slot);
-        match self.fit(anchor, hypothesis.clone(), asked.clone()) {
-            // What the effect had held up may be impossible without it: then from the segments as given.
-            Err(GapError::Simulation { .. }) => {
-                hypothesis.segments = [[0.0; 3]; N];
-                match self.fit(anchor, hypothesis.clone(), asked.clone()) {
-                    // Or too far away to be followed.
-                    Err(GapError::Simulation { .. }) => {
-                        let settled = self.settle(hypothesis.clone(), asked.clone());
-                        Ok(settled.map_or_else(
-                            |_| Fitted {
-                                hypothesis,
-                                asked,
-                                cost: f64::INFINITY,
-                                residuals: fitted.residuals.clone(),
-                            },
-                            |(less, _)| less,
-                        ))
-                    }
-                    other => other,
-                }
-            }
-            other => other,
-        }
-    }
-
-    /// Goes back: effects that are no longer worth their price are taken out.
-    fn pruned(
-        &self,
-        (mut fitted, mut anchor): Settled<'a, N>,
-        calibrated: &Fitted<N>,
-        scale: f64,
-    ) -> Result<Settled<'a, N>, GapError> {
-        let floor = match self.repeated {
-            true => FLOOR,
-            false => FLOOR_UNREPEATED,
-        };
-        while !fitted.asked.is_empty() {
-            let mut weakest: Option<(f64, Fitted<N>)> = None;
-            let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
-            let without = without.collect::<Result<Vec<_>, _>>()?;
-            let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
-            // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
-            let foretold = match self.repeated {
-                true => None,
-                false => Some(self.foretold(&anchor, &fitted)?),
-            };
-            for (slot, less) in without.into_iter().enumerate() {
-                let mut gain = gains[slot];
-                if let Some(with) = foretold
-                    && gain.is_finite()
-                {
-                    gain = gain.min(self.foretold(&anchor, &less)? - with);
-                }
-                // Less may be the imperfect shape of another one.
-                let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
-                let least = others
-                    .map(|o| fitted.asked[o].kind().probe().missed * gains[o])
-                    .fold(floor * (calibrated.cost - fitted.cost), f64::max);
-                let worth = gain / scale - fitted.asked[slot].price;
-                let worth = if gain < least {
-                    worth.min(gain - least)
-                } else {
-                    worth
-                };
-                if worth < 0.0 && weakest.as_ref().is_none_or(|(least, _)| worth < *least) {
-                    weakest = Some((worth, less));
-                }
-            }
-            let Some((_, less)) = weakest else { break };
-            (fitted, anchor) = self.settle(less.hypothesis, less.asked)?;
-        }
-        Ok((fitted, anchor))
-    }
-
-    /// What could stand in the place of each named effect; a better one takes it.
-    fn judged(
-        &self,
-        (mut fitted, mut anchor): Settled<'a, N>,
-        calibrated: &Fitted<N>,
-        (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
-        progress: Progress<'_>,
-    ) -> Result<(Fitted<N>, Anchor<'a, N>, Vec<Named>), GapError> {
-        let mut exchanges = 0;
-        'again: loop {
-            let mut named = Vec::new();
-            let library = match fitted.asked.len() {
-                0 => None,
-                _ => Some(Library::build(self, &anchor, periodic)?),
-            };
-            for (slot, library) in (0..fitted.asked.len()).zip(std::iter::repeat(&library)) {
-                progress(
-                    "comparing alternatives",
-                    0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
-                );
-                let less = self.without(&fitted, slot, &anchor)?;
-                let gain = (less.cost - fitted.cost).min(f64::MAX);
-                let rivals = match library {
-                    Some(library) if less.cost.is_finite() => {
-                        self.rivals(&fitted, (slot, &less), (&anchor, library), scale)?
-                    }
-                    _ => Vec::new(),
-                };
-                if exchanges < EXCHANGES
-                    && let Some(better) = rivals.iter().find(|r| {
-                        self.takes_over(&r.alternative, (&fitted.asked[slot], gain / scale))
-                    })
-                {
-                    let better = better.fitted.clone();
-                    (fitted, anchor) = self.settle(better.hypothesis, better.asked)?;
-                    exchanges += 1;
-                    continue 'again;
-                }
-                let candidate = &fitted.asked[slot];
-                let chance = chi_square_tail(gain / scale, candidate.width());
-                named.push(Named {
-                    slot,
-                    p_value: (asked * chance).min(1.0),
-                    share: gain / (calibrated.cost - fitted.cost).max(gain),
-                    alternatives: rivals
-                        .into_iter()
-                        .map(|r| r.alternative)
-                        .filter(|a| a.worse <= self.tie(candidate, gain / scale))
-                        .collect(),
-                });
-            }
-            named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
-            return Ok((fitted, anchor, named));
-        }
-    }
-
-    /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
-    ///
-    /// Without repeats nothing tells a law that is not exact from another one: what its kind may miss of what it shows decides nothing.
-    fn tie(&self, own: &Candidate, gain: f64) -> f64 {
-        match self.repeated {
-            true => TIE,
-            false => TIE.max(own.kind().probe().missed * gain),
-        }
-    }
-
-    /// Whether another effect takes the place of a named one.
-    ///
-    /// The better one does. Without repeats a tie goes to the plainer law, the one with fewer parameters or, with as many, the one that
-    /// stands before it in the catalogue: an intricate one bends itself to what sensors and a rigid model get wrong.
-    fn takes_over(&self, rival: &Alternative, (own, gain): (&Candidate, f64)) -> bool {
-        const BETTER: f64 = 0.05;
-        let plain = |c: &Candidate| {
-            let place = self.session.kinds().position(|k| k == c.kind());
-            (c.kind().info().parameters.len(), place)
-        };
-        let handicap = match plain(&rival.candidate).cmp(&plain(own)) {
-            _ if self.repeated => 0.0,
-            Ordering::Less => self.tie(own, gain),
-            Ordering::Equal => 0.0,
-            Ordering::Greater => -self.tie(own, gain),
-        };
-        rival.worse < handicap - BETTER
-    }
-
-    /// Other effects in the place of one, fitted, the best first.
-    fn rivals(
-        &self,
-        fitted: &Fitted<N>,
-        (slot, less): (usize, &Fitted<N>),
-        (anchor, library): (&Anchor<N>, &Library),
-        scale: f64,
-    ) -> Result<Vec<Rival<N>>, GapError> {
-        let own = &fitted.asked[slot];
-        let gain = less.cost - fitted.cost;
-        let scan = Scan::new(self, less, anchor, library)?;
-        let mut singles: Vec<Choice> = (0..scan.len())
-            .filter(|&c| {
-                let candidate = &library.candidates[c];
-                !own.is_same_effect(&candidate.effect)
-                    && !less
-                        .asked
-                        .iter()
-                        .any(|a| a.is_same_effect(&candidate.effect))
-            })
-            .filter_map(|c| scan.evaluate(&[c]))
-            .filter(|c| c.gain > RIVAL * gain)
-            .collect();
-        singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let twin = (0..scan.len()).find(|&c| {
-            own.is_same_effect(&library.candidates[c].effect)
-                && own.question == library.candidates[c].question
-        });
-        let mut seen: Vec<&Candidate> = Vec::new();
-        let mut rivals = Vec::new();
-        for choice in &singles {
-            let candidate = &library.candidates[choice.members[0]];
-            if seen.iter().any(|s| s.is_same_effect(&candidate.effect)) {
-                continue;
-            }
-            if seen.len() >= RIVALS {
-                break;
-            }
-            seen.push(candidate);
-            let mut asked = candidate.clone();
-            asked.price = scan.price[choice.members[0]] * scan.spread[choice.members[0]];
-            let Some(rival) = self.attempt(
-                less,
-                (std::slice::from_ref(&asked), &choice.coefficients),
-                anchor,
-            ) else {
-                continue;
-            };
-            let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
-            let likeness = twin.map_or(0.0, |t| scan.likeness(t, choice.members[0]));
-            let Some(&effect) = rival.hypothesis.named.last() else {
-                continue;
-            };
-            rivals.push(Rival {
-                alternative: Alternative {
-                    candidate: asked,
-                    effect,
-                    worse,
-                    likeness,
-                },
-                fitted: rival,
-            });
-        }
-        rivals.sort_by(|a, b| a.alternative.worse.total_cmp(&b.alternative.worse));
-        Ok(rivals)
     }
 
     fn ruled(&self, library: &Library, scan: &Scan) -> Vec<Ruled> {

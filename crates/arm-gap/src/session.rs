@@ -40,6 +40,8 @@ pub enum Sight {
 /// A promise of the calibration is kept within this share of the tolerance (standard deviation): twice as far is the
 /// tolerance itself.
 const KEPT: f64 = 0.5;
+/// Standard deviations beyond which nothing that is known is refitted: what is further off is a fault, and has a name.
+const FURTHEST: f64 = 4.0;
 /// Relative standard deviation of what the model says of its own effects, and of the compliance of its contact.
 const KNOWN: f64 = 0.05;
 /// Relative standard deviation of what the model says of the damping of its contact.
@@ -119,11 +121,12 @@ impl<const N: usize> Session<N> {
         let mut list = Vec::new();
         let mut add = |target, sd: f64, lower: f64, upper: f64| {
             if sd > 0.0 {
+                let value = given.get(target);
                 list.push(Coordinate {
                     target,
-                    prior: Some((given.get(target), sd)),
-                    lower,
-                    upper,
+                    prior: Some((value, sd)),
+                    lower: f64::max(lower, value - FURTHEST * sd),
+                    upper: f64::min(upper, value + FURTHEST * sd),
                     step: 0.25 * sd,
                 });
             }

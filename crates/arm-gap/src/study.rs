@@ -3,17 +3,31 @@
 use std::sync::Arc;
 
 use arm_core::effect::{Local, Place};
+use arm_core::{Pose, jacobian};
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::groups::groups;
 use crate::hypothesis::Hypothesis;
-use crate::noise::{Noise, Stretches, dot};
+use crate::noise::{Noise, dot};
 use crate::normal::factor;
 use crate::predict::{Channels, Course};
 use crate::session::{Session, Sight};
+use crate::stretches::{Stretches, Told, widened};
 use crate::threads;
+
+/// Share of the samples that must be left when those at which joints with dry friction rest are left out.
+const LEAST_LEFT: f64 = 0.15;
+
+/// What rest takes from the comparison of a movement.
+#[derive(Clone, Debug, Default)]
+struct Rest {
+    /// Samples that are left out.
+    left_out: Vec<bool>,
+    /// What the force tells where it does not tell both components.
+    told: Arc<Vec<Told>>,
+}
 
 /// A session made ready.
 pub struct Study<'a, const N: usize> {
@@ -33,10 +47,10 @@ pub struct Study<'a, const N: usize> {
     pub repeated: bool,
     /// Trials that are fitted.
     pub fitted: Vec<usize>,
-    /// Joints with dry friction: where they rest, nothing is compared.
+    /// Joints with dry friction: where they rest, less is compared.
     pub dry: [bool; N],
-    /// The samples of each group at which one of them rests.
-    resting: Vec<Vec<bool>>,
+    /// At every sample of each group.
+    resting: Vec<Rest>,
     /// What disturbances have touched: trial, start and end \[s\].
     touched: Vec<(usize, f64, f64)>,
     /// Threads.
@@ -71,7 +85,7 @@ impl<'a, const N: usize> Study<'a, N> {
             .map(|i| Ok(Arc::new(session.course(i)?)))
             .collect::<Result<Vec<_>, GapError>>()?;
         let stretches: Vec<_> = std::iter::zip(&session.trials, &courses)
-            .map(|(trial, course)| Stretches::of(trial, course, &[]))
+            .map(|(trial, course)| Stretches::of(trial, course, &[], Arc::default()))
             .collect();
         let fitted: Vec<usize> = session
             .fit_trials()
@@ -108,6 +122,7 @@ impl<'a, const N: usize> Study<'a, N> {
     /// [`GapError::Numerics`] for series that no noise can be read off.
     pub fn measure_noise(&mut self, anchor: &Anchor<N>) -> Result<(), GapError> {
         let channels = self.session.channels();
+        let told = self.told();
         let mut deviations = Vec::new();
         // For each deviation what a trial may differ by without noise.
         let mut shifts: Vec<Arc<Vec<Vec<Vec<f64>>>>> = Vec::new();
@@ -161,11 +176,27 @@ impl<'a, const N: usize> Study<'a, N> {
             })
             .collect();
         self.noise = if self.repeated {
-            self.noise_of(&deviations, &shifts, &range)?
+            self.noise_of(&deviations, &shifts, (&range, &told))?
         } else {
-            self.noise_of_residuals(anchor, &range)?
+            self.noise_of_residuals(anchor, (&range, &told))?
         };
         Ok(())
+    }
+
+    /// The share of the samples of each channel that tell anything.
+    fn told(&self) -> Vec<f64> {
+        let channels = self.session.channels();
+        let all: usize = self.fitted.iter().map(|&t| self.stretches[t].len()).sum();
+        let told = self
+            .fitted
+            .iter()
+            .map(|&t| self.stretches[t].told(channels));
+        let sum = told.fold(vec![0; channels], |sum, own| {
+            std::iter::zip(sum, own).map(|(a, b)| a + b).collect()
+        });
+        sum.into_iter()
+            .map(|n: usize| n as f64 / all.max(1) as f64)
+            .collect()
     }
 
     /// The noise of deviations, and how far each is shifted, found in turns: as much is taken for a shift as the noise and
@@ -174,7 +205,7 @@ impl<'a, const N: usize> Study<'a, N> {
         &self,
         deviations: &[Vec<Vec<f64>>],
         shifts: &[Arc<Vec<Vec<Vec<f64>>>>],
-        range: &[f64],
+        (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
         const TURNS: usize = 3;
         let known: Vec<f64> = self
@@ -183,7 +214,7 @@ impl<'a, const N: usize> Study<'a, N> {
             .iter()
             .map(|c| c.prior.map_or(f64::INFINITY, |(_, sd)| sd))
             .collect();
-        let mut noise = Noise::of(deviations, range)?;
+        let mut noise = Noise::of(deviations, range, told)?;
         for _ in 0..TURNS {
             if known.is_empty() {
                 break;
@@ -211,12 +242,12 @@ impl<'a, const N: usize> Study<'a, N> {
                     }
                 }
             }
-            noise = Noise::of(&clean, range)?;
+            noise = Noise::of(&clean, range, told)?;
         }
         Ok(noise)
     }
 
-    /// Leaves out the samples at which a joint with dry friction rests, or reverses: there friction is whatever holds it.
+    /// Leaves out what dry friction makes unknowable where its joint rests or reverses: there friction is whatever holds it.
     ///
     /// Whether anything changed since the last time; then anchors are to be made anew. The samples of repeats stay the same:
     /// they rest together.
@@ -226,9 +257,16 @@ impl<'a, const N: usize> Study<'a, N> {
             return false;
         }
         self.dry = dry;
-        let one = |group: usize| self.resting(anchor, group);
+        let one = |group: usize| self.rest(anchor, group);
         self.resting = (0..self.references.len()).map(one).collect();
+        let compared = |study: &Self| -> usize { study.stretches.iter().map(Stretches::len).sum() };
+        let before = compared(self);
         self.cut();
+        if (compared(self) as f64) < LEAST_LEFT * before as f64 {
+            // Then some joint rests at any time, and imperfect samples are better than none.
+            self.resting.clear();
+            self.cut();
+        }
         true
     }
 
@@ -250,16 +288,16 @@ impl<'a, const N: usize> Study<'a, N> {
         const AROUND: (f64, f64) = (0.2, 0.5);
         for i in 0..self.courses.len() {
             let trial = &self.session.trials[i];
-            let rest = self.resting.get(self.group_of[i]);
-            let mut out = rest.cloned().unwrap_or_default();
-            out.resize(trial.len(), false);
+            let rest = self.resting.get(self.group_of[i]).cloned();
+            let Rest { mut left_out, told } = rest.unwrap_or_default();
+            left_out.resize(trial.len(), false);
             for (_, start, end) in self.touched.iter().filter(|(t, _, _)| *t == i) {
-                for (k, flag) in out.iter_mut().enumerate() {
+                for (k, flag) in left_out.iter_mut().enumerate() {
                     let time = k as f64 / trial.rate;
                     *flag |= time >= start - AROUND.0 && time <= end + AROUND.1;
                 }
             }
-            self.stretches[i] = Stretches::of(trial, &self.courses[i], &out);
+            self.stretches[i] = Stretches::of(trial, &self.courses[i], &left_out, told);
         }
         let kept: Vec<usize> = self
             .session
@@ -272,35 +310,69 @@ impl<'a, const N: usize> Study<'a, N> {
         }
     }
 
-    /// The samples of a movement at which a joint with dry friction rests.
-    fn resting(&self, anchor: &Anchor<N>, group: usize) -> Vec<bool> {
-        /// Share of its fastest speed below which a joint rests, and the speed above which it never does \[rad/s\].
-        const SLOW: (f64, f64) = (0.25, 0.03);
+    /// What the rest of joints with dry friction takes from the comparison of a movement.
+    ///
+    /// The contact alone places an arm of one or two joints: what holds a resting joint shows in one component of the force
+    /// and nowhere else. A longer arm gives way to it, and nothing is known then.
+    fn rest(&self, anchor: &Anchor<N>, group: usize) -> Rest {
         let course = &self.courses[self.references[group]];
+        let joints: Vec<Vec<bool>> = (0..N)
+            .map(|j| match self.dry[j] {
+                true => widened(&self.resting_joint(anchor, (group, j)), course),
+                false => vec![false; course.seen[0].len()],
+            })
+            .collect();
+        let held = |i: usize| -> Vec<usize> { (0..N).filter(|&j| joints[j][i]).collect() };
         let count = course.seen[0].len();
-        let speed = |i: usize, j: usize| match (course.motion(), anchor.lines.get(group)) {
+        match anchor.lines.get(group) {
+            Some(line) if N <= 2 && self.session.sight == Sight::Led => {
+                let told = |i: usize| match held(i)[..] {
+                    [] => Told::Both,
+                    // The torque of the other joint, as a component of the force.
+                    [j] if N == 2 => {
+                        let moves = jacobian(&self.session.chain, &Pose::new(&line.state(i).0));
+                        let column = moves.column(1 - j);
+                        match column.norm() {
+                            size if size > 0.0 => Told::Along([column[0] / size, column[1] / size]),
+                            _ => Told::Neither,
+                        }
+                    }
+                    _ => Told::Neither,
+                };
+                Rest {
+                    left_out: Vec::new(),
+                    told: Arc::new((0..count).map(told).collect()),
+                }
+            }
+            _ => Rest {
+                left_out: (0..count).map(|i| !held(i).is_empty()).collect(),
+                told: Arc::default(),
+            },
+        }
+    }
+
+    /// The samples of a movement at which a joint rests.
+    fn resting_joint(&self, anchor: &Anchor<N>, (group, j): (usize, usize)) -> Vec<bool> {
+        /// Share of its fastest speed below which a joint rests, the speed below which it always does, and the one above
+        /// which it never does \[rad/s\].
+        const SLOW: (f64, f64, f64) = (0.25, 0.005, 0.03);
+        let course = &self.courses[self.references[group]];
+        let speed = |i: usize| match (course.motion(), anchor.lines.get(group)) {
             (Some(motion), _) => motion.qd[i][j].abs(),
             (None, Some(line)) => line.state(i).1[j].abs(),
             (None, None) => f64::INFINITY,
         };
-        let mut rest = vec![false; count];
-        for j in (0..N).filter(|&j| self.dry[j]) {
-            let fastest = (0..count).map(|i| speed(i, j)).fold(0.0, f64::max);
-            let limit = f64::min(SLOW.0 * fastest, SLOW.1);
-            // Where torques are compared a joint that reverses on the way does not rest: the law of its friction holds through zero.
-            let shortest = match self.session.sight {
-                Sight::Led => 1,
-                Sight::Torque => (course.rate / course.band) as usize,
-            };
-            let mut start = 0;
-            for i in 0..=count {
-                if i < count && speed(i, j) <= limit {
-                    continue;
+        let speeds: Vec<f64> = (0..course.seen[0].len()).map(speed).collect();
+        let fastest = speeds.iter().copied().fold(0.0, f64::max);
+        let limit = (SLOW.0 * fastest).clamp(SLOW.1, SLOW.2);
+        let mut rest: Vec<bool> = speeds.into_iter().map(|v| v <= limit).collect();
+        if self.session.sight == Sight::Torque {
+            // A joint that reverses on the way does not rest: the law of its friction holds through zero.
+            let shortest = (course.rate / course.band) as usize;
+            for run in rest.chunk_by_mut(|a, b| a == b) {
+                if run.len() < shortest {
+                    run.fill(false);
                 }
-                if i - start >= shortest {
-                    rest[start..i].fill(true);
-                }
-                start = i + 1;
             }
         }
         rest
@@ -344,6 +416,6 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
 
 /// Thinned channels with their stretches joined.
 pub fn flat(channels: &Channels, stretches: &Stretches) -> Vec<Vec<f64>> {
-    let one = |c: &Vec<f64>| stretches.pick(c).into_iter().flatten().collect();
-    channels.iter().map(one).collect()
+    let picked = stretches.pick(channels).into_iter();
+    picked.map(|pieces| pieces.concat()).collect()
 }

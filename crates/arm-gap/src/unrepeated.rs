@@ -19,10 +19,11 @@ impl<const N: usize> Study<'_, N> {
     /// sample weighs by what is left around it, with the mean over all as one sample more.
     ///
     /// * `range` - size of each channel, below a share of which no noise is believed
+    /// * `told` - share of the samples of each channel that tell anything
     pub(crate) fn noise_of_residuals(
         &self,
         anchor: &Anchor<N>,
-        range: &[f64],
+        (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
         let mut left = self.unexplained(anchor)?;
         let mut weights = vec![Channels::new(); self.courses.len()];
@@ -34,7 +35,7 @@ impl<const N: usize> Study<'_, N> {
             })
             .collect();
         for (own, &trial) in left.iter_mut().zip(&self.fitted) {
-            let samples: Vec<usize> = self.stretches[trial].0.iter().flatten().copied().collect();
+            let samples: Vec<usize> = self.stretches[trial].samples().collect();
             let length = self.courses[trial].counted.len();
             for (channel, mean) in own.iter_mut().zip(&mean) {
                 let weigh = |i: usize| {
@@ -56,7 +57,7 @@ impl<const N: usize> Study<'_, N> {
                 weights[trial].push(whole);
             }
         }
-        Noise::without_repeats(&left, range, weights)
+        Noise::without_repeats(&left, range, (told, weights))
     }
 
     /// What is left of residuals when everything that the catalogue could explain is taken out, to first order.

@@ -18,7 +18,7 @@ impl Law for Backlash {
         ],
         memory: false,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(2e-4)]);
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(2e-4)]).missing(0.003);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         for axis in 0..2 {

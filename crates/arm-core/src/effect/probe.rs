@@ -110,7 +110,7 @@ impl Probe {
             questions,
             nature: Nature::Lasting,
             promise: None,
-            missed: 0.005,
+            missed: 2e-5,
         }
     }
 

@@ -22,7 +22,8 @@ impl Law for Relaxation {
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[0.3, 1.0, 3.0]))])
-        .refining(&[1])]);
+        .refining(&[1])])
+    .missing(0.002);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

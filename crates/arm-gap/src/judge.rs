@@ -1,0 +1,321 @@
+//! What a named effect is worth: without it, against what could stand in its place, and at the price of its freedom.
+
+use std::cmp::Ordering;
+
+use arm_core::effect::Effect;
+
+use crate::GapError;
+use crate::anchor::Anchor;
+use crate::candidate::{Candidate, Library};
+use crate::chance::chi_square_tail;
+use crate::fit::Fitted;
+use crate::hypothesis::Hypothesis;
+use crate::scan::{Choice, Scan};
+use crate::search::{Progress, Settled};
+use crate::study::Study;
+
+/// Share of all that is explained that an effect must explain, whatever the others are.
+pub(crate) const FLOOR: f64 = 2e-5;
+/// The same without repeats: what sensors and a rigid model get wrong cannot be told from noise then, and an effect may be no more
+/// than what comes nearest to it.
+const FLOOR_UNREPEATED: f64 = 0.03;
+/// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
+const TIE: f64 = 10.0;
+/// Alternatives that are converged by simulation for each named effect.
+const RIVALS: usize = 5;
+/// Share of what a named effect gains that another must gain to first order to be converged in its place.
+const RIVAL: f64 = 0.6;
+/// Times that a better alternative may take the place of a named effect.
+const EXCHANGES: usize = 4;
+
+/// One effect that was named.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// Its place in the hypothesis.
+    pub slot: usize,
+    /// Probability of such a gain by chance, with all candidates that were asked.
+    pub p_value: f64,
+    /// Share of what can be explained that is lost without it.
+    pub share: f64,
+    /// What would explain the same: the candidate, and how much worse it does.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// Another effect that would explain what a named one does.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// The question that it answers.
+    pub candidate: Candidate,
+    /// The effect as it fits best.
+    pub effect: Effect<f64>,
+    /// How much worse it explains the data, in units of twice the log-likelihood.
+    pub worse: f64,
+    /// Squared cosine between what the two would show.
+    pub likeness: f64,
+}
+
+/// An alternative, fitted.
+struct Rival<const N: usize> {
+    alternative: Alternative,
+    fitted: Fitted<N>,
+}
+
+impl<'a, const N: usize> Study<'a, N> {
+    /// A fitted hypothesis without the effect at a place, fitted again; of infinite cost where nothing goes without it.
+    fn without(
+        &self,
+        fitted: &Fitted<N>,
+        slot: usize,
+        anchor: &Anchor<N>,
+    ) -> Result<Fitted<N>, GapError> {
+        let mut hypothesis: Hypothesis<N> = fitted.hypothesis.clone();
+        let mut asked = fitted.asked.clone();
+        hypothesis.named.remove(slot);
+        asked.remove(slot);
+        let again = |hypothesis: &Hypothesis<N>| match self.fit(
+            anchor,
+            hypothesis.clone(),
+            asked.clone(),
+        ) {
+            Err(GapError::Simulation { .. }) => Ok(None),
+            other => other.map(Some),
+        };
+        if let Some(less) = again(&hypothesis)? {
+            return Ok(less);
+        }
+        // What the effect had held up may be impossible without it: then from the segments as given.
+        hypothesis.segments = [[0.0; 3]; N];
+        if let Some(less) = again(&hypothesis)? {
+            return Ok(less);
+        }
+        // Or too far away to be followed.
+        let settled = self.settle(hypothesis.clone(), asked.clone());
+        Ok(settled.map_or_else(
+            |_| Fitted {
+                hypothesis,
+                asked,
+                cost: f64::INFINITY,
+                residuals: fitted.residuals.clone(),
+            },
+            |(less, _)| less,
+        ))
+    }
+
+    /// Goes back: effects that are no longer worth their price are taken out.
+    pub(crate) fn pruned(
+        &self,
+        (mut fitted, mut anchor): Settled<'a, N>,
+        calibrated: &Fitted<N>,
+        scale: f64,
+    ) -> Result<Settled<'a, N>, GapError> {
+        let floor = match self.repeated {
+            true => FLOOR,
+            false => FLOOR_UNREPEATED,
+        };
+        while !fitted.asked.is_empty() {
+            let mut weakest: Option<(f64, Fitted<N>)> = None;
+            let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
+            let without = without.collect::<Result<Vec<_>, _>>()?;
+            let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
+            // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
+            let foretold = match self.repeated {
+                true => None,
+                false => Some(self.foretold(&anchor, &fitted)?),
+            };
+            for (slot, less) in without.into_iter().enumerate() {
+                let mut gain = gains[slot];
+                if let Some(with) = foretold
+                    && gain.is_finite()
+                {
+                    gain = gain.min(self.foretold(&anchor, &less)? - with);
+                }
+                // Less may be the imperfect shape of another one.
+                let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
+                let least = others
+                    .map(|o| fitted.asked[o].kind().probe().missed * gains[o])
+                    .fold(floor * (calibrated.cost - fitted.cost), f64::max);
+                let candidate = &fitted.asked[slot];
+                let worth = gain / scale - candidate.price * candidate.spread;
+                let worth = if gain < least {
+                    worth.min(gain - least)
+                } else {
+                    worth
+                };
+                if worth < 0.0 && weakest.as_ref().is_none_or(|(least, _)| worth < *least) {
+                    weakest = Some((worth, less));
+                }
+            }
+            let Some((_, less)) = weakest else { break };
+            (fitted, anchor) = self.settle(less.hypothesis, less.asked)?;
+        }
+        Ok((fitted, anchor))
+    }
+
+    /// What could stand in the place of each named effect; a better one takes it.
+    pub(crate) fn judged(
+        &self,
+        (mut fitted, mut anchor): Settled<'a, N>,
+        calibrated: &Fitted<N>,
+        (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
+        progress: Progress<'_>,
+    ) -> Result<(Fitted<N>, Anchor<'a, N>, Vec<Named>), GapError> {
+        let mut exchanges = 0;
+        'again: loop {
+            let mut named = Vec::new();
+            let library = match fitted.asked.len() {
+                0 => None,
+                _ => Some(Library::build(self, &anchor, periodic)?),
+            };
+            for (slot, library) in (0..fitted.asked.len()).zip(std::iter::repeat(&library)) {
+                progress(
+                    "comparing alternatives",
+                    0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
+                );
+                let less = self.without(&fitted, slot, &anchor)?;
+                let gain = (less.cost - fitted.cost).min(f64::MAX);
+                let rivals = match library {
+                    Some(library) if less.cost.is_finite() => {
+                        self.rivals(&fitted, (slot, &less), (&anchor, library), scale)?
+                    }
+                    _ => Vec::new(),
+                };
+                let better = rivals
+                    .iter()
+                    .find(|r| self.takes_over(&r.alternative, (&fitted.asked[slot], gain / scale)));
+                if exchanges < EXCHANGES
+                    && let Some(better) = better
+                {
+                    let better = better.fitted.clone();
+                    (fitted, anchor) = self.settle(better.hypothesis, better.asked)?;
+                    exchanges += 1;
+                    continue 'again;
+                }
+                let candidate = &fitted.asked[slot];
+                let chance = chi_square_tail(gain / scale, candidate.width());
+                named.push(Named {
+                    slot,
+                    p_value: (asked * chance).min(1.0),
+                    share: gain / (calibrated.cost - fitted.cost).max(gain),
+                    alternatives: rivals
+                        .into_iter()
+                        .map(|r| r.alternative)
+                        .filter(|a| a.worse <= self.tie(candidate, gain / scale))
+                        .collect(),
+                });
+            }
+            named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
+            return Ok((fitted, anchor, named));
+        }
+    }
+
+    /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
+    ///
+    /// Without repeats nothing tells a law that is not exact from another one: what its kind may miss of what it shows decides nothing.
+    fn tie(&self, own: &Candidate, gain: f64) -> f64 {
+        match self.repeated {
+            true => TIE,
+            false => TIE.max(own.kind().probe().missed * gain),
+        }
+    }
+
+    /// Whether another effect takes the place of a named one.
+    ///
+    /// The better one does, when it earns the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
+    /// one with fewer parameters or, with as many, the one that stands before it in the catalogue: an intricate one bends itself to
+    /// what sensors and a rigid model get wrong.
+    fn takes_over(&self, rival: &Alternative, (own, gain): (&Candidate, f64)) -> bool {
+        const BETTER: f64 = 0.05;
+        let shapes = |c: &Candidate| self.price_of_shapes(std::slice::from_ref(c));
+        let plain = |c: &Candidate| {
+            let place = self.session.kinds().position(|k| k == c.kind());
+            (c.kind().info().parameters.len(), place)
+        };
+        let handicap = match plain(&rival.candidate).cmp(&plain(own)) {
+            _ if self.repeated => shapes(own) - shapes(&rival.candidate),
+            Ordering::Less => self.tie(own, gain),
+            Ordering::Equal => 0.0,
+            Ordering::Greater => -self.tie(own, gain),
+        };
+        rival.worse < handicap - BETTER
+    }
+
+    /// Other effects in the place of one, fitted, the best first.
+    fn rivals(
+        &self,
+        fitted: &Fitted<N>,
+        (slot, less): (usize, &Fitted<N>),
+        (anchor, library): (&Anchor<N>, &Library),
+        scale: f64,
+    ) -> Result<Vec<Rival<N>>, GapError> {
+        let own = &fitted.asked[slot];
+        let scan = Scan::new(self, less, anchor, library)?;
+        // What the effect itself would gain to first order: what others gain to first order is held against that.
+        let gain = (0..scan.len())
+            .filter(|&c| own.is_same_effect(&library.candidates[c].effect))
+            .filter_map(|c| scan.evaluate(&[c]))
+            .map(|c| c.gain)
+            .fold(0.0, f64::max)
+            .min(less.cost - fitted.cost);
+        let mut singles: Vec<Choice> = (0..scan.len())
+            .filter(|&c| {
+                let candidate = &library.candidates[c];
+                !own.is_same_effect(&candidate.effect)
+                    && !less
+                        .asked
+                        .iter()
+                        .any(|a| a.is_same_effect(&candidate.effect))
+            })
+            .filter_map(|c| scan.evaluate(&[c]))
+            .filter(|c| c.gain > RIVAL * gain)
+            .collect();
+        singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let twin = (0..scan.len()).find(|&c| {
+            own.is_same_effect(&library.candidates[c].effect)
+                && own.question == library.candidates[c].question
+        });
+        let mut seen: Vec<&Candidate> = Vec::new();
+        let mut rivals = Vec::new();
+        for choice in &singles {
+            let candidate = &library.candidates[choice.members[0]];
+            if seen.iter().any(|s| s.is_same_effect(&candidate.effect)) {
+                continue;
+            }
+            if seen.len() >= RIVALS {
+                break;
+            }
+            seen.push(candidate);
+            let mut asked = candidate.clone();
+            let member = choice.members[0];
+            (asked.price, asked.spread) = (scan.price[member], scan.spread[member]);
+            let Some(rival) = self.attempt(
+                less,
+                (std::slice::from_ref(&asked), &choice.coefficients),
+                anchor,
+            ) else {
+                continue;
+            };
+            let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
+            let likeness = twin.map_or(0.0, |t| scan.likeness(t, choice.members[0]));
+            let Some(&effect) = rival.hypothesis.named.last() else {
+                continue;
+            };
+            rivals.push(Rival {
+                alternative: Alternative {
+                    candidate: asked,
+                    effect,
+                    worse,
+                    likeness,
+                },
+                fitted: rival,
+            });
+        }
+        rivals.sort_by(|a, b| a.alternative.worse.total_cmp(&b.alternative.worse));
+        Ok(rivals)
+    }
+
+    /// What refined shapes must earn before a simpler explanation is given up for them (Schwarz' criterion).
+    pub(crate) fn price_of_shapes(&self, asked: &[Candidate]) -> f64 {
+        let shapes: f64 = asked.iter().map(Candidate::shapes).sum();
+        shapes * libm::log(self.rows_of_references() as f64)
+    }
+}
