@@ -224,7 +224,7 @@ def forecast(
     The closed chain is simulated, noise of the sensors is carried through the rows of the regression and the prior of the
     model, as `identify` would have them. Nothing is measured: what the model lacks is not in it. Over 200 repetitions with two
     segments the deviations agree with the scatter within 12 %. With three segments, where the robot does not hold every joint,
-    identification from noisy angles is biased by more than they say (`scripts/check_plan.py`).
+    over 20 repetitions within 42 % at most, in the middle a fifth too small (`scripts/check_plan.py`).
     """
     asked = _Question(model, with_effects, instruments, repeats)
     movements = checks.instances("movements", movements, Movement)

@@ -55,16 +55,19 @@ pub fn predicted_force<const N: usize>(
 }
 
 /// What one unit of an imperfection adds to the left-hand side of a sample's rows \[N m\].
-pub fn influence<const N: usize>(
+pub(crate) fn influence<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
     motion: &Kinematics<N>,
-    (force, i): (&[Plane<f64>], usize),
+    (force, memory, i): (&[Plane<f64>], &Memory, usize),
     what: Imperfection,
 ) -> Joints<f64, N> {
     let pose = Pose::new(&motion.q[i]);
     match what {
-        Imperfection::AngleOffset(joint) => angle_offset(model, motion, (force[i], i), joint),
+        Imperfection::AngleOffset(joint) => {
+            let time = i as f64 / trial.rate;
+            angle_offset(model, motion, (force[i], memory, i, time), joint)
+        }
         Imperfection::ForceBias(channel) => {
             let mut unit = [0.0; 2];
             unit[channel] = 1.0;
@@ -92,19 +95,21 @@ pub fn influence<const N: usize>(
     }
 }
 
-/// The measured angle is the true one plus the offset: the row moves against the offset.
+/// The measured angle is the true one plus the offset: the row moves against the offset, and springs of the joints with it.
 fn angle_offset<const N: usize>(
     model: &Model<N>,
     motion: &Kinematics<N>,
-    (force, i): (Plane<f64>, usize),
+    (force, memory, i, time): (Plane<f64>, &Memory, usize, f64),
     joint: usize,
 ) -> Joints<f64, N> {
     const STEP: f64 = 1e-5;
     let row = |shift: f64| {
         let mut q = motion.q[i];
         q[joint] += shift;
-        let pose = Pose::new(&q);
+        let (pose, moving) = (Pose::new(&q), Motion::new(time, q, motion.qd[i]));
         inverse_dynamics(&model.chain, &pose, &motion.qd[i], &motion.qdd[i])
+            + resisting_torque(&model.fitted, &moving, &memory.fitted)
+            + resisting_torque(&model.held, &moving, &memory.held)
             - static_torque(&model.chain, &pose, force, 0.0)
     };
     (row(-STEP) - row(STEP)) / (2.0 * STEP)

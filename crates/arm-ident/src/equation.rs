@@ -7,6 +7,7 @@ use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{Chain, Joints, Pose, inverse_dynamics, joint_force, regressor, static_torque};
 
 use crate::calibration::{influence, predicted_force};
+use crate::response::Course;
 use crate::trial::{Model, Trial};
 use crate::unknown::{Moment, Source, Unknown};
 
@@ -62,7 +63,9 @@ pub fn rows<const N: usize>(
             let column = match unknown.source {
                 Source::Segment(k, moment) => inertial[k][position(moment)],
                 Source::Effect(e, p) => gradient(&model.fitted[e], p, &at.motion, memory.fitted[e]),
-                Source::Calibration(what) => influence(model, trial, motion, (&predicted, i), what),
+                Source::Calibration(what) => {
+                    influence(model, trial, motion, (&predicted, &memory, i), what)
+                }
             };
             if let Source::Segment(k, moment) = unknown.source {
                 explained += column * value_of(&model.chain, k, moment);
@@ -78,6 +81,50 @@ pub fn rows<const N: usize>(
         columns,
         rhs,
         samples: (0..samples).collect(),
+    }
+}
+
+/// Puts rows built along a simulated motion in the place of those along measured angles, without the noise of the latter.
+///
+/// Angles with noise must not stand in columns: a wrist that hangs between forearm and handle moves little more than its
+/// noise, and a spring read off such angles comes out too soft, with everything that hangs on it. The columns Z stay those of the
+/// simulated motion, with what each unknown changes of it; the right-hand side becomes `τ − Y(q) x + Z x` with the measured angles q and
+/// the model's own values x. The fit stands still where `Zᵀ (τ − Y(q) x) = 0`: Z are instruments, and the residual is that of the measured angles.
+pub(crate) fn instrument<const N: usize>(
+    rows: &mut Rows,
+    (model, unknowns): (&Model<N>, &[Unknown]),
+    trial: &Trial<N>,
+    course: &Course<N>,
+) {
+    // A handle holds two joints; what is left of their freedom is the give of the contact, which is none to speak of.
+    if N > 2 {
+        for (column, more) in rows.columns.iter_mut().zip(course.columns(model, unknowns)) {
+            for (value, more) in column.iter_mut().zip(more) {
+                *value += more;
+            }
+        }
+    }
+    let mut motion = course.at_samples();
+    motion.q.clone_from(&trial.q);
+    let mut memory = Memory::new(model);
+    for i in 0..trial.len() {
+        let at = Sample::new(model, trial, &motion, i);
+        memory.advance(&at.motion, 1.0 / trial.rate);
+        let left = at.measured
+            - inverse_dynamics(&model.chain, &at.pose, &motion.qd[i], &motion.qdd[i])
+            - resisting_torque(&model.fitted, &at.motion, &memory.fitted)
+            - resisting_torque(&model.held, &at.motion, &memory.held);
+        rows.rhs[i * N..(i + 1) * N].copy_from_slice(left.as_slice());
+    }
+    for (unknown, column) in unknowns.iter().zip(&rows.columns) {
+        let value = match unknown.source {
+            Source::Segment(k, moment) => value_of(&model.chain, k, moment),
+            Source::Effect(e, p) => model.fitted[e].parameters[p],
+            Source::Calibration(_) => continue,
+        };
+        for (rest, column) in rows.rhs.iter_mut().zip(column) {
+            *rest += column * value;
+        }
     }
 }
 

@@ -3,14 +3,16 @@
 //! A movement is simulated in the closed chain, its rows are those of [`joint`](crate::joint), and noise of force and angle sensors is carried
 //! through them to a covariance `H⁻¹ M H⁻¹`.
 
+use arm_core::effect::{Motion, resisting_torque};
 use arm_core::{Joints, Limits, Pose, Robot, Setup, Shape, jacobian};
 use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Recording, Start, simulate};
 
 use crate::condition::{Pieces, filtered};
 use crate::constraint::base_parameters;
 use crate::covariance::{Bread, standard_error};
-use crate::equation::{Kinematics, rows};
+use crate::equation::{Kinematics, Memory, instrument, rows};
 use crate::error::IdentError;
+use crate::response::{Course, parts};
 use crate::summary::base_name;
 use crate::trial::{Model, Role, Tolerance, Trial};
 use crate::unknown::{Source, Unknown, unknowns};
@@ -143,17 +145,15 @@ pub fn forecast<const N: usize>(
     let unknowns = unknowns(model, &question.tolerance, &first);
     let pieces = seen
         .iter()
-        .map(|(trial, motion, _)| {
-            filtered(
-                &rows(model, &unknowns, trial, motion),
-                trial,
-                question.accuracy.cutoff,
-            )
+        .map(|(trial, course, _)| {
+            let mut found = rows(model, &unknowns, trial, &course.at_samples());
+            instrument(&mut found, (model, &unknowns), trial, course);
+            filtered(&found, trial, question.accuracy.cutoff)
         })
         .collect::<Result<Vec<Pieces>, _>>()?;
     let torque_noise: Vec<Vec<Covariance<N>>> = seen
         .iter()
-        .map(|(trial, motion, _)| noise_of(question, trial, motion))
+        .map(|(trial, course, _)| noise_of(question, trial, &course.at_samples()))
         .collect();
     let (bread, meat) = condensed(question, tasks, (&pieces, &torque_noise), unknowns.len())?;
     let covariance = covariance(&bread, &meat, &unknowns, |u| u.sd)?;
@@ -221,7 +221,7 @@ pub fn forecast<const N: usize>(
 fn simulated<const N: usize>(
     question: &Question<N>,
     task: &Task<N>,
-) -> Result<(Trial<N>, Kinematics<N>, Recording<N>), IdentError> {
+) -> Result<(Trial<N>, Course<N>, Recording<N>), IdentError> {
     let model = &question.model;
     let limits = Limits {
         speed: task.speed,
@@ -240,65 +240,65 @@ fn simulated<const N: usize>(
     experiment.start = Start::Equilibrium {
         near: task.waypoints[0],
     };
-    experiment.dt = interval / libm::ceil(interval / STEP);
-    experiment.output_interval = Some(interval);
+    let parts = parts(question.accuracy.rate);
+    let finer = interval / parts as f64;
+    experiment.dt = finer / libm::ceil(finer / STEP);
+    experiment.output_interval = Some(finer);
     let recording = simulate(&experiment)?;
-    let joints = |values: &[f64]| -> Vec<Joints<f64, N>> {
-        values
-            .chunks_exact(N)
-            .map(Joints::from_column_slice)
-            .collect()
-    };
-    let pairs = |values: &[f64]| -> Vec<[f64; 2]> {
-        values.chunks_exact(2).map(|v| [v[0], v[1]]).collect()
-    };
+    let course = Course::new(&recording, question.accuracy.rate, parts);
+    let q = course.at_samples().q;
     let trial = Trial {
         role: Role::Fit,
         configuration: 0,
         rate: question.accuracy.rate,
-        q: joints(&recording.q),
-        force_on_arm: Some(pairs(&recording.force_on_arm)),
+        force_on_arm: Some(course.force_at_samples()),
         moment_on_arm: None,
         torque: None,
-        handle: Some(pairs(&recording.handle)),
+        handle: None,
         speed: None,
-        valid: vec![true; recording.len()],
+        valid: vec![true; q.len()],
+        q,
     };
-    let motion = Kinematics {
-        q: trial.q.clone(),
-        qd: joints(&recording.qd),
-        qdd: joints(&recording.qdd),
-    };
-    Ok((trial, motion, recording))
+    Ok((trial, course, recording))
 }
 
 /// Covariance of the torque residual of a single sample, at every sample \[N² m²\].
 ///
-/// The forces act through the Jacobian; angles move gravity and the lever arms of the force, which is what stiffness of the static equilibrium does.
+/// The forces act through the Jacobian; angles move gravity, springs and the lever arms of the force, which is what stiffness of the
+/// static equilibrium does.
 fn noise_of<const N: usize>(
     question: &Question<N>,
     trial: &Trial<N>,
     motion: &Kinematics<N>,
 ) -> Vec<Covariance<N>> {
-    let chain = &question.model.chain;
+    let model = &question.model;
+    let chain = &model.chain;
     let Accuracy { force, angle, .. } = question.accuracy;
-    let static_residual = |q: &Joints<f64, N>, f: [f64; 2]| {
-        let pose = Pose::new(q);
-        arm_core::gravity(chain, &pose) - arm_core::static_torque(chain, &pose, f, 0.0)
-    };
+    let mut memory = Memory::new(model);
     let forces = trial.force_on_arm.as_deref().unwrap_or_default();
     motion
         .q
         .iter()
+        .zip(&motion.qd)
         .zip(forces)
-        .map(|(q, &f)| {
+        .enumerate()
+        .map(|(i, ((q, qd), &f))| {
+            let moving = |q: &Joints<f64, N>| Motion::new(i as f64 / trial.rate, *q, *qd);
+            memory.advance(&moving(q), 1.0 / trial.rate);
+            let residual = |q: &Joints<f64, N>| {
+                let (pose, motion) = (Pose::new(q), moving(q));
+                arm_core::gravity(chain, &pose)
+                    + resisting_torque(&model.fitted, &motion, &memory.fitted)
+                    + resisting_torque(&model.held, &motion, &memory.held)
+                    - arm_core::static_torque(chain, &pose, f, 0.0)
+            };
             let j = jacobian(chain, &Pose::new(q));
-            let here = static_residual(q, f);
+            let here = residual(q);
             let mut covariance = [[0.0; N]; N];
             let columns = (0..N).map(|k| {
                 let mut moved = *q;
                 moved[k] += SMALL_ANGLE;
-                (static_residual(&moved, f) - here) / SMALL_ANGLE * angle
+                (residual(&moved) - here) / SMALL_ANGLE * angle
             });
             let axes = (0..2).map(|axis| Joints::<f64, N>::from_fn(|i, _| j[(axis, i)] * force));
             for column in columns.chain(axes) {

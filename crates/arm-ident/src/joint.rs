@@ -6,7 +6,7 @@ use arm_core::effect::Effect;
 use crate::condition::{Noise, Pieces, filtered, repeat_deviations, residual};
 use crate::constraint::{binding_gradients, common_scale, program};
 use crate::covariance::blocks;
-use crate::equation::{Kinematics, Rows, rows};
+use crate::equation::{Rows, instrument, rows, value_of};
 use crate::error::IdentError;
 use crate::estimate::{Explained, Identified};
 use crate::motion::{
@@ -21,9 +21,6 @@ use crate::{Condenser, Factor, Matrix};
 
 /// Most rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
 const MOST_ROUNDS: usize = 15;
-/// First rounds in which the calibration is held: while the simulated motion is still that of a wrong arm, what it cannot
-/// explain must not be taken for a wrong sensor.
-const SETTLING_ROUNDS: usize = 2;
 /// The estimate stands when a round moves it by less than this, in units of its noise.
 const SETTLED: f64 = 1e-2;
 /// From this number of trials on, a trial is a cluster; below, trials are cut into blocks.
@@ -116,13 +113,19 @@ pub fn identify<const N: usize>(
     };
     let mut current = model.clone();
     let mut last: Option<(Solved, Vec<Pieces>)> = None;
-    for round in 0..MOST_ROUNDS {
-        let asked = if round < SETTLING_ROUNDS {
-            calibration_held(&unknowns)
-        } else {
-            unknowns.clone()
+    let (mut shown, mut refused) = (model.clone(), None);
+    for _ in 0..MOST_ROUNDS {
+        let prepared = match prepare(&current, &unknowns, trials, (cutoff, simulate)) {
+            Ok(prepared) => prepared,
+            // A step too far makes an arm that cannot be simulated: half of it is a step too.
+            Err(error) if last.is_some() => {
+                current = half_way(&shown, &current, &unknowns)?;
+                refused = Some(error);
+                continue;
+            }
+            Err(error) => return Err(error),
         };
-        let prepared = prepare(&current, &asked, trials, (cutoff, simulate))?;
+        (shown, refused) = (current, None);
         let fitted: Vec<&Pieces> = prepared
             .iter()
             .zip(trials)
@@ -130,15 +133,18 @@ pub fn identify<const N: usize>(
             .map(|(p, _)| p)
             .collect();
         let deviations = deviations(&fit, &fitted);
-        let solved = weighted(&current, &asked, &fitted, (&deviations, scale_free))?;
-        current = updated(&current, &unknowns, &solved.outcome.x)?;
+        let solved = weighted(&shown, &unknowns, &fitted, (&deviations, scale_free))?;
+        current = updated(&shown, &unknowns, &solved.outcome.x)?;
         let moved = last
             .as_ref()
             .map_or(f64::INFINITY, |(before, _)| moved(&solved, before));
         last = Some((solved, prepared));
-        if round > SETTLING_ROUNDS && moved < SETTLED {
+        if moved < SETTLED {
             break;
         }
+    }
+    if let Some(error) = refused {
+        return Err(error);
     }
     let Some((solved, prepared)) = last else {
         unreachable!("there is at least one round")
@@ -171,17 +177,6 @@ fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
         .flatten()
         .any(|t| t.iter().any(|&v| v != 0.0));
     trial.handle.is_some() && !moment && !torque
-}
-
-/// The same unknowns with a calibration that is trusted a thousand times more.
-fn calibration_held(unknowns: &[Unknown]) -> Vec<Unknown> {
-    let mut held = unknowns.to_vec();
-    for unknown in &mut held {
-        if matches!(unknown.source, Source::Calibration(_)) {
-            unknown.sd *= 1e-3;
-        }
-    }
-    held
 }
 
 /// How far a round moved the estimate, in units of its noise.
@@ -238,19 +233,6 @@ fn prepare<const N: usize>(
     trials: &[Trial<N>],
     (cutoff, simulate): (f64, bool),
 ) -> Result<Vec<Pieces>, IdentError> {
-    let motions = trials
-        .iter()
-        .enumerate()
-        .map(|(k, t)| {
-            let seen = measured(t, cutoff)?;
-            // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
-            if simulate && (t.role == Role::Fit || can_simulate(t)) {
-                simulated(model, t, seen, cutoff).map_err(|error| error.in_trial(k))
-            } else {
-                Ok(seen)
-            }
-        })
-        .collect::<Result<Vec<Kinematics<N>>, _>>()?;
     let mut model = model.clone();
     if !simulate {
         for trial in trials.iter().filter(|t| t.role == Role::Fit) {
@@ -263,11 +245,18 @@ fn prepare<const N: usize>(
             }
         }
     }
-    trials
-        .iter()
-        .zip(&motions)
-        .map(|(trial, motion)| filtered(&rows(&model, unknowns, trial, motion), trial, cutoff))
-        .collect()
+    let of_trial = |(k, trial): (usize, &Trial<N>)| {
+        // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
+        if !simulate || (trial.role == Role::Test && !can_simulate(trial)) {
+            let motion = measured(trial, cutoff)?;
+            return filtered(&rows(&model, unknowns, trial, &motion), trial, cutoff);
+        }
+        let course = simulated(&model, trial, cutoff).map_err(|error| error.in_trial(k))?;
+        let mut found = rows(&model, unknowns, trial, &course.at_samples());
+        instrument(&mut found, (&model, unknowns), trial, &course);
+        filtered(&found, trial, cutoff)
+    };
+    trials.iter().enumerate().map(of_trial).collect()
 }
 
 /// Raises the smoothing speed of an effect that has one, within its bounds.
@@ -525,6 +514,32 @@ fn updated<const N: usize>(
         .and_then(|c| c.with_rotor_inertia(*model.chain.rotor_inertia()))
         .map_err(IdentError::Model)?;
     Ok(next)
+}
+
+/// The model half way between two.
+fn half_way<const N: usize>(
+    from: &Model<N>,
+    to: &Model<N>,
+    unknowns: &[Unknown],
+) -> Result<Model<N>, IdentError> {
+    let x: Vec<f64> = values(from, unknowns)
+        .iter()
+        .zip(values(to, unknowns))
+        .map(|(a, b)| 0.5 * (a + b))
+        .collect();
+    updated(from, unknowns, &x)
+}
+
+/// The model's own values of the unknowns, zero for those of the calibration.
+fn values<const N: usize>(model: &Model<N>, unknowns: &[Unknown]) -> Vec<f64> {
+    unknowns
+        .iter()
+        .map(|u| match u.source {
+            Source::Segment(k, moment) => value_of(&model.chain, k, moment),
+            Source::Effect(e, p) => model.fitted[e].parameters[p],
+            Source::Calibration(_) => 0.0,
+        })
+        .collect()
 }
 
 /// How rows are explained by values of the unknowns.

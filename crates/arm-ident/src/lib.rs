@@ -50,6 +50,7 @@ mod equality;
 mod orthogonal;
 mod outcome;
 mod polish;
+mod response;
 mod scaled;
 
 pub use condense::Condenser;

@@ -2,14 +2,15 @@
 //!
 //! Differentiated camera angles make dry friction and viscosity unreadable: the sign and size of a resting joint's speed
 //! are noise. The simulated arm is led by the robot's own angles, which are known far better (an instrument in the sense
-//! of Janot, Vandanjon, Gautier 2014); only its speeds and accelerations are used, the angles stay the measured ones.
+//! of Janot, Vandanjon, Gautier 2014). Measured angles stay on the right-hand side, see
+//! [`instrument`](crate::equation::instrument).
 
 use arm_core::Setup;
 use arm_sim::{Coupling, Drive, Experiment, HandlePath, Start, simulate};
 
-use crate::equation::Kinematics;
 use crate::error::IdentError;
 use crate::motion::low_pass;
+use crate::response::{Course, parts};
 use crate::trial::{Model, Trial};
 
 /// Longest simulation step \[s\]; small enough for stiff contacts and smoothed dry friction.
@@ -20,16 +21,15 @@ const HANDLE_BAND: f64 = 2.0;
 /// Largest root mean square difference between simulated and measured angles that is still the same movement \[rad\].
 const SAME_MOVEMENT: f64 = 0.15;
 
-/// Simulated speeds and accelerations under measured angles.
+/// The run that the model makes along the handle's path of a trial.
 ///
 /// # Errors
 /// [`IdentError`] when the handle's path is not known, the simulation stops, or it moves elsewhere than the measured arm.
-pub fn simulated<const N: usize>(
+pub(crate) fn simulated<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
-    seen: Kinematics<N>,
     cutoff: f64,
-) -> Result<Kinematics<N>, IdentError> {
+) -> Result<Course<N>, IdentError> {
     let Some(handle) = &trial.handle else {
         return Err(IdentError::TooFew {
             name: "robot angles in every trial",
@@ -37,12 +37,10 @@ pub fn simulated<const N: usize>(
             expected: 1,
         });
     };
-    let recording = simulate(&experiment(model, trial, handle, &seen, cutoff)?)?;
-    let joint =
-        |values: &[f64], i: usize| arm_core::Joints::from_column_slice(&values[i * N..(i + 1) * N]);
+    let recording = simulate(&experiment(model, trial, handle, cutoff)?)?;
+    let course = Course::new(&recording, trial.rate, parts(trial.rate));
     let mut square = [0.0; N];
-    for (i, q) in seen.q.iter().enumerate() {
-        let simulated: arm_core::Joints<f64, N> = joint(&recording.q, i);
+    for (simulated, q) in course.at_samples().q.iter().zip(&trial.q) {
         for j in 0..N {
             square[j] += (simulated[j] - q[j]) * (simulated[j] - q[j]);
         }
@@ -57,18 +55,13 @@ pub fn simulated<const N: usize>(
             });
         }
     }
-    Ok(Kinematics {
-        q: seen.q,
-        qd: (0..trial.len()).map(|i| joint(&recording.qd, i)).collect(),
-        qdd: (0..trial.len()).map(|i| joint(&recording.qdd, i)).collect(),
-    })
+    Ok(course)
 }
 
 fn experiment<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
     handle: &[[f64; 2]],
-    seen: &Kinematics<N>,
     cutoff: f64,
 ) -> Result<Experiment<N>, IdentError> {
     let filter = low_pass((HANDLE_BAND * cutoff).min(0.4 * trial.rate), trial.rate)?;
@@ -77,7 +70,8 @@ fn experiment<const N: usize>(
     let points: Vec<[f64; 2]> = y.into_iter().zip(z).map(|(y, z)| [y, z]).collect();
     let interval = 1.0 / trial.rate;
     let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 * interval).collect();
-    let steps = libm::ceil(interval / LONGEST_STEP);
+    let parts = parts(trial.rate) as f64;
+    let steps = parts * libm::ceil(interval / parts / LONGEST_STEP);
     let drive = Drive::Handle {
         path: HandlePath::through_points(&times, &points)?,
         coupling: Coupling::Compliant,
@@ -88,8 +82,8 @@ fn experiment<const N: usize>(
         times[times.len() - 1],
     );
     experiment.effects = model.fitted.iter().chain(&model.held).copied().collect();
-    experiment.start = Start::Equilibrium { near: seen.q[0] };
+    experiment.start = Start::Equilibrium { near: trial.q[0] };
     experiment.dt = interval / steps;
-    experiment.output_interval = Some(interval);
+    experiment.output_interval = Some(interval / parts);
     Ok(experiment)
 }

@@ -1,0 +1,198 @@
+//! What an unknown changes in the torques by moving the arm otherwise.
+//!
+//! A robot that leads the hand does not hold every joint: where the arm has more joints than the handle has directions, what it
+//! does between shoulder and handle depends on its own springs, friction and inertia. Torques computed along a simulated motion
+//! then follow an unknown twice, directly and through the motion. The second part comes from the equation of motion linearised
+//! along the run, `M q̈ + D q̇ + (K + Jᵀ S J) q = −Y`, which is solved implicitly, so that a stiff contact and dry friction need
+//! no short steps.
+
+use arm_core::effect::{Motion, resisting_torque};
+use arm_core::{Joints, Plane, Pose, inverse_dynamics, jacobian, static_torque};
+use arm_sim::Recording;
+use nalgebra::SMatrix;
+
+use crate::equation::{Kinematics, Memory, rows};
+use crate::trial::{Model, Role, Trial};
+use crate::unknown::{Source, Unknown};
+
+/// Samples a second that follow the arm's own vibrations between the samples of a trial \[Hz\].
+const FINE: f64 = 200.0;
+/// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
+const THETA: f64 = 0.55;
+/// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
+const NUDGE: (f64, f64) = (1e-6, 1e-5);
+
+/// Steps for each sample of a trial.
+pub(crate) fn parts(rate: f64) -> usize {
+    libm::ceil(FINE / rate).max(1.0) as usize
+}
+
+/// A simulated run, more finely sampled than the trial that it belongs to.
+#[derive(Clone, Debug)]
+pub(crate) struct Course<const N: usize> {
+    /// What moved, as a trial without noise.
+    fine: Trial<N>,
+    motion: Kinematics<N>,
+    parts: usize,
+}
+
+impl<const N: usize> Course<N> {
+    /// From a recording with `parts` samples for each of a trial at `rate` \[Hz\].
+    pub fn new(recording: &Recording<N>, rate: f64, parts: usize) -> Self {
+        let joints = |values: &[f64]| -> Vec<Joints<f64, N>> {
+            values
+                .chunks_exact(N)
+                .map(Joints::from_column_slice)
+                .collect()
+        };
+        let force = recording.force_on_arm.chunks_exact(2);
+        let motion = Kinematics {
+            q: joints(&recording.q),
+            qd: joints(&recording.qd),
+            qdd: joints(&recording.qdd),
+        };
+        let fine = Trial {
+            role: Role::Fit,
+            configuration: 0,
+            rate: rate * parts as f64,
+            q: motion.q.clone(),
+            speed: None,
+            force_on_arm: Some(force.map(|f| [f[0], f[1]]).collect()),
+            moment_on_arm: None,
+            torque: None,
+            handle: None,
+            valid: vec![true; motion.q.len()],
+        };
+        Self {
+            fine,
+            motion,
+            parts,
+        }
+    }
+
+    /// The motion at the samples of the trial.
+    pub fn at_samples(&self) -> Kinematics<N> {
+        let pick = |values: &[Joints<f64, N>]| values.iter().step_by(self.parts).copied().collect();
+        Kinematics {
+            q: pick(&self.motion.q),
+            qd: pick(&self.motion.qd),
+            qdd: pick(&self.motion.qdd),
+        }
+    }
+
+    /// The force on the arm at the samples of the trial \[N\].
+    pub fn force_at_samples(&self) -> Vec<Plane<f64>> {
+        let force = self.fine.force_on_arm.iter().flatten();
+        force.step_by(self.parts).copied().collect()
+    }
+
+    /// What one unit of each unknown of the arm adds to the torques through speeds and accelerations; columns like those of
+    /// [`rows`], none for the calibration.
+    pub fn columns(&self, model: &Model<N>, unknowns: &[Unknown]) -> Vec<Vec<f64>> {
+        let count = unknowns
+            .iter()
+            .take_while(|u| !matches!(u.source, Source::Calibration(_)))
+            .count();
+        let direct = rows(model, &unknowns[..count], &self.fine, &self.motion).columns;
+        let slopes = self.slopes(model);
+        direct.iter().map(|y| self.answer(&slopes, y)).collect()
+    }
+
+    fn answer(&self, slopes: &[Slopes<N>], y: &[f64]) -> Vec<f64> {
+        let h = 1.0 / self.fine.rate;
+        let (early, late) = (h * (1.0 - THETA), h * THETA);
+        let (mut q, mut qd, mut qdd) = (Joints::zeros(), Joints::zeros(), Joints::zeros());
+        let mut out = Vec::with_capacity(y.len() / self.parts + N);
+        for (i, s) in slopes.iter().enumerate() {
+            let push = -Joints::from_column_slice(&y[i * N..(i + 1) * N]);
+            if i == 0 {
+                q = s.inverse * push;
+            } else {
+                let speed: Joints<f64, N> = qd + qdd * early;
+                let angle = q + speed * late + qd * early;
+                let next = s.inverse * (push - s.damping * speed - s.stiffness * angle);
+                let faster = speed + next * late;
+                q += faster * late + qd * early;
+                (qd, qdd) = (faster, next);
+            }
+            if i % self.parts == 0 {
+                out.extend((s.mass * qdd + s.own_damping * qd).iter());
+            }
+        }
+        out
+    }
+
+    fn slopes(&self, model: &Model<N>) -> Vec<Slopes<N>> {
+        let step = THETA / self.fine.rate;
+        let mut memory = Memory::new(model);
+        let forces = self.fine.force_on_arm.iter().flatten();
+        forces
+            .enumerate()
+            .map(|(i, &force)| {
+                let (q, qd, qdd) = (self.motion.q[i], self.motion.qd[i], self.motion.qdd[i]);
+                let moving = |q, qd| Motion::new(i as f64 / self.fine.rate, q, qd);
+                memory.advance(&moving(q, qd), 1.0 / self.fine.rate);
+                let left = |q, qd, qdd: &Joints<f64, N>| {
+                    let (pose, motion) = (Pose::new(&q), moving(q, qd));
+                    inverse_dynamics(&model.chain, &pose, &qd, qdd)
+                        + resisting_torque(&model.fitted, &motion, &memory.fitted)
+                        + resisting_torque(&model.held, &motion, &memory.held)
+                        - static_torque(&model.chain, &pose, force, 0.0)
+                };
+                let unit = |j, size| {
+                    let mut change = Joints::<f64, N>::zeros();
+                    change[j] = size;
+                    change
+                };
+                let here = left(q, qd, &qdd);
+                let matrix = |column: &dyn Fn(usize) -> Joints<f64, N>| {
+                    let columns: [Joints<f64, N>; N] = core::array::from_fn(column);
+                    SMatrix::<f64, N, N>::from_columns(&columns)
+                };
+                let mass = matrix(&|j| left(q, qd, &(qdd + unit(j, 1.0))) - here);
+                let own_damping = matrix(&|j| {
+                    let d = unit(j, NUDGE.1);
+                    (left(q, qd + d, &qdd) - left(q, qd - d, &qdd)) / (2.0 * NUDGE.1)
+                });
+                let own_stiffness = matrix(&|j| {
+                    let d = unit(j, NUDGE.0);
+                    (left(q + d, qd, &qdd) - left(q - d, qd, &qdd)) / (2.0 * NUDGE.0)
+                });
+                let jacobian = jacobian(&model.chain, &Pose::new(&q));
+                let through = |gain: Plane<f64>| {
+                    let mut scaled = jacobian;
+                    for (axis, gain) in gain.into_iter().enumerate() {
+                        scaled.row_mut(axis).scale_mut(gain);
+                    }
+                    jacobian.transpose() * scaled
+                };
+                let damping = own_damping + through(model.contact.damping);
+                let stiffness = own_stiffness + through(model.contact.stiffness);
+                // At rest, in the first instant, only angles give way.
+                let whole = if i == 0 {
+                    stiffness
+                } else {
+                    mass + damping * step + stiffness * (step * step)
+                };
+                Slopes {
+                    inverse: whole.try_inverse().unwrap_or_else(SMatrix::zeros),
+                    mass,
+                    own_damping,
+                    damping,
+                    stiffness,
+                }
+            })
+            .collect()
+    }
+}
+
+/// How torques follow the motion at one instant.
+struct Slopes<const N: usize> {
+    mass: SMatrix<f64, N, N>,
+    /// Of the arm without the contact, whose force is measured.
+    own_damping: SMatrix<f64, N, N>,
+    damping: SMatrix<f64, N, N>,
+    stiffness: SMatrix<f64, N, N>,
+    /// Of what multiplies the new accelerations of a step.
+    inverse: SMatrix<f64, N, N>,
+}
