@@ -146,7 +146,12 @@ impl<'a, const N: usize> Study<'a, N> {
                 }
             }
             let Some((_, less)) = weakest else { break };
-            (fitted, anchor) = self.settle(less.hypothesis, less.asked)?;
+            match self.settle(less.hypothesis, less.asked) {
+                Ok(settled) => (fitted, anchor) = settled,
+                // It may be worth little, and nothing can be simulated without it.
+                Err(GapError::Simulation { .. }) => break,
+                Err(error) => return Err(error),
+            }
         }
         Ok((fitted, anchor))
     }
@@ -174,8 +179,10 @@ impl<'a, const N: usize> Study<'a, N> {
                 let less = self.without(&fitted, slot, &anchor)?;
                 let gain = (less.cost - fitted.cost).min(f64::MAX);
                 let rivals = match library {
+                    // Of what cannot be followed without it nothing can be said.
                     Some(library) if less.cost.is_finite() => {
-                        self.rivals(&fitted, (slot, &less), (&anchor, library), scale)?
+                        let found = self.rivals(&fitted, (slot, &less), (&anchor, library), scale);
+                        found.unwrap_or_default()
                     }
                     _ => Vec::new(),
                 };
@@ -185,10 +192,16 @@ impl<'a, const N: usize> Study<'a, N> {
                 if exchanges < EXCHANGES
                     && let Some(better) = better
                 {
-                    let better = better.fitted.clone();
-                    (fitted, anchor) = self.settle(better.hypothesis, better.asked)?;
                     exchanges += 1;
-                    continue 'again;
+                    let Fitted {
+                        hypothesis, asked, ..
+                    } = better.fitted.clone();
+                    // What can be followed but not simulated is no answer.
+                    if let Ok(settled) = self.settle(hypothesis, asked) {
+                        // Others may have stood for what the former one missed.
+                        (fitted, anchor) = self.pruned(settled, calibrated, scale)?;
+                        continue 'again;
+                    }
                 }
                 let candidate = &fitted.asked[slot];
                 let chance = chi_square_tail(gain / scale, candidate.width());

@@ -224,7 +224,11 @@ impl<'a, const N: usize> Study<'a, N> {
         for round in 0..MOST {
             progress("asking the catalogue", 0.1 + 0.1 * round as f64);
             let library = Library::build(self, &anchor, periodic)?;
-            let scan = Scan::new(self, &current, &anchor, &library)?;
+            let scan = match Scan::new(self, &current, &anchor, &library) {
+                // What was found so far stands.
+                Err(GapError::Simulation { .. }) if round > 0 => break,
+                other => other?,
+            };
             asked = library.candidates.len() as f64;
             scale = scan.scale;
             ruled = self.ruled(&library, &scan);
