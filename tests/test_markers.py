@@ -194,6 +194,7 @@ def test_refuses_broken_motions(tmp_path: Path) -> None:
         ("endheader\n", "", "header: found no line endheader"),
         ("time\tq", "q\ttime", "line 7: found columns q, time, allowed time first"),
         ("0.1\t2.0\n", "", r"found 1 rows, allowed 2 rows, as its header says \(the file is cut off\)"),
+        ("inDegrees=yes", "inDegrees=maybe", "header, inDegrees: found 'maybe', allowed yes or no"),
         ("2.0", "two", "line 9, column q: found 'two', allowed a number"),
         ("0.1\t", "0.0\t", "line 9, time: found 0.0 s after 0.0 s"),
     ]

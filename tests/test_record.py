@@ -149,6 +149,11 @@ def test_a_fault_stops_the_trial(experiment: Path, tmp_path: Path, fault: str, r
         ("moment_Nm = [0.05, 0.02]", "moment_Nm = [nan, 0.02]", r"\[variation\], moment_Nm: found nan"),
         ("marker_gaps = 0.01", "marker_gaps = 2", r"\[sensors\], marker_gaps: found 2\.0, allowed a finite number 0 to 0\.5"),
         ("repeats = 2", "repeats = 0", r"\[\[movement\]\]: found no repeats"),
+        (
+            'configuration = "slow"',
+            'configuration = "../slow"',
+            r"\[\[movement\]\] 1, configuration: found '\.\./slow', allowed a name that files",
+        ),
         ("seed = 3", "seed = -3", r"seed: found -3, allowed a whole number 0 to"),
         ("[[-60, 60], [-48, 60]", "[[-60, 60], [-48]", r"\[\[movement\]\] 1, movement.waypoints_deg"),
         ("[[-60, 60], [-48, 60]", "[[-60, 60], [90, 0]", r"from the robot's base, allowed"),
@@ -200,3 +205,10 @@ def test_nobody_has_a_centre_of_mass_beyond_the_segment(experiment: Path) -> Non
         hand = load_experiment(experiment).truth.segments[2]
         ended += hand.com == hand.length
     assert 0 < ended < 30
+
+
+def test_a_session_that_the_supervisor_stopped_is_one_line(experiment: Path, tmp_path: Path) -> None:
+    experiment.write_text(EXPERIMENT.replace("acceleration_rad_s2 = 2.0", "acceleration_rad_s2 = 1e12"), encoding="utf-8")
+    with pytest.raises(armrs.ArmrsError, match=r"the first after \d.* s: acceleration 1 beyond the limit, -?\d.* where -?60 is allowed$"):
+        armrs.record(experiment, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

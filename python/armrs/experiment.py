@@ -262,6 +262,9 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
     runs = tuple(_run(f"[[movement]] {k}", t, n) for k, t in enumerate(checks.tables("movement", document["movement"]), 1))
     names = [run.configuration for run in runs]
     for k, name in enumerate(names):
+        # Trials are files of this name below the folder asked for, and nowhere else.
+        if not name or name.startswith(".") or any(c in name for c in "/\\\0"):
+            raise BadInput(f"[[movement]] {k + 1}, configuration", name, "a name that files can have")
         if name in names[:k]:
             raise BadInput(f"[[movement]] {k + 1}, configuration", name, "each configuration once")
     if not any(run.repeats for run in runs):

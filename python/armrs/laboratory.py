@@ -129,7 +129,9 @@ def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done
             step(1)
     kept = [(m.trial, m.markers, m.story) for m in seen if m.trial is not None and m.markers is not None]
     if not any(trial.role == "fit" for trial, _, _ in kept):
-        raise ArmrsError(f"the supervisor stopped every trial to be fitted: {seen[0].story['stop']}")
+        stop = seen[0].story["stop"]
+        found = f"{stop['what']} {stop['reason']}, {stop['value']:.4g} where {stop['limit']:.4g} is allowed"
+        raise ArmrsError(f"the supervisor stopped every trial to be fitted, the first after {stop['at_s']:.4g} s: {found}")
     lengths = np.mean([story["lengths_m"] for _, _, story in kept], axis=0)
     dataset = Dataset(
         name=experiment.name,

@@ -115,6 +115,10 @@ def read_trc(path: Path) -> Markers:
     table = _numbers(rows, columns)
     _increasing(table[:, 1], [k for k, _ in rows])
     announced = header.get("numframes", "")
+    if announced.isdigit() and int(announced) > len(table):
+        raise BadInput(
+            "line 3, NumFrames", f"{announced} announced, {len(table)} there", "all of them: the file is cut off, or its header wrong"
+        )
     notes = () if announced == str(len(table)) else (f"the header announces {announced or 'no'} frames, {len(table)} are there",)
     positions = METRES[unit] * table[:, 2:].reshape(len(table), len(names), 3)
     return Markers(names, table[:, 1], positions, up="y", warnings=notes)
@@ -154,7 +158,10 @@ def _header(lines: Sequence[str]) -> dict[str, str]:
 
 def _in_degrees(header: dict[str, str], lines: Sequence[str]) -> bool | None:
     if "indegrees" in header:
-        return header["indegrees"].lower() in ("yes", "true", "1")
+        said = header["indegrees"].lower()
+        if said not in ("yes", "true", "1", "no", "false", "0"):
+            raise BadInput("header, inDegrees", header["indegrees"], "yes or no")
+        return said in ("yes", "true", "1")
     return True if any("SIMM" in line for line in lines) else None  # motions of SIMM are in degrees
 
 
