@@ -115,10 +115,6 @@ def read_trc(path: Path) -> Markers:
     table = _numbers(rows, columns)
     _increasing(table[:, 1], [k for k, _ in rows])
     announced = header.get("numframes", "")
-    if announced.isdigit() and int(announced) > len(table):
-        raise BadInput(
-            "line 3, NumFrames", f"{announced} announced, {len(table)} there", "all of them: the file is cut off, or its header wrong"
-        )
     notes = () if announced == str(len(table)) else (f"the header announces {announced or 'no'} frames, {len(table)} are there",)
     positions = METRES[unit] * table[:, 2:].reshape(len(table), len(names), 3)
     return Markers(names, table[:, 1], positions, up="y", warnings=notes)
