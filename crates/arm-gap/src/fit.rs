@@ -126,7 +126,10 @@ impl<'a, const N: usize> Study<'a, N> {
         let mut fitted = self.state(anchor, start, asked)?;
         for _ in 0..STEPS {
             let hypothesis = &fitted.hypothesis;
-            let (coordinates, clusters) = self.equations(anchor, &fitted, &[])?;
+            // What cannot be followed a little further on is fitted as far as it was.
+            let Ok((coordinates, clusters)) = self.equations(anchor, &fitted, &[]) else {
+                break;
+            };
             // Where nothing decides an unknown, what was found so far stands.
             let Some((usable, step)) = stepped(&clusters, hypothesis, &coordinates) else {
                 break;

@@ -233,18 +233,12 @@ impl<'a, const N: usize> Study<'a, N> {
             scale = scan.scale;
             ruled = self.ruled(&library, &scan);
             let room = MOST - current.asked.len();
-            let Some((better, rung)) =
-                self.round((&calibrated, &current), &anchor, (&library, &scan), room)?
-            else {
-                break;
-            };
-            // What can be followed but not simulated is no answer.
-            let Ok(settled) = self.settle(better.hypothesis, better.asked) else {
+            let found = self.round((&calibrated, &current), &anchor, (&library, &scan), room);
+            let Some((settled, rung)) = found else {
                 break;
             };
             ladder.push(rung);
-            (current, anchor) = settled;
-            (current, anchor) = self.pruned((current, anchor), &calibrated, scale)?;
+            (current, anchor) = self.pruned(settled, &calibrated, scale)?;
             if self.leave_out_rest(&anchor) {
                 self.measure_noise(&self.anchor(&current.hypothesis)?)?;
                 let from;
@@ -304,14 +298,14 @@ impl<'a, const N: usize> Study<'a, N> {
         self.calibrate()
     }
 
-    /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price.
+    /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price and possible.
     fn round(
         &self,
         (calibrated, current): (&Fitted<N>, &Fitted<N>),
         anchor: &Anchor<N>,
         (library, scan): (&Library, &Scan),
         room: usize,
-    ) -> Result<Option<(Fitted<N>, Rung)>, GapError> {
+    ) -> Option<(Settled<'a, N>, Rung)> {
         let fresh = |members: &[usize], c: usize| {
             let candidate = &library.candidates[c];
             let same = |other: &Candidate| {
@@ -352,7 +346,7 @@ impl<'a, const N: usize> Study<'a, N> {
         {
             contenders.push(single.clone());
         }
-        let mut best: Option<(f64, Fitted<N>)> = None;
+        let mut worthy: Vec<(f64, Fitted<N>)> = Vec::new();
         let mut tried = Vec::new();
         for choice in &contenders {
             let asked: Vec<Candidate> = choice
@@ -372,19 +366,22 @@ impl<'a, const N: usize> Study<'a, N> {
             let worth = gain / scan.scale - price;
             let simple = worth - self.price_of_shapes(&asked);
             tried.push((asked, gain));
-            if worth > 0.0 && best.as_ref().is_none_or(|(most, _)| simple > *most) {
-                best = Some((simple, fitted));
+            if worth > 0.0 {
+                worthy.push((simple, fitted));
             }
         }
         tried.sort_by(|a, b| b.1.total_cmp(&a.1));
-        Ok(best.map(|(_, fitted)| {
+        worthy.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // What can be followed but not simulated is no answer.
+        worthy.into_iter().find_map(|(_, better)| {
             let rung = Rung {
-                tried,
+                tried: tried.clone(),
                 before: current.cost,
-                after: fitted.cost,
+                after: better.cost,
             };
-            (fitted, rung)
-        }))
+            let settled = self.settle(better.hypothesis, better.asked).ok()?;
+            Some((settled, rung))
+        })
     }
 
     /// A hypothesis with further effects, fitted; `None` where it cannot be followed.
