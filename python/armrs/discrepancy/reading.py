@@ -221,8 +221,8 @@ def gaps(dataset: Dataset, led: bool, raw: Mapping[str, Any], last: str = "amend
         result[name] = ChannelGap(given, calibrated, after, _floor(dataset, raw, c, last))
     if not led:
         for j in range(dataset.model.n_joints):
-            sizes = (_free_size(dataset, raw, version, j) for version in ("given", "calibrated", "amended"))
-            result[f"q{j + 1}_rad"] = ChannelGap(*sizes, None)
+            given, calibrated, after = (_free_size(dataset, raw, version, j) for version in ("given", "calibrated", "amended"))
+            result[f"q{j + 1}_rad"] = ChannelGap(given, calibrated, after, None)
     return result
 
 
