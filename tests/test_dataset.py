@@ -248,7 +248,7 @@ BROKEN_TRIAL: dict[str, tuple[Callable[[Session], None], str, str]] = {
     "all missing": (every_cell("Fz_N", ""), "column Fz_N: found no sample at all, allowed samples, or no such column", ""),
     "unknown column": (header("qr1_rad", "robot1_rad"), "header: found unknown column 'robot1_rad'", "(nearest known: "),
     "wrong case": (header("Fy_N", "FY_N"), "header: found unknown column 'FY_N'", "(nearest known: Fy_N)"),
-    "unknown unit": (header("Fy_N", "Fy_lbf"), "header: found 'Fy_lbf', allowed a known unit: Fy_N, Fy_mN, Fy_kN", "(nearest known: Fy_"),
+    "unknown unit": (header("Fy_N", "Fy_lbf"), "header: found 'Fy_lbf', allowed a known unit: Fy_N, Fy_mN, Fy_kN", ""),
     "no unit": (header("Fy_N", "Fy"), "header: found 'Fy', allowed a known unit: Fy_N", ""),
     "same column": (header("q2_rad", "q1_rad"), "line 1: found column q1_rad twice, allowed each column once", ""),
     "two units": (header("q2_rad", "q1_deg"), "header: found q1_rad and q1_deg, allowed q1 once", ""),

@@ -203,7 +203,7 @@ class _Session:
             repeat,
             "fit",
             led["time"][::every],
-            np.empty((0, 0)),
+            np.empty((len(led["time"][::every]), 0)),
             robot_q=led["robot_q"][::every],
             valid=np.ones(1, bool),
         )

@@ -261,12 +261,13 @@ class Model:
         before = [sum(s.length for s in self.segments[:k]) for k in range(len(self.segments))]
         held = self.gravity * sum(s.mass * (at + s.com) for s, at in zip(self.segments, before, strict=True)) / length
         least = held / (SOFT_CONTACT * length)
-        upward = self.contact.stiffness[1]
-        if upward < least:
+        # A slide gives way in one direction on purpose.
+        stiffest = max(self.contact.stiffness)
+        if stiffest < least:
             raise BadInput(
-                "[contact], stiffness[1]",
-                upward,
-                f">= {least:.3g} N/m: {held:.3g} N of the arm's weight would press it in by {held / upward:.3g} m",
+                "[contact], stiffness",
+                stiffest,
+                f">= {least:.3g} N/m: {held:.3g} N of the arm's weight would press it in by {held / stiffest:.3g} m",
                 hint="kN/m or N/mm? 10 kN/m is 10000",
             )
 
