@@ -102,7 +102,7 @@ def test_stiffness_in_kilonewtons_is_named(stiffness: float, tmp_path: Path, cap
     file = tmp_path / "model.toml"
     file.write_text(model.to_toml().replace("stiffness = [10000.0, 10000.0]", f"stiffness = [{stiffness}, {stiffness}]"), encoding="utf-8")
     assert main(["simulate", str(file), "--movement", "none.toml"]) == 2
-    assert capsys.readouterr().err.startswith(f"armrs: {file}: [contact], stiffness[1]: found {stiffness}, allowed >= ")
+    assert capsys.readouterr().err.startswith(f"armrs: {file}: [contact], stiffness: found {stiffness}, allowed >= ")
 
 
 def test_a_soft_contact_is_a_contact() -> None:
