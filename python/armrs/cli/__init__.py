@@ -1,0 +1,119 @@
+"""The command line: `armrs <verb>`.
+
+A verb parses, calls one public function and writes. `main` is the only place that turns errors into lines and exit statuses:
+0 done, 1 ran and found something that needs the user, 2 bad input (one line, nothing written).
+
+To add a verb, write a function in the module of its kind and name it in `_VERBS`; its docstring is the help. Return 1 for a finding,
+nothing otherwise.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import ArmrsError, BadInput, one_line
+from . import fmu
+from .analysis import gap, identify, passive
+from .built_in import demo, reproduce
+from .data import convert, effects, report
+from .experiments import plan, record, simulate, sweep
+
+_VERBS: tuple[Callable[..., Any], ...] = (
+    effects, convert, demo, identify, gap, simulate, passive, plan, record, sweep, reproduce, report,
+)  # fmt: skip
+"""In the order in which the help lists them."""
+
+app = typer.Typer(name="armrs", add_completion=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
+
+
+# Typer brings its own copy of click in newer versions and uses the package in older ones; this is the class that both raise.
+_USAGE: type[Exception] = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        import armrs
+
+        print(f"armrs {armrs.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and end.")] = False,
+) -> None:
+    """Find out what an arm is made of, when a robot leads it.
+
+    Simulate the experiment, identify the arm, and name what the model lacks. SI units and radians unless a name says otherwise.
+
+    Exit status: 0 done, 1 found something that needs you, 2 bad input.
+    """
+
+
+for _verb in _VERBS:
+    app.command()(_verb)
+app.add_typer(fmu.app)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    command = typer.main.get_command(app)
+    try:
+        # Not `command.main`, which turns some errors into exits of its own.
+        with command.make_context("armrs", given or ["--help"], obj=tuple(given)) as context:
+            result = command.invoke(context)
+        sys.stdout.flush()
+    except typer.Exit as end:
+        return end.exit_code
+    except BadInput as error:
+        return _refuse(str(_of_option(error)))
+    except ArmrsError as error:
+        print(f"armrs: {one_line(error)}", file=sys.stderr)
+        return 1
+    except _USAGE as error:
+        inside = getattr(error, "ctx", None)
+        return _refuse(f"{_usage_text(error)} (see {inside.command_path if inside else 'armrs'} --help)")
+    except (KeyboardInterrupt, typer.Abort):
+        print("armrs: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has seen enough. Standard output is turned away, or its last flush would complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return result if isinstance(result, int) else 0
+
+
+def run() -> None:
+    """Entry point of the command `armrs`."""
+    sys.exit(main())
+
+
+_OPTIONS = {
+    "with_effects": "--with", "cutoff": "--cutoff-hz", "rate": "--rate-hz", "duration": "--duration-s",
+    "robot_speed": "--robot-speed-rad-s",
+    **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "integrator", "jobs", "level", "method", "motion")},
+}  # fmt: skip
+"""What the command line calls an argument of a function."""
+
+
+def _of_option(error: BadInput) -> BadInput:
+    """Return a refusal with the name that the argument has on the command line."""
+    if error.file is not None or error.place not in _OPTIONS:
+        return error
+    return BadInput(_OPTIONS[error.place], error.found, error.allowed, hint=error.hint)
+
+
+def _refuse(line: str) -> int:
+    print(f"armrs: {one_line(line)}", file=sys.stderr)
+    return 2
+
+
+def _usage_text(error: Exception) -> str:
+    text: str = getattr(error, "format_message", error.__str__)()
+    return text.rstrip(".").replace("Value error, ", "")

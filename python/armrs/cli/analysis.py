@@ -1,0 +1,156 @@
+"""Verbs that say what a data set tells of its arm."""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import console
+from ..errors import BadInput, Text
+from .common import JsonFile, MaybeFolder, Source, command_line, present, writable
+
+
+class Method(str, enum.Enum):
+    """Methods of identification."""
+
+    joint = "joint"
+    cascade = "cascade"
+
+
+class Motion(str, enum.Enum):
+    """Sources of speeds and accelerations."""
+
+    auto = "auto"
+    measured = "measured"
+    simulated = "simulated"
+
+
+def identify(
+    context: typer.Context,
+    dataset: Source,
+    out: MaybeFolder = None,
+    method: Annotated[Method, typer.Option(help="All joints at once with physical constraints, or one after the other.")] = Method.joint,
+    with_: Annotated[
+        str | None,
+        typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects that are fitted at every joint besides the model's."),
+    ] = None,
+    cutoff_hz: Annotated[float | None, typer.Option(help="Cutoff of the common low-pass [Hz]; chosen from the data when absent.")] = None,
+    motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
+    level: Annotated[float, typer.Option(help="Probability of the intervals, 0.5 to 1.")] = 0.95,
+    history: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Add the result to the history of this subject, a file of SQLite, and show it.")
+    ] = None,
+    date: Annotated[
+        str | None, typer.Option(metavar="YYYY-MM-DD", help="Date of the session; that in the data set's name, or today, when absent.")
+    ] = None,
+    json: JsonFile = None,
+) -> int:
+    """Identify body segment and joint parameters, each with an interval and what decided it.
+
+    Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, or when
+    speeds are noise to a good part. Such a result is not added to a history.
+    """
+    from .. import history as sessions
+    from .. import results, words
+    from ..dataset import load_dataset
+    from ..identification import identify as run_identification
+
+    folder = writable(out, json)
+    data = load_dataset(dataset)
+    if history is None and date is not None:
+        raise BadInput("--date", date, "--date together with --history")
+    day = sessions.session_date(data.name, date)
+    if history is not None:
+        sessions.check(history, data.model.n_joints)
+    with console.progress("identifying"):
+        result = run_identification(
+            data,
+            method=method.value,
+            with_effects=() if with_ is None else with_,
+            cutoff=cutoff_hz,
+            motion=motion.value,
+            level=level,
+        )
+    plain = results.identified_data(result, command_line(context))
+    with contextlib.ExitStack() as kept:
+        # What is added to the history stays only if everything else could be written.
+        if history is not None and result.is_sound:
+            plain["history"] = [course.to_dict() for course in kept.enter_context(sessions.adding(history, result, day))]
+        written = results.write_identified(result, plain, folder) if folder else []
+        console.warn([*data.warnings, *result.warnings])
+        if history is not None and not result.is_sound:
+            console.warn([f"{history}: not added to the history, since the result is not sound"])
+        present(lambda: plain, json, lambda: words.identified(plain, written))
+    return 0 if result.is_sound else 1
+
+
+def gap(
+    context: typer.Context,
+    dataset: Source,
+    out: MaybeFolder = None,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="A first answer only: calibrate, and list what may be missing; nothing is named or written below -o."),
+    ] = False,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores when absent. The result does not depend on it.")] = None,
+    json: JsonFile = None,
+) -> int:
+    """Find where model and data disagree, name the effect that is missing, and show the gap before and after.
+
+    Everything is chosen and fitted on the fit trials; the gap is measured on the test trials. Exit status 1 when something is left
+    that no effect of the catalogue explains.
+    """
+    from ..dataset import load_dataset
+    from ..discrepancy import calibrate, find_gap, words
+    from ..discrepancy.results import gap_data, write_gap
+
+    if quick and out is not None:
+        raise BadInput("--quick", Text("-o beside it"), "--json, or nothing: a first answer has no report")
+    folder = writable(out, json)
+    data = load_dataset(dataset)
+    if quick:
+        with console.stages("a first look") as tell:
+            first = calibrate(data, threads=threads, progress=tell)
+        console.warn([*data.warnings, *first.warnings])
+        present(lambda: first.to_dict(command_line(context)), json, lambda: words.quick(first.to_dict()))
+        return 0
+    with console.stages("looking for what is missing") as tell:
+        result = find_gap(data, threads=threads, progress=tell)
+    plain = gap_data(result, command_line(context))
+    written = write_gap(result, plain, folder) if folder else []
+    console.warn([*data.warnings, *result.warnings])
+    present(lambda: plain, json, lambda: words.show(plain, written))
+    return 1 if result.verdict == "unexplained" else 0
+
+
+def passive(
+    context: typer.Context,
+    dataset: Source,
+    out: MaybeFolder = None,
+    cutoff_hz: Annotated[float, typer.Option(help="Cutoff of the low-pass of angles and forces [Hz].")] = 1.0,
+    bins: Annotated[int, typer.Option(help="Angle bins over the range of a joint.")] = 24,
+    json: JsonFile = None,
+) -> int:
+    """Compute passive joint moments of slow movements: elastic mean and hysteresis against the angle.
+
+    Of the model only the rigid arm counts, none of its springs, friction or other effects.
+
+    Exit status 1 when no joint moved long enough in both directions.
+    """
+    from .. import results, words
+    from ..dataset import load_dataset
+    from ..moments import passive_moments
+
+    folder = writable(out, json)
+    data = load_dataset(dataset)
+    with console.progress("passive moments"):
+        result = passive_moments(data, cutoff=cutoff_hz, bins=bins)
+    plain = results.passive_data(result, command_line(context))
+    written = results.write_passive(result, plain, folder) if folder else []
+    console.warn([*data.warnings, *result.warnings])
+    present(lambda: plain, json, lambda: words.passive(plain, written))
+    return 0 if result.curves else 1

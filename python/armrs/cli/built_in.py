@@ -1,0 +1,34 @@
+"""Verbs that need no data: the main job on a simulated session, and the thesis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .. import console
+from .common import JsonFile, OutFolder, command_line, present, writable
+
+
+def demo(context: typer.Context, out: OutFolder = Path("armrs-demo"), json: JsonFile = None) -> None:
+    """Do the main job on built-in data: simulate the experiment, identify the arm, compare with what is known, write a report."""
+    from .. import words
+    from ..demo import run_demo
+    from ..report import read_result
+
+    writable(out, json)
+    with console.progress("demo"):
+        result = run_demo(out, command=command_line(context))
+    plain = read_result(out / "demo.json")
+    present(lambda: plain, json, lambda: words.demo(plain, result.files))
+
+
+def reproduce(context: typer.Context, out: OutFolder = Path("armrs-thesis"), json: JsonFile = None) -> None:
+    """Compute every table and figure of the thesis that a machine can: what is printed, what comes out, and why they differ."""
+    from .. import words
+    from ..reproduce import run_reproduce
+
+    writable(out, json)
+    with console.stages("the thesis") as tell:
+        result = run_reproduce(out, command=command_line(context), tell=tell)
+    present(lambda: result.data, json, lambda: words.reproduced(result.data, result.files))

@@ -1,0 +1,71 @@
+"""What the verbs share: options that several have, and how results reach the user."""
+
+from __future__ import annotations
+
+import enum
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .. import files
+
+JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is standard output.")]
+OutFolder = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write below; made when it does not exist.")]
+MaybeFolder = Annotated[
+    Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder to write files and report below; made when it does not exist.")
+]
+Source = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with dataset.toml, or that file.")]
+
+_STDOUT = Path("-")
+
+
+class Format(str, enum.Enum):
+    """Formats of trial files."""
+
+    csv = "csv"
+    parquet = "parquet"
+
+
+def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None]) -> None:
+    """Give a result to the user: JSON where `--json` says, and words on standard output unless the JSON is there.
+
+    Parameters
+    ----------
+    data : callable
+        Makes the result as plain data; called only when JSON is asked for.
+    to : Path or None
+        The value of `--json`.
+    human : callable
+        Prints the result in words.
+    """
+    if to == _STDOUT:
+        sys.stdout.write(files.json_text(data()))
+        return
+    if to is not None:
+        files.write_json(to, data())
+    human()
+
+
+def writable(out: Path | None, json: Path | None = None) -> Path | None:
+    """Refuse outputs that cannot be written before any work is done."""
+    if json is not None and json != _STDOUT:
+        files.may_replace(json, ".json")
+        files.must_be_writable(json)
+    if out is None:
+        return None
+    files.must_be_writable(out)
+    return files.output_folder(out, "-o")
+
+
+def command_line(context: typer.Context) -> str:
+    """Return the command as it was given, for the origin of a result."""
+    return shlex.join(["armrs", *(context.find_root().obj or [])])
+
+
+def listed(text: str) -> list[str]:
+    """Return what stands between commas."""
+    return [part.strip() for part in text.split(",") if part.strip()]

@@ -1,0 +1,119 @@
+"""Verbs that compute nothing of an arm: the catalogue, conversions, reports."""
+
+from __future__ import annotations
+
+import enum
+import math
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .. import console, files
+from ..errors import ArmrsError, BadInput, Text, unknown_name
+from .common import JsonFile, OutFolder, listed, present, writable
+
+
+class TableFormat(str, enum.Enum):
+    """Formats of tables over time."""
+
+    csv = "csv"
+    parquet = "parquet"
+    mot = "mot"
+    sto = "sto"
+
+
+def effects(
+    kind: Annotated[str | None, typer.Argument(metavar="KIND", help="Only this kind.")] = None,
+    json: JsonFile = None,
+) -> None:
+    """Print the catalogue of effects: where each acts, its formula, its parameters with units and bounds."""
+    from ..catalogue import catalogue
+
+    known = catalogue()
+    if not known:
+        raise ArmrsError("the compiled module armrs._armrs is missing: build it with make, or install the wheel")
+    if kind is not None and kind not in known:
+        raise unknown_name("KIND", kind, known, what="kind of effect")
+    chosen = list(known.values()) if kind is None else [known[kind]]
+
+    def data() -> Any:
+        import dataclasses
+
+        return {"effects": [dataclasses.asdict(entry) for entry in chosen]}
+
+    def human() -> None:
+        for entry in chosen:
+            needs = f", needs {entry.address}" if entry.address else ""
+            print(f"{entry.kind} ({entry.where}{needs}): {entry.summary}")
+            print(f"    {entry.formula}    [{entry.reference}]")
+            for p in entry.parameters:
+                print(f"    {p.name}: {_range(p.min, p.max)} {p.unit}, default {p.default:g}")
+            print()
+
+    present(data, json, human)
+
+
+def convert(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="Data set folder, dataset.toml, or one .csv, .parquet, .mot, .sto, .c3d or .trc file.")
+    ],
+    out: OutFolder,
+    to: Annotated[TableFormat, typer.Option("--to", help="Format to write.")] = TableFormat.parquet,
+    points: Annotated[
+        str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the point half way.")
+    ] = "",
+    up: Annotated[
+        str | None, typer.Option(metavar="AXIS", help="Axis of the markers that points up: z in C3D, y in TRC when absent.")
+    ] = None,
+    forward: Annotated[
+        str | None, typer.Option(metavar="AXIS", help="Axis that points forward; where the arm reaches when absent.")
+    ] = None,
+    coordinates: Annotated[str, typer.Option(metavar="NAME,…", help="Joint angles of a MOT or STO file, first joint first.")] = "",
+    json: JsonFile = None,
+) -> None:
+    """Convert between file formats, every value kept to the bit; turn marker trajectories into joint angles and segment lengths."""
+    from .. import motions, words
+    from ..conversion import convert as run_conversion
+    from ..markers import MARKER_SUFFIXES
+    from ..opensim import MOTION_SUFFIXES
+
+    suffix = "" if source.is_dir() else source.suffix.lower()
+    chosen, named = listed(points), listed(coordinates)
+    if suffix in MARKER_SUFFIXES:
+        writable(out, json)
+        file, motion, notes = motions.convert_markers(source, out, to=to.value, points=chosen, up=up, forward=forward)
+        console.warn(notes)
+        present(
+            lambda: {"files": [file], "points": chosen, **motion.to_dict(), "warnings": notes},
+            json,
+            lambda: words.planar(motion, chosen, file),
+        )
+        return
+    for option, given in (("--points", points), ("--up", up), ("--forward", forward)):
+        if given:
+            raise BadInput(option, Text(f"a {suffix or 'data set'} source"), f"{option} with {' or '.join(MARKER_SUFFIXES)} files only")
+    if suffix in MOTION_SUFFIXES or f".{to.value}" in MOTION_SUFFIXES or named:
+        written = [motions.convert_motion(source, out, to=to.value, coordinates=named)]
+    else:
+        written = run_conversion(source, out, to=to.value)
+    present(lambda: {"files": written}, json, lambda: print("\n".join(os.fspath(path) for path in written)))
+
+
+def report(
+    sources: Annotated[list[Path], typer.Argument(metavar="RESULT.json…", help="Results that other verbs wrote.")],
+    out: OutFolder = Path(),
+) -> None:
+    """Make one self-contained HTML report, report.html, of any results."""
+    from ..report import write_report
+
+    print(write_report(sources, files.output_folder(out, "-o") / "report.html"))
+
+
+def _range(low: float, high: float) -> str:
+    if math.isinf(low) and math.isinf(high):
+        return "any"
+    if math.isinf(high):
+        return f">= {low:g}"
+    return f"<= {high:g}" if math.isinf(low) else f"{low:g} to {high:g}"

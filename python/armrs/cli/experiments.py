@@ -1,0 +1,217 @@
+"""Verbs that make data: experiments simulated, planned, recorded, and many of them."""
+
+from __future__ import annotations
+
+import enum
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .. import console
+from ..errors import BadInput, Text
+from .common import Format, JsonFile, MaybeFolder, OutFolder, command_line, listed, present, writable
+
+if TYPE_CHECKING:
+    from ..trial import Reading
+
+
+class Engine(str, enum.Enum):
+    """Engines of simulation."""
+
+    native = "native"
+    rapier = "rapier"
+
+
+class Integrator(str, enum.Enum):
+    """Integrators of the native engine."""
+
+    rk4 = "rk4"
+    euler = "euler"
+
+
+class Coupling(str, enum.Enum):
+    """How the handle holds the tip."""
+
+    compliant = "compliant"
+    rigid = "rigid"
+
+
+def simulate(
+    context: typer.Context,
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
+    movement: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="TOML file with a table [movement]: waypoints_deg, speed_rad_s, …")
+    ] = None,
+    trial: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
+    ] = None,
+    out: MaybeFolder = None,
+    engine: Annotated[Engine, typer.Option(help="Minimal coordinates, or rigid bodies and joints.")] = Engine.native,
+    dt: Annotated[float, typer.Option(help="Step [s].")] = 0.25e-3,
+    rate_hz: Annotated[float, typer.Option(help="Samples a second that are recorded [Hz].")] = 50.0,
+    integrator: Annotated[Integrator, typer.Option(help="Fourth order, or semi-implicit first order.")] = Integrator.rk4,
+    coupling: Annotated[Coupling, typer.Option(help="How the handle holds the tip.")] = Coupling.compliant,
+    duration_s: Annotated[float | None, typer.Option(help="Length of the run [s]; that of the movement when absent.")] = None,
+    to: Annotated[Format, typer.Option("--to", help="Format of the samples written.")] = Format.csv,
+    json: JsonFile = None,
+) -> None:
+    """Simulate the closed-chain experiment: a robot leads the arm."""
+    from .. import results, words
+    from ..model import load_model
+    from ..simulation import load_movement
+    from ..simulation import simulate as run_simulation
+
+    if (movement is None) == (trial is None):
+        found = Text("neither" if movement is None else "both")
+        raise BadInput("--movement, --trial", found, "one of them")
+    folder = writable(out, json)
+    arm = load_model(model)
+    reading = None if trial is None else _single_trial(trial, arm.n_joints)
+    measured = None if reading is None else reading.trial
+    drive = measured if movement is None else load_movement(movement, arm.n_joints)
+    with console.progress("simulating"):
+        result = run_simulation(
+            arm,
+            drive,
+            engine=engine.value,
+            integrator=integrator.value,
+            dt=dt,
+            rate=rate_hz,
+            duration=duration_s,
+            coupling=coupling.value,
+        )
+    plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
+    written = results.write_simulated(result, plain, folder, suffix=f".{to.value}", trial=measured) if folder else []
+    console.warn([*arm.warnings, *(() if reading is None else reading.warnings)])
+    present(lambda: plain, json, lambda: words.simulated(plain, written))
+
+
+def plan(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml: the arm as it is believed to be, and the robot.")],
+    angles_deg: Annotated[str, typer.Option(metavar="LOW:HIGH,…", help="Range of each joint [deg], first joint first.")],
+    out: MaybeFolder = None,
+    with_: Annotated[
+        str, typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects to be fitted besides those of the model.")
+    ] = "",
+    speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint [rad/s].")] = 2.0,
+    acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint [rad/s²].")] = 8.0,
+    robot_speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint of the robot [rad/s].")] = 4.0,
+    force_n: Annotated[float, typer.Option(help="Largest force on the arm [N].")] = 60.0,
+    duration_s: Annotated[float, typer.Option(help="Longest trial [s].")] = 20.0,
+    repeats: Annotated[int, typer.Option(help="Trials of each movement.")] = 5,
+    compare: Annotated[Path | None, typer.Option(metavar="FILE", help="Movement file to compare the plan with.")] = None,
+    evaluations: Annotated[int, typer.Option(help="Movements to try.")] = 300,
+    seed: Annotated[int, typer.Option(help="Seed of the search.")] = 1,
+    json: JsonFile = None,
+) -> int:
+    """Propose movements that make the parameters identifiable, and say before the experiment how well each will be known.
+
+    Exit status 1 when a parameter will stay uncertain by more than half its value.
+    """
+    from .. import planning, words
+    from ..discrepancy import detectable
+    from ..model import load_model
+    from ..simulation import load_movement
+
+    folder = writable(out, json)
+    arm = load_model(model)
+    limits = planning.Limits(planning.angles_of(angles_deg), speed_rad_s, acceleration_rad_s2, robot_speed_rad_s, force_n, duration_s)
+    other = None if compare is None else load_movement(compare, arm.n_joints)
+    kinds = listed(with_)
+    with console.progress("planning"):
+        found = planning.plan(arm, limits, repeats=repeats, with_effects=kinds, evaluations=evaluations, seed=seed)
+        beside = None if other is None else planning.forecast(arm, [other], repeats=repeats, with_effects=kinds)
+    smallest: tuple[Any, ...] = ()
+    if arm.robot is not None and repeats > 1:
+        with console.progress("looking for the smallest effects that they would show"):
+            smallest = detectable(arm, found.movements, repeats=repeats)
+    plain = planning.plan_data(found, beside, smallest)
+    written = planning.write_plan(found, plain, folder) if folder else []
+    present(lambda: plain, json, lambda: words.planned(plain, written))
+    return 0 if found.worst <= 0.5 else 1
+
+
+def record(
+    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="EXPERIMENT.toml: subject, robot, sensors, movements.")],
+    out: OutFolder,
+    json: JsonFile = None,
+) -> int:
+    """Run an experiment in the virtual laboratory; writes a data set, the markers, and the truth in a folder of its own.
+
+    Exit status 1 when the safety supervisor stopped a trial; that trial is not in the data set.
+    """
+    from .. import words
+    from ..experiment import load_experiment
+    from ..laboratory import record as run_record
+
+    writable(out, json)
+    planned = load_experiment(experiment)
+    with console.progress("recording", sum(run.repeats + run.tests for run in planned.runs)) as step:
+        result = run_record(planned, out, step=step)
+    present(result.to_dict, json, lambda: words.recorded(result.to_dict()))
+    return 1 if result.stopped else 0
+
+
+def sweep(
+    context: typer.Context,
+    source: Annotated[
+        Path, typer.Argument(metavar="SWEEP", help="SWEEP.toml: an experiment or a data set, how many cases, and what varies.")
+    ],
+    out: OutFolder,
+    jobs: Annotated[int | None, typer.Option(help="Processes; all cores when absent. The results do not depend on it.")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler that does the work, such as tcp://host:8786.")
+    ] = None,
+    json: JsonFile = None,
+) -> int:
+    """Simulate and identify many cases with subjects, sensors and movements drawn at random, or resamples of a data set.
+
+    Writes two Parquet tables, a row a case and a row an estimate. The same command goes on where an interrupted one stopped. Exit status
+    1 when cases failed.
+
+    A SWEEP.toml; docs/files.md has every key:
+
+    \b
+      cases = 200
+      seed = 1
+      experiment = "EXPERIMENT.toml"    # as for `armrs record`
+      [identify]
+      with = ["coulomb"]
+      [[vary]]
+      key = "joint[2].coulomb"
+      range = [0.0, 0.3]                # uniform
+    """  # noqa: D301 (click reads this backspace as: leave the lines as they are)
+    from ..montecarlo import load_sweep, words
+    from ..montecarlo import sweep as run_sweep
+
+    writable(out, json)
+    if cluster is not None and jobs is not None:
+        raise BadInput("--jobs", jobs, "no --jobs beside --cluster: the cluster has its own workers")
+    planned = load_sweep(source)
+    count = os.cpu_count() or 1 if jobs is None else jobs
+    with console.progress("cases", planned.cases) as step:
+        result = run_sweep(planned, out, jobs=count, cluster=cluster, step=step, command=command_line(context))
+    present(
+        lambda: result.data | {"run": result.run, "files": list(result.files)},
+        json,
+        lambda: words.swept(result.data, result.run, result.files),
+    )
+    return 1 if result.failed else 0
+
+
+def _single_trial(path: Path, n_joints: int) -> Reading:
+    """Read a trial that stands alone. Its forces are not used, so that it does not matter what they act on."""
+    from ..trial import read_trial
+
+    try:
+        reading = read_trial(
+            path, n_joints=n_joints, force_on="arm", sample_rate=None, file=path.name, configuration=path.stem, repeat=1, role="test"
+        )
+    except BadInput as error:
+        raise error.within(file=path) from None
+    if reading is None:
+        raise BadInput("file", Text("no samples below the header"), "samples", file=path)
+    return reading

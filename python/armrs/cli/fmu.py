@@ -1,0 +1,146 @@
+"""The verbs of `armrs fmu`."""
+
+from __future__ import annotations
+
+import enum
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import console
+from ..errors import BadInput
+from .common import Format, JsonFile, MaybeFolder, command_line, present, writable
+
+app = typer.Typer(
+    name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.", no_args_is_help=True
+)
+
+
+class Port(str, enum.Enum):
+    """Ports through which an arm is coupled to other simulators."""
+
+    force = "force"
+    motion = "motion"
+
+
+class Fmi(str, enum.Enum):
+    """Versions of the FMI standard."""
+
+    two = "2"
+    three = "3"
+
+
+@app.command("export")
+def fmu_export(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="The FMU to write; MODEL.fmu when absent.")] = None,
+    version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard: FMI 2.0 or 3.0.")] = Fmi.three,
+    port: Annotated[Port, typer.Option(help="Force on the arm in, or motion of the robot's handle in.")] = Port.force,
+    start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; zero when absent.")] = "",
+    rest: Annotated[bool, typer.Option("--rest", help="Start in equilibrium near these angles.")] = False,
+    dt: Annotated[float, typer.Option(help="Inner step [s].")] = 0.25e-3,
+    json: JsonFile = None,
+) -> None:
+    """Export an arm as a functional mock-up unit for co-simulation: no compiler is needed.
+
+    The same model gives the same bytes. Personal values travel inside and are protected by the token of the description.
+    """
+    from ..cosim.slave import Slave
+    from ..fmu.export import export_fmu
+
+    writable(None, json)
+    target = out if out is not None else Path(model.with_suffix(".fmu").name)
+    start = _angles("--start-deg", start_deg)
+    slave = Slave(model, port=port.value, start=start, rest=rest, step=dt, name=model.stem)
+    written = export_fmu(slave, target, fmi=int(version.value))
+    data = {"verb": "fmu export", "file": written, "fmi": int(version.value), "port": port.value, "token": slave.token}
+    present(lambda: data, json, lambda: print(written))
+
+
+@app.command("info")
+def fmu_info(
+    file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
+    json: JsonFile = None,
+) -> None:
+    """Print what an FMU says of itself: capabilities, variables, units."""
+    from ..fmu.info import about, info_words
+
+    writable(None, json)
+    data = about(file)
+    present(lambda: data, json, lambda: info_words(data))
+
+
+@app.command("check")
+def fmu_check(
+    file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
+    json: JsonFile = None,
+) -> int:
+    """Check an FMU: file, description and library against the standard and against one another.
+
+    The library is loaded and makes a step, in a process of its own. Exit status 1 when something is wrong.
+    """
+    import dataclasses
+
+    from ..fmu.check import check_fmu
+
+    writable(None, json)
+    with console.progress("checking"):
+        found = check_fmu(file)
+    wrong = sum(f.level == "error" for f in found)
+
+    def human() -> None:
+        for finding in found:
+            print(finding)
+        print(f"{file.name}: {wrong} wrong" if wrong else f"{file.name}: nothing wrong found")
+
+    present(lambda: {"verb": "fmu check", "file": file, "findings": [dataclasses.asdict(f) for f in found]}, json, human)
+    return 1 if wrong else 0
+
+
+@app.command("run")
+def fmu_run(
+    context: typer.Context,
+    system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],
+    out: MaybeFolder = None,
+    to: Annotated[Format, typer.Option("--to", help="Format of the samples written.")] = Format.csv,
+    json: JsonFile = None,
+) -> int:
+    """Couple arms, FMUs of any tool and walls, and say whether the numbers may be believed.
+
+    Exit status 1 when the run is no result: it diverged, the coupling creates energy, or the iteration did not converge. Then only the
+    diagnosis is written, and no samples.
+    """
+    from .. import words
+    from ..cosim.master import run_system
+    from ..cosim.outcome import coupled_data, write_coupled
+    from ..cosim.system import load_system
+    from ..errors import CoupledError
+
+    folder = writable(out, json)
+    loaded = load_system(system)
+    try:
+        with console.progress("coupling", total=loaded.count) as advance:
+            run = run_system(loaded, progress=advance)
+    except CoupledError as error:
+        run = error.run
+    finally:
+        loaded.free()
+    plain = coupled_data(run, system.name, command_line(context))
+    written = write_coupled(run, plain, folder, suffix=f".{to.value}") if folder else []
+    console.warn(run.warnings)
+    if run.verdict != "good":
+        console.warn([f"{run.verdict}, no result: {run.why}"])
+    present(lambda: plain, json, lambda: words.coupled(plain, written))
+    return 0 if run.verdict == "good" else 1
+
+
+def _angles(option: str, text: str) -> list[float] | None:
+    """Read angles in degrees, separated by commas, as radians."""
+    if not text.strip():
+        return None
+    try:
+        return [math.radians(float(part)) for part in text.split(",")]
+    except ValueError:
+        raise BadInput(option, text, "numbers separated by commas") from None
