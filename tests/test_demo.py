@@ -79,31 +79,11 @@ def test_the_report_stands_alone_and_says_synthetic(folder: Path) -> None:
     assert (folder / "copy.json").read_text(encoding="utf-8") == (folder / "demo.json").read_text(encoding="utf-8")
 
 
-def test_the_terminal_ends_with_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     class Stub:
-        files = (tmp_path / "report.html",)
-
-    monkeypatch.setattr(demo, "run_demo", lambda out, command: Stub)
-    (tmp_path / "demo.json").write_text(
-        json.dumps(
-            {
-                "verb": "demo",
-                "story": ["a"],
-                "comparison": [],
-                "comparison_text": "",
-                "missing_text": "b",
-                "verdict": "c",
-                "data": {"name": "d"},
-            }
-        ),
-        encoding="utf-8",
-    )
-    assert cli.main(["demo", "-o", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "report.html")
-
-
-def test_the_terminal_says_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from armrs import words
+        files = (tmp_path / "data" / "dataset.toml", tmp_path / "report.html")
 
     plain = {
         "verb": "demo",
@@ -112,10 +92,12 @@ def test_the_terminal_says_how_to_go_on(tmp_path: Path, capsys: pytest.CaptureFi
         "comparison_text": "",
         "missing_text": "b",
         "verdict": "c",
-        "data": {"joints": []},
+        "data": {"name": "d", "joints": []},
         "level": 0.95,
     }
-    words.demo(plain, [tmp_path / "data" / "dataset.toml", tmp_path / "report.html"])
+    monkeypatch.setattr(demo, "run_demo", lambda out, command: Stub)
+    (tmp_path / "demo.json").write_text(json.dumps(plain), encoding="utf-8")
+    assert cli.main(["demo", "-o", str(tmp_path)]) == 0
     go_on, last = capsys.readouterr().out.splitlines()[-2:]
     assert last == str(tmp_path / "report.html")
     assert f"armrs identify {tmp_path / 'data'} --with coulomb" in go_on
