@@ -28,6 +28,15 @@ def changed(data: armrs.Dataset, every: bool = False, **changes: Callable[[np.nd
     return data.replace(trials=tuple(of(trial) if every or trial is data.trials[0] else trial for trial in data.trials))
 
 
+def refusal(asked: Callable[[], object]) -> str | None:
+    """Return what a call is refused with; None where it is accepted."""
+    try:
+        asked()
+    except BadInput as error:
+        return str(error)
+    return None
+
+
 def held(column: int) -> Callable[[np.ndarray], np.ndarray]:
     def change(values: np.ndarray) -> np.ndarray:
         values[:, column] = values[0, column]
@@ -84,14 +93,16 @@ def test_one_joint_that_is_still_may_be_held(slow_arm: Path, tmp_path: Path, cap
 def test_sound_data_pass(slow_arm: Path) -> None:
     from armrs.plausibility import refuse_implausible
 
-    refuse_implausible(armrs.load_dataset(slow_arm))
+    data = armrs.load_dataset(slow_arm)
+    assert refusal(lambda: refuse_implausible(data)) is None
 
 
 def test_grams_are_not_kilograms() -> None:
     for mass in (2114.0, 380.0):
         with pytest.raises(BadInput, match=r"mass: found .*, allowed at most .* kg for a segment of .* m \(grams\?\)"):
             armrs.Segment("upper arm", length=0.322, mass=mass, com=0.186, inertia=0.0165)
-    armrs.Segment("boom of an excavator", length=5.0, mass=2000.0, com=2.0, inertia=4000.0)
+    boom = ("boom of an excavator", 5.0, 2000.0, 2.0, 4000.0)
+    assert refusal(lambda: armrs.Segment(*boom)) is None
 
 
 @pytest.mark.parametrize("stiffness", [10.0, 1.0])
@@ -106,8 +117,10 @@ def test_stiffness_in_kilonewtons_is_named(stiffness: float, tmp_path: Path, cap
 
 
 def test_a_soft_contact_is_a_contact() -> None:
-    model = true_model().replace(contact=armrs.Contact((300.0, 300.0)))
-    model.replace(gravity=0.0, contact=armrs.Contact((1.0, 1.0)))  # nothing presses it in
+    model, softest = true_model(), armrs.Contact((1.0, 1.0))
+    assert refusal(lambda: model.replace(contact=armrs.Contact((300.0, 300.0)))) is None
+    assert refusal(lambda: model.replace(contact=softest)) is not None
+    assert refusal(lambda: model.replace(gravity=0.0, contact=softest)) is None  # nothing presses it in
 
 
 def test_the_core_counts_trials_and_the_message_names_the_file(slow_arm: Path) -> None:
