@@ -212,8 +212,9 @@ def test_the_map_of_the_architecture_is_complete() -> None:
             named |= {crate / f"{before}{part}{after}" for part in (braces or "").split(",")}
     assert [str(p) for p in named if not p.exists()] == []
     inside = [p for p in named if p.is_dir()]
-    sources = itertools.chain(*((ROOT / "crates" / c / "src").rglob("*.rs") for c in ("arm-core", "arm-sim", "arm-ident")))
-    left = [p for p in sources if p not in named and p.name != "lib.rs" and not any(d in p.parents for d in inside)]
+    sources = itertools.chain(*(ROOT.glob(pattern) for pattern in ("crates/arm-*/src/**/*.rs", "python/armrs/**/*.py")))
+    entries = ("lib.rs", "__init__.py", "__main__.py")
+    left = [p for p in sources if p not in named and p.name not in entries and not any(d in p.parents for d in inside)]
     assert [str(p) for p in left] == []
 
 
