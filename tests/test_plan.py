@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs import BadInput, IdentificationError, Limits, Movement
+from armrs import BadInput, IdentificationError, Joint, Limits, Movement
 from armrs.cli import main
+from armrs.discrepancy import detectable
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import check_plan
@@ -76,6 +77,16 @@ def test_a_wrist_that_hangs_between_forearm_and_handle_is_identified() -> None:
             if (p.name, p.joint) == ("viscosity", 3):
                 continue  # known to come out six standard deviations too small
             assert abs(found[(p.name, p.joint)] - p.value) < 4.0 * p.std, (seed, p)
+
+
+def test_a_movement_in_which_dry_joints_rest_tells_nothing_and_breaks_nothing() -> None:
+    """Nothing is compared where dry friction holds a joint: a movement may have no sample left, and a longer one follows it."""
+    joints = (Joint("shoulder", coulomb=0.2), Joint("elbow", coulomb=0.2), Joint("wrist", viscosity=0.1, stiffness=12.0))
+    arm = check_plan.truth(3).replace(joints=joints)
+    slow = Movement(np.radians([[-60, 60, 0], [-57, 60, 0]]), speed=0.03, acceleration=0.3, pause=0.0)
+    wide = Movement(np.radians([[-10, 20, -11], [-52, 96, 11], [-10, 41, 11], [-10, 20, -11]]), speed=1.0, acceleration=4.0)
+    seen = detectable(arm, [slow, wide], repeats=3)
+    assert [w.joint for w in seen if w.kind == "viscous"] == [1, 2, 3]
 
 
 def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -65,8 +65,13 @@ impl<'a, const N: usize> Study<'a, N> {
     pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
         let noise = Noise::unknown(session.channels())?;
         let mut study = Self::with_noise(session, noise, threads)?;
-        let given = study.anchor(&session.given())?;
+        let mut given = study.anchor(&session.given())?;
+        let all = study.fitted.clone();
         study.leave_out_rest(&given);
+        if study.fitted != all {
+            // A trial in which nothing is left to compare has no place among the residuals either.
+            given = study.anchor(&session.given())?;
+        }
         study.measure_noise(&given)?;
         Ok(study)
     }
