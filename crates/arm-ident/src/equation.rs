@@ -7,7 +7,7 @@ use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{Chain, Joints, Pose, inverse_dynamics, joint_force, regressor, static_torque};
 
 use crate::calibration::{influence, predicted_force};
-use crate::response::Course;
+use crate::response::{Course, HELD};
 use crate::trial::{Model, Trial};
 use crate::unknown::{Moment, Source, Unknown};
 
@@ -96,8 +96,7 @@ pub(crate) fn instrument<const N: usize>(
     trial: &Trial<N>,
     course: &Course<N>,
 ) {
-    // A handle holds two joints; what is left of their freedom is the give of the contact, which is none to speak of.
-    if N > 2 {
+    if N > HELD {
         for (column, more) in rows.columns.iter_mut().zip(course.columns(model, unknowns)) {
             for (value, more) in column.iter_mut().zip(more) {
                 *value += more;

@@ -264,8 +264,8 @@ fn simulated<const N: usize>(
 
 /// Covariance of the torque residual of a single sample, at every sample \[N² m²\].
 ///
-/// The forces act through the Jacobian; angles move gravity, springs and the lever arms of the force, which is what stiffness of the
-/// static equilibrium does.
+/// The forces act through the Jacobian. Angles move everything on the left-hand side that depends on them, at the speeds and accelerations
+/// of the simulated motion: inertia, gravity, springs and the lever arms of the force.
 fn noise_of<const N: usize>(
     question: &Question<N>,
     trial: &Trial<N>,
@@ -280,14 +280,15 @@ fn noise_of<const N: usize>(
         .q
         .iter()
         .zip(&motion.qd)
+        .zip(&motion.qdd)
         .zip(forces)
         .enumerate()
-        .map(|(i, ((q, qd), &f))| {
+        .map(|(i, (((q, qd), qdd), &f))| {
             let moving = |q: &Joints<f64, N>| Motion::new(i as f64 / trial.rate, *q, *qd);
             memory.advance(&moving(q), 1.0 / trial.rate);
             let residual = |q: &Joints<f64, N>| {
                 let (pose, motion) = (Pose::new(q), moving(q));
-                arm_core::gravity(chain, &pose)
+                arm_core::inverse_dynamics(chain, &pose, qd, qdd)
                     + resisting_torque(&model.fitted, &motion, &memory.fitted)
                     + resisting_torque(&model.held, &motion, &memory.held)
                     - arm_core::static_torque(chain, &pose, f, 0.0)

@@ -15,6 +15,8 @@ use crate::equation::{Kinematics, Memory, rows};
 use crate::trial::{Model, Role, Trial};
 use crate::unknown::{Source, Unknown};
 
+/// Joints that a handle holds; what is left of their freedom is the give of the contact, which is none to speak of.
+pub(crate) const HELD: usize = 2;
 /// Samples a second that follow the arm's own vibrations between the samples of a trial \[Hz\].
 const FINE: f64 = 200.0;
 /// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.

@@ -10,7 +10,7 @@ use arm_sim::{Coupling, Drive, Experiment, HandlePath, Start, simulate};
 
 use crate::error::IdentError;
 use crate::motion::low_pass;
-use crate::response::{Course, parts};
+use crate::response::{Course, HELD, parts};
 use crate::trial::{Model, Trial};
 
 /// Longest simulation step \[s\]; small enough for stiff contacts and smoothed dry friction.
@@ -18,6 +18,9 @@ const LONGEST_STEP: f64 = 0.25e-3;
 /// Bandwidth of the handle's path, in bandwidths of the rows. Wider, and noise of the robot's encoders makes a resting arm
 /// creep to and fro, which is read as friction; narrower, and the corners of the path are rounded twice.
 const HANDLE_BAND: f64 = 2.0;
+/// The same for an arm that the robot does not hold in every joint. Its own vibrations and the sign of its dry friction answer
+/// to what is faster than the rows: rounded corners of the path made the viscosity of a wrist a third too small.
+const HANDLE_BAND_OF_FREE: f64 = 4.0;
 /// Largest root mean square difference between simulated and measured angles that is still the same movement \[rad\].
 const SAME_MOVEMENT: f64 = 0.15;
 
@@ -64,7 +67,12 @@ fn experiment<const N: usize>(
     handle: &[[f64; 2]],
     cutoff: f64,
 ) -> Result<Experiment<N>, IdentError> {
-    let filter = low_pass((HANDLE_BAND * cutoff).min(0.4 * trial.rate), trial.rate)?;
+    let band = if N > HELD {
+        HANDLE_BAND_OF_FREE
+    } else {
+        HANDLE_BAND
+    };
+    let filter = low_pass((band * cutoff).min(0.4 * trial.rate), trial.rate)?;
     let axis = |a: usize| filter.both_ways(&handle.iter().map(|p| p[a]).collect::<Vec<_>>());
     let (y, z) = (axis(0)?, axis(1)?);
     let points: Vec<[f64; 2]> = y.into_iter().zip(z).map(|(y, z)| [y, z]).collect();
