@@ -86,7 +86,7 @@ def test_the_date_is_in_the_name_or_today() -> None:
     assert sessions.session_date("S1 2026-03-14") == "2026-03-14"
     assert sessions.session_date("S1 2026-03-14", "2025-01-02") == "2025-01-02"
     assert len(sessions.session_date("S1")) == 10
-    with pytest.raises(BadInput, match=r"--date: found '2026-02-30', allowed a date such as"):
+    with pytest.raises(BadInput, match=r"date: found '2026-02-30', allowed a date such as"):
         sessions.session_date("S1", "2026-02-30")
 
 

@@ -178,6 +178,37 @@ def test_refuses_points_and_axes(
     assert not (tmp_path / "out").exists()
 
 
+def test_from_python_a_refusal_names_the_argument(good: Path, tmp_path: Path) -> None:
+    markers = armrs.read_markers(good)
+    with pytest.raises(BadInput, match="^points: found 1 points"):
+        armrs.planar_motion(markers, ["S"])
+    with pytest.raises(BadInput, match="^up: found 'w'"):
+        armrs.planar_motion(markers, ["S", "E", "H"], up="w")
+    (tmp_path / "m.mot").write_text("a\ninDegrees=yes\nendheader\ntime\tq\n0.0\t1.0\n0.1\t2.0\n")
+    with pytest.raises(BadInput, match="m.mot: coordinates: found unknown coordinate 'p'"):
+        armrs.convert_motion(tmp_path / "m.mot", tmp_path / "out", to="csv", coordinates=["p"])
+
+
+@pytest.mark.parametrize("stated", ["0", "-100", "nan", "inf", "fast", "50", "100000"])
+def test_refuses_a_rate_that_the_time_stamps_do_not_have(tmp_path: Path, stated: str) -> None:
+    _, points = planar_arm()
+    path = trc(tmp_path / "m.trc", points, rate=100.0)
+    path.write_text(path.read_text().replace("\n100.0\t", f"\n{stated}\t"))
+    with pytest.raises(BadInput, match=f"m.trc: line 3, DataRate: found '?{stated}"):
+        armrs.read_markers(path)
+
+
+def test_rounded_time_stamps_and_lost_frames_have_the_rate_stated(tmp_path: Path) -> None:
+    _, points = planar_arm()
+    path = trc(tmp_path / "m.trc", points, rate=60.0)
+    lines = path.read_text().splitlines()
+    rounded = [line.split("\t") for line in lines[5:]]
+    path.write_text("\n".join([*lines[:5], *("\t".join([r[0], f"{float(r[1]):.3f}", *r[2:]]) for r in rounded), ""]))
+    assert len(armrs.read_markers(path).t) == len(points)
+    path.write_text("\n".join([*lines[:20], *lines[60:], ""]))
+    assert any("frames" in note for note in armrs.read_markers(path).warnings)
+
+
 @pytest.mark.parametrize("keep", [0, 1, 100, 512, 4000, 60_000, 2_000_000])
 def test_refuses_a_c3d_that_is_cut_off(data: Path, tmp_path: Path, keep: int, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("ezc3d")
@@ -197,6 +228,9 @@ def test_refuses_broken_motions(tmp_path: Path) -> None:
         ("inDegrees=yes", "inDegrees=maybe", "header, inDegrees: found 'maybe', allowed yes or no"),
         ("2.0", "two", "line 9, column q: found 'two', allowed a number"),
         ("0.1\t", "0.0\t", "line 9, time: found 0.0 s after 0.0 s"),
+        ("nColumns=2", "nColumns=3", "file: found 2 columns, allowed 3 columns, as its header says"),
+        ("nRows=2", "nRows=3", "file: found 2 rows, allowed 3 rows, as its header says"),
+        ("version=1", "datacolumns 12", "file: found 2 columns, allowed 12 columns, as its header says"),
     ]
     for old, new, message in cases:
         assert good.count(old) == 1

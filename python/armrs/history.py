@@ -111,17 +111,17 @@ def session_date(name: str, given: str | None = None) -> str:
     try:
         return datetime.date.fromisoformat(given).isoformat()
     except ValueError:
-        raise BadInput("--date", given, "a date such as 2026-03-14") from None
+        raise BadInput("date", given, "a date such as 2026-03-14") from None
 
 
 def check(path: str | os.PathLike[str], joints: int) -> None:
     """Refuse a history file that cannot be added to, before any work is done."""
     file = Path(path)
     if file.is_dir():
-        raise BadInput("--history", Text("a folder"), "the name of a file", file=file)
+        raise BadInput("history", Text("a folder"), "the name of a file", file=file)
     if file.suffix.lower() in _OUTPUTS:
         # A result of the same command could take its place.
-        raise BadInput("--history", Text(f"a name that ends with {file.suffix}"), "another, such as .sqlite", file=file)
+        raise BadInput("history", Text(f"a name that ends with {file.suffix}"), "another, such as .sqlite", file=file)
     if file.exists():
         with closing(_open(file)) as connection:
             _same_arm(connection, joints, file)
@@ -166,7 +166,7 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
             connection.commit()
             is_kept = True
     except sqlite3.Error as error:
-        raise BadInput("--history", Text(str(error)), "a history that can be written", file=file) from None
+        raise BadInput("history", Text(str(error)), "a history that can be written", file=file) from None
     finally:
         if is_new and not is_kept:
             file.unlink(missing_ok=True)
@@ -190,7 +190,7 @@ def read(path: str | os.PathLike[str], method: str = "joint") -> tuple[Course, .
         with closing(_open(file)) as connection:
             return _courses(connection, method)
     except sqlite3.Error as error:
-        raise BadInput("--history", Text(str(error)), "a history that armrs wrote", file=file) from None
+        raise BadInput("history", Text(str(error)), "a history that armrs wrote", file=file) from None
 
 
 def _courses(connection: sqlite3.Connection, method: str) -> tuple[Course, ...]:
@@ -233,10 +233,10 @@ def _open(file: Path) -> sqlite3.Connection:
         tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         mark = connection.execute("PRAGMA application_id").fetchone()[0]
     except sqlite3.Error as error:
-        raise BadInput("--history", Text(str(error)), "a history that armrs wrote, or a new file", file=file) from None
+        raise BadInput("history", Text(str(error)), "a history that armrs wrote, or a new file", file=file) from None
     if tables and mark != APPLICATION:
         connection.close()
-        raise BadInput("--history", Text("a database of another program"), "a history that armrs wrote, or a new file", file=file)
+        raise BadInput("history", Text("a database of another program"), "a history that armrs wrote, or a new file", file=file)
     return connection
 
 
@@ -245,7 +245,7 @@ def _same_arm(connection: sqlite3.Connection, joints: int, file: Path) -> None:
         return
     other = connection.execute("SELECT joints FROM session WHERE joints != ?", (joints,)).fetchone()
     if other is not None:
-        raise BadInput("--history", Text(f"the history of an arm of {other[0]} joints"), f"one of {joints}: one subject a file", file=file)
+        raise BadInput("history", Text(f"the history of an arm of {other[0]} joints"), f"one of {joints}: one subject a file", file=file)
 
 
 def _deviation(estimate: Estimate, level: float) -> float:

@@ -66,9 +66,9 @@ class Markers:
     def _index(self, name: str) -> int:
         found = [k for k, label in enumerate(self.names) if name in (label, label.rpartition(":")[2])]
         if not found:
-            raise unknown_name("--points", name, [label.rpartition(":")[2] for label in self.names], what="marker")
+            raise unknown_name("points", name, [label.rpartition(":")[2] for label in self.names], what="marker")
         if len(found) > 1:
-            raise BadInput("--points", name, f"one of {', '.join(self.names[k] for k in found)}")
+            raise BadInput("points", name, f"one of {', '.join(self.names[k] for k in found)}")
         return found[0]
 
 
@@ -221,30 +221,30 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
     checks.instance("markers", markers, Markers)
     points = checks.instances("points", points, str)
     if len(points) < 2:
-        raise BadInput("--points", Text(f"{len(points)} points"), "two or more, from the first joint to the handle")
+        raise BadInput("points", Text(f"{len(points)} points"), "two or more, from the first joint to the handle")
     at = np.stack([markers.point(text) for text in points], axis=1)
     there = np.isfinite(at).all(axis=(1, 2))
     if there.sum() < 2:
-        raise BadInput("--points", Text("no two samples at which all of them are seen"), "samples with all markers")
+        raise BadInput("points", Text("no two samples at which all of them are seen"), "samples with all markers")
     segments = np.diff(at, axis=1)
     distances = np.linalg.norm(segments, axis=2)
     seen, lengths = segments[there], distances[there]
     if lengths.min() < 1e-6:
-        raise BadInput("--points", Text("two neighbours at one place"), "points that lie apart")
+        raise BadInput("points", Text("two neighbours at one place"), "points that lie apart")
     scatter = np.einsum("nki,nkj->ij", seen, seen) / seen.shape[0]
     spread, axes = np.linalg.eigh(scatter)
     if np.sqrt(max(spread[1], 0.0) / spread[2]) < _LEAST_SPREAD:
-        raise BadInput("--points", Text("points on one line at all times"), "a movement that spans a plane")
+        raise BadInput("points", Text("points on one line at all times"), "a movement that spans a plane")
     normal = axes[:, 0]
-    vertical = _axis(markers.up if up is None else up, "--up")
+    vertical = _axis(markers.up if up is None else up, "up")
     upward = vertical - normal * (normal @ vertical)
     if np.linalg.norm(upward) < 0.1:
         raise BadInput(
-            "--up", Text("a plane that lies flat"), "a plane of movement along the vertical, or another axis", hint="--up x, y or z"
+            "up", Text("a plane that lies flat"), "a plane of movement along the vertical, or another axis", hint="up may be x, y or z"
         )
     upward /= np.linalg.norm(upward)
     ahead = np.cross(upward, normal)
-    reach = np.mean(at[there, -1] - at[there, 0], axis=0) if forward is None else _axis(forward, "--forward")
+    reach = np.mean(at[there, -1] - at[there, 0], axis=0) if forward is None else _axis(forward, "forward")
     if ahead @ reach < 0.0:
         ahead, normal = -ahead, -normal
     absolute = np.arctan2(segments @ upward, segments @ ahead)
@@ -269,10 +269,10 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
     )
 
 
-def _axis(text: str, option: str) -> np.ndarray:
-    name = checks.text(option, text).lower().lstrip("+-")
+def _axis(text: str, place: str) -> np.ndarray:
+    name = checks.text(place, text).lower().lstrip("+-")
     if name not in _AXES or len(text) - len(name) > 1:
-        raise BadInput(option, text, "x, y, z, -x, -y or -z")
+        raise BadInput(place, text, "x, y, z, -x, -y or -z")
     result = np.zeros(3)
     result[_AXES[name]] = -1.0 if text.startswith("-") else 1.0
     return result

@@ -104,7 +104,7 @@ def convert_motion(source: str | os.PathLike[str], folder: str | os.PathLike[str
             motion = _named(path, lambda _: _angles(motion, coordinates))
     else:
         if coordinates:
-            raise BadInput("--coordinates", Text(f"a {path.suffix} file"), f"coordinates of {' or '.join(MOTION_SUFFIXES)} files")
+            raise BadInput("coordinates", Text(f"a {path.suffix} file"), f"coordinates of {' or '.join(MOTION_SUFFIXES)} files")
         motion = _named(path, _table_motion)
     _write(target, motion)
     return target
@@ -120,7 +120,7 @@ def _write(target: Path, motion: Motion) -> None:
 def _angles(motion: Motion, coordinates: Sequence[str]) -> Motion:
     for name in coordinates:
         if name not in motion.names:
-            raise unknown_name("--coordinates", name, motion.names, what="coordinate")
+            raise unknown_name("coordinates", name, motion.names, what="coordinate")
     if motion.in_degrees is None:
         raise BadInput("header", Text("no inDegrees"), "inDegrees=yes or inDegrees=no", hint="the unit of the angles is not known")
     unit = "deg" if motion.in_degrees else "rad"

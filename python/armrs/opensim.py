@@ -12,6 +12,7 @@ import numpy as np
 from . import files, tomlfile
 from .errors import BadInput, Text
 from .markers import METRES, Markers
+from .trial import SAME_RATE
 
 MOTION_SUFFIXES = (".mot", ".sto")
 _LARGEST = 1 << 30
@@ -68,9 +69,11 @@ def read_motion(path: Path) -> Motion:
             raise BadInput(f"line {start + 1}", Text(f"column {name} twice"), "each column once")
     rows = [(k, line.split()) for k, line in enumerate(lines[start + 1 :], start + 2) if line.strip()]
     table = _numbers(rows, names)
-    announced = header.get("nrows", header.get("datarows"))
-    if announced is not None and announced != str(len(table)):
-        raise BadInput("file", Text(f"{len(table)} rows"), f"{announced} rows, as its header says", hint="the file is cut off")
+    for keys, count, what in ((("nrows", "datarows"), len(table), "rows"), (("ncolumns", "datacolumns"), len(names), "columns")):
+        for key in keys:
+            if key in header and header[key] != str(count):
+                hint = "the file is cut off" if what == "rows" else None
+                raise BadInput("file", Text(f"{count} {what}"), f"{header[key] or 'no'} {what}, as its header says", hint=hint)
     _increasing(table[:, 0], [k for k, _ in rows])
     return Motion(names[1:], table[:, 0], table[:, 1:], _in_degrees(header, lines[:end]))
 
@@ -114,6 +117,7 @@ def read_trc(path: Path) -> Markers:
         rows.append((number, cells))
     table = _numbers(rows, columns)
     _increasing(table[:, 1], [k for k, _ in rows])
+    _same_rate(header.get("datarate", ""), table[:, 1])
     announced = header.get("numframes", "")
     notes = () if announced == str(len(table)) else (f"the header announces {announced or 'no'} frames, {len(table)} are there",)
     positions = METRES[unit] * table[:, 2:].reshape(len(table), len(names), 3)
@@ -148,8 +152,8 @@ def _lines(path: Path) -> list[str]:
 
 def _header(lines: Sequence[str]) -> dict[str, str]:
     """Return the keys of a header, old (`datarows 121`) and new (`nRows=121`)."""
-    pairs = [line.partition("=") if "=" in line else line.partition(" ") for line in lines]
-    return {key.strip().lower(): value.strip() for key, _, value in pairs}
+    pairs = [line.partition("=")[::2] if "=" in line else (line.split(None, 1) + ["", ""])[:2] for line in lines]
+    return {key.strip().lower(): value.strip() for key, value in pairs}
 
 
 def _in_degrees(header: dict[str, str], lines: Sequence[str]) -> bool | None:
@@ -182,6 +186,18 @@ def _numbers(rows: Sequence[tuple[int, list[str]]], columns: list[str]) -> np.nd
             bad = int(np.argmax(np.isinf(table[k])))
             raise BadInput(f"line {line}, column {columns[bad]}", cells[bad], "a finite number")
     return table
+
+
+def _same_rate(stated: str, t: np.ndarray) -> None:
+    """Refuse a DataRate that is none, or that the time stamps have neither from one to the next nor, rounded as they may be, on average."""
+    place = "line 3, DataRate"
+    if not (_is_number(stated) and 0.0 < float(stated) < math.inf):
+        raise BadInput(place, stated or Text("nothing"), "a rate above 0 Hz")
+    if len(t) < 2:
+        return
+    seen = (1.0 / float(np.median(np.diff(t))), (len(t) - 1) / float(t[-1] - t[0]))
+    if all(abs(float(stated) / rate - 1.0) > SAME_RATE for rate in seen):
+        raise BadInput(place, Text(f"{stated} Hz"), f"{seen[1]:.6g} Hz, as the time stamps have", hint="time stamps in seconds?")
 
 
 def _is_number(cell: str) -> bool:

@@ -90,7 +90,7 @@ class Limits:
         checks.number("speed", self.speed, above=0.0, most=100.0, unit="rad/s")
         checks.number("acceleration", self.acceleration, above=0.0, most=1e4, unit="rad/s²")
         checks.number("robot_speed", self.robot_speed, above=0.0, most=100.0, unit="rad/s")
-        checks.number("force", self.force, above=0.0, unit="N")
+        checks.number("force", self.force, above=0.0, most=1e4, unit="N")
         checks.number("duration", self.duration, above=0.0, most=600.0, unit="s")
 
 

@@ -96,17 +96,21 @@ def run() -> None:
 
 _OPTIONS = {
     "with_effects": "--with", "cutoff": "--cutoff-hz", "rate": "--rate-hz", "duration": "--duration-s",
-    "robot_speed": "--robot-speed-rad-s",
-    **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "integrator", "jobs", "level", "method", "motion")},
+    "robot_speed": "--robot-speed-rad-s", "speed": "--speed-rad-s", "acceleration": "--acceleration-rad-s2", "force": "--force-n",
+    **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "evaluations", "integrator", "jobs", "level", "method")},
+    **{name: f"--{name}" for name in ("motion", "repeats", "seed")},
 }  # fmt: skip
 """What the command line calls an argument of a function."""
+_NEVER_IN_FILES = {name: f"--{name}" for name in ("coordinates", "date", "forward", "history", "points", "up")}
+"""The same of arguments that are no key of any file, so that a refusal of theirs may say which file they were asked of."""
 
 
 def _of_option(error: BadInput) -> BadInput:
     """Return a refusal with the name that the argument has on the command line."""
-    if error.file is not None or error.place not in _OPTIONS:
+    options = _NEVER_IN_FILES if error.file is not None else _OPTIONS | _NEVER_IN_FILES
+    if error.place not in options:
         return error
-    return BadInput(_OPTIONS[error.place], error.found, error.allowed, hint=error.hint)
+    return BadInput(options[error.place], error.found, error.allowed, file=error.file, hint=error.hint)
 
 
 def _refuse(line: str) -> int:
