@@ -149,7 +149,7 @@ BROKEN_DESCRIPTION = {
     "repeat zero": ("repeat = 2", "repeat = 0", "[[trial]] 2, repeat: found 0, allowed a whole number >= 1", ""),
     "height in centimetres": ("1.80", "180", "[subject], height: found 180.0, allowed", "(centimetres?)"),
     "sex": ('"male"', '"m"', '[subject], sex: found \'m\', allowed "male" or "female"', ""),
-    "tolerance negative": ("= 0.4", "= -0.4", "[tolerance], force_bias_N: found -0.4, allowed a finite number >= 0", ""),
+    "tolerance negative": ("= 0.4", "= -0.4", "[tolerance], force_bias_N: found -0.4, allowed a finite number 0 to 10000", ""),
     "rate zero": ("= 50.0", "= 0", "sample_rate: found 0.0, allowed a finite number > 0", "Hz"),
     "empty file name": ('"trials/slow_1.csv"', '""', "[[trial]] 1, file: found '', allowed a text", ""),
     "not TOML": ("[subject]", "[subject", "line 6, column 9: found", "allowed TOML"),
@@ -540,3 +540,28 @@ def test_measured_data_sets_load(data: Path, name: str) -> None:
         assert trial.resampled == (name.startswith("dfki") and trial.file != "trials/release_1.csv")
     expected = ["trials/swing_2.csv"] if name == "pendulum_single" else []
     assert [line.partition(":")[0] for line in loaded.warnings] == expected
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            'segment = 3\nmass = 0.2\nat = 0.1\nconfigurations = ["slow"]',
+            r"\[\[added\]\] 1, segment: found 3, allowed a whole number 1 to 2",
+        ),
+        (
+            'segment = 1\nmass = 0.2\nat = 1.9\nconfigurations = ["slow"]',
+            r"\[\[added\]\] 1, at: found 1\.9, allowed a finite number 0 to 0\.322 m",
+        ),
+    ],
+)
+def test_what_is_worn_has_to_be_on_the_arm(session: Session, table: str, message: str) -> None:
+    with (session.folder / "dataset.toml").open("a", encoding="utf-8") as out:
+        out.write(f"\n[[added]]\n{table}\n")
+    with pytest.raises(BadInput, match=rf"dataset\.toml: {message}"):
+        armrs.load_dataset(session.folder)
+
+
+def test_a_tolerance_beyond_all_sensors_is_refused() -> None:
+    with pytest.raises(BadInput, match="force_bias_N: found 1e\\+300, allowed a finite number 0 to 10000"):
+        armrs.Tolerance(force_bias_N=1e300)

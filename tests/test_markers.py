@@ -180,12 +180,12 @@ def test_refuses_points_and_axes(
 
 def test_from_python_a_refusal_names_the_argument(good: Path, tmp_path: Path) -> None:
     markers = armrs.read_markers(good)
-    with pytest.raises(BadInput, match="^points: found 1 points"):
+    with pytest.raises(BadInput, match=r"^points: found 1 points"):
         armrs.planar_motion(markers, ["S"])
-    with pytest.raises(BadInput, match="^up: found 'w'"):
+    with pytest.raises(BadInput, match=r"^up: found 'w'"):
         armrs.planar_motion(markers, ["S", "E", "H"], up="w")
     (tmp_path / "m.mot").write_text("a\ninDegrees=yes\nendheader\ntime\tq\n0.0\t1.0\n0.1\t2.0\n")
-    with pytest.raises(BadInput, match="m.mot: coordinates: found unknown coordinate 'p'"):
+    with pytest.raises(BadInput, match=r"m\.mot: coordinates: found unknown coordinate 'p'"):
         armrs.convert_motion(tmp_path / "m.mot", tmp_path / "out", to="csv", coordinates=["p"])
 
 

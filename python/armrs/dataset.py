@@ -51,6 +51,10 @@ class Subject:
             checks.choice("sex", self.sex, ("male", "female"))
 
 
+_MOST = {"angle_offset_deg": 180.0, "force_bias_N": 1e4, "force_gain": 10.0, "time_delay_s": 10.0, "handle_placement_m": 10.0}
+"""What no calibration promises less than."""
+
+
 @dataclass(frozen=True)
 class Tolerance:
     """What the calibration promises. Smaller deviations are absorbed and reported, larger ones are named.
@@ -77,7 +81,7 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         for f in dataclasses.fields(self):
-            object.__setattr__(self, f.name, checks.number(f.name, getattr(self, f.name), least=0.0))
+            object.__setattr__(self, f.name, checks.number(f.name, getattr(self, f.name), least=0.0, most=_MOST[f.name]))
 
     @property
     def angle_offset(self) -> float:
@@ -265,9 +269,8 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     description = describe(source)
     model_path = description.model_path
     model = load_model(model_path)
-    for item in description.added:
-        if item.segment > model.n_joints:
-            raise BadInput("[[added]], segment", item.segment, f"1 to {model.n_joints}", file=description.path)
+    for number, item in enumerate(description.added, start=1):
+        _on(model, item, f"[[added]] {number}", description.path)
     trials: list[Trial] = []
     warnings = list(model.warnings)
     for entry in description.entries:
@@ -304,6 +307,15 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         synthetic=description.synthetic,
         added=description.added,
     )
+
+
+def _on(model: Model, item: Added, place: str, file: Path) -> None:
+    """Refuse a mass that is on no segment of a model."""
+    try:
+        checks.whole("segment", item.segment, least=1, most=model.n_joints)
+        model.with_mass(item.segment, item.mass, item.at)
+    except BadInput as error:
+        raise error.within(place=place, file=file) from None
 
 
 @contextmanager

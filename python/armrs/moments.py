@@ -18,6 +18,8 @@ from .trial import FEWEST_SAMPLES, Trial
 
 DEFAULT_CUTOFF = 1.0
 """Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
+LEAST_CUTOFF = 1e-3
+"""Nobody moves slower [Hz]."""
 DEFAULT_BINS = 24
 """Angle bins over the range of a joint in one configuration."""
 LEAST_RANGE = np.radians(2.0)
@@ -26,6 +28,12 @@ MOVING = 0.25
 """A joint moves when its speed is above this part of its usual speed in the trial."""
 MARGIN = 0.43
 """The low-pass mixes what lies within this time, in periods of its cutoff."""
+APART = np.radians(10.0)
+"""Repeats whose mean angles differ by more are no repeats of one movement [rad]."""
+CARRIED = (0.05, 20.0)
+"""The force carries an arm that is led: its torque along that of the weight, relative to that. Outside of this, unit or side are wrong."""
+LEAST_WEIGHT = 0.5
+"""Torque of the weight from which on that is asked [N m]."""
 RESTING = 0.02
 """A joint rests when its speed is below this part of its usual speed in the trial."""
 LEVEL = 0.95
@@ -212,7 +220,7 @@ def passive_moments(
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     bins = checks.whole("bins", bins, least=2, most=1000)
-    cutoff = checks.number("cutoff", cutoff, above=0.0, unit="Hz")
+    cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
     refuse_implausible(dataset, robot_matters=False)
     trials = tuple(_of_trial(dataset, trial, cutoff) for trial in dataset.trials)
     curves, warnings = [], []
@@ -227,6 +235,7 @@ def passive_moments(
                     f"{configuration}: joint {joint + 1} moved, but not long enough in both directions over the same angles for a low-pass "
                     f"at {cutoff:g} Hz: left out"
                 )
+        warnings += _doubtful(dataset, repeats)
     slow = [(c.configuration, c.joint, c.inertial_share) for c in curves]
     assumptions = (relaxed.muscles_silent(dataset.trials), relaxed.slow_enough(slow))
     if assumptions[0].passed is False:
@@ -305,7 +314,7 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     if angles.size == 0:
         return None
     edges = np.linspace(angles.min(), angles.max(), bins + 1)
-    rising, falling = (np.array([_binned(m, m.moment[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
+    rising, falling = (np.array([_at_centres(m, joint, sign, edges) for m in repeats]) for sign in (1, -1))
     # A friction that turns with the speed went through the same low-pass as its sign did.
     ups, downs = (np.array([_binned(m, m.sign[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
     half_width = (rising - falling) / (ups - downs)
@@ -321,7 +330,7 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     return PassiveCurve(
         configuration=repeats[0].trial.configuration,
         joint=joint + 1,
-        repeats=len(repeats),
+        repeats=int(np.isfinite(elastic).any(axis=1).sum()),
         angle=0.5 * (edges[1:] + edges[:-1]),
         rising=_mean(rising) + kept,
         falling=_mean(falling) + kept,
@@ -395,6 +404,20 @@ def _binned(moments: TrialMoments, values: np.ndarray, joint: int, sign: int, ed
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
+def _at_centres(moments: TrialMoments, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
+    """Return the moment at the middle of each angle bin in one direction; NaN where there are no samples.
+
+    Where a movement turns, its bins are filled on one side only, and by another part for every repeat and direction: the mean of their
+    samples belongs to the mean of their angles, and is moved from there along the slope between bins.
+    """
+    mean, angle = (_binned(moments, values[:, joint], joint, sign, edges) for values in (moments.moment, moments.q))
+    there = np.isfinite(mean)
+    if there.sum() >= 2:
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        mean[there] += np.gradient(mean[there], angle[there]) * (middle - angle)[there]
+    return mean
+
+
 def _mean(values: np.ndarray) -> np.ndarray:
     """Return the mean over repeats of those that have samples."""
     there = np.isfinite(values)
@@ -408,6 +431,31 @@ def _deviation(values: np.ndarray) -> np.ndarray:
     count = there.sum(axis=0)
     square = np.where(there, values - _mean(values), 0.0) ** 2
     return np.where(count > 1, np.sqrt(square.sum(axis=0) / np.maximum(count - 1, 1)), np.nan)
+
+
+def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
+    """Return what is odd in the trials of one configuration, a line each: none of it proves an error, and all of it spoils the means."""
+    lines = []
+    for m in repeats:
+        there = np.isfinite(m.q).all(axis=1)
+        if not m.direction.any():
+            lines.append(
+                f"{m.trial.file}: no joint moves long enough in it to tell its direction: it counts nowhere (unit, or a dead sensor?)"
+            )
+        if m.force is None or not there.any():
+            continue
+        weight = arm(dataset.model_of(m.trial.configuration)).gravity(m.q[there])
+        share = float(np.sum((m.moment + m.inertial)[there] * weight) / max(np.sum(weight**2), 1e-300)) + 1.0
+        if np.mean(np.sum(weight**2, axis=1)) > LEAST_WEIGHT**2 and not CARRIED[0] <= share <= CARRIED[1]:
+            lines.append(
+                f"{m.trial.file}: the force carries {100 * share:.2g} % of the arm's weight: is it in N, and force_on the right side?"
+            )
+    places = np.array([_mean(m.q) for m in repeats])
+    for j, at in enumerate(places[np.isfinite(places).all(axis=1)].T, start=1):
+        if at.size and np.ptp(at) > APART:
+            where = f"{repeats[0].trial.configuration}: its repeats have joint {j} up to {np.degrees(np.ptp(at)):.3g}° apart"
+            lines.append(f"{where}: another unit, swapped columns, or two configurations?")
+    return lines
 
 
 def _not_slow(curves: Sequence[PassiveCurve]) -> tuple[str, ...]:

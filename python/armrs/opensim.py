@@ -152,7 +152,7 @@ def _lines(path: Path) -> list[str]:
 
 def _header(lines: Sequence[str]) -> dict[str, str]:
     """Return the keys of a header, old (`datarows 121`) and new (`nRows=121`)."""
-    pairs = [line.partition("=")[::2] if "=" in line else (line.split(None, 1) + ["", ""])[:2] for line in lines]
+    pairs = [line.partition("=")[::2] if "=" in line else [*line.split(None, 1), "", ""][:2] for line in lines]
     return {key.strip().lower(): value.strip() for key, value in pairs}
 
 

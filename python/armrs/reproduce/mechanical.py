@@ -203,7 +203,12 @@ def _bars(brakes: bool) -> tuple[Drawn, Drawn]:
     for ax, own in zip(
         figure.subplots(1, 3, width_ratios=(1.0, 3.0, 2.0)), (("m2",), ("m2·l2", "l2", "m1·l1"), ("τp2", "τp1")), strict=True
     ):
-        drawing.bars(ax, own, {k: (c, [v[name] for name in own]) for k, (c, v) in values.items()}, ylabel=f"[{UNITS[own[0]]}]")
+        drawing.bars(
+            ax,
+            own,
+            {k: (c, [v[name] for name in own]) for k, (c, v) in values.items()},
+            ylabel=f"[{', '.join(dict.fromkeys(UNITS[name] for name in own))}]",
+        )
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=4)
     errors = plotting.figure(9.4, 3.4)
     shown = NAMES if brakes else NAMES[:4]

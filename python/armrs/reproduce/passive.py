@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 GROUP = Group("passive", "Passive moments (4.1)")
 JOINTS = ("shoulder", "elbow", "wrist")
 COLOURS = (plotting.BLUE, plotting.ORANGE, plotting.GREEN)
+FORCE_COLOURS = (plotting.RED, plotting.INK)
+"""Others than those of the joints, beside which forces stand."""
 
 
 def curve_of(found: Session, name: str, joint: int) -> PassiveCurve:
@@ -114,7 +116,7 @@ def forces_and_angles() -> Found:
             force = -np.array([trial.force_on_arm for trial in own])
             q = np.degrees([trial.q for trial in own])
             for k, label in enumerate(("$F_y$", "$F_z$")):
-                drawing.over_trials(top, t, force[:, :, k], label, COLOURS[k])
+                drawing.over_trials(top, t, force[:, :, k], label, FORCE_COLOURS[k])
             for j, label in enumerate(JOINTS):
                 drawing.over_trials(middle, t, q[:, :, j], label, COLOURS[j])
             top.set(title=name + "°", ylabel="force on the robot [N]")

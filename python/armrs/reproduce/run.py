@@ -57,7 +57,7 @@ def run_reproduce(
                 tell(item.title, done / count)
                 with plotting.style():
                     found = item.make()
-                written += _draw(found, out)
+                written += _draw(found, out, item.virtual)
                 items.append(_plain(item, found))
                 done += 1
             parts.append({"key": group.key, "title": group.title, "items": items})
@@ -71,11 +71,14 @@ def run_reproduce(
     return Reproduced(made[0], tuple(written))
 
 
-def _draw(found: Found, out: Path) -> list[Path]:
+def _draw(found: Found, out: Path, virtual: bool) -> list[Path]:
+    """Write the figures; one of virtual data says so, since it may be shown away from the page."""
     paths = []
     for drawn in found.figures:
         path = out / "figures" / f"{drawn.name}.png"
         files.may_replace(path, ".png")
+        if virtual:
+            drawn.figure.text(0.998, 0.004, "virtual data", ha="right", va="bottom", fontsize=7, color=plotting.SILVER)
         with plotting.style(), files.replacing(path) as temporary:
             drawn.figure.savefig(temporary, format="png", dpi=110)
         paths.append(path)
