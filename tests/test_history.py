@@ -127,3 +127,75 @@ def test_refuses_other_files(slow_arm: Path, tmp_path: Path, capsys: pytest.Capt
         assert not before or (tmp_path / name).read_bytes() == before
     assert main(["identify", str(slow_arm), "--date", "2026-01-01"]) == 2
     assert not (tmp_path / "out").exists()
+
+
+def _written(file: Path, *changes: str) -> None:
+    """Write a history with one estimate, and then change it by hand."""
+    with sqlite3.connect(file) as made:
+        made.executescript(f"PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA}")
+        made.execute("INSERT INTO session (name, date, method, joints) VALUES ('a', '2026-01-01', 'joint', 2)")
+        made.execute("INSERT INTO estimate VALUES (1, 'm2*l2', 'combination', 0, 0.13, 0.001, 'kg m', 'data')")
+        for change in changes:
+            made.execute(change)
+    made.close()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("DROP TABLE estimate", "a history with other tables than armrs makes"),
+        ("DROP TABLE session", "a history with other tables than armrs makes"),
+        ("ALTER TABLE session ADD COLUMN x", "a history with other tables than armrs makes"),
+        ("CREATE TRIGGER t BEFORE INSERT ON session BEGIN SELECT raise(ABORT, 'no'); END", "a history with other tables than armrs makes"),
+        ("UPDATE estimate SET value = 'abc'", "a history in which a number is none"),
+        ("UPDATE estimate SET value = 9e999", "a history in which a number is none"),
+        ("UPDATE estimate SET std = -1", "a history in which a number is none"),
+        ("UPDATE session SET date = 'yesterday'", "a history in which a date is none"),
+        ("UPDATE session SET joints = 'x'", "a history in which a number of joints is none"),
+    ],
+)
+def test_refuses_a_history_that_was_changed_by_hand(tmp_path: Path, change: str, message: str) -> None:
+    file = tmp_path / "s.sqlite"
+    _written(file)
+    sessions.check(file, 2)
+    file.unlink()
+    _written(file, change)
+    before = file.read_bytes()
+    for ask in (lambda: sessions.check(file, 2), lambda: sessions.read(file)):
+        with pytest.raises(BadInput, match=rf"s\.sqlite: history: found {message}, allowed a history that armrs wrote"):
+            ask()
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("keep", [1, 15, 50, 100, 4096, 8192])
+def test_refuses_a_history_that_is_cut_off(tmp_path: Path, keep: int) -> None:
+    file = tmp_path / "s.sqlite"
+    _written(file)
+    file.write_bytes(file.read_bytes()[:keep])
+    with pytest.raises(BadInput, match=r"s\.sqlite: history: found "):
+        sessions.check(file, 2)
+    assert file.stat().st_size == keep
+
+
+@pytest.mark.parametrize("at", [20, 100, 4096, 8192, 12288])
+def test_refuses_a_history_that_is_damaged(tmp_path: Path, at: int) -> None:
+    file = tmp_path / "s.sqlite"
+    _written(file)
+    content = bytearray(file.read_bytes())
+    content[at : at + 400] = bytes(range(200)) * 2
+    file.write_bytes(bytes(content[: file.stat().st_size]))
+    with pytest.raises(BadInput, match=r"s\.sqlite: history: found "):
+        sessions.check(file, 2)
+
+
+@pytest.mark.parametrize("given", ["20260101", "2026-W01-1", "2026-1-1", " 2026-01-01", "", 3, b"2026-01-01"])
+def test_a_date_has_one_form(given: object) -> None:
+    with pytest.raises(BadInput, match="date: found "):
+        sessions.session_date("S1", given)  # type: ignore[arg-type]
+
+
+def test_a_place_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="found File name too long"):
+        sessions.check(tmp_path / ("a" * 300), 2)
+    with pytest.raises(BadInput, match="history: found 3, allowed a path"):
+        sessions.check(3, 2)  # type: ignore[arg-type]

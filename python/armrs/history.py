@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from . import files
+from . import checks, files
 from .errors import BadInput, Text
 from .identification import Estimate, Identified
 
@@ -34,6 +34,17 @@ CREATE TABLE IF NOT EXISTS estimate (
     PRIMARY KEY (session, name, kind, joint)
 );
 """
+_MAGIC = b"SQLite format 3\0"
+_TABLES = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
+_IMPOSSIBLE = {
+    "a number is none": (
+        "SELECT count(*) FROM estimate WHERE typeof(value) NOT IN ('real', 'integer') OR typeof(std) NOT IN ('real', 'integer') "
+        "OR abs(value) > 1e300 OR std < 0 OR std > 1e300"
+    ),
+    "a date is none": "SELECT count(*) FROM session WHERE date IS NOT date(date)",
+    "a number of joints is none": "SELECT count(*) FROM session WHERE typeof(joints) != 'integer' OR joints < 1",
+}
+"""What the tables would take and armrs never writes, with a query that counts it."""
 _OUTPUTS = (".json", ".toml", ".html", ".png", ".csv", ".parquet")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 
@@ -109,21 +120,25 @@ def session_date(name: str, given: str | None = None) -> str:
         found = _DATE.search(name)
         given = found[0] if found else datetime.date.today().isoformat()
     try:
-        return datetime.date.fromisoformat(given).isoformat()
-    except ValueError:
-        raise BadInput("date", given, "a date such as 2026-03-14") from None
+        day = datetime.date.fromisoformat(given)
+    except (TypeError, ValueError):
+        day = None
+    if day is None or given != day.isoformat():  # other forms of ISO 8601 are read by some versions of Python only
+        raise BadInput("date", given, "a date such as 2026-03-14")
+    return given
 
 
 def check(path: str | os.PathLike[str], joints: int) -> None:
     """Refuse a history file that cannot be added to, before any work is done."""
-    file = Path(path)
+    file = checks.path("history", path)
+    files.must_be_writable(file)
     if file.is_dir():
         raise BadInput("history", Text("a folder"), "the name of a file", file=file)
     if file.suffix.lower() in _OUTPUTS:
         # A result of the same command could take its place.
         raise BadInput("history", Text(f"a name that ends with {file.suffix}"), "another, such as .sqlite", file=file)
     if file.exists():
-        with closing(_open(file)) as connection:
+        with _reading(file) as connection:
             _same_arm(connection, joints, file)
 
 
@@ -153,7 +168,6 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
     """
     file = Path(path)
     check(file, result.dataset.model.n_joints)
-    files.must_be_writable(file)
     made = [folder for folder in file.absolute().parents if not folder.exists()]
     file.parent.mkdir(parents=True, exist_ok=True)
     is_new, is_kept = not file.exists(), False
@@ -185,12 +199,18 @@ def _insert(connection: sqlite3.Connection, result: Identified, date: str) -> No
 
 def read(path: str | os.PathLike[str], method: str = "joint") -> tuple[Course, ...]:
     """Return every parameter that the data decided in the last session, over all sessions in which they did."""
-    file = Path(path)
+    with _reading(checks.path("history", path)) as connection:
+        return _courses(connection, method)
+
+
+@contextmanager
+def _reading(file: Path) -> Iterator[sqlite3.Connection]:
+    """Open a history to read it; what SQLite cannot read of it is a refusal too."""
     try:
         with closing(_open(file)) as connection:
-            return _courses(connection, method)
+            yield connection
     except sqlite3.Error as error:
-        raise BadInput("history", Text(str(error)), "a history that armrs wrote", file=file) from None
+        raise _no_history(file, str(error)) from None
 
 
 def _courses(connection: sqlite3.Connection, method: str) -> tuple[Course, ...]:
@@ -226,22 +246,50 @@ def _courses(connection: sqlite3.Connection, method: str) -> tuple[Course, ...]:
 
 
 def _open(file: Path) -> sqlite3.Connection:
-    """Open a history, or refuse what is none."""
+    """Open a history, or refuse what is none: another file, another program's database, one that is damaged or was changed by hand."""
     try:
+        # SQLite takes a file of a few bytes for an empty database, and would write over it.
+        if file.exists() and (not file.is_file() or file.read_bytes()[: len(_MAGIC)] not in (b"", _MAGIC)):
+            raise _no_history(file, "file is not a database")
         connection = sqlite3.connect(file)
-        connection.execute("PRAGMA foreign_keys = ON")
-        tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-        mark = connection.execute("PRAGMA application_id").fetchone()[0]
+    except OSError as error:
+        raise _no_history(file, error.strerror or "a file that cannot be read") from None
     except sqlite3.Error as error:
-        raise BadInput("history", Text(str(error)), "a history that armrs wrote, or a new file", file=file) from None
-    if tables and mark != APPLICATION:
+        raise _no_history(file, str(error)) from None
+    try:
+        wrong = _wrong(connection)
+    except sqlite3.Error as error:
+        wrong = str(error)
+    if wrong:
         connection.close()
-        raise BadInput("history", Text("a database of another program"), "a history that armrs wrote, or a new file", file=file)
+        raise _no_history(file, wrong)
     return connection
 
 
+def _wrong(connection: sqlite3.Connection) -> str | None:
+    """Return what makes a database no history of ours, or None."""
+    connection.execute("PRAGMA foreign_keys = ON")
+    tables = connection.execute(_TABLES).fetchall()
+    if not tables:
+        return None
+    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION:
+        return "a database of another program"
+    with closing(sqlite3.connect(":memory:")) as ours:
+        ours.executescript(_SCHEMA)
+        if tables != ours.execute(_TABLES).fetchall():
+            return "a history with other tables than armrs makes"
+    damage = connection.execute("PRAGMA integrity_check(1)").fetchone()[0]
+    if damage != "ok":
+        return f"a damaged history ({damage})"
+    return next((f"a history in which {what}" for what, query in _IMPOSSIBLE.items() if connection.execute(query).fetchone()[0]), None)
+
+
+def _no_history(file: Path, found: str) -> BadInput:
+    return BadInput("history", Text(found), "a history that armrs wrote, or a new file", file=file)
+
+
 def _same_arm(connection: sqlite3.Connection, joints: int, file: Path) -> None:
-    if not connection.execute("SELECT count(*) FROM sqlite_master WHERE name = 'session'").fetchone()[0]:
+    if not connection.execute(_TABLES).fetchall():
         return
     other = connection.execute("SELECT joints FROM session WHERE joints != ?", (joints,)).fetchone()
     if other is not None:
