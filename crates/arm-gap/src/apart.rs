@@ -382,35 +382,53 @@ impl<const N: usize> Study<'_, N> {
             .filter(|&m| self.has_repeat(m))
             .filter(|&m| stands_out(&deviations[m], self.session.channels(), scale))
             .collect();
+        let rows = self.rows_of_references() as f64;
+        let tried = (self.fitted.len() * 4 * N * 100) as f64;
+        let price = crate::scan::THRESHOLD + libm::log(rows) + 2.0 * libm::log(tried);
         let mut best: Option<Apart> = None;
         for m in suspects {
             let trial = self.fitted[m];
-            for (effect, response) in self.shapes_in(anchor, trial) {
+            let see = |(effect, response): (Effect<f64>, Channels)| {
                 let mut row = self.noise.whiten(&response, &self.stretches[trial]);
                 project_off(&mut row, &usual[m]);
-                let (square, along) = (dot(&row, &row), dot(&row, &deviations[m]));
-                if square <= 0.0 {
-                    continue;
-                }
+                let square = dot(&row, &row);
+                (square > 0.0).then_some(Asked {
+                    effect,
+                    row,
+                    square,
+                })
+            };
+            let asked: Vec<Asked> = self
+                .shapes_in(anchor, trial)
+                .into_iter()
+                .filter_map(see)
+                .collect();
+            let others = self.repeats_of(m);
+            for one in &asked {
+                let along = dot(&one.row, &deviations[m]);
                 // Of two repeats both deviate alike: the disturbed one is further from the model.
-                let own = dot(&row, &white[m]).abs();
-                let further = self.repeats_of(m).iter().all(|&o| {
-                    let other = dot(&row, &white[o]).abs();
-                    own > other
-                });
-                let gain = along * along / square / scale;
+                let own = dot(&one.row, &white[m]).abs();
+                let further = others.iter().all(|&o| own > dot(&one.row, &white[o]).abs());
+                let size = along / one.square;
                 // A sensor that moves within what the calibration promises of it is no finding.
-                let promised = match effect.kind.probe().promise {
+                let promised = match one.effect.kind.probe().promise {
                     Some(_) => self.session.tolerance.angle_offset,
                     None => 0.0,
                 };
-                let further = further && (along / square).abs() > promised;
-                if further && best.as_ref().is_none_or(|b| gain > b.gain) {
-                    let mut effect = effect;
-                    effect.parameters[0] = along / square;
+                let gain = along * size / scale;
+                let least = best.as_ref().map_or(price, |b| b.gain);
+                if !further || size.abs() <= promised || gain <= least {
+                    continue;
+                }
+                let group = others.iter().chain([&m]).map(|&o| deviations[o].as_slice());
+                let scatter = scatter_elsewhere(one, &asked, &group.collect::<Vec<_>>());
+                let gain = gain / scatter;
+                if gain > least {
+                    let mut effect = one.effect;
+                    effect.parameters[0] = size;
                     best = Some(Apart {
                         effect,
-                        sd: libm::sqrt(scale / square),
+                        sd: libm::sqrt(scale * scatter / one.square),
                         trial: Some(trial),
                         gain,
                         rivals: Vec::new(),
@@ -421,10 +439,7 @@ impl<const N: usize> Study<'_, N> {
                 }
             }
         }
-        let rows = self.rows_of_references() as f64;
-        let tried = (self.fitted.len() * 4 * N * 100) as f64;
-        let price = crate::scan::THRESHOLD + libm::log(rows) + 2.0 * libm::log(tried);
-        best.filter(|b| b.gain > price)
+        best
     }
 
     /// Whitened columns of what differs from trial to trial without being a disturbance, each orthogonal to the others.
@@ -590,6 +605,50 @@ fn small(swing: &Effect<f64>, frequency: f64, earlier: bool) -> Effect<f64> {
         effect.parameters[phase] += 0.5 * core::f64::consts::PI;
     }
     effect
+}
+
+/// A disturbance that is asked for, with what it would show.
+struct Asked {
+    effect: Effect<f64>,
+    /// Whitened, without what is usual.
+    row: Vec<f64>,
+    square: f64,
+}
+
+/// How much more than noise the shape of a burst finds at other times of its movement, as a ratio of variances; at least one.
+///
+/// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like bursts at many times.
+///
+/// * `deviations` - of the trial and its repeats
+fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[&[f64]]) -> f64 {
+    /// Nine of ten squares of a standard normal number are smaller.
+    const NINE_OF_TEN: f64 = 2.706;
+    /// How long a burst is felt around it \[s\].
+    const FELT: f64 = 1.0;
+    if one.effect.kind.probe().nature != Nature::Burst {
+        return 1.0;
+    }
+    let span = |e: &Effect<f64>| (e.parameters[1] - FELT, e.parameters[1] + e.parameters[2]);
+    let own = span(&one.effect);
+    let elsewhere = asked.iter().filter(|other| {
+        let same = (other.effect.kind, other.effect.index) == (one.effect.kind, one.effect.index)
+            && other.effect.parameters[2] == one.effect.parameters[2];
+        let there = span(&other.effect);
+        same && (there.0 > own.1 || there.1 < own.0)
+    });
+    let mut squares: Vec<f64> = elsewhere
+        .flat_map(|other| {
+            deviations.iter().map(|d| {
+                let along = dot(&other.row, d);
+                along * along / other.square
+            })
+        })
+        .collect();
+    squares.sort_by(f64::total_cmp);
+    let tenth = squares.len().saturating_sub(1) * 9 / 10;
+    squares
+        .get(tenth)
+        .map_or(1.0, |s| f64::max(s / NINE_OF_TEN, 1.0))
 }
 
 /// Whether some second of a whitened deviation holds far more than noise.

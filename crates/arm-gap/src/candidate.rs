@@ -239,6 +239,50 @@ impl Library {
             responses,
         })
     }
+
+    /// Adds named effects in the shapes that they have; where each stands, and the coefficients of its columns.
+    ///
+    /// # Errors
+    /// As [`Study::responses`].
+    pub fn add_named<const N: usize>(
+        &mut self,
+        study: &Study<N>,
+        anchor: &Anchor<N>,
+        named: &[(Candidate, Effect<f64>)],
+    ) -> Result<Vec<Option<Twin>>, GapError> {
+        let mut places = Vec::new();
+        for (own, mut effect) in named.iter().cloned() {
+            let mut sizes: Vec<f64> = own.free.iter().map(|&p| effect.parameters[p]).collect();
+            if let Some(rest) = own.rest {
+                // With a rest angle the columns are the effect there and one unit further on, which must be possible.
+                let most = effect.kind.info().parameters[rest].max;
+                if effect.parameters[rest] + 1.0 > most {
+                    effect.parameters[rest] -= 1.0;
+                    sizes.insert(0, 0.0);
+                } else {
+                    sizes.push(0.0);
+                }
+            }
+            let Some(exact) = Candidate::again(study, anchor, effect, &own.free) else {
+                places.push(None);
+                continue;
+            };
+            let changes = exact.changes(study.session, &anchor.hypothesis);
+            self.responses.push(study.responses(anchor, &changes)?);
+            let place = self.candidates.len();
+            places.push(Some(Twin { place, sizes }));
+            self.candidates.push(exact);
+        }
+        Ok(places)
+    }
+}
+
+/// A named effect among the questions.
+pub struct Twin {
+    /// Its place.
+    pub place: usize,
+    /// The coefficients of its columns.
+    pub sizes: Vec<f64>,
 }
 
 /// Where a kind may act in a session.

@@ -1,11 +1,11 @@
-//! Fitting a hypothesis to the fit trials: Gauss and Newton's method with step control, near a simulated one.
+//! Fitting a hypothesis to the fit trials: Gauss and Newton's method, damped where it must be, near a simulated one.
 
 use nalgebra::DMatrix;
 
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::candidate::Candidate;
-use crate::hypothesis::{Coordinate, Hypothesis};
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::normal::{Cluster, Normal, factor, solve};
 use crate::predict::Channels;
 use crate::spread::spread;
@@ -13,8 +13,9 @@ use crate::study::Study;
 
 /// Most steps of a fit.
 const STEPS: usize = 6;
-/// Most halvings of a step.
-const HALVINGS: usize = 4;
+/// Damping of the steps that are tried, as a share of the diagonal of the normal equations (Levenberg and Marquardt): what the data
+/// decide well moves on where a whole step leads astray.
+const DAMPING: [f64; 5] = [0.0, 0.01, 0.1, 1.0, 10.0];
 /// A step that gains less than this, in units of the noise, is the last.
 const ENOUGH: f64 = 0.2;
 /// Share of the cost that a last step gains at most, where the model is far from the data.
@@ -130,14 +131,19 @@ impl<'a, const N: usize> Study<'a, N> {
             let Ok((coordinates, clusters)) = self.equations(anchor, &fitted, &[]) else {
                 break;
             };
-            // Where nothing decides an unknown, what was found so far stands.
-            let Some((usable, step)) = stepped(&clusters, hypothesis, &coordinates) else {
-                break;
+            let damped = |damping: &f64| {
+                let (usable, step) = stepped(&clusters, hypothesis, &coordinates, *damping)?;
+                let moved =
+                    std::iter::zip(&usable, step).fold(hypothesis.clone(), |h, (&i, step)| {
+                        let c = &coordinates[i];
+                        let value = hypothesis.get(c.target) + step;
+                        h.with(c.target, value.clamp(c.lower, c.upper))
+                    });
+                let next = self.state(anchor, moved, fitted.asked.clone()).ok()?;
+                (next.cost < fitted.cost).then_some(next)
             };
-            let moves: Vec<(Coordinate, f64)> = std::iter::zip(&usable, step)
-                .map(|(&i, step)| (coordinates[i], step))
-                .collect();
-            let Some(next) = self.shortened(anchor, &fitted, &moves) else {
+            // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands.
+            let Some(next) = DAMPING.iter().find_map(damped) else {
                 break;
             };
             let gained = fitted.cost - next.cost;
@@ -147,26 +153,6 @@ impl<'a, const N: usize> Study<'a, N> {
             }
         }
         Ok(fitted)
-    }
-
-    /// The first of a step, its half, its quarter … that lowers the cost.
-    fn shortened(
-        &self,
-        anchor: &Anchor<N>,
-        from: &Fitted<N>,
-        moves: &[(Coordinate, f64)],
-    ) -> Option<Fitted<N>> {
-        let mut share = 1.0;
-        (0..HALVINGS).find_map(|_| {
-            let mut next = from.hypothesis.clone();
-            for (c, step) in moves {
-                let value = from.hypothesis.get(c.target) + share * step;
-                next = next.with(c.target, value.clamp(c.lower, c.upper));
-            }
-            share *= 0.5;
-            let next = self.state(anchor, next, from.asked.clone()).ok()?;
-            (next.cost < from.cost).then_some(next)
-        })
     }
 
     /// Squares of what a fitted hypothesis leaves of each cluster when the others alone decide its numbers, to first order.
@@ -184,7 +170,8 @@ impl<'a, const N: usize> Study<'a, N> {
                 .filter(|(i, _)| *i != out)
                 .map(|(_, c)| c.clone())
                 .collect();
-            let (usable, steps) = stepped(&others, hypothesis, &coordinates).unwrap_or_default();
+            let (usable, steps) =
+                stepped(&others, hypothesis, &coordinates, 0.0).unwrap_or_default();
             sum += cluster.square;
             for (&i, a) in usable.iter().zip(&steps) {
                 let row = usable.iter().zip(&steps);
@@ -233,12 +220,16 @@ fn stepped<const N: usize>(
     clusters: &[Cluster],
     hypothesis: &Hypothesis<N>,
     coordinates: &[Coordinate],
+    damping: f64,
 ) -> Option<(Vec<usize>, Vec<f64>)> {
     let mut normal = Normal::new(clusters, &priors(hypothesis, coordinates));
     let usable: Vec<usize> = (0..coordinates.len())
         .filter(|&i| normal.gram[(i, i)] > 0.0)
         .collect();
     regularise(&mut normal.gram, hypothesis, coordinates);
+    for &i in &usable {
+        normal.gram[(i, i)] *= 1.0 + damping;
+    }
     let bounds = |i: usize| {
         let c = &coordinates[usable[i]];
         let value = hypothesis.get(c.target);
@@ -271,13 +262,30 @@ pub struct Precision {
     pub sd: Vec<f64>,
 }
 
+impl Precision {
+    /// Share of what a law may miss of what it shows that may lie along one of its parameters, as sums of squares.
+    const ALONG: f64 = 1.0 / 9.0;
+
+    /// Widens what is known of the parameters of a named effect by what its law may miss.
+    ///
+    /// * `gain` - what the effect explains, in units of twice the log-likelihood
+    pub fn widen(&mut self, slot: usize, missed: f64, gain: f64) {
+        let wider = libm::sqrt(1.0 + Self::ALONG * missed * gain.max(0.0));
+        for (c, sd) in self.coordinates.iter().zip(&mut self.sd) {
+            if matches!(c.target, Target::Named(own, _) if own == slot) {
+                *sd *= wider;
+            }
+        }
+    }
+}
+
 impl<const N: usize> Study<'_, N> {
     /// How well the unknowns of a fitted hypothesis are known.
     ///
     /// The spread between trials counts where it is larger than the noise tells.
     ///
     /// # Errors
-    /// As [`Study::equations`].
+    /// [`GapError::Numerics`] as [`Study::equations`].
     pub fn precision(
         &self,
         anchor: &Anchor<N>,
@@ -285,16 +293,27 @@ impl<const N: usize> Study<'_, N> {
         scale: f64,
     ) -> Result<Precision, GapError> {
         let hypothesis = &fitted.hypothesis;
-        let (coordinates, clusters) = self.equations(anchor, fitted, &[])?;
+        let (coordinates, clusters) = match self.equations(anchor, fitted, &[]) {
+            // Where a small change of what was found cannot be simulated, nothing can be said of how well it is known.
+            Err(GapError::Simulation { .. }) => {
+                let mut coordinates = anchor.coordinates.clone();
+                coordinates.extend(fitted.named());
+                let sd = vec![f64::INFINITY; coordinates.len()];
+                return Ok(Precision { coordinates, sd });
+            }
+            other => other?,
+        };
         let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
         regularise(&mut normal.gram, hypothesis, &coordinates);
         let mut sd = vec![f64::INFINITY; coordinates.len()];
-        // A value at its limit is held there: the others are known as if it were exact.
+        // A size at the limit of its kind is held there: the others are known as if it were exact. What was known before is
+        // known no better where it met the end of what is refitted.
         let free: Vec<usize> = (0..coordinates.len())
             .filter(|&i| {
-                let value = hypothesis.get(coordinates[i].target);
-                let inside = value > coordinates[i].lower && value < coordinates[i].upper;
-                inside && normal.gram[(i, i)] > 0.0
+                let c = &coordinates[i];
+                let value = hypothesis.get(c.target);
+                let inside = value > c.lower && value < c.upper;
+                (inside || c.prior.is_some()) && normal.gram[(i, i)] > 0.0
             })
             .collect();
         let left = DMatrix::from_fn(free.len(), free.len(), |a, b| {

@@ -92,6 +92,19 @@ impl<const N: usize> Hypothesis<N> {
         self
     }
 
+    /// Hands what calibration stands in for a sensor over to a named fault of the same sensor: the two are one sum, and the fault is
+    /// free to be as large as it is.
+    pub fn handed_over(mut self) -> Self {
+        for fault in &mut self.named {
+            let same = |c: &&mut Effect<f64>| (c.kind, c.index) == (fault.kind, fault.index);
+            for imperfection in self.calibration.iter_mut().filter(same) {
+                fault.parameters[0] += imperfection.parameters[0];
+                imperfection.parameters[0] = 0.0;
+            }
+        }
+        self
+    }
+
     /// All effects: those of the model, the named ones, then the imperfections of the sensors.
     pub fn effects(&self) -> Vec<Effect<f64>> {
         let parts = [&self.known, &self.named, &self.calibration];

@@ -2,11 +2,11 @@
 
 use std::cmp::Ordering;
 
-use arm_core::effect::Effect;
+use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
 use crate::anchor::Anchor;
-use crate::candidate::{Candidate, Library};
+use crate::candidate::{Candidate, Library, Twin};
 use crate::chance::chi_square_tail;
 use crate::fit::Fitted;
 use crate::hypothesis::Hypothesis;
@@ -28,6 +28,23 @@ const RIVAL: f64 = 0.6;
 /// Times that a better alternative may take the place of a named effect.
 const EXCHANGES: usize = 4;
 
+/// Part of what a law misses that an effect in another place can stand for: what misses acts in the joint of the law, and seldom
+/// looks like something else.
+const ELSEWHERE: f64 = 0.1;
+
+/// What an effect may explain, as a sum of squares, without being there: what the law of a named one misses of what it shows.
+///
+/// * `gain` - what the named one explains
+pub(crate) fn mimicked(effect: &Effect<f64>, named: &Candidate, gain: f64) -> f64 {
+    let joints = |e: &Effect<f64>| match e.kind.info().place {
+        Place::Joint => e.index + 1 - usize::from(e.kind.crosses())..e.index + 2,
+        _ => 0..0,
+    };
+    let (own, other) = (joints(effect), joints(&named.effect));
+    let is_near = own.start < other.end && other.start < own.end;
+    named.kind().probe().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
+}
+
 /// One effect that was named.
 #[derive(Clone, Debug)]
 pub struct Named {
@@ -35,6 +52,8 @@ pub struct Named {
     pub slot: usize,
     /// Probability of such a gain by chance, with all candidates that were asked.
     pub p_value: f64,
+    /// What it gains, in units of twice the log-likelihood as the data scatter.
+    pub gain: f64,
     /// Share of what can be explained that is lost without it.
     pub share: f64,
     /// What would explain the same: the candidate, and how much worse it does.
@@ -132,7 +151,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 // Less may be the imperfect shape of another one.
                 let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
                 let least = others
-                    .map(|o| fitted.asked[o].kind().probe().missed * gains[o])
+                    .map(|o| mimicked(&fitted.asked[slot].effect, &fitted.asked[o], gains[o]))
                     .fold(floor * (calibrated.cost - fitted.cost), f64::max);
                 let candidate = &fitted.asked[slot];
                 let worth = gain / scale - candidate.price * candidate.spread;
@@ -167,28 +186,48 @@ impl<'a, const N: usize> Study<'a, N> {
         let mut exchanges = 0;
         'again: loop {
             let mut named = Vec::new();
-            let library = match fitted.asked.len() {
+            let mut library = match fitted.asked.len() {
                 0 => None,
                 _ => Some(Library::build(self, &anchor, periodic)?),
             };
-            for (slot, library) in (0..fitted.asked.len()).zip(std::iter::repeat(&library)) {
+            let twins = match &mut library {
+                Some(library) => {
+                    let effects = fitted.hypothesis.named.iter().copied();
+                    let named: Vec<_> = fitted.asked.iter().cloned().zip(effects).collect();
+                    library.add_named(self, &anchor, &named)?
+                }
+                None => Vec::new(),
+            };
+            for (slot, twin) in twins.iter().enumerate() {
                 progress(
                     "comparing alternatives",
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 );
                 let less = self.without(&fitted, slot, &anchor)?;
                 let gain = (less.cost - fitted.cost).min(f64::MAX);
-                let rivals = match library {
+                let rivals = match &library {
                     // Of what cannot be followed without it nothing can be said.
                     Some(library) if less.cost.is_finite() => {
-                        let found = self.rivals(&fitted, (slot, &less), (&anchor, library), scale);
+                        let place = (slot, &less, twin.as_ref());
+                        let found = self.rivals(&fitted, place, (&anchor, library), scale);
                         found.unwrap_or_default()
                     }
                     _ => Vec::new(),
                 };
-                let better = rivals
-                    .iter()
-                    .find(|r| self.takes_over(&r.alternative, (&fitted.asked[slot], gain / scale)));
+                // A shape that is refined may stand for what the law of another one misses.
+                let named_others = fitted.asked.iter().enumerate().filter(|(o, _)| *o != slot);
+                let bent = named_others
+                    .map(|(_, o)| {
+                        mimicked(&fitted.asked[slot].effect, o, calibrated.cost - less.cost)
+                    })
+                    .fold(0.0, f64::max);
+                let better = rivals.iter().find(|r| {
+                    self.takes_over(
+                        &r.alternative,
+                        (&fitted.asked[slot], gain / scale),
+                        bent / scale,
+                    )
+                });
                 if exchanges < EXCHANGES
                     && let Some(better) = better
                 {
@@ -208,6 +247,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 named.push(Named {
                     slot,
                     p_value: (asked * chance).min(1.0),
+                    gain: gain / scale,
                     share: gain / (calibrated.cost - fitted.cost).max(gain),
                     alternatives: rivals
                         .into_iter()
@@ -236,7 +276,7 @@ impl<'a, const N: usize> Study<'a, N> {
     /// The better one does, when it earns the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
     /// one with fewer parameters or, with as many, the one that stands before it in the catalogue: an intricate one bends itself to
     /// what sensors and a rigid model get wrong.
-    fn takes_over(&self, rival: &Alternative, (own, gain): (&Candidate, f64)) -> bool {
+    fn takes_over(&self, rival: &Alternative, (own, gain): (&Candidate, f64), bent: f64) -> bool {
         const BETTER: f64 = 0.05;
         let shapes = |c: &Candidate| self.price_of_shapes(std::slice::from_ref(c));
         let plain = |c: &Candidate| {
@@ -244,6 +284,9 @@ impl<'a, const N: usize> Study<'a, N> {
             (c.kind().info().parameters.len(), place)
         };
         let handicap = match plain(&rival.candidate).cmp(&plain(own)) {
+            _ if self.repeated && own.shapes() > rival.candidate.shapes() => {
+                f64::max(shapes(own) - shapes(&rival.candidate), bent)
+            }
             _ if self.repeated => shapes(own) - shapes(&rival.candidate),
             Ordering::Less => self.tie(own, gain),
             Ordering::Equal => 0.0,
@@ -253,42 +296,59 @@ impl<'a, const N: usize> Study<'a, N> {
     }
 
     /// Other effects in the place of one, fitted, the best first.
+    ///
+    /// Two things speak for another effect: what it explains once all is refitted without the named one, and how well it stands for
+    /// that one where all is as it was fitted. The first is blind where the refitting has gone to its bounds, the second where much
+    /// else changes with the exchange.
     fn rivals(
         &self,
         fitted: &Fitted<N>,
-        (slot, less): (usize, &Fitted<N>),
+        (slot, less, twin): (usize, &Fitted<N>, Option<&Twin>),
         (anchor, library): (&Anchor<N>, &Library),
         scale: f64,
     ) -> Result<Vec<Rival<N>>, GapError> {
         let own = &fitted.asked[slot];
-        let scan = Scan::new(self, less, anchor, library)?;
+        let refitted = Scan::new(self, less, anchor, library)?;
+        let others: Vec<usize> = (0..refitted.len())
+            .filter(|&c| {
+                let effect = &library.candidates[c].effect;
+                let is_named = less.asked.iter().any(|a| a.is_same_effect(effect));
+                !is_named && !own.is_same_effect(effect)
+            })
+            .collect();
         // What the effect itself would gain to first order: what others gain to first order is held against that.
-        let gain = (0..scan.len())
+        let gain = (0..refitted.len())
             .filter(|&c| own.is_same_effect(&library.candidates[c].effect))
-            .filter_map(|c| scan.evaluate(&[c]))
+            .filter_map(|c| refitted.evaluate(&[c]))
             .map(|c| c.gain)
             .fold(0.0, f64::max)
             .min(less.cost - fitted.cost);
-        let mut singles: Vec<Choice> = (0..scan.len())
-            .filter(|&c| {
-                let candidate = &library.candidates[c];
-                !own.is_same_effect(&candidate.effect)
-                    && !less
-                        .asked
-                        .iter()
-                        .any(|a| a.is_same_effect(&candidate.effect))
-            })
-            .filter_map(|c| scan.evaluate(&[c]))
-            .filter(|c| c.gain > RIVAL * gain)
-            .collect();
-        singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let twin = (0..scan.len()).find(|&c| {
-            own.is_same_effect(&library.candidates[c].effect)
-                && own.question == library.candidates[c].question
+        let mut hypothesis = fitted.hypothesis.clone();
+        hypothesis.named.remove(slot);
+        let as_fitted = Fitted {
+            hypothesis,
+            residuals: fitted.residuals.clone(),
+            ..less.clone()
+        };
+        let in_place = twin.and_then(|twin| {
+            let scan = Scan::new(self, &as_fitted, anchor, library).ok()?;
+            Some((scan, twin))
         });
+        let mut singles: Vec<(f64, Choice, (&Scan, &Fitted<N>))> = Vec::new();
+        for &c in &others {
+            let choice = refitted.evaluate(&[c]);
+            let choice = choice.map(|choice| (choice.gain / gain, choice, (&refitted, less)));
+            let stand_in = in_place.as_ref().and_then(|(scan, twin)| {
+                let (part, choice) = scan.stand_in(c, twin)?;
+                Some((part, choice, (scan, &as_fitted)))
+            });
+            let both = choice.into_iter().chain(stand_in);
+            singles.extend(both.filter(|(part, ..)| *part > RIVAL));
+        }
+        singles.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut seen: Vec<&Candidate> = Vec::new();
         let mut rivals = Vec::new();
-        for choice in &singles {
+        for (_, choice, (scan, from)) in &singles {
             let candidate = &library.candidates[choice.members[0]];
             if seen.iter().any(|s| s.is_same_effect(&candidate.effect)) {
                 continue;
@@ -301,14 +361,14 @@ impl<'a, const N: usize> Study<'a, N> {
             let member = choice.members[0];
             (asked.price, asked.spread) = (scan.price[member], scan.spread[member]);
             let Some(rival) = self.attempt(
-                less,
+                from,
                 (std::slice::from_ref(&asked), &choice.coefficients),
                 anchor,
             ) else {
                 continue;
             };
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
-            let likeness = twin.map_or(0.0, |t| scan.likeness(t, choice.members[0]));
+            let likeness = twin.map_or(0.0, |t| scan.likeness(t.place, choice.members[0]));
             let Some(&effect) = rival.hypothesis.named.last() else {
                 continue;
             };

@@ -5,12 +5,16 @@ use crate::fit::Fitted;
 use crate::noise::dot;
 use crate::study::Study;
 
+/// Rows whose squares are summed to see how much such sums scatter: about a second.
+const RUN: usize = 12;
+
 /// Lack of fit against pure error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lack {
     /// Variance of what repeats have in common over the variance of what they differ in, both for each degree of freedom.
     pub ratio: f64,
-    /// The ratio less one in its standard deviations; not a number without repeats.
+    /// The ratio less one in its standard deviations, of which a second of what repeats differ in tells how large they are; not a
+    /// number without repeats.
     pub z: f64,
     /// What repeats have in common beyond the noise, as a sum of squares.
     pub excess: f64,
@@ -23,6 +27,7 @@ pub fn lack_of_fit<const N: usize>(
     fitted: &Fitted<N>,
 ) -> Lack {
     let (mut common, mut common_dof, mut apart, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
+    let mut runs = Vec::new();
     for group in 0..study.references.len() {
         let members: Vec<usize> = (0..study.fitted.len())
             .filter(|&m| {
@@ -57,13 +62,20 @@ pub fn lack_of_fit<const N: usize>(
         let size = rows[0].len();
         let told: usize = stretches.told(study.session.channels()).iter().sum();
         let free = told.saturating_sub(columns.len()) as f64;
-        for i in 0..size {
+        let mut differ = vec![0.0; size];
+        for (i, differ) in differ.iter_mut().enumerate() {
             let mean = rows.iter().map(|r| r[i]).sum::<f64>() / n;
             common += n * mean * mean;
-            apart += rows
-                .iter()
-                .map(|r| (r[i] - mean) * (r[i] - mean))
-                .sum::<f64>();
+            let each = rows.iter().map(|r| (r[i] - mean) * (r[i] - mean));
+            *differ = each.sum::<f64>();
+            apart += *differ;
+        }
+        if n > 1.0 {
+            let channels = differ.chunks_exact(stretches.len());
+            let each = channels.flat_map(|channel| channel.chunks_exact(RUN));
+            let sums = each.map(|run| (run.iter().sum::<f64>(), n - 1.0));
+            // Where rest takes a component of the force there is nothing to see.
+            runs.extend(sums.filter(|(sum, _)| *sum > 0.0));
         }
         common_dof += free;
         apart_dof += free * (n - 1.0);
@@ -79,9 +91,16 @@ pub fn lack_of_fit<const N: usize>(
     }
     let noise = apart / apart_dof;
     let ratio = common / common_dof / noise;
+    // Rows that are not quite white, or larger at some times than at others, scatter more than white ones.
+    let scatter = runs.iter().fold(0.0, |s, (sum, freedom)| {
+        let dof = RUN as f64 * freedom;
+        let off = sum / noise - dof;
+        s + off * off / (2.0 * dof)
+    }) / f64::max(runs.len() as f64, 1.0);
+    let variance = (2.0 / common_dof + 2.0 / apart_dof) * scatter.max(1.0);
     Lack {
         ratio,
-        z: (ratio - 1.0) / libm::sqrt(2.0 / common_dof + 2.0 / apart_dof),
+        z: (ratio - 1.0) / libm::sqrt(variance),
         excess: common / noise - common_dof,
     }
 }

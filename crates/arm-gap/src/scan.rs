@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::anchor::{Anchor, Response};
-use crate::candidate::Library;
+use crate::candidate::{Library, Twin};
 use crate::fit::{Fitted, priors, regularise};
 use crate::normal::{Normal, factor, solve};
 use crate::spread::spread;
@@ -147,12 +147,32 @@ impl Scan {
 
     /// What some candidates explain together; `None` where they cannot be told apart.
     pub fn evaluate(&self, members: &[usize]) -> Option<Choice> {
+        self.answer(members, &self.score)
+    }
+
+    /// How well a candidate stands for a named effect: its part of what that one shows, and its coefficients.
+    pub fn stand_in(&self, candidate: usize, twin: &Twin) -> Option<(f64, Choice)> {
+        let shown = self.columns[twin.place].clone().zip(&twin.sizes);
+        let mut score = DVector::zeros(self.score.len());
+        let mut all = 0.0;
+        for (column, size) in shown.clone() {
+            score += self.gram.column(column) * *size;
+        }
+        for (column, size) in shown {
+            all += score[column] * size;
+        }
+        let choice = self.answer(&[candidate], &score)?;
+        (all > 0.0).then(|| (choice.gain / all, choice))
+    }
+
+    /// What some candidates explain of something with the given products with their columns.
+    fn answer(&self, members: &[usize], score: &DVector<f64>) -> Option<Choice> {
         let columns: Vec<usize> = members
             .iter()
             .flat_map(|&m| self.columns[m].clone())
             .collect();
         let bounds = |i: usize| self.bounds[columns[i]];
-        let (steps, gain) = solve(&self.gram, &self.score, &columns, &bounds)?;
+        let (steps, gain) = solve(&self.gram, score, &columns, &bounds)?;
         let mut rest = steps.as_slice();
         let coefficients = members
             .iter()

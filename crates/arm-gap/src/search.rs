@@ -1,11 +1,14 @@
 //! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
 
+use arm_core::effect::Effect;
+
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::apart::{Apart, Line};
 use crate::candidate::{Candidate, Library};
 use crate::fit::{Fitted, Precision};
-use crate::judge::{FLOOR, Named};
+use crate::hypothesis::Hypothesis;
+use crate::judge::{FLOOR, Named, mimicked};
 use crate::misfit::{Lack, lack_of_fit};
 use crate::scan::{Choice, Scan};
 use crate::session::Sight;
@@ -22,6 +25,8 @@ const MOST: usize = 6;
 const CONTENDERS: usize = 4;
 /// Effects that a choice may add in one round: what is invisible alone may be plain together.
 const AHEAD: usize = 3;
+/// Times that what was found is judged, when others have taken the places of what was named.
+const TURNS: usize = 3;
 /// Choices that are kept while looking ahead.
 const WIDTH: usize = 12;
 
@@ -94,9 +99,12 @@ struct Hunt<'a, const N: usize> {
 
 impl<const N: usize> Hunt<'_, N> {
     /// What a further effect must gain so as not to be the imperfect shape of a named one.
-    fn least(&self) -> f64 {
-        let missed = self.current.asked.iter().map(|c| c.kind().probe().missed);
-        missed.fold(FLOOR, f64::max) * (self.calibrated.cost - self.current.cost)
+    fn least(&self, effect: &Effect<f64>) -> f64 {
+        let explained = self.calibrated.cost - self.current.cost;
+        let named = self.current.asked.iter();
+        named
+            .map(|c| mimicked(effect, c, explained))
+            .fold(FLOOR * explained, f64::max)
     }
 }
 
@@ -146,7 +154,7 @@ impl<'a, const N: usize> Study<'a, N> {
         if led
             && let Some(found) = self.rhythm(&hunt.anchor, Line::OfTheRobot)?
             && (found.locked || found.wave()[0] > SLOW)
-            && found.gain > hunt.least()
+            && found.gain > hunt.least(&found.effect)
             && !apart.iter().any(|a| a.is_like(&found))
         {
             let [frequency, phase] = found.wave();
@@ -171,24 +179,44 @@ impl<'a, const N: usize> Study<'a, N> {
             hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
             (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
         }
+        let mut named;
+        let mut turns = 0;
+        loop {
+            let kinds = |f: &Fitted<N>| f.asked.iter().map(Candidate::kind).collect::<Vec<_>>();
+            let before = kinds(&hunt.current);
+            (hunt.current, hunt.anchor, named) = self.judged(
+                (hunt.current, hunt.anchor),
+                &hunt.calibrated,
+                (hunt.asked, hunt.scale, periodic),
+                progress,
+            )?;
+            turns += 1;
+            if turns == TURNS || kinds(&hunt.current) == before {
+                break;
+            }
+            // What a coarser law could have missed may be seen beside the one that took its place.
+            let rounds = hunt.ladder.len();
+            hunt = self.hunt_on(hunt, periodic, progress)?;
+            if hunt.ladder.len() == rounds {
+                break;
+            }
+        }
         let Hunt {
             mut calibrated,
             before,
-            current,
+            current: mut amended,
             anchor,
             ladder,
             ruled,
-            asked,
             scale,
+            ..
         } = hunt;
-        let (mut amended, anchor, named) = self.judged(
-            (current, anchor),
-            &calibrated,
-            (asked, scale, periodic),
-            progress,
-        )?;
         progress("measuring what is left", 0.9);
         let mut precision = self.precision(&anchor, &amended, scale)?;
+        for one in &named {
+            let missed = amended.asked[one.slot].kind().probe().missed;
+            precision.widen(one.slot, missed, one.gain);
+        }
         let lack = [before, lack_of_fit(self, &anchor, &amended)];
         if let Some((hypothesis, _)) = self.refined(&calibrated) {
             calibrated.hypothesis = hypothesis;
@@ -210,58 +238,91 @@ impl<'a, const N: usize> Study<'a, N> {
         })
     }
 
-    /// Looks for effects that last, round by round.
+    /// Looks for effects that last, round by round, from a calibrated model.
     fn hunt(
         &mut self,
-        (mut calibrated, mut anchor): Settled<'a, N>,
+        (calibrated, anchor): Settled<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
     ) -> Result<Hunt<'a, N>, GapError> {
-        let mut before = lack_of_fit(self, &anchor, &calibrated);
-        let mut current = calibrated.clone();
-        let mut ladder = Vec::new();
-        let (mut asked, mut scale, mut ruled) = (1.0, 1.0, Vec::new());
+        let start = Hunt {
+            before: lack_of_fit(self, &anchor, &calibrated),
+            current: calibrated.clone(),
+            calibrated,
+            anchor,
+            ladder: Vec::new(),
+            ruled: Vec::new(),
+            asked: 1.0,
+            scale: 1.0,
+        };
+        self.hunt_on(start, periodic, progress)
+    }
+
+    /// Goes on looking from what was found.
+    fn hunt_on(
+        &mut self,
+        mut hunt: Hunt<'a, N>,
+        periodic: Option<[f64; 2]>,
+        progress: Progress<'_>,
+    ) -> Result<Hunt<'a, N>, GapError> {
         for round in 0..MOST {
             progress("asking the catalogue", 0.1 + 0.1 * round as f64);
-            let library = Library::build(self, &anchor, periodic)?;
-            let scan = match Scan::new(self, &current, &anchor, &library) {
+            let library = Library::build(self, &hunt.anchor, periodic)?;
+            let scan = match Scan::new(self, &hunt.current, &hunt.anchor, &library) {
                 // What was found so far stands.
-                Err(GapError::Simulation { .. }) if round > 0 => break,
+                Err(GapError::Simulation { .. }) if !hunt.current.asked.is_empty() => break,
                 other => other?,
             };
-            asked = library.candidates.len() as f64;
-            scale = scan.scale;
-            ruled = self.ruled(&library, &scan);
-            let room = MOST - current.asked.len();
-            let found = self.round((&calibrated, &current), &anchor, (&library, &scan), room);
-            let Some((settled, rung)) = found else {
+            hunt.asked = library.candidates.len() as f64;
+            hunt.scale = scan.scale;
+            hunt.ruled = self.ruled(&library, &scan);
+            let room = MOST - hunt.current.asked.len();
+            let from = (&hunt.calibrated, &hunt.current);
+            let Some((settled, rung)) = self.round(from, &hunt.anchor, (&library, &scan), room)
+            else {
                 break;
             };
-            ladder.push(rung);
-            (current, anchor) = self.pruned(settled, &calibrated, scale)?;
-            if self.leave_out_rest(&anchor) {
-                self.measure_noise(&self.anchor(&current.hypothesis)?)?;
+            hunt.ladder.push(rung);
+            let settled = self.afresh(settled);
+            (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
+            if self.leave_out_rest(&hunt.anchor) {
+                self.measure_noise(&self.anchor(&hunt.current.hypothesis)?)?;
                 let from;
-                (calibrated, from) = self.settle(calibrated.hypothesis, Vec::new())?;
-                before = lack_of_fit(self, &from, &calibrated);
-                let settled = self.settle(current.hypothesis, current.asked)?;
-                (current, anchor) = self.pruned(settled, &calibrated, scale)?;
+                (hunt.calibrated, from) = self.settle(hunt.calibrated.hypothesis, Vec::new())?;
+                hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
+                let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
+                (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
             }
             // Without repeats a second look has only its own residual to tell noise from what the model lacks.
-            if current.asked.len() >= MOST || !self.repeated {
+            if hunt.current.asked.len() >= MOST || !self.repeated {
                 break;
             }
         }
-        Ok(Hunt {
-            calibrated,
-            before,
-            current,
-            anchor,
-            ladder,
-            ruled,
-            asked,
-            scale,
-        })
+        Ok(hunt)
+    }
+
+    /// What was found, fitted once more with segments and sensors as given, where much is left: without it they were bent far,
+    /// and may not find back by themselves.
+    fn afresh(&self, (fitted, anchor): Settled<'a, N>) -> Settled<'a, N> {
+        /// Misfit for each row beyond which much is left.
+        const MUCH: f64 = 1.5;
+        let channels = self.session.channels();
+        let told = self
+            .fitted
+            .iter()
+            .map(|&t| self.stretches[t].told(channels));
+        let rows: usize = told.flatten().sum();
+        if fitted.cost < MUCH * rows as f64 {
+            return (fitted, anchor);
+        }
+        let start = Hypothesis {
+            named: fitted.hypothesis.named.clone(),
+            ..self.session.given()
+        };
+        match self.settle(start, fitted.asked.clone()) {
+            Ok(again) if again.0.cost < fitted.cost => again,
+            _ => (fitted, anchor),
+        }
     }
 
     /// Leaves out of single trials what disturbs them, the clearest first.
@@ -316,11 +377,17 @@ impl<'a, const N: usize> Study<'a, N> {
         };
         let choices = scan.search(&[], AHEAD.min(room), WIDTH, &fresh);
         // Less than every effect must explain need not be converged.
-        let missed = current.asked.iter().map(|c| c.kind().probe().missed);
-        let least = missed.fold(0.0, f64::max) * (calibrated.cost - current.cost);
+        let explained = calibrated.cost - current.cost;
+        let least = |member: &usize| {
+            let effect = &library.candidates[*member].effect;
+            let named = current.asked.iter();
+            named
+                .map(|c| mimicked(effect, c, explained))
+                .fold(0.0, f64::max)
+        };
         let choices: Vec<Choice> = choices
             .into_iter()
-            .filter(|c| c.gain > least * c.members.len() as f64)
+            .filter(|c| c.gain > c.members.iter().map(least).sum())
             .collect();
         let mut contenders: Vec<Choice> = Vec::new();
         let most = choices.first().map_or(0.0, |c| c.worth);
@@ -403,7 +470,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 let own: Vec<f64> = own.iter().map(|b| share * b).collect();
                 hypothesis.named.push(candidate.found(&own));
             }
-            if let Ok(fitted) = self.fit(anchor, hypothesis, all.clone()) {
+            if let Ok(fitted) = self.fit(anchor, hypothesis.handed_over(), all.clone()) {
                 if fitted.cost < current.cost {
                     return Some(fitted);
                 }
