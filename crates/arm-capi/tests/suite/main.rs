@@ -13,6 +13,17 @@ const ARM: [armrs_segment; ARMRS_JOINTS] = [armrs_segment {
     inertia: 0.009,
 }; ARMRS_JOINTS];
 
+const LIMITS: [armrs_limits; ARMRS_JOINTS] = [armrs_limits {
+    speed: 1.0,
+    acceleration: 4.0,
+}; ARMRS_JOINTS];
+const CHANNEL: armrs_channel = armrs_channel {
+    quantity: 0,
+    min: -1.0,
+    max: 1.0,
+    frozen_after: 0,
+};
+
 /// Storage as C has it before `_init`: zeros.
 fn empty<T>() -> T {
     // SAFETY: all structs of the interface are plain numbers.
@@ -27,10 +38,9 @@ fn named(name: &core::ffi::CStr, joint: u32) -> armrs_effect {
     effect
 }
 
-fn arm() -> armrs_arm {
-    let (mut arm, mut effects) = (empty(), [named(c"viscous", 0), named(c"coulomb", 1)]);
-    effects[0].parameters[0] = 0.25;
-    effects[1].parameters[0] = 0.16;
+/// The arm with effects, where it takes them.
+fn arm_with(effects: &[armrs_effect]) -> Option<armrs_arm> {
+    let mut arm = empty();
     // SAFETY: all pointers are good.
     let status = unsafe {
         armrs_arm_init(
@@ -42,8 +52,14 @@ fn arm() -> armrs_arm {
             effects.len(),
         )
     };
-    assert_eq!(status, ARMRS_OK);
-    arm
+    (status == ARMRS_OK).then_some(arm)
+}
+
+fn arm() -> armrs_arm {
+    let mut effects = [named(c"viscous", 0), named(c"coulomb", 1)];
+    effects[0].parameters[0] = 0.25;
+    effects[1].parameters[0] = 0.16;
+    arm_with(&effects).expect("a valid arm")
 }
 
 fn moving() -> armrs_motion {
@@ -125,17 +141,13 @@ fn a_path_ends_where_it_should() {
         [0.5; ARMRS_JOINTS],
         [0.2; ARMRS_JOINTS],
     ];
-    let limits = [armrs_limits {
-        speed: 1.0,
-        acceleration: 4.0,
-    }; ARMRS_JOINTS];
     // SAFETY: all pointers are good.
     unsafe {
         assert_eq!(
             armrs_path_duration(&path, &mut duration),
             ARMRS_NOT_INITIALISED
         );
-        let status = armrs_path_init(&mut path, waypoints.as_ptr(), 3, &limits, 0.1, 1);
+        let status = armrs_path_init(&mut path, waypoints.as_ptr(), 3, &LIMITS, 0.1, 1);
         assert_eq!(status, ARMRS_OK);
         assert_eq!(armrs_path_duration(&path, &mut duration), ARMRS_OK);
         assert_eq!(armrs_path_at(&path, duration + 1.0, &mut motion), ARMRS_OK);
@@ -144,18 +156,18 @@ fn a_path_ends_where_it_should() {
                 &mut path,
                 waypoints.as_ptr(),
                 ARMRS_WAYPOINTS + 1,
-                &limits,
+                &LIMITS,
                 0.1,
                 1
             ),
             ARMRS_OUT_OF_RANGE
         );
         assert_eq!(
-            armrs_path_init(&mut path, null(), 2, &limits, 0.1, 1),
+            armrs_path_init(&mut path, null(), 2, &LIMITS, 0.1, 1),
             ARMRS_NULL
         );
         assert_eq!(
-            armrs_path_init(&mut path, waypoints.as_ptr(), 0, &limits, 0.1, 1),
+            armrs_path_init(&mut path, waypoints.as_ptr(), 0, &LIMITS, 0.1, 1),
             ARMRS_OUT_OF_RANGE
         );
     }
@@ -282,12 +294,6 @@ fn an_estimator_learns_and_a_compensation_carries() {
 #[test]
 fn a_monitor_stops_until_reset() {
     let mut monitor = empty::<armrs_monitor>();
-    let channel = armrs_channel {
-        quantity: 0,
-        min: -1.0,
-        max: 1.0,
-        frozen_after: 0,
-    };
     let mut seen: armrs_observation = empty();
     let mut stop: armrs_stop = empty();
     // SAFETY: all pointers are good.
@@ -297,7 +303,7 @@ fn a_monitor_stops_until_reset() {
             ARMRS_NOT_INITIALISED
         );
         assert_eq!(
-            armrs_monitor_init(&mut monitor, &channel, 1, 1000),
+            armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000),
             ARMRS_OK
         );
         assert_eq!(
@@ -327,7 +333,7 @@ fn a_monitor_stops_until_reset() {
         );
         let odd = armrs_channel {
             quantity: 99,
-            ..channel
+            ..CHANNEL
         };
         assert_eq!(
             armrs_monitor_init(&mut monitor, &odd, 1, 1000),
@@ -405,32 +411,14 @@ fn replaced(at: usize, value: armrs_real) -> armrs_motion {
     motion
 }
 
-/// Every kind that acts in joints, as many as an arm takes at once.
+/// An arm with each kind that acts in joints, one at a time.
 fn arms_with_all_effects() -> Vec<armrs_arm> {
-    let joint_kinds: Vec<_> = arm_core::effect::KINDS
+    arm_core::effect::KINDS
         .iter()
         .map(|kind| kind.info())
         .filter(|info| info.place == arm_core::effect::Place::Joint)
         .map(|info| named(&std::ffi::CString::new(info.kind).unwrap(), 1))
-        .collect();
-    let made = |effects: &[armrs_effect]| {
-        let mut arm = empty();
-        // SAFETY: all pointers are good.
-        let status = unsafe {
-            armrs_arm_init(
-                &mut arm,
-                &ARM,
-                &[0.0; 2],
-                &[0.0, -9.81],
-                effects.as_ptr(),
-                effects.len(),
-            )
-        };
-        (status == ARMRS_OK).then_some(arm)
-    };
-    joint_kinds
-        .iter()
-        .filter_map(|effect| made(std::slice::from_ref(effect)))
+        .filter_map(|effect| arm_with(&[effect]))
         .collect()
 }
 
@@ -599,33 +587,23 @@ fn what_carries_an_arm_is_finite_or_nothing() {
 
 #[test]
 fn paths_robots_and_monitors_take_numbers_only() {
-    let limits = [armrs_limits {
-        speed: 1.0,
-        acceleration: 4.0,
-    }; ARMRS_JOINTS];
     let way = [[0.0; ARMRS_JOINTS], [0.5; ARMRS_JOINTS]];
     let (mut path, mut robot, mut monitor) = (
         empty::<armrs_path>(),
         empty::<armrs_robot>(),
         empty::<armrs_monitor>(),
     );
-    let channel = armrs_channel {
-        quantity: 0,
-        min: -1.0,
-        max: 1.0,
-        frozen_after: 0,
-    };
     // SAFETY: all pointers are good.
     unsafe {
         for bad in NO_NUMBERS.into_iter().chain([-1.0]) {
-            let mut slow = limits;
+            let mut slow = LIMITS;
             slow[0].speed = bad;
             assert_ne!(
                 armrs_path_init(&mut path, way.as_ptr(), 2, &slow, 0.0, 1),
                 ARMRS_OK,
                 "{bad}"
             );
-            slow = limits;
+            slow = LIMITS;
             slow[0].acceleration = bad;
             assert_ne!(
                 armrs_path_init(&mut path, way.as_ptr(), 2, &slow, 0.0, 1),
@@ -633,7 +611,7 @@ fn paths_robots_and_monitors_take_numbers_only() {
                 "{bad}"
             );
             assert_ne!(
-                armrs_path_init(&mut path, way.as_ptr(), 2, &limits, bad, 1),
+                armrs_path_init(&mut path, way.as_ptr(), 2, &LIMITS, bad, 1),
                 ARMRS_OK,
                 "{bad}"
             );
@@ -643,7 +621,7 @@ fn paths_robots_and_monitors_take_numbers_only() {
             );
         }
         assert_eq!(
-            armrs_path_init(&mut path, way.as_ptr(), 2, &limits, 0.0, 1),
+            armrs_path_init(&mut path, way.as_ptr(), 2, &LIMITS, 0.0, 1),
             ARMRS_OK
         );
         assert_eq!(
@@ -654,7 +632,7 @@ fn paths_robots_and_monitors_take_numbers_only() {
             let mut away = way;
             away[1][0] = bad;
             assert_ne!(
-                armrs_path_init(&mut path, away.as_ptr(), 2, &limits, 0.0, 1),
+                armrs_path_init(&mut path, away.as_ptr(), 2, &LIMITS, 0.0, 1),
                 ARMRS_OK
             );
             let mut motion = moving();
@@ -681,11 +659,11 @@ fn paths_robots_and_monitors_take_numbers_only() {
                 "at full stretch"
             );
             assert_eq!(out, [42.0; 2]);
-            let (none, mut odd) = (armrs_real::NAN, channel);
+            let (none, mut odd) = (armrs_real::NAN, CHANNEL);
             odd.max = none;
             assert_ne!(armrs_monitor_init(&mut monitor, &odd, 1, 1000), ARMRS_OK);
             assert_eq!(
-                armrs_monitor_init(&mut monitor, &channel, 1, 1000),
+                armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000),
                 ARMRS_OK
             );
             for place in [0, ARMRS_CHANNELS - 1] {
