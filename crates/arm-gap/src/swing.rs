@@ -36,6 +36,16 @@ struct Piece {
     residual: DVector<f64>,
 }
 
+/// A step tried from where the runs were linearised.
+struct Step<const N: usize> {
+    /// What is fitted afterwards, and the share of the cost that it gains; `None` where no step lowers the cost.
+    next: Option<(Swing<N>, f64)>,
+    /// Normal equations of what is common to all runs.
+    gram: DMatrix<f64>,
+    /// What each run adds to their right-hand side.
+    scores: Vec<DVector<f64>>,
+}
+
 /// What is fitted.
 #[derive(Clone)]
 struct Swing<const N: usize> {
@@ -69,10 +79,11 @@ impl<const N: usize> Study<'_, N> {
         for _ in 0..TURNS {
             let pieces = self.pieces(&windows, &swing, &coordinates)?;
             let weights = self.weights(&windows, &swing)?;
-            let (next, equations) =
-                self.step(&windows, &swing, (&coordinates, &pieces, &weights))?;
-            last = Some(equations);
-            let Some((next, gained)) = next else { break };
+            let step = self.step(&windows, &swing, (&coordinates, &pieces, &weights))?;
+            last = Some((step.gram, step.scores));
+            let Some((next, gained)) = step.next else {
+                break;
+            };
             swing = next;
             if gained < ENOUGH {
                 break;
@@ -213,15 +224,13 @@ impl<const N: usize> Study<'_, N> {
         (0..windows.len()).map(one).collect()
     }
 
-    /// One step that lowers the cost, with the share that it gains; and the equations of what is common to all runs, with the scores
-    /// of each.
-    #[allow(clippy::type_complexity)]
+    /// One step of Gauss and Newton's method, halved until it lowers the cost.
     fn step(
         &self,
         windows: &[Window],
         swing: &Swing<N>,
         (coordinates, pieces, weights): (&[Coordinate], &[Piece], &[DVector<f64>]),
-    ) -> Option<(Option<(Swing<N>, f64)>, (DMatrix<f64>, Vec<DVector<f64>>))> {
+    ) -> Option<Step<N>> {
         let n = coordinates.len();
         let mut gram = DMatrix::<f64>::zeros(n, n);
         let mut score = DVector::<f64>::zeros(n);
@@ -292,6 +301,6 @@ impl<const N: usize> Study<'_, N> {
             let gained = 1.0 - cost(&next) / before;
             (gained > 0.0).then_some((next, gained))
         });
-        Some((next, (gram, scores)))
+        Some(Step { next, gram, scores })
     }
 }
