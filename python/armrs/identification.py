@@ -16,7 +16,7 @@ from .dataset import Dataset, Tolerance, load_dataset, naming_trials
 from .errors import BadInput, Text, unknown_name
 from .model import Effect, Joint, Model, Segment
 from .plausibility import refuse_implausible
-from .rig import all_effects, rig
+from .rig import all_effects, core_tolerance, rig
 from .trial import Trial
 
 
@@ -295,11 +295,7 @@ def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dic
         "method": "joint",
         "fitted": fitted,
         "segment_uncertainty": model.segment_uncertainty,
-        "angle_offset": np.radians(tolerance.angle_offset_deg),
-        "force_bias": tolerance.force_bias_N,
-        "force_gain": tolerance.force_gain,
-        "time_delay": tolerance.time_delay_s,
-        "handle_placement": tolerance.handle_placement_m,
+        "tolerance": core_tolerance(tolerance),
         "cutoff": None,
         "motion": "auto",
         "level": 0.95,

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from . import _armrs
 from .catalogue import FORCE_CHANNELS, catalogue
 from .model import Effect, Model
+
+if TYPE_CHECKING:
+    from .dataset import Tolerance
 
 NO_CONTACT = ((10_000.0, 10_000.0), (25.0, 25.0))
 """Stiffness [N/m] and damping [N s/m] of the thesis' contact, where a model says nothing."""
@@ -50,6 +54,17 @@ def rig(model: Model, effects: Iterable[Effect] | None = None) -> _armrs.Rig:
     contact = NO_CONTACT if model.contact is None else (model.contact.stiffness, model.contact.damping)
     robot = None if model.robot is None else (model.robot.lengths, model.robot.base, model.robot.elbow)
     return _armrs.Rig(arm(model), [_entry(e) for e in listed], contact, robot)
+
+
+def core_tolerance(tolerance: Tolerance) -> dict[str, float]:
+    """Return what the calibration promises for the core, in SI units and radians."""
+    return {
+        "angle_offset": tolerance.angle_offset,
+        "force_bias": tolerance.force_bias_N,
+        "force_gain": tolerance.force_gain,
+        "time_delay": tolerance.time_delay_s,
+        "handle_placement": tolerance.handle_placement_m,
+    }
 
 
 def _entry(effect: Effect) -> tuple[str, int, list[float]]:

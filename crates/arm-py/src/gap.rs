@@ -2,23 +2,25 @@
 
 use arm_core::Chain;
 use arm_core::effect::Effect;
+use arm_gap::GapError;
 use arm_gap::candidate::Candidate;
 use arm_gap::fit::Fitted;
 use arm_gap::hypothesis::{Coordinate, Hypothesis, Target};
 use arm_gap::judge::Named;
+use arm_gap::look::Look;
 use arm_gap::misfit::Lack;
+use arm_gap::predict::{Channels, Course};
 use arm_gap::search::Finding;
 use arm_gap::separate::Contest;
 use arm_gap::session::{Session, Sight};
 use arm_gap::study::Study;
-use arm_ident::trial::Tolerance;
 use numpy::ToPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arm::{AnyChain, each_short_length};
 use crate::errors::{bad_input, gap};
-use crate::ident::{Columns, read_trials};
+use crate::ident::{Columns, Promised, read_trials};
 use crate::own;
 use crate::rig::Rig;
 
@@ -27,11 +29,7 @@ use crate::rig::Rig;
 #[pyo3(from_item_all)]
 pub struct Settings {
     segment_uncertainty: f64,
-    angle_offset: f64,
-    force_bias: f64,
-    force_gain: f64,
-    time_delay: f64,
-    handle_placement: f64,
+    tolerance: Promised,
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
     threads: usize,
@@ -44,39 +42,55 @@ fn too_long() -> PyErr {
     bad_input("[[arm.segment]]", "more than 4", "1 to 4 segments")
 }
 
-fn session<const N: usize>(
-    chain: &Chain<f64, N>,
-    rig: &Rig,
-    columns: &[Columns<'_>],
-    settings: &Settings,
-) -> PyResult<Session<N>> {
-    Ok(Session {
-        chain: *chain,
-        contact: rig.contact,
-        effects: rig.effects.clone(),
-        segment_uncertainty: settings.segment_uncertainty,
-        tolerance: Tolerance {
-            angle_offset: settings.angle_offset,
-            force_bias: settings.force_bias,
-            force_gain: settings.force_gain,
-            time_delay: settings.time_delay,
-            handle_placement: settings.handle_placement,
-        },
-        trials: read_trials(columns, rig)?,
-        sight: if settings.led {
-            Sight::Led
-        } else {
-            Sight::Torque
-        },
-        own: settings
-            .own
-            .iter()
-            .map(|kind| own::kind(kind))
-            .collect::<PyResult<_>>()?,
-    })
+/// What a call is about.
+struct Asked<'a, 'py> {
+    rig: &'a Rig,
+    trials: &'a [Columns<'py>],
+    settings: &'a Settings,
 }
 
-/// What the model as given would show on every trial, beside what was measured; `None` where it cannot be simulated.
+impl Asked<'_, '_> {
+    fn session<const N: usize>(&self, chain: &Chain<f64, N>) -> PyResult<Session<N>> {
+        let (rig, settings) = (self.rig, self.settings);
+        Ok(Session {
+            chain: *chain,
+            contact: rig.contact,
+            effects: rig.effects.clone(),
+            segment_uncertainty: settings.segment_uncertainty,
+            tolerance: (&settings.tolerance).into(),
+            trials: read_trials(self.trials, rig)?,
+            sight: if settings.led {
+                Sight::Led
+            } else {
+                Sight::Torque
+            },
+            own: settings
+                .own
+                .iter()
+                .map(|kind| own::kind(kind))
+                .collect::<PyResult<_>>()?,
+        })
+    }
+
+    /// A session made ready, and what some work on it came to; the interpreter is free meanwhile.
+    fn studied<'s, const N: usize, T: Send>(
+        &self,
+        py: Python<'_>,
+        session: &'s Session<N>,
+        work: impl FnOnce(&mut Study<'s, N>) -> Result<T, GapError> + Send,
+    ) -> PyResult<(Study<'s, N>, T)> {
+        let threads = self.settings.threads;
+        let outcome = py.detach(|| {
+            let mut study = Study::new(session, threads)?;
+            let found = work(&mut study)?;
+            Ok((study, found))
+        });
+        own::failed()?;
+        outcome.map_err(gap)
+    }
+}
+
+/// What the model as given would show on every trial, beside what was measured; see [`shown`].
 #[pyfunction]
 pub fn play<'py>(
     py: Python<'py>,
@@ -87,29 +101,27 @@ pub fn play<'py>(
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
-        rig: &Rig,
-        (columns, settings): (&[Columns<'py>], &Settings),
+        asked: &Asked<'_, 'py>,
     ) -> PyResult<Bound<'py, PyList>> {
-        let session = session::<N>(chain, rig, columns, settings)?;
+        let session = asked.session(chain)?;
         session.check().map_err(gap)?;
         let given = session.given();
         let plays = (0..session.trials.len())
             .map(|i| {
                 let course = session.course(i).map_err(gap)?;
-                let Ok(shown) = py.detach(|| session.shown_in(&given, &course)) else {
-                    return Ok(py.None().into_bound(py));
-                };
-                let one = PyDict::new(py);
-                one.set_item("measured", table(py, session.measured_in(&course))?)?;
-                one.set_item("counted", course.counted.to_pyarray(py))?;
-                one.set_item("given", table(py, &shown)?)?;
-                Ok(one.into_any())
+                shown(py, (&session, &course), &[("given", &given)])
             })
             .collect::<PyResult<Vec<_>>>();
         own::failed()?;
         PyList::new(py, plays?)
     }
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)), Err(too_long()))
+    let (trials, settings) = (&trials[..], &settings);
+    let asked = Asked {
+        rig,
+        trials,
+        settings,
+    };
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked), Err(too_long()))
 }
 
 /// Searches for what a model lacks; see `armrs.find_gap`.
@@ -125,24 +137,20 @@ pub fn find_gap<'py>(
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
-        rig: &Rig,
-        (columns, settings, progress): (&[Columns<'py>], &Settings, Option<&Py<PyAny>>),
+        asked: &Asked<'_, 'py>,
+        progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let session = session::<N>(chain, rig, columns, settings)?;
-        let outcome = py.detach(|| {
-            let mut study = Study::new(&session, settings.threads)?;
-            let finding = study.search(&tell(progress))?;
-            Ok((study, finding))
-        });
-        own::failed()?;
-        let (study, finding) = outcome.map_err(gap)?;
+        let session = asked.session(chain)?;
+        let (study, finding) = asked.studied(py, &session, |s| s.search(&tell(progress)))?;
         result(py, &study, &finding)
     }
-    each_short_length!(
-        &rig.arm.get().chain,
-        c => run(py, c, rig, (&trials, &settings, progress.as_ref())),
-        Err(too_long())
-    )
+    let (trials, settings) = (&trials[..], &settings);
+    let asked = Asked {
+        rig,
+        trials,
+        settings,
+    };
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()), Err(too_long()))
 }
 
 /// Calibrates a model, and asks every candidate alone to first order; see `armrs.discrepancy.calibrate`.
@@ -158,49 +166,53 @@ pub fn look<'py>(
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
-        rig: &Rig,
-        (columns, settings, progress): (&[Columns<'py>], &Settings, Option<&Py<PyAny>>),
+        asked: &Asked<'_, 'py>,
+        progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let session = session::<N>(chain, rig, columns, settings)?;
-        let outcome = py.detach(|| {
-            let mut study = Study::new(&session, settings.threads)?;
-            let look = study.look(&tell(progress))?;
-            Ok((study, look))
-        });
-        own::failed()?;
-        let (study, look) = outcome.map_err(gap)?;
-        let out = PyDict::new(py);
-        out.set_item("groups", study.group_of.clone())?;
-        out.set_item("calibrated", fitted(py, &look.calibrated)?)?;
-        out.set_item("lack", lack(&look.lack))?;
-        out.set_item("unknowns", unknowns(&study, &look.calibrated))?;
-        let suspects: Vec<_> = look
-            .suspects
-            .iter()
-            .map(|s| {
-                (
-                    entry(&s.effect),
-                    s.candidate.free.clone(),
-                    s.gain,
-                    s.price,
-                    s.smallest,
-                )
-            })
-            .collect();
-        out.set_item("suspects", suspects)?;
-        let given = study.session.given();
-        let plays = [
-            ("given", &given),
-            ("calibrated", &look.calibrated.hypothesis),
-        ];
-        out.set_item("trials", played(py, &study, &plays)?)?;
-        Ok(out)
+        let session = asked.session(chain)?;
+        let (study, look) = asked.studied(py, &session, |s| s.look(&tell(progress)))?;
+        first_look(py, &study, &look)
     }
-    each_short_length!(
-        &rig.arm.get().chain,
-        c => run(py, c, rig, (&trials, &settings, progress.as_ref())),
-        Err(too_long())
-    )
+    let (trials, settings) = (&trials[..], &settings);
+    let asked = Asked {
+        rig,
+        trials,
+        settings,
+    };
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()), Err(too_long()))
+}
+
+fn first_look<'py, const N: usize>(
+    py: Python<'py>,
+    study: &Study<'_, N>,
+    look: &Look<N>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    out.set_item("groups", study.group_of.clone())?;
+    out.set_item("calibrated", fitted(py, &look.calibrated)?)?;
+    out.set_item("lack", lack(&look.lack))?;
+    out.set_item("unknowns", unknowns(study, &look.calibrated))?;
+    let suspects: Vec<_> = look
+        .suspects
+        .iter()
+        .map(|s| {
+            (
+                entry(&s.effect),
+                s.candidate.free.clone(),
+                s.gain,
+                s.price,
+                s.smallest,
+            )
+        })
+        .collect();
+    out.set_item("suspects", suspects)?;
+    let given = study.session.given();
+    let plays = [
+        ("given", &given),
+        ("calibrated", &look.calibrated.hypothesis),
+    ];
+    out.set_item("trials", played(py, study, &plays)?)?;
+    Ok(out)
 }
 
 /// What is told of the work to a callable, where there is one.
@@ -228,29 +240,36 @@ fn lack(l: &Lack) -> (f64, f64, f64) {
     (l.ratio, l.z, l.excess)
 }
 
-/// Measured and simulated channels of every trial, under several hypotheses; `None` where one cannot be simulated.
+/// Measured channels of one trial, and those that hypotheses show; `None` where one cannot be simulated.
+fn shown<'py, const N: usize>(
+    py: Python<'py>,
+    (session, course): (&Session<N>, &Course<N>),
+    plays: &[(&str, &Hypothesis<N>)],
+) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    out.set_item("measured", table(py, session.measured_in(course))?)?;
+    out.set_item("counted", course.counted.to_pyarray(py))?;
+    for (name, hypothesis) in plays {
+        let channels = py.detach(|| session.shown_in(hypothesis, course));
+        set_table(&out, name, channels.ok())?;
+    }
+    Ok(out)
+}
+
+/// What is shown of every trial, and the angles of a free run in `free`.
 fn played<'py, const N: usize>(
     py: Python<'py>,
     study: &Study<'_, N>,
     plays: &[(&str, &Hypothesis<N>)],
 ) -> PyResult<Bound<'py, PyList>> {
-    let trials = (0..study.courses.len())
-        .map(|i| {
-            let one = PyDict::new(py);
-            let course = &study.courses[i];
+    let trials = std::iter::zip(0.., &study.courses)
+        .map(|(i, course)| {
+            let one = shown(py, (study.session, course), plays)?;
             let free = PyDict::new(py);
-            one.set_item("measured", table(py, study.session.measured_in(course))?)?;
-            one.set_item("counted", course.counted.to_pyarray(py))?;
             for (name, hypothesis) in plays {
-                match py.detach(|| study.session.shown_in(hypothesis, course)) {
-                    Ok(channels) => one.set_item(name, table(py, &channels)?)?,
-                    Err(_) => one.set_item(name, py.None())?,
-                }
                 let place = (i, course.as_ref());
-                match py.detach(|| study.session.free_run(hypothesis, place)) {
-                    Ok(angles) => free.set_item(name, table(py, &angles)?)?,
-                    Err(_) => free.set_item(name, py.None())?,
-                }
+                let angles = py.detach(|| study.session.free_run(hypothesis, place));
+                set_table(&free, name, angles.ok())?;
             }
             one.set_item("free", free)?;
             Ok(one)
@@ -263,7 +282,7 @@ fn played<'py, const N: usize>(
 type Rivals = Vec<(String, usize, Vec<f64>, Vec<usize>)>;
 
 /// An effect, and which of its parameters are free.
-type Asked = (Effect<f64>, Vec<usize>);
+type Rival = (Effect<f64>, Vec<usize>);
 
 /// How far apart a named effect and its rivals would be on planned movements, in standard deviations.
 ///
@@ -294,19 +313,18 @@ pub fn distances<'py>(
     fn run<const N: usize>(
         py: Python<'_>,
         chain: &Chain<f64, N>,
-        rig: &Rig,
-        (columns, settings): (&[Columns<'_>], &Settings),
-        (planned, rivals): (&[Columns<'_>], &[Asked]),
+        asked: &Asked<'_, '_>,
+        (planned, rivals): (&[Columns<'_>], &[Rival]),
     ) -> PyResult<Vec<Option<Vec<f64>>>> {
-        let all = session::<N>(chain, rig, columns, settings)?;
-        let planned = read_trials::<N>(planned, rig)?;
+        let all = asked.session(chain)?;
+        let (planned, threads) = (read_trials(planned, asked.rig)?, asked.settings.threads);
         let mut without = all.clone();
         let Some(named) = without.effects.pop() else {
             return Err(bad_input("effects", "none", "a named effect"));
         };
         let outcome = py.detach(|| {
-            let noise = Study::new(&all, settings.threads)?.noise;
-            let study = Study::with_noise(&without, noise, settings.threads)?;
+            let noise = Study::new(&all, threads)?.noise;
+            let study = Study::with_noise(&without, noise, threads)?;
             let contest = Contest::new(study, named, rivals)?;
             let mut found = vec![Some(contest.distances(None)?)];
             let one = |i: usize| contest.distances(Some(&planned[i])).ok();
@@ -323,11 +341,13 @@ pub fn distances<'py>(
             Ok((Effect::new(own::kind(&kind)?, index).with(&values), free))
         })
         .collect::<PyResult<Vec<_>>>()?;
-    each_short_length!(
-        &rig.arm.get().chain,
-        c => run(py, c, rig, (&trials, &settings), (&planned, &rivals)),
-        Err(too_long())
-    )
+    let (trials, settings) = (&trials[..], &settings);
+    let asked = Asked {
+        rig,
+        trials,
+        settings,
+    };
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, (&planned, &rivals)), Err(too_long()))
 }
 
 fn result<'py, const N: usize>(
@@ -475,6 +495,11 @@ fn unknown<const N: usize>(
     };
     let before = c.prior.map_or(f64::INFINITY, |(_, sd)| sd);
     Some((what, index, part, hypothesis.get(c.target), before, sd))
+}
+
+fn set_table(out: &Bound<'_, PyDict>, name: &str, channels: Option<Channels>) -> PyResult<()> {
+    let array = channels.map(|c| table(out.py(), &c)).transpose()?;
+    out.set_item(name, array)
 }
 
 /// Channels as an array, `(n_samples, n_channels)`.

@@ -31,6 +31,29 @@ pub struct Columns<'py> {
     valid: PyReadonlyArray1<'py, bool>,
 }
 
+/// What the calibration promises, as standard deviations; see [`Tolerance`].
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Promised {
+    angle_offset: f64,
+    force_bias: f64,
+    force_gain: f64,
+    time_delay: f64,
+    handle_placement: f64,
+}
+
+impl From<&Promised> for Tolerance {
+    fn from(promised: &Promised) -> Self {
+        Self {
+            angle_offset: promised.angle_offset,
+            force_bias: promised.force_bias,
+            force_gain: promised.force_gain,
+            time_delay: promised.time_delay,
+            handle_placement: promised.handle_placement,
+        }
+    }
+}
+
 /// How to identify.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -38,11 +61,7 @@ pub struct Settings {
     method: String,
     fitted: Vec<bool>,
     segment_uncertainty: f64,
-    angle_offset: f64,
-    force_bias: f64,
-    force_gain: f64,
-    time_delay: f64,
-    handle_placement: f64,
+    tolerance: Promised,
     cutoff: Option<f64>,
     motion: String,
     level: f64,
@@ -51,13 +70,7 @@ pub struct Settings {
 impl Settings {
     /// What the calibration promises.
     pub fn tolerance(&self) -> Tolerance {
-        Tolerance {
-            angle_offset: self.angle_offset,
-            force_bias: self.force_bias,
-            force_gain: self.force_gain,
-            time_delay: self.time_delay,
-            handle_placement: self.handle_placement,
-        }
+        (&self.tolerance).into()
     }
 }
 

@@ -10,7 +10,7 @@ from .. import _armrs, checks
 from ..dataset import Dataset, load_dataset, naming_trials
 from ..identification import core_columns
 from ..own import OwnEffect
-from ..rig import all_effects, rig
+from ..rig import all_effects, core_tolerance, rig
 from . import reading, suspicion
 from .found import GapFound
 
@@ -77,14 +77,9 @@ def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
 
 def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> dict[str, Any]:
     """Return what is known beforehand, for the core."""
-    tolerance = dataset.tolerance
     return {
         "segment_uncertainty": dataset.model.segment_uncertainty,
-        "angle_offset": tolerance.angle_offset,
-        "force_bias": tolerance.force_bias_N,
-        "force_gain": tolerance.force_gain,
-        "time_delay": tolerance.time_delay_s,
-        "handle_placement": tolerance.handle_placement_m,
+        "tolerance": core_tolerance(dataset.tolerance),
         "led": led,
         "own": list(own),
         "threads": (os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),

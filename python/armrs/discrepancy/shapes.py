@@ -185,8 +185,8 @@ def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.nd
     settings = core_settings(data, led, 1)
     plays = []
     for listed in ([*others, own], others):
-        outcome = _armrs.play(rig(result.model, listed), columns, settings)[0]
-        if outcome is None:
+        given = _armrs.play(rig(result.model, listed), columns, settings)[0]["given"]
+        if given is None:
             return trial.file, t, None
-        plays.append(outcome["given"])
+        plays.append(given)
     return trial.file, t, plays[0] - plays[1]

@@ -100,7 +100,7 @@ def compare(dataset: Source, model: Model | None = None) -> Compared:
     data = _loaded(dataset, model)
     led = reading.is_led(data)
     warnings = suspicion.examine(data, led)
-    plays = [p or {"given": None} for p in _armrs.play(rig(data.model), core_trials(data), core_settings(data, led, 1))]
+    plays = _armrs.play(rig(data.model), core_trials(data), core_settings(data, led, 1))
     known = [p for p in plays if p["given"] is not None]
     trials = [t for t, p in zip(data.trials, plays, strict=True) if p["given"] is not None]
     found = maps.discrepancies(data.replace(trials=tuple(trials)), led, known, "given") if trials else []
@@ -169,15 +169,13 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
     tests = data.test_trials or data.trials
     data = data.replace(trials=tuple(tests))
     columns, settings = [t | {"role": "fit"} for t in core_trials(data)], core_settings(data, led, 1)
-    plays: dict[str, list[Any]] = {}
+    plays: dict[str, list[dict[str, Any]]] = {}
     for version in ("given", "calibrated", "amended"):
         built = rig(data.model) if version == "given" else as_fitted(result.dataset.model, result.raw[version])
-        plays[version] = list(_armrs.play(built, columns, settings))
+        plays[version] = _armrs.play(built, columns, settings)
     gap = {}
     for c, name in enumerate(reading.channel_names(data, led)):
-        size = {}
-        for version, listed in plays.items():
-            size[version] = reading.size([p for p in listed if p is not None], "given", c)
+        size = {version: reading.size(listed, "given", c) for version, listed in plays.items()}
         gap[name] = ChannelGap(size["given"], size["calibrated"], size["amended"], result.gap[name].floor)
     return gap
 

@@ -82,13 +82,13 @@ def _channels(trial: Any, led: bool) -> list[tuple[str, np.ndarray]]:
     return [] if trial.tau is None else [(f"tau{j + 1}", trial.tau[:, j]) for j in range(trial.tau.shape[1])]
 
 
-def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any] | None]) -> None:
+def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any]]) -> None:
     """Compare what was measured with what the model as given would show, and refuse what only a label can explain.
 
     Parameters
     ----------
     plays
-        For each trial `measured` and `given`, (n_samples, n_channels); None where it cannot be simulated.
+        For each trial `measured` and `given`, (n_samples, n_channels); `given` is None where it cannot be simulated.
 
     Raises
     ------
@@ -98,8 +98,8 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
     if not led:
         return
     n = dataset.model.n_joints
-    measured = np.concatenate([p["measured"] for p in plays if p is not None])
-    given = np.concatenate([p["given"] for p in plays if p is not None])
+    measured = np.concatenate([p["measured"] for p in plays if p["given"] is not None])
+    given = np.concatenate([p["given"] for p in plays if p["given"] is not None])
     if not len(measured):
         return
     forces, expected = measured[:, n:], given[:, n:]
