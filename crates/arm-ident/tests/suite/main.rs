@@ -1,4 +1,4 @@
-//! One module per source file; `noise` is the seeded source of random numbers that they share.
+//! One module per source file, or more where one is not enough; `noise`, `synthetic` and `joint_method` are what they share.
 
 mod bits;
 mod coloured;
@@ -8,7 +8,10 @@ mod derivative;
 mod design;
 mod factor;
 mod filter;
+mod imperfections;
 mod joint;
+mod joint_input;
+mod joint_method;
 mod long_run;
 mod noise;
 mod online;

@@ -1,0 +1,51 @@
+//! What the tests of the joint method share: how they ask, and how they read the answer.
+
+use arm_core::{Chain, Segment, models};
+use arm_ident::estimate::{Estimate, Identified};
+use arm_ident::joint::{MotionSource, Options};
+
+use super::synthetic::EXACT;
+
+pub fn exactly() -> Options {
+    Options {
+        cutoff: Some(20.0),
+        motion: MotionSource::Measured,
+        tolerance: EXACT,
+        level: 0.95,
+    }
+}
+
+pub fn human() -> Chain<f64, 3> {
+    let arm = models::human_arm();
+    let segments: [Segment<f64>; 3] = core::array::from_fn(|k| Segment {
+        inertia: [0.0155, 0.0055, 0.0012][k],
+        ..arm.segments()[k]
+    });
+    Chain::new(segments, arm.base(), arm.gravity()).expect("a valid arm")
+}
+
+pub fn named<'a, const N: usize>(result: &'a Identified<N>, name: &str) -> &'a Estimate {
+    result
+        .parameters
+        .iter()
+        .chain(&result.combinations)
+        .chain(&result.calibration)
+        .find(|e| e.name == name)
+        .unwrap_or_else(|| panic!("nothing is called {name}"))
+}
+
+pub fn close(found: f64, truth: f64, relative: f64) {
+    assert!(
+        (found - truth).abs() <= relative * truth.abs().max(1e-3),
+        "{found} instead of {truth}"
+    );
+}
+
+pub fn two_factors() -> [[f64; 3]; 2] {
+    [[1.1, 0.92, 0.8], [0.9, 1.08, 1.3]]
+}
+
+pub fn rms<const N: usize>(result: &Identified<N>, trial: usize) -> f64 {
+    let (sum, n) = result.explained[trial].square_sum();
+    (sum.iter().sum::<f64>() / (n * N) as f64).sqrt()
+}
