@@ -13,6 +13,7 @@ from .people import points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def stick(ax: Axes, model: Model, q: np.ndarray, *, poses: int = 6, title: str = "") -> None:
@@ -31,6 +32,19 @@ def over_trials(ax: Axes, t: np.ndarray, values: np.ndarray, label: str, colour:
     ax.plot(t, mean, color=colour, lw=1.3, label=label)
     at = np.arange(len(t) // 24, len(t), max(1, len(t) // 12))
     ax.errorbar(t[at], mean[at], std[at], fmt="none", color=colour, capsize=2, lw=0.9)
+
+
+def forces_and_torques(t: np.ndarray, force: np.ndarray, torque: np.ndarray, joints: Sequence[str]) -> Figure:
+    """Draw means over trials of the force on the robot, shape (trials, n, 2) [N], and of its joint torques, shape (trials, n, n_joints)."""
+    figure = plotting.figure(9.4, 3.6)
+    left, right = figure.subplots(1, 2)
+    for ax, values, labels in ((left, force, ("$F_y$", "$F_z$")), (right, torque, joints)):
+        for k, label in enumerate(labels):
+            over_trials(ax, t, values[:, :, k], label, plotting.CYCLE[k])
+        ax.legend(fontsize=8)
+    left.set(title="contact force", xlabel="time [s]", ylabel="force on the robot [N]")
+    right.set(title="joint torque of the force", xlabel="time [s]", ylabel="torque [N m]")
+    return figure
 
 
 def bars(ax: Axes, names: Sequence[str], groups: Mapping[str, tuple[str, Sequence[float]]], *, ylabel: str, title: str = "") -> None:

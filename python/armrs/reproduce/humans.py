@@ -254,17 +254,8 @@ def fits() -> Found:
     t = found.dataset.trials[0].t
     force = -np.array([trial.force_on_arm for trial in found.dataset.trials])
     torque = np.array([people.static_torque(found.run.model, trial) for trial in found.dataset.trials])
-    figure = plotting.figure(9.4, 3.6)
-    left, right = figure.subplots(1, 2)
-    for k, label in enumerate(("$F_y$", "$F_z$")):
-        drawing.over_trials(left, t, force[:, :, k], label, plotting.CYCLE[k])
     names = ("shoulder", "elbow", "wrist")
-    for j, label in enumerate(names):
-        drawing.over_trials(right, t, torque[:, :, j], label, plotting.CYCLE[j])
-    left.set(title="contact force", xlabel="time [s]", ylabel="force on the robot [N]")
-    right.set(title="joint torque of the force", xlabel="time [s]", ylabel="torque [N m]")
-    for ax in (left, right):
-        ax.legend(fontsize=8)
+    figure = drawing.forces_and_torques(t, force, torque, names)
     figures = [Drawn("figure-4.27", "Figure 4.27: forces and torques", "Ten virtual measurements; sensors alone differ.", figure)]
     shown = found.cascade[0].explained[0]
     rows = []

@@ -134,16 +134,7 @@ def forces() -> Found:
         t = found.dataset.trials[0].t
         force = -np.array([trial.force_on_arm for trial in found.dataset.trials])
         torque = np.array([people.static_torque(found.run.model, trial) for trial in found.dataset.trials])
-        figure = plotting.figure(9.4, 3.6)
-        left, right = figure.subplots(1, 2)
-        for k, label in enumerate(("$F_y$", "$F_z$")):
-            drawing.over_trials(left, t, force[:, :, k], label, plotting.CYCLE[k])
-        for j, label in enumerate(("shoulder", "elbow")):
-            drawing.over_trials(right, t, torque[:, :, j], label, plotting.CYCLE[j])
-        left.set(title="contact force", xlabel="time [s]", ylabel="force on the robot [N]")
-        right.set(title="joint torque of the force", xlabel="time [s]", ylabel="torque [N m]")
-        for ax in (left, right):
-            ax.legend(fontsize=8)
+        figure = drawing.forces_and_torques(t, force, torque, ("shoulder", "elbow"))
         title = f"Figure 4.{number}: {'with' if brakes else 'without'} brakes"
         figures.append(Drawn(f"figure-4.{number}", title, "Mean of ten measurements, bars of one standard deviation.", figure))
         half = len(t) // 2
