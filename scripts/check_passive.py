@@ -4,6 +4,11 @@
 
 Hidden elastic and dissipative moments of a virtual subject beside what comes back, how often the intervals hold them, and how often a
 coupling is found that is there, or is not, with trials that scatter as in tables 4.1 and 4.2. Shared by tests/test_passive_moments.py.
+
+200 runs gave, over the ten configurations: without tone, errors of the elastic moment up to 1.0 % and of the dissipative one up to 3.0 %
+in 95 % of the runs, and 95 % intervals that hold in 92.5 to 97.5 % of them (94.8 on average; a count of 200 is good to 1.5). With the
+thesis' tone the dissipative moment is as good (3.1 %, 92.0 to 97.0 %); the elastic one is off by what the tone is, and its intervals
+know it (93.0 to 97.0 %).
 """
 
 from __future__ import annotations
