@@ -12,7 +12,7 @@ import pytest
 from armrs import cli
 from browser import opened
 
-NEEDED = {"3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
+NEEDED = {"3.5", "3.6", "3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
 """Tables and figures that some item has to be about."""
 
 
@@ -61,6 +61,8 @@ def test_the_virtual_experiments_find_what_was_simulated(items: dict[str, dict[s
     # Twice the deviation to be expected stays within 1 % for sums of masses and within 3 % for the brakes, with the noise of the sensors.
     for name, limit in {"m1·l1 + a1·m2": 1.0, "m2·l2": 1.0, "τp1": 3.0, "τp2": 3.0}.items():
         assert 2.0 * values["table-4.5"][f"expected_std_percent_{name}"] < limit
+    active, led = (values["figures-3.5-3.6"][f"{way}_uV"]["emg_elbow_flexor_uV"] for way in ("voluntary", "led"))
+    assert active > 5.0 * led and led == pytest.approx(3.0, rel=0.05)
     hysteresis = values["figure-3.10"]
     assert hysteresis["half_width_Nm"] == pytest.approx(hysteresis["half_width_simulated_Nm"], rel=0.05)
     assert hysteresis["elastic_rms_error_Nm"] < 0.05

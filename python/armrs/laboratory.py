@@ -307,13 +307,24 @@ def _brakes(true: Simulated, t: np.ndarray, devices: Devices, draw: np.random.Ge
 
 
 def _emg(true: Simulated, t: np.ndarray, draw: np.random.Generator) -> dict[str, np.ndarray]:
-    """Return the amplitude of a flexor and an extensor of each joint [µV]; silent ones are never at zero."""
     pull = -_effects_torque(true, MUSCULAR)
+    return muscle_activity(np.column_stack([np.interp(t, true.t, column) for column in pull.T]), draw)
+
+
+def muscle_activity(pull: np.ndarray, draw: np.random.Generator) -> dict[str, np.ndarray]:
+    """Return the amplitude of a flexor and an extensor of each joint by the names of columns [µV]; silent ones are never at zero.
+
+    Parameters
+    ----------
+    pull : ndarray, shape (n, n_joints)
+        Torque that the muscles of each joint apply, flexion positive [N m].
+    draw : Generator
+        Of the noise.
+    """
     columns = {}
-    for j, name in enumerate(_POINTS[: pull.shape[1]]):
-        at = np.interp(t, true.t, pull[:, j])
+    for name, at in zip(_POINTS, pull.T, strict=False):
         for side, sign in (("flexor", 1.0), ("extensor", -1.0)):
-            rest = EMG_REST * np.abs(1.0 + 0.2 * draw.standard_normal(len(t)))
+            rest = EMG_REST * np.abs(1.0 + 0.2 * draw.standard_normal(len(at)))
             columns[f"emg_{name}_{side}_uV"] = rest + EMG_GAIN * np.maximum(sign * at, 0.0)
     return columns
 

@@ -6,11 +6,16 @@ import numpy as np
 
 from .. import plotting
 from ..figures import Drawn
+from ..laboratory import muscle_activity
+from ..relaxed import muscles_silent
+from ..rig import arm as kernel
+from ..simulation import Simulated
 from ..tables import Table
+from ..trial import Trial
 from . import drawing
 from .item import Found, Group, Sheet
 from .people import HANDLE, ORTHOSIS, TABLE_4_10, arm, mechanical, points
-from .sessions import ELBOW_HELD, SHOULDER_HELD, subject_one
+from .sessions import ELBOW_HELD, SEED, SHOULDER_HELD, subject_one
 from .simulation import HUMAN_PATH, MECHANICAL_PATH
 
 GROUP = Group("movements", "Movements (3.1, 3.4, 3.5)")
@@ -54,6 +59,68 @@ def movements() -> Found:
         sheets=[Sheet("Fixation angles as printed", Table(["where", "shoulder [°]", "elbow [°]"], rows))],
         figures=[Drawn("figure-3.9", "Movements", "Left the elbow moves, right the shoulder. Below, the arm at six instants.", figure)],
     )
+
+
+@GROUP.item(
+    "figures-3.5-3.6",
+    "Figures 3.5 and 3.6 and figure 2 of appendix B: silent muscles while a robot leads the arm",
+    "section 3.2, appendix B",
+    "The elbow's movement, and surface EMG of biceps (long and short head), triceps and brachioradialis in one voluntary flexion and one "
+    "movement led by the robot: “practically no EMG activity”. Signals without numbers, recorded once.",
+)
+def muscles() -> Found:
+    """Let electrodes read an arm that is led, and the same movement made by its own muscles."""
+    run = subject_one().runs[f"shoulder at {SHOULDER_HELD[0]:g}"]
+    acceleration = np.gradient(run.qd, run.t, axis=0)
+    needed = kernel(run.model).inverse_dynamics(run.q, run.qd, acceleration) + run.columns["torque.resisting"]
+    draw = np.random.default_rng([SEED, 36])
+    ways = {"voluntary movement": muscle_activity(needed, draw), "led by the robot": muscle_activity(np.zeros_like(needed), draw)}
+    names = [f"emg_{joint}_{side}_uV" for joint in ("elbow", "shoulder") for side in ("flexor", "extensor")]
+    path = plotting.figure(9.4, 3.0)
+    left, right = path.subplots(1, 2, width_ratios=(1.5, 1.0))
+    left.plot(run.t, np.degrees(run.q[:, 1]), color=plotting.ORANGE)
+    left.set(xlabel="time [s]", ylabel="elbow [°]")
+    drawing.stick(right, run.model, run.q[: len(run.q) // 2 + 1])
+    figure = plotting.figure(9.4, 6.8)
+    axes = figure.subplots(4, 2, sharex=True, sharey="row")
+    for column, (way, columns) in zip(axes.T, ways.items(), strict=True):
+        column[0].set_title(way)
+        column[-1].set_xlabel("time [s]")
+        for ax, name in zip(column, names, strict=True):
+            ax.plot(run.t, columns[name], color=plotting.BLUE, lw=0.8)
+    for ax, name in zip(axes[:, 0], names, strict=True):
+        _, joint, side, _ = name.split("_")
+        ax.set_ylabel(f"{side},\n{joint} [µV]")
+        ax.set_ylim(bottom=0.0)
+    mean = {way: [float(np.mean(columns[name])) for name in names] for way, columns in ways.items()}
+    rows = [
+        [f"{side} of the {joint}", *(f"{mean[way][k]:.1f}" for way in ways)]
+        for k, (joint, side) in enumerate(name.split("_")[1:3] for name in names)
+    ]
+    led = muscles_silent([_with_activity(run, ways["led by the robot"])])
+    return Found(
+        ours=(
+            f"A virtual recording: the elbow's flexor has {mean['voluntary movement'][0]:.0f} µV on average where it bears forearm and "
+            f"hand itself, and {mean['led by the robot'][0]:.1f} µV, its rest, where the robot does. The check of `armrs passive` says of "
+            f"the movement that is led: “{led.text}”"
+        ),
+        why=(
+            "The figures cannot be recomputed: no signals are printed, and EMG says nothing of mechanics by itself. What is drawn is the "
+            "virtual laboratory's amplitude, 3 µV at rest and 20 µV for each newton metre, both chosen, of one flexor and one extensor of "
+            "each joint: a model of a joint does not know the two heads of the biceps apart. The virtual muscles of the arm that is led "
+            "are silent because they were made so; whether a subject's are has to be measured. The thesis measured it once."
+        ),
+        values={f"{way.split()[0]}_uV": dict(zip(names, values, strict=True)) for way, values in mean.items()},
+        sheets=[Sheet("Mean activity [µV]", Table(["muscle", *ways], rows))],
+        figures=[
+            Drawn("figure-3.5", "Figure 3.5: the movement", "The elbow is led from one end to the other and back.", path),
+            Drawn("figure-3.6", "Figure 3.6: muscle activity", "Left the arm moves itself, right the robot leads it.", figure),
+        ],
+    )
+
+
+def _with_activity(run: Simulated, emg: dict[str, np.ndarray]) -> Trial:
+    return Trial("the movement", "led", 1, "fit", run.t, run.q, run.force_on_arm, emg=emg)
 
 
 @GROUP.item(
