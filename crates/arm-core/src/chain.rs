@@ -3,7 +3,7 @@
 use core::array::from_fn;
 
 use crate::check::{at_least_zero, finite, positive};
-use crate::{Invalid, Plane, Scalar};
+use crate::{Invalid, Lanes, Plane, Scalar};
 
 /// One rigid segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,5 +149,28 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
     /// Second moments about the proximal joints, `J_j` \[kg m²\].
     pub fn second_moments(&self) -> &[T; N] {
         &self.j
+    }
+}
+
+impl<const L: usize, const N: usize> Chain<Lanes<L>, N> {
+    /// The arm of one lane.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> Chain<f64, N> {
+        let of = |value: &Lanes<L>| value.0[lane];
+        let plane = |value: &Plane<Lanes<L>>| [of(&value[0]), of(&value[1])];
+        Chain {
+            segments: from_fn(|i| Segment {
+                length: of(&self.segments[i].length),
+                mass: of(&self.segments[i].mass),
+                com: plane(&self.segments[i].com),
+                inertia: of(&self.segments[i].inertia),
+            }),
+            base: plane(&self.base),
+            gravity: plane(&self.gravity),
+            rotor: from_fn(|i| of(&self.rotor[i])),
+            x: from_fn(|i| of(&self.x[i])),
+            h: from_fn(|i| of(&self.h[i])),
+            j: from_fn(|i| of(&self.j[i])),
+        }
     }
 }

@@ -40,7 +40,7 @@ impl<T: Scalar> Contact<T> {
     pub fn spring_and_damper(&self, gap: Plane<T>, gap_rate: Plane<T>) -> [Plane<T>; 2] {
         let (mut stretch, mut rate) = (gap, gap_rate);
         // Without play what follows would change nothing, to the last bit.
-        if !self.play.iter().all(|play| play.every(|play| play == 0.0)) {
+        if !self.has_no_play() {
             for i in 0..2 {
                 let beyond = (gap[i].abs() - self.play[i]).max(T::ZERO);
                 stretch[i] = T::if_less(gap[i], T::ZERO, -beyond, beyond);
@@ -48,13 +48,22 @@ impl<T: Scalar> Contact<T> {
                 rate[i] = T::if_less(T::ZERO, self.play[i], touching, T::ONE) * gap_rate[i];
             }
         }
+        self.linear(stretch, rate)
+    }
+
+    /// [`Contact::spring_and_damper`] of a contact without play.
+    #[inline(always)]
+    pub fn linear(&self, gap: Plane<T>, gap_rate: Plane<T>) -> [Plane<T>; 2] {
         [
-            [
-                self.stiffness[0] * stretch[0],
-                self.stiffness[1] * stretch[1],
-            ],
-            [self.damping[0] * rate[0], self.damping[1] * rate[1]],
+            [self.stiffness[0] * gap[0], self.stiffness[1] * gap[1]],
+            [self.damping[0] * gap_rate[0], self.damping[1] * gap_rate[1]],
         ]
+    }
+
+    /// Whether there is none in any lane.
+    #[inline(always)]
+    pub fn has_no_play(&self) -> bool {
+        self.play.iter().all(|play| play.every(|play| play == 0.0))
     }
 
     /// Time derivative of [`Contact::force_on_arm`] \[N/s\], where the contact neither closes nor opens.

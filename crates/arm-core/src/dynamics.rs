@@ -80,7 +80,7 @@ pub fn inverse_dynamics<T: Scalar, const N: usize>(
 ///
 /// Solved in link angles by a square-root-free Cholesky factorisation. The arm of a validated [`Chain`] has a positive
 /// definite inertia matrix unless all inertia about a joint vanishes; then the result is not finite.
-#[inline]
+#[inline(always)]
 pub fn forward_dynamics<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -108,7 +108,7 @@ pub fn forward_dynamics<T: Scalar, const N: usize>(
 }
 
 /// Solves `M x = b` in place for symmetric positive definite M, given by its rows up to the diagonal, by `L D Lᵀ`.
-#[inline]
+#[inline(always)]
 fn solve<T: Scalar, const N: usize>(mut m: [[T; N]; N], b: &mut [T; N]) {
     let mut reciprocal = [T::ONE; N];
     each!(k in 0, N => {

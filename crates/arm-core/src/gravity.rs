@@ -18,7 +18,7 @@ pub(crate) fn link_gravity<T: Scalar, const N: usize>(
 }
 
 /// Moments of the weight of a link and of all beyond it about its joint, with the link level and upright \[N m\].
-#[inline]
+#[inline(always)]
 pub(crate) fn weight_moments<T: Scalar, const N: usize>(chain: &Chain<T, N>, i: usize) -> [T; 2] {
     let [gy, gz] = chain.gravity;
     let (x, h) = (chain.x[i], chain.h[i]);

@@ -20,7 +20,7 @@ pub fn link_inertia<T: Scalar, const N: usize>(
 /// One pass over the pairs i < k of links, with their angle θ_i − θ_k: `M_ik = a_i (X_k cos + H_k sin)`, and its slope
 /// `a_i (H_k cos − X_k sin)` to θ_i takes the squared speed of k from row i and gives that of i to row k. Products of
 /// parameters come first: they do not change during a run.
-#[inline]
+#[inline(always)]
 pub(crate) fn link_motion<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,

@@ -4,7 +4,7 @@ use core::array::from_fn;
 
 use nalgebra::SMatrix;
 
-use crate::{Chain, Joints, Plane, Scalar, joints};
+use crate::{Chain, Joints, Lanes, Plane, Scalar, joints};
 
 /// Direction of every link: sine and cosine of θ_j = q_1 + … + q_j.
 ///
@@ -42,7 +42,7 @@ impl<T: Scalar, const N: usize> Pose<T, N> {
     }
 
     /// Cosine and sine of θ_i − θ_k.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn difference(&self, i: usize, k: usize) -> (T, T) {
         (
             self.cos[i] * self.cos[k] + self.sin[i] * self.sin[k],
@@ -51,8 +51,19 @@ impl<T: Scalar, const N: usize> Pose<T, N> {
     }
 }
 
+impl<const L: usize, const N: usize> Pose<Lanes<L>, N> {
+    /// The pose of one lane.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> Pose<f64, N> {
+        Pose {
+            sin: from_fn(|i| self.sin[i].0[lane]),
+            cos: from_fn(|i| self.cos[i].0[lane]),
+        }
+    }
+}
+
 /// Sums from the proximal end: joint speeds to link speeds, joint angles to link angles.
-#[inline]
+#[inline(always)]
 pub(crate) fn to_links<T: Scalar, const N: usize>(values: &Joints<T, N>) -> [T; N] {
     let mut sum = T::ZERO;
     from_fn(|i| {
@@ -72,7 +83,7 @@ pub(crate) fn to_joint_torque<T: Scalar, const N: usize>(links: &[T; N]) -> Join
 }
 
 /// Position of joint `joint` (0 is the base, `N` the tip) \[m\].
-#[inline]
+#[inline(always)]
 pub fn joint_position<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -87,13 +98,13 @@ pub fn joint_position<T: Scalar, const N: usize>(
 }
 
 /// Position of the tip: `y = Σ a_j cos θ_j`, `z = Σ a_j sin θ_j` from the base \[m\].
-#[inline]
+#[inline(always)]
 pub fn tip<T: Scalar, const N: usize>(chain: &Chain<T, N>, pose: &Pose<T, N>) -> Plane<T> {
     joint_position(chain, pose, N)
 }
 
 /// Velocity of the tip at joint speeds `qd` \[m/s\]; equals `jacobian · qd`.
-#[inline]
+#[inline(always)]
 pub fn tip_velocity<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,

@@ -12,7 +12,7 @@ use crate::series::{DOUBLE, LARGEST_REDUCED, exp, reduced_sin_cos, tanh, turned}
 pub struct Lanes<const L: usize>(pub [f64; L]);
 
 impl<const L: usize> Lanes<L> {
-    #[inline]
+    #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self(from_fn(|i| f(self.0[i], other.0[i])))
     }
@@ -22,7 +22,7 @@ macro_rules! elementwise {
     ($($trait:ident $method:ident $operator:tt)*) => {$(
         impl<const L: usize> $trait for Lanes<L> {
             type Output = Self;
-            #[inline]
+            #[inline(always)]
             fn $method(self, other: Self) -> Self {
                 self.zip(other, |a, b| a $operator b)
             }
@@ -33,21 +33,21 @@ elementwise!(Add add + Sub sub - Mul mul * Div div /);
 
 impl<const L: usize> Neg for Lanes<L> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn neg(self) -> Self {
         Self(self.0.map(|a| -a))
     }
 }
 
 impl<const L: usize> AddAssign for Lanes<L> {
-    #[inline]
+    #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
 impl<const L: usize> SubAssign for Lanes<L> {
-    #[inline]
+    #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
@@ -56,11 +56,11 @@ impl<const L: usize> SubAssign for Lanes<L> {
 impl<const L: usize> Scalar for Lanes<L> {
     const ZERO: Self = Self([0.0; L]);
     const ONE: Self = Self([1.0; L]);
-    #[inline]
+    #[inline(always)]
     fn of(value: f64) -> Self {
         Self([value; L])
     }
-    #[inline]
+    #[inline(always)]
     fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
         Self(from_fn(|i| {
             if a.0[i] < b.0[i] {
@@ -70,19 +70,24 @@ impl<const L: usize> Scalar for Lanes<L> {
             }
         }))
     }
-    #[inline]
+    #[inline(always)]
     fn every(self, condition: impl Fn(f64) -> bool) -> bool {
         self.0.iter().all(|&a| condition(a))
     }
-    #[inline]
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        // Without a branch.
+        self.0.iter().fold(true, |all, a| all & a.is_finite())
+    }
+    #[inline(always)]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {
         Self(self.0.map(f))
     }
-    #[inline]
+    #[inline(always)]
     fn together<const K: usize>(values: [Self; K], f: impl Fn([f64; K]) -> f64) -> Self {
         Self(from_fn(|i| f(values.map(|v| v.0[i]))))
     }
-    #[inline]
+    #[inline(always)]
     fn sqrt(self) -> Self {
         self.map(libm::sqrt)
     }
@@ -103,15 +108,15 @@ impl<const L: usize> Scalar for Lanes<L> {
         }
         (Self(sin), Self(cos))
     }
-    #[inline]
+    #[inline(always)]
     fn exp(self) -> Self {
         self.map(exp)
     }
-    #[inline]
+    #[inline(always)]
     fn tanh(self) -> Self {
         self.map(tanh)
     }
-    #[inline]
+    #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         self.zip(x, libm::atan2)
     }

@@ -135,7 +135,7 @@ fn far_sin_cos(x: f64) -> (f64, f64) {
 
 /// Sines and cosines of many angles \[rad\], with the bits of [`Scalar::sin_cos`]: in one pass without a branch, which the
 /// compiler makes for several at once.
-#[inline]
+#[inline(always)]
 pub fn sines_and_cosines<const K: usize>(angles: &[f64; K]) -> [[f64; K]; 2] {
     let [mut sines, mut cosines] = [[0.0; K]; 2];
     let mut beyond = 0;

@@ -9,7 +9,7 @@
 use crate::error::{IdentError, check_len};
 use crate::factor::Factor;
 use crate::matrix::Matrix;
-use crate::widest::{Computation, widest};
+use arm_sim::widest::{Computation, widest};
 
 /// Rows in a panel.
 pub const BLOCK: usize = 128;

@@ -1,7 +1,7 @@
 //! Butterworth low-pass filters, once or without phase.
 
 use crate::error::{IdentError, check_finite, check_least, check_len, check_range};
-use crate::widest::{Computation, widest};
+use arm_sim::widest::{Computation, widest};
 use std::f64::consts::PI;
 
 /// Highest order; beyond it no measurement asks for a steeper edge.

@@ -29,7 +29,6 @@ pub mod quasi_static;
 pub mod simulated;
 pub mod trial;
 pub mod unknown;
-mod widest;
 
 mod summary;
 

@@ -13,7 +13,7 @@ use crate::factor::Factor;
 use crate::matrix::{Matrix, add_scaled, dot};
 use crate::trial::Model;
 use crate::unknown::{Moment, Source, Unknown};
-use crate::widest::{Computation, widest};
+use arm_sim::widest::{Computation, widest};
 
 /// Samples that are computed with together.
 const WIDTH: usize = 4;

@@ -3,16 +3,17 @@
 use std::mem::discriminant;
 
 use arm_core::effect::Effect;
-use arm_core::{Contact, Joints, Lanes, Plane, Scalar, Segment, Setup};
+use arm_core::{Contact, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup};
 
 use crate::breaks::step_in_pieces;
-use crate::feed::Feed;
-use crate::model::{Input, Link, Model, State};
+use crate::feed::{Ahead, Feed};
+use crate::model::{Input, Link, Model, Plain, State};
 use crate::native::diverged;
 use crate::prepare::{Prepared, add_ripple, commands};
 use crate::recorder::Recorder;
-use crate::step::{Memory, step};
-use crate::{Experiment, Handle, Recording, SimulationError, simulate};
+use crate::step::{Inputs, Memory, step};
+use crate::widest::{Computation, widest};
+use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
 
 /// Runs in one group.
 const LANES: usize = 8;
@@ -74,13 +75,16 @@ fn group<const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
 fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
     let kinds =
         |p: &Prepared<N>| -> Vec<_> { p.model.effects.iter().map(|e| (e.kind, e.index)).collect() };
-    let has_ripple = |p: &Prepared<N>| p.setup.ripple.iter().any(|a| *a != 0.0);
     a.schedule == b.schedule
         && a.integrator() == b.integrator()
         && discriminant(&a.model.link) == discriminant(&b.model.link)
         && a.model.base.is_some() == b.model.base.is_some()
         && has_ripple(a) == has_ripple(b)
         && kinds(a) == kinds(b)
+}
+
+fn has_ripple<const N: usize>(prepared: &Prepared<N>) -> bool {
+    prepared.setup.ripple.iter().any(|a| *a != 0.0)
 }
 
 /// The runs in the lanes of one. A group of fewer than eight repeats its last run in the lanes left over.
@@ -103,16 +107,15 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     let model = Model::new(&setup, link, effects.collect())?;
     let one_drive = prepared
         .iter()
-        .all(|p| p.experiment.drive == first.experiment.drive);
+        .all(|p| p.experiment.drive == first.experiment.drive && !has_ripple(p));
     let mut each: [Vec<Input<f64, N>>; LANES] = Default::default();
-    let drives = if one_drive { 1 } else { LANES };
-    let mut compute = |half_steps: &[usize], out: &mut Vec<Input<Wide, N>>| {
-        for (i, inputs) in each[..drives].iter_mut().enumerate() {
+    let mut own = |half_steps: &[usize], out: &mut Vec<Input<Wide, N>>| {
+        for (i, inputs) in each.iter_mut().enumerate() {
             inputs.clear();
             commands(&lane(i).experiment.drive, &schedule, half_steps, inputs);
         }
         for at in 0..half_steps.len() {
-            let mut input = pack_input(|i| each[i.min(drives - 1)][at]);
+            let mut input = pack_input(|i| each[i][at]);
             add_ripple(&mut input, &setup);
             out.push(input);
         }
@@ -128,34 +131,54 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     let mut stopped: Vec<Option<SimulationError>> = vec![None; prepared.len()];
     let mut sample =
         |steps: usize, state: &State<Wide, N>, memory: &[Wide], stopped: &[Option<_>]| {
+            let time = schedule.time(steps);
+            let common = one_drive.then(|| first.input(time));
             for (i, recorder) in recorders.iter_mut().enumerate() {
                 if stopped[i].is_none() {
                     for (one, all) in lane_memory.iter_mut().zip(memory) {
                         *one = all.0[i];
                     }
-                    recorder.push(steps, &lane_state(state, i), &lane_memory);
+                    let input = common.unwrap_or_else(|| lane(i).input(time));
+                    recorder.push(&input, &state.lane(i), &lane_memory);
                 }
             }
         };
     sample(0, &state, &memory.state, &stopped);
-    let mut feed = Feed::new(integrator);
+    let (mut common, mut feed) = (Feed::new(integrator), Feed::new(integrator));
+    let plain = first.plain().and_then(|_| model.plain());
     // Where the drive of any lane breaks, every lane makes its own step.
     let mut broken: Vec<usize> = prepared.iter().flat_map(|p| p.breaks.steps()).collect();
     broken.sort_unstable();
     broken.dedup();
     let mut broken = broken.into_iter().peekable();
-    let mut sampled = 0;
-    for done in 1..=schedule.steps {
-        if broken.next_if_eq(&done).is_some() {
-            step_apart(prepared, done, (&mut state, &mut memory));
+    let (mut done, mut sampled) = (0, 0);
+    while done < schedule.steps {
+        let next = done + 1;
+        if broken.next_if_eq(&next).is_some() {
+            step_apart(prepared, next, (&mut state, &mut memory));
+            done = next;
         } else {
+            let most = schedule.smooth(done, sampled, broken.peek());
+            let steps = Steps {
+                model: &model,
+                plain: plain.as_ref(),
+                integrator,
+                h: schedule.dt,
+            };
             let at = (&mut state, &mut memory);
-            let inputs = feed.step(done, &mut compute);
-            step(&model, integrator, schedule.dt, inputs, at);
+            done += if one_drive {
+                let ahead = common.ahead(next, most, |half_steps, out| {
+                    commands(&first.experiment.drive, &schedule, half_steps, out);
+                });
+                widest(Advance { steps, ahead, at })
+            } else {
+                let ahead = feed.ahead(next, most, &mut own);
+                widest(Advance { steps, ahead, at })
+            };
         }
         if !state.is_finite() {
             for (i, stop) in stopped.iter_mut().enumerate() {
-                if let (None, Some(joint)) = (&stop, diverged(&lane_state(&state, i))) {
+                if let (None, Some(joint)) = (&stop, diverged(&state.lane(i))) {
                     *stop = Some(SimulationError::Diverged {
                         step: done,
                         time: schedule.time(done),
@@ -179,6 +202,126 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
         .collect())
 }
 
+/// What steps are made of, whatever drives them.
+struct Steps<'a, const N: usize> {
+    model: &'a Model<Wide, N>,
+    /// The rig, where it is plain and the integrator that of plain rigs.
+    plain: Option<&'a Plain<Wide, N>>,
+    integrator: Integrator,
+    h: f64,
+}
+
+/// Some steps of all lanes, to the end or to the first after which a state is not finite.
+struct Advance<'a, T, const N: usize> {
+    steps: Steps<'a, N>,
+    ahead: Ahead<'a, T, N>,
+    at: (&'a mut State<Wide, N>, &'a mut Memory<Wide>),
+}
+
+impl<T: Scalar, const N: usize> Computation for Advance<'_, T, N>
+where
+    Input<T, N>: Drives<N>,
+{
+    /// The number of steps made.
+    type Output = usize;
+
+    #[inline(always)]
+    fn call(self) -> usize {
+        let Self {
+            steps,
+            ahead,
+            at: (state, memory),
+        } = self;
+        let Some(rig) = steps.plain else {
+            for number in 0..ahead.steps {
+                let inputs = ahead.step(number);
+                let [start, middle, end] =
+                    [inputs.start, inputs.middle, inputs.end].map(Drives::wide);
+                let inputs = Inputs {
+                    start: &start,
+                    middle: &middle,
+                    end: &end,
+                };
+                let at = (&mut *state, &mut *memory);
+                step(steps.model, steps.integrator, steps.h, inputs, at);
+                if !state.is_finite() {
+                    return number + 1;
+                }
+            }
+            return ahead.steps;
+        };
+        // Copies of which nobody else knows: without them the compiler must fear that the rig changes with the state.
+        let (rig, mut now) = (*rig, *state);
+        let mut made = 0;
+        while made < ahead.steps {
+            plain_step(&rig, steps.h, ahead.step(made).start, &mut now);
+            made += 1;
+            if !now.is_finite() {
+                break;
+            }
+        }
+        *state = now;
+        made
+    }
+}
+
+/// A step of plain rigs: one loop over lanes around all of it, of which the compiler makes vectors.
+#[inline(always)]
+fn plain_step<const N: usize>(
+    rig: &Plain<Wide, N>,
+    h: f64,
+    input: &impl Drives<N>,
+    state: &mut State<Wide, N>,
+) {
+    let pose = Pose::new(&state.q);
+    // Into another place: what a lane writes is nothing that another one reads.
+    let mut next = *state;
+    for i in 0..LANES {
+        let mut lane = state.lane(i);
+        let now = rig.lane(i).evaluate(&input.lane(i), &pose.lane(i), &lane);
+        lane.advance(h, &now);
+        next.set_lane(i, &lane);
+    }
+    *state = next;
+}
+
+/// What drives all lanes, the same for each or not.
+trait Drives<const N: usize> {
+    fn wide(&self) -> Input<Wide, N>;
+    fn lane(&self, lane: usize) -> Input<f64, N>;
+}
+
+impl<const N: usize> Drives<N> for Input<f64, N> {
+    #[inline(always)]
+    fn wide(&self) -> Input<Wide, N> {
+        pack_input(|_| *self)
+    }
+    #[inline(always)]
+    fn lane(&self, _: usize) -> Input<f64, N> {
+        *self
+    }
+}
+
+impl<const N: usize> Drives<N> for Input<Wide, N> {
+    #[inline(always)]
+    fn wide(&self) -> Input<Wide, N> {
+        *self
+    }
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> Input<f64, N> {
+        let plane = |of: &Plane<Wide>| [of[0].0[lane], of[1].0[lane]];
+        Input {
+            time: self.time.0[lane],
+            handle: Handle {
+                position: plane(&self.handle.position),
+                velocity: plane(&self.handle.velocity),
+                acceleration: plane(&self.handle.acceleration),
+            },
+            torque: Joints::from_fn(|j, _| self.torque[j].0[lane]),
+        }
+    }
+}
+
 /// One step of each run by itself.
 fn step_apart<const N: usize>(
     prepared: &[Prepared<N>],
@@ -188,17 +331,12 @@ fn step_apart<const N: usize>(
     let mut lane_memory = Memory::new(memory.state.len());
     for i in 0..LANES {
         let run = &prepared[i.min(prepared.len() - 1)];
-        let mut lane = lane_state(state, i);
+        let mut lane = state.lane(i);
         for (one, all) in lane_memory.state.iter_mut().zip(&memory.state) {
             *one = all.0[i];
         }
         step_in_pieces(run, number, (&mut lane, &mut lane_memory));
-        for j in 0..N {
-            (state.q[j].0[i], state.qd[j].0[i]) = (lane.q[j], lane.qd[j]);
-        }
-        for (all, one) in state.work.iter_mut().zip(lane.work) {
-            all.0[i] = one;
-        }
+        state.set_lane(i, &lane);
         for (one, all) in lane_memory.state.iter().zip(&mut memory.state) {
             all.0[i] = *one;
         }
@@ -259,13 +397,5 @@ fn pack_setup<'a, const N: usize>(lane: impl Fn(usize) -> &'a Prepared<'a, N>) -
         ripple_frequency: pack(|i| setup(i).ripple_frequency),
         ripple_phase: pack(|i| setup(i).ripple_phase),
         force_delay: pack(|i| setup(i).force_delay),
-    }
-}
-
-fn lane_state<const N: usize>(state: &State<Wide, N>, i: usize) -> State<f64, N> {
-    State {
-        q: Joints::from_fn(|j, _| state.q[j].0[i]),
-        qd: Joints::from_fn(|j, _| state.qd[j].0[i]),
-        work: state.work.map(|w| w.0[i]),
     }
 }

@@ -18,6 +18,27 @@ pub(crate) struct Feed<T, const N: usize> {
     points: usize,
 }
 
+/// The drive of some steps.
+#[derive(Clone, Copy)]
+pub(crate) struct Ahead<'a, T, const N: usize> {
+    pub steps: usize,
+    points: usize,
+    inputs: &'a [Input<T, N>],
+}
+
+impl<T: Scalar, const N: usize> Ahead<'_, T, N> {
+    /// What drives one of them, counted from zero.
+    #[inline(always)]
+    pub fn step(&self, step: usize) -> Inputs<'_, T, N> {
+        let at = step * self.points;
+        Inputs {
+            start: &self.inputs[at],
+            middle: &self.inputs[at + self.points / 2],
+            end: &self.inputs[at + self.points],
+        }
+    }
+}
+
 impl<T: Scalar, const N: usize> Feed<T, N> {
     pub fn new(integrator: Integrator) -> Self {
         let points = match integrator {
@@ -31,23 +52,25 @@ impl<T: Scalar, const N: usize> Feed<T, N> {
         }
     }
 
-    /// What drives a step; the first has number 1.
+    /// What drives a step, the first has number 1, and the steps after it: as many as are known, at most `most`.
     ///
     /// * `compute` - appends the drive at given numbers of half steps
     #[inline(always)]
-    pub fn step(
+    pub fn ahead(
         &mut self,
         number: usize,
+        most: usize,
         mut compute: impl FnMut(&[usize], &mut Vec<Input<T, N>>),
-    ) -> Inputs<'_, T, N> {
+    ) -> Ahead<'_, T, N> {
         if self.block.is_empty() || number >= self.first + AHEAD {
             self.fill(number, &mut compute);
         }
+        let steps = most.min(self.first + AHEAD - number);
         let from = (number - self.first) * self.points;
-        Inputs {
-            start: &self.block[from],
-            middle: &self.block[from + self.points / 2],
-            end: &self.block[from + self.points],
+        Ahead {
+            steps,
+            points: self.points,
+            inputs: &self.block[from..=from + steps * self.points],
         }
     }
 

@@ -44,6 +44,8 @@ mod start;
 mod step;
 mod stepper;
 mod terms;
+#[doc(hidden)]
+pub mod widest;
 
 pub use batch::simulate_batch;
 pub use controlled::{Controlled, Controller, Fault, Safety, control};

@@ -2,7 +2,7 @@
 
 use arm_core::effect::{Effect, Local, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Invalid, Joints, Load, Plane, Pose, Scalar, Setup, forward_dynamics,
+    Chain, Contact, Invalid, Joints, Lanes, Load, Plane, Pose, Scalar, Setup, forward_dynamics,
     joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
 };
 
@@ -63,7 +63,46 @@ impl<T: Scalar, const N: usize> State<T, N> {
         for i in 0..N {
             sum += T::ZERO * self.q[i] + T::ZERO * self.qd[i];
         }
-        sum.every(|s| s == 0.0)
+        sum.is_finite()
+    }
+
+    /// Goes on for a time by semi-implicit Euler: first the speeds, and with the new ones the angles.
+    #[inline(always)]
+    pub fn advance(&mut self, h: T, now: &Outcome<T, N>) {
+        for i in 0..N {
+            self.qd[i] += h * now.qdd[i];
+        }
+        for i in 0..N {
+            self.q[i] += h * self.qd[i];
+        }
+        for i in 0..4 {
+            self.work[i] += h * now.power[i];
+        }
+    }
+}
+
+impl<const L: usize, const N: usize> State<Lanes<L>, N> {
+    /// The state of one lane.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> State<f64, N> {
+        State {
+            q: Joints::from_fn(|j, _| self.q[j].0[lane]),
+            qd: Joints::from_fn(|j, _| self.qd[j].0[lane]),
+            // Not by `map`, which would copy every lane.
+            work: core::array::from_fn(|i| self.work[i].0[lane]),
+        }
+    }
+
+    /// Puts a state into one lane.
+    #[inline(always)]
+    pub fn set_lane(&mut self, lane: usize, state: &State<f64, N>) {
+        for j in 0..N {
+            self.q[j].0[lane] = state.q[j];
+            self.qd[j].0[lane] = state.qd[j];
+        }
+        for (all, one) in self.work.iter_mut().zip(state.work) {
+            all.0[lane] = one;
+        }
     }
 }
 
@@ -114,8 +153,24 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         })
     }
 
+    /// The rig, where it is a plain one.
+    pub fn plain(&self) -> Option<Plain<T, N>> {
+        match &self.link {
+            Link::Compliant(contact)
+                if contact.has_no_play() && self.base.is_none() && self.others.is_empty() =>
+            {
+                Some(Plain {
+                    chain: self.chain,
+                    contact: *contact,
+                    affine: self.affine,
+                })
+            }
+            _ => None,
+        }
+    }
+
     /// Position of the tip \[m\].
-    #[inline]
+    #[inline(always)]
     pub fn tip(&self, q: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
         let mut point = tip(&self.chain, pose);
         if let Some(base) = &self.base {
@@ -126,7 +181,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 
     /// Velocity of the tip \[m/s\].
-    #[inline]
+    #[inline(always)]
     pub fn tip_velocity(&self, qd: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
         let mut velocity = tip_velocity(&self.chain, pose, qd);
         if let Some(base) = &self.base {
@@ -171,11 +226,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     /// Sum of what all effects resist with \[N m\].
     #[inline(always)]
     pub fn resisting(&self, motion: &Motion<T, N>, memory: &[T]) -> Joints<T, N> {
-        let mut total = Joints::<T, N>::repeat(T::ZERO);
-        for i in 0..N {
-            let [constant, to_angle, to_speed] = self.affine[i];
-            total[i] = constant + to_angle * motion.q[i] + to_speed * motion.qd[i];
-        }
+        let mut total = affine(&self.affine, &motion.q, &motion.qd);
         if !self.others.is_empty() {
             self.resist_otherwise(motion, memory, &mut total);
         }
@@ -225,15 +276,10 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             Link::Forced(_) => self.tip_velocity(qd, &pose),
             _ => input.handle.velocity,
         };
-        let (mut drive, mut resisted) = (T::ZERO, T::ZERO);
-        for i in 0..N {
-            drive += input.torque[i] * qd[i];
-            resisted += resisting[i] * qd[i];
-        }
         Outcome {
             qdd,
             force_on_arm: force,
-            power: [force[0] * v[0] + force[1] * v[1], drive, resisted, lost],
+            power: powers((force, v), [&input.torque, &resisting], qd, lost),
             joint_force: motion.joint_force,
         }
     }
@@ -275,12 +321,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         torque: &Joints<T, N>,
         force_on_arm: Plane<T>,
     ) -> Joints<T, N> {
-        let load = Load {
-            torque: *torque,
-            force_on_arm,
-            moment_on_arm: T::ZERO,
-        };
-        forward_dynamics(&self.chain, pose, qd, &load)
+        forward_dynamics(&self.chain, pose, qd, &load(torque, force_on_arm))
     }
 
     /// Evaluations of the dynamics for one state.
@@ -324,12 +365,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             Link::Free | Link::Rigid => return ([T::ZERO; 2], T::ZERO),
         };
         let (at, v) = (self.tip(q, pose), self.tip_velocity(qd, pose));
-        let handle = &input.handle;
-        let gap = [handle.position[0] - at[0], handle.position[1] - at[1]];
-        let rate = [handle.velocity[0] - v[0], handle.velocity[1] - v[1]];
-        let [spring, damper] = contact.spring_and_damper(gap, rate);
-        let force = [spring[0] + damper[0], spring[1] + damper[1]];
-        (force, damper[0] * rate[0] + damper[1] * rate[1])
+        let (gap, rate) = apart(&input.handle, at, v);
+        pull(contact.spring_and_damper(gap, rate), rate)
     }
 
     /// Accelerations and the force on the arm, which for a rigid coupling follows from the constraint.
@@ -384,6 +421,121 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 }
 
+/// A rig of which a step takes no decision: its base stands still, its tip is on springs and dampers without play, and all that
+/// resists in its joints is linear in their motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plain<T, const N: usize> {
+    chain: Chain<T, N>,
+    contact: Contact<T>,
+    affine: [[T; 3]; N],
+}
+
+impl<T: Scalar, const N: usize> Plain<T, N> {
+    /// As [`Model::evaluate`], the same bits.
+    ///
+    /// * `pose` - at `state.q`
+    #[inline(always)]
+    pub fn evaluate(
+        &self,
+        input: &Input<T, N>,
+        pose: &Pose<T, N>,
+        state: &State<T, N>,
+    ) -> Outcome<T, N> {
+        let State { q, qd, .. } = state;
+        let resisting = affine(&self.affine, q, qd);
+        let (at, v) = (tip(&self.chain, pose), tip_velocity(&self.chain, pose, qd));
+        let (gap, rate) = apart(&input.handle, at, v);
+        let (force, lost) = pull(self.contact.linear(gap, rate), rate);
+        let net = load(&difference(&input.torque, &resisting), force);
+        Outcome {
+            qdd: forward_dynamics(&self.chain, pose, qd, &net),
+            force_on_arm: force,
+            power: powers(
+                (force, input.handle.velocity),
+                [&input.torque, &resisting],
+                qd,
+                lost,
+            ),
+            joint_force: [T::ZERO; N],
+        }
+    }
+}
+
+impl<const L: usize, const N: usize> Plain<Lanes<L>, N> {
+    /// The rig of one lane.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> Plain<f64, N> {
+        let plane = |of: &Plane<Lanes<L>>| [of[0].0[lane], of[1].0[lane]];
+        Plain {
+            chain: self.chain.lane(lane),
+            contact: Contact {
+                stiffness: plane(&self.contact.stiffness),
+                damping: plane(&self.contact.damping),
+                play: plane(&self.contact.play),
+            },
+            affine: core::array::from_fn(|i| {
+                core::array::from_fn(|term| self.affine[i][term].0[lane])
+            }),
+        }
+    }
+}
+
+/// What effects linear in the motion of their joint resist with: `constant + to_angle q + to_speed q̇`.
+#[inline(always)]
+fn affine<T: Scalar, const N: usize>(
+    terms: &[[T; 3]; N],
+    q: &Joints<T, N>,
+    qd: &Joints<T, N>,
+) -> Joints<T, N> {
+    Joints::from_fn(|i, _| {
+        let [constant, to_angle, to_speed] = terms[i];
+        constant + to_angle * q[i] + to_speed * qd[i]
+    })
+}
+
+/// Gap between the handle and a tip at `at` that moves with `v`, and its rate.
+#[inline(always)]
+fn apart<T: Scalar>(handle: &Handle<T>, at: Plane<T>, v: Plane<T>) -> (Plane<T>, Plane<T>) {
+    (
+        [handle.position[0] - at[0], handle.position[1] - at[1]],
+        [handle.velocity[0] - v[0], handle.velocity[1] - v[1]],
+    )
+}
+
+/// The force of springs and dampers, and the power lost in these.
+#[inline(always)]
+fn pull<T: Scalar>([spring, damper]: [Plane<T>; 2], rate: Plane<T>) -> (Plane<T>, T) {
+    (
+        [spring[0] + damper[0], spring[1] + damper[1]],
+        damper[0] * rate[0] + damper[1] * rate[1],
+    )
+}
+
+/// Powers as in [`Outcome::power`].
+#[inline(always)]
+fn powers<T: Scalar, const N: usize>(
+    (force, v): (Plane<T>, Plane<T>),
+    [drive, resisting]: [&Joints<T, N>; 2],
+    qd: &Joints<T, N>,
+    lost: T,
+) -> [T; 4] {
+    let (mut driven, mut resisted) = (T::ZERO, T::ZERO);
+    for i in 0..N {
+        driven += drive[i] * qd[i];
+        resisted += resisting[i] * qd[i];
+    }
+    [force[0] * v[0] + force[1] * v[1], driven, resisted, lost]
+}
+
+#[inline(always)]
+fn load<T: Scalar, const N: usize>(torque: &Joints<T, N>, force_on_arm: Plane<T>) -> Load<T, N> {
+    Load {
+        torque: *torque,
+        force_on_arm,
+        moment_on_arm: T::ZERO,
+    }
+}
+
 /// Tries whether the force through the joint changes an effect's torque; no kind is named here.
 fn feels_joint_force<T: Scalar>(effect: &Effect<T>) -> bool {
     let mut at = Local {
@@ -400,7 +552,7 @@ fn feels_joint_force<T: Scalar>(effect: &Effect<T>) -> bool {
     !(effect.torque(&at) - without).every(|d| d == 0.0)
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn sum<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>) -> Joints<T, N> {
     let mut c = *a;
     for i in 0..N {
@@ -409,7 +561,7 @@ pub(crate) fn sum<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>)
     c
 }
 
-#[inline]
+#[inline(always)]
 fn difference<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>) -> Joints<T, N> {
     let mut c = *a;
     for i in 0..N {

@@ -1,12 +1,14 @@
 //! The native engine: minimal coordinates, one run at a time.
 
 use crate::breaks::step_in_pieces;
-use crate::feed::Feed;
-use crate::model::State;
+use crate::feed::{Ahead, Feed};
+use crate::model::{Plain, State};
 use crate::prepare::Prepared;
 use crate::recorder::Recorder;
 use crate::step::{Memory, step};
+use crate::widest::{Computation, widest};
 use crate::{Experiment, Partial, SimulationError};
+use arm_core::Pose;
 
 /// Runs an experiment; the loop does not allocate.
 pub(crate) fn run<const N: usize>(
@@ -21,25 +23,30 @@ pub(crate) fn run<const N: usize>(
         qd: prepared.start.1,
         work: [0.0; 4],
     };
-    recorder.push(0, &state, &memory.state);
+    recorder.push(&prepared.input(0.0), &state, &memory.state);
     let mut feed = Feed::new(prepared.integrator());
+    let plain = prepared.plain();
     let mut stopped = None;
     let mut broken = prepared.breaks.steps().peekable();
-    let mut sampled = 0;
-    for done in 1..=schedule.steps {
+    let (mut done, mut sampled) = (0, 0);
+    while done < schedule.steps {
+        let next = done + 1;
         let at = (&mut state, &mut memory);
-        if broken.next_if_eq(&done).is_some() {
-            while broken.next_if_eq(&done).is_some() {}
-            step_in_pieces(&prepared, done, at);
+        if broken.next_if_eq(&next).is_some() {
+            while broken.next_if_eq(&next).is_some() {}
+            step_in_pieces(&prepared, next, at);
+            done = next;
         } else {
-            let inputs = feed.step(done, |half_steps, out| prepared.inputs(half_steps, out));
-            step(
-                &prepared.model,
-                prepared.integrator(),
-                schedule.dt,
-                inputs,
+            let most = schedule.smooth(done, sampled, broken.peek());
+            let ahead = feed.ahead(next, most, |half_steps, out| {
+                prepared.inputs(half_steps, out);
+            });
+            done += widest(Steps {
+                prepared: &prepared,
+                plain: plain.as_ref(),
+                ahead,
                 at,
-            );
+            });
         }
         if let Some(joint) = diverged(&state) {
             stopped = Some(SimulationError::Diverged {
@@ -51,13 +58,61 @@ pub(crate) fn run<const N: usize>(
         }
         if done == sampled + schedule.every {
             sampled = done;
-            recorder.push(done, &state, &memory.state);
+            let input = prepared.input(schedule.time(done));
+            recorder.push(&input, &state, &memory.state);
         }
     }
     Ok(Partial {
         recording: recorder.finish(),
         stopped,
     })
+}
+
+/// Some steps, to the end or to the first after which the state is not finite.
+struct Steps<'a, const N: usize> {
+    prepared: &'a Prepared<'a, N>,
+    /// The rig, where it is plain and the integrator that of plain rigs.
+    plain: Option<&'a Plain<f64, N>>,
+    ahead: Ahead<'a, f64, N>,
+    at: (&'a mut State<f64, N>, &'a mut Memory<f64>),
+}
+
+impl<const N: usize> Computation for Steps<'_, N> {
+    /// The number of steps made.
+    type Output = usize;
+
+    #[inline(always)]
+    fn call(self) -> usize {
+        let Self {
+            prepared,
+            plain,
+            ahead,
+            at: (state, memory),
+        } = self;
+        let h = prepared.schedule.dt;
+        let Some(rig) = plain else {
+            for number in 0..ahead.steps {
+                let (inputs, at) = (ahead.step(number), (&mut *state, &mut *memory));
+                step(&prepared.model, prepared.integrator(), h, inputs, at);
+                if !state.is_finite() {
+                    return number + 1;
+                }
+            }
+            return ahead.steps;
+        };
+        let mut now = *state;
+        let mut made = 0;
+        while made < ahead.steps {
+            let outcome = rig.evaluate(ahead.step(made).start, &Pose::new(&now.q), &now);
+            now.advance(h, &outcome);
+            made += 1;
+            if !now.is_finite() {
+                break;
+            }
+        }
+        *state = now;
+        made
+    }
 }
 
 /// The first joint whose angle or speed is not finite.

@@ -139,6 +139,7 @@ impl<const N: usize> HandlePath<N> {
     }
 
     /// [`HandlePath::at`] for several increasing times at once; the same bits.
+    #[inline(always)]
     pub(crate) fn abreast<const P: usize>(&self, times: &[f64; P]) -> [Handle<f64>; P] {
         match &self.source {
             Source::Arm(arm, movement) => match movement.way(times) {
@@ -188,7 +189,7 @@ fn joints(jet: Jet<2>) -> JointMotion<2> {
 }
 
 /// Position, velocity and acceleration of an arm's tip at some times: the sums over its links, each for all times.
-#[inline]
+#[inline(always)]
 fn tip_motion<const P: usize, const N: usize>(
     arm: &Chain<f64, N>,
     way: &Way<'_, P, N>,

@@ -4,10 +4,11 @@ use arm_core::effect::{Effect, Place};
 use arm_core::{Joints, Scalar, Setup};
 
 use crate::breaks::Breaks;
-use crate::model::{Input, Link, Model};
+use crate::model::{Input, Link, Model, Plain};
+use crate::widest::{Computation, widest};
 use crate::{
-    Coupling, Drive, Experiment, Handle, Integrator, JointMotion, SimulationError, Start,
-    stability, start,
+    Coupling, Drive, Experiment, Handle, HandlePath, Integrator, JointMotion, SimulationError,
+    Start, stability, start,
 };
 
 /// Longest run: at 4 kHz three days. More is a slip of units.
@@ -40,6 +41,12 @@ impl Schedule {
     #[inline]
     pub fn half_time(&self, half_steps: usize) -> f64 {
         0.5 * half_steps as f64 * self.dt
+    }
+
+    /// Steps from `done` on to the end of the run, the next sample or the next step where the drive breaks, whatever is first.
+    pub fn smooth(&self, done: usize, sampled: usize, broken: Option<&usize>) -> usize {
+        let to = (sampled + self.every).min(self.steps);
+        broken.map_or(to, |broken| to.min(broken - 1)) - done
     }
 
     pub fn of<const N: usize>(experiment: &Experiment<N>) -> Result<Self, SimulationError> {
@@ -146,6 +153,13 @@ impl<'a, const N: usize> Prepared<'a, N> {
         }
     }
 
+    /// The rig, where steps of semi-implicit Euler need take no decision.
+    pub fn plain(&self) -> Option<Plain<f64, N>> {
+        matches!(self.integrator(), Integrator::SemiImplicitEuler)
+            .then(|| self.model.plain())
+            .flatten()
+    }
+
     pub fn integrator(&self) -> Integrator {
         self.experiment.integrator
     }
@@ -178,6 +192,20 @@ pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64,
 /// Points of time whose commands are computed side by side.
 const ABREAST: usize = 16;
 
+struct Abreast<'a, const N: usize> {
+    path: &'a HandlePath<N>,
+    times: &'a [f64; ABREAST],
+}
+
+impl<const N: usize> Computation for Abreast<'_, N> {
+    type Output = [Handle<f64>; ABREAST];
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        self.path.abreast(self.times)
+    }
+}
+
 /// [`command`] after each of some numbers of half steps, appended to `out`; the same bits.
 pub(crate) fn commands<const N: usize>(
     drive: &Drive<N>,
@@ -197,7 +225,10 @@ pub(crate) fn commands<const N: usize>(
             // A last group that is not full repeats its end.
             *time = schedule.half_time(halves[i.min(halves.len() - 1)]);
         }
-        let handles = path.abreast(&group);
+        let handles = widest(Abreast {
+            path,
+            times: &group,
+        });
         let inputs = group.iter().zip(handles).take(halves.len());
         out.extend(inputs.map(|(&time, handle)| Input {
             time,

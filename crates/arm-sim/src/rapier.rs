@@ -153,7 +153,7 @@ pub fn simulate_rapier<const N: usize>(
                 qd: sample.qd,
                 work,
             };
-            recorder.push_with(done, &state, &arm.memory, &sample.forces);
+            recorder.push_with(&input, &state, &arm.memory, &sample.forces);
         }
         arm.remember(&sample);
         input = next;

@@ -3,7 +3,7 @@
 use arm_core::effect::Motion;
 use arm_core::{Joints, Load, Plane, Pose, contributions};
 
-use crate::model::State;
+use crate::model::{Input, State};
 use crate::prepare::Prepared;
 use crate::{JointMotion, Recording};
 
@@ -86,30 +86,25 @@ impl<'a, const N: usize> Recorder<'a, N> {
     }
 
     /// A sample of the native engine: forces follow from the model.
-    pub fn push(&mut self, steps: usize, state: &State<f64, N>, memory: &[f64]) {
-        let prepared = self.prepared;
-        let input = prepared.input(prepared.schedule.time(steps));
-        let outcome = prepared.model.evaluate(&input, &state.q, &state.qd, memory);
+    pub fn push(&mut self, input: &Input<f64, N>, state: &State<f64, N>, memory: &[f64]) {
+        let outcome = (self.prepared.model).evaluate(input, &state.q, &state.qd, memory);
         let forces = Forces {
             qdd: outcome.qdd,
             force_on_arm: outcome.force_on_arm,
             joint_force: outcome.joint_force,
         };
-        self.push_with(steps, state, memory, &forces);
+        self.push_with(input, state, memory, &forces);
     }
 
     /// A sample with forces of another engine.
     pub fn push_with(
         &mut self,
-        steps: usize,
+        input: &Input<f64, N>,
         state: &State<f64, N>,
         memory: &[f64],
         forces: &Forces<N>,
     ) {
-        let Prepared {
-            model, schedule, ..
-        } = self.prepared;
-        let input = self.prepared.input(schedule.time(steps));
+        let model = &self.prepared.model;
         let State { q, qd, work } = state;
         let pose = Pose::new(q);
         let mut motion = Motion::new(input.time, *q, *qd);

@@ -75,15 +75,10 @@ fn semi_implicit_euler<T: Scalar, const N: usize>(
             *m += h * *rate;
         }
     }
-    add(&mut state.qd, h, &now.qdd);
-    let qd = state.qd;
-    add(&mut state.q, h, &qd);
-    for (work, power) in state.work.iter_mut().zip(&now.power) {
-        *work += h * *power;
-    }
+    state.advance(h, &now);
 }
 
-#[inline]
+#[inline(always)]
 fn rk4<T: Scalar, const N: usize>(
     model: &Model<T, N>,
     h: f64,
@@ -150,7 +145,7 @@ fn rk4<T: Scalar, const N: usize>(
     }
 }
 
-#[inline]
+#[inline(always)]
 fn motion<T: Scalar, const N: usize>(
     input: &Input<T, N>,
     q: &Joints<T, N>,
@@ -164,7 +159,7 @@ fn motion<T: Scalar, const N: usize>(
 }
 
 /// `a += s b`.
-#[inline]
+#[inline(always)]
 fn add<T: Scalar, const N: usize>(a: &mut Joints<T, N>, s: T, b: &Joints<T, N>) {
     for i in 0..N {
         a[i] += s * b[i];

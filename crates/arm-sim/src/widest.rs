@@ -3,12 +3,12 @@
 //! What goes through [`widest`] is compiled a second time for AVX2. Its operations and their order stay what they are and none are
 //! fused, so the bits are the same; only more numbers go through one instruction.
 
-pub(crate) use pulp::NullaryFnOnce as Computation;
+pub use pulp::NullaryFnOnce as Computation;
 
 /// Computes, with the vectors that this processor has.
 ///
 /// Only what is inlined is compiled for them: `call`, and all that it calls and that counts, is `#[inline(always)]`.
 #[inline(always)]
-pub(crate) fn widest<C: Computation>(computation: C) -> C::Output {
+pub fn widest<C: Computation>(computation: C) -> C::Output {
     pulp::Arch::new().dispatch(computation)
 }
