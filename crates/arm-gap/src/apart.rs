@@ -698,3 +698,38 @@ fn swinging(kind: Kind, index: usize, size: usize, frequency: f64) -> Effect<f64
     effect.parameters[phase] = 0.5 * core::f64::consts::PI;
     effect
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bursts of 0.5 s that start every 0.1 s of 10 s, each with a row of its own.
+    fn bursts() -> Vec<Asked> {
+        (0..95)
+            .map(|k| {
+                let mut row = vec![0.0; 95];
+                row[k] = 1.0;
+                let effect = Effect::new(Kind::Voluntary, 0).with(&[1e-2, 0.1 * k as f64, 0.5]);
+                Asked {
+                    effect,
+                    row,
+                    square: 1.0,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_burst_stands_out_against_other_times_and_not_against_itself() {
+        let asked = bursts();
+        // Far more than noise from 4.0 to 5.0 s alone: that is what a burst does.
+        let once: Vec<f64> = (0..95)
+            .map(|k| if (40..50).contains(&k) { 9.0 } else { 1.0 })
+            .collect();
+        assert_eq!(scatter_elsewhere(&asked[45], &asked, &[&once]), 1.0);
+        // As much all the time is no burst.
+        let always = vec![9.0; 95];
+        let scatter = scatter_elsewhere(&asked[45], &asked, &[&once, &always]);
+        assert!((scatter - 81.0 / 2.706).abs() < 1e-12, "{scatter}");
+    }
+}

@@ -142,3 +142,36 @@ impl<const N: usize> Hypothesis<N> {
         Ok(Setup::new(&chain, contact))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    #[test]
+    fn a_named_fault_takes_over_the_calibration_of_its_own_sensor_alone() {
+        let with = |kind, index, size: f64| Effect::<f64>::new(kind, index).with(&[size]);
+        let before = Hypothesis::<2> {
+            segments: [[0.0; 3]; 2],
+            contact: [[0.0; 2]; 2],
+            shift: [0.0; 2],
+            placement: [0.0; 2],
+            eccentricity: [[0.0; 2]; 2],
+            known: Vec::new(),
+            calibration: vec![
+                with(Kind::ForceBias, 0, 0.1),
+                with(Kind::ForceBias, 1, -0.2),
+                with(Kind::TimeDelay, 0, 0.01),
+            ],
+            named: vec![
+                with(Kind::ForceBias, 1, 3.0),
+                with(Kind::TimeDelay, 0, 0.03),
+            ],
+        };
+        let after = before.handed_over();
+        let sizes = |list: &[Effect<f64>]| list.iter().map(|e| e.parameters[0]).collect::<Vec<_>>();
+        assert_eq!(sizes(&after.calibration), [0.1, 0.0, 0.0]);
+        assert_eq!(sizes(&after.named), [2.8, 0.04]);
+    }
+}
