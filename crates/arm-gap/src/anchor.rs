@@ -169,6 +169,15 @@ impl<'a, const N: usize> Study<'a, N> {
         anchor: &Anchor<N>,
         changes: &[Change<N>],
     ) -> Result<Vec<Response>, GapError> {
+        self.each_response(anchor, changes).into_iter().collect()
+    }
+
+    /// The same, where some of the changes may not be possible.
+    pub fn each_response(
+        &self,
+        anchor: &Anchor<N>,
+        changes: &[Change<N>],
+    ) -> Vec<Result<Response, GapError>> {
         let groups = self.references.len();
         let one = |job: usize| {
             let (change, group) = (&changes[job / groups], job % groups);
@@ -184,11 +193,15 @@ impl<'a, const N: usize> Study<'a, N> {
             };
             response.map_err(|source| GapError::Simulation { trial, source })
         };
-        let all = self.parallel(changes.len() * groups, one);
-        let mut all = all.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter();
-        Ok((0..changes.len())
-            .map(|_| Response(all.by_ref().take(groups).collect()))
-            .collect())
+        let mut all = self.parallel(changes.len() * groups, one).into_iter();
+        changes
+            .iter()
+            .map(|_| {
+                // All of a change are taken, so that the next one meets its own.
+                let own: Vec<_> = all.by_ref().take(groups).collect();
+                Ok(Response(own.into_iter().collect::<Result<_, _>>()?))
+            })
+            .collect()
     }
 
     /// Responses to numbers of the anchor's hypothesis.

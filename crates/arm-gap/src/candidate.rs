@@ -223,11 +223,16 @@ impl Library {
             .iter()
             .flat_map(|c| c.changes(study.session, hypothesis))
             .collect();
-        let mut all = study.responses(anchor, &changes)?.into_iter();
+        let mut all = study.each_response(anchor, &changes).into_iter();
         let mut kept = Vec::new();
         let mut responses = Vec::new();
         for candidate in candidates {
-            let own: Vec<Response> = all.by_ref().take(candidate.width()).collect();
+            let own: Vec<_> = all.by_ref().take(candidate.width()).collect();
+            let own: Vec<Response> = match own.into_iter().collect() {
+                // What cannot be changed a little there cannot be asked there.
+                Err(GapError::Simulation { .. }) => continue,
+                other => other?,
+            };
             let moves = |r: &Response| r.0.iter().flatten().flatten().any(|v| *v != 0.0);
             if own.iter().all(moves) {
                 kept.push(candidate);
@@ -268,7 +273,14 @@ impl Library {
                 continue;
             };
             let changes = exact.changes(study.session, &anchor.hypothesis);
-            self.responses.push(study.responses(anchor, &changes)?);
+            match study.responses(anchor, &changes) {
+                Ok(own) => self.responses.push(own),
+                Err(GapError::Simulation { .. }) => {
+                    places.push(None);
+                    continue;
+                }
+                Err(other) => return Err(other),
+            }
             let place = self.candidates.len();
             places.push(Some(Twin { place, sizes }));
             self.candidates.push(exact);

@@ -10,6 +10,7 @@ use crate::candidate::{Candidate, Library, Twin};
 use crate::chance::chi_square_tail;
 use crate::fit::Fitted;
 use crate::hypothesis::Hypothesis;
+use crate::misfit::lack_of_fit;
 use crate::scan::{Choice, Scan};
 use crate::search::{Progress, Settled};
 use crate::study::Study;
@@ -19,6 +20,8 @@ pub(crate) const FLOOR: f64 = 2e-5;
 /// The same without repeats: what sensors and a rigid model get wrong cannot be told from noise then, and an effect may be no more
 /// than what comes nearest to it.
 const FLOOR_UNREPEATED: f64 = 0.03;
+/// The same of what is left when all are named: a name for a small part of what cannot be explained would be a guess.
+const OF_WHAT_IS_LEFT: f64 = 0.2;
 /// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
 const TIE: f64 = 10.0;
 /// Alternatives that are converged by simulation for each named effect.
@@ -30,7 +33,7 @@ const EXCHANGES: usize = 4;
 
 /// Part of what a law misses that an effect in another place can stand for: what misses acts in the joint of the law, and seldom
 /// looks like something else.
-const ELSEWHERE: f64 = 0.1;
+const ELSEWHERE: f64 = 0.25;
 
 /// What an effect may explain, as a sum of squares, without being there: what the law of a named one misses of what it shows.
 ///
@@ -133,6 +136,9 @@ impl<'a, const N: usize> Study<'a, N> {
         };
         while !fitted.asked.is_empty() {
             let mut weakest: Option<(f64, Fitted<N>)> = None;
+            // Not a number without repeats, which `max` passes over.
+            let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &anchor, &fitted).excess;
+            let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
             let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
             let without = without.collect::<Result<Vec<_>, _>>()?;
             let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
@@ -152,7 +158,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
                 let least = others
                     .map(|o| mimicked(&fitted.asked[slot].effect, &fitted.asked[o], gains[o]))
-                    .fold(floor * (calibrated.cost - fitted.cost), f64::max);
+                    .fold(floor, f64::max);
                 let candidate = &fitted.asked[slot];
                 let worth = gain / scale - candidate.price * candidate.spread;
                 let worth = if gain < least {
