@@ -43,39 +43,39 @@ def _kernels() -> list[Measured]:
     return once + clock + lanes + batch
 
 
-def _runs() -> list[Measured]:
-    def of(tool: str, task: str, name: str, slow: bool = False) -> Measured:
-        return Measured("W2", tool, task, name, STEPS, slow)
+def _each(workload: str, units: float, rows: list[tuple[str, str, str]], slow: bool = False) -> list[Measured]:
+    return [Measured(workload, tool, task, name, units, slow) for tool, task, name in rows]
 
-    return [
-        of("limit", "run", "one loop, the handle's path computed in every step"),
-        of("limit", "run:table", "one loop, the path from a table"),
-        of("armrs, Rust", "run", "recorded at 50 Hz"),
-        of("armrs, Rust", "run:ends", "first and last sample only"),
-        of("armrs, Rust", "run:fourth", "fourth order, recorded at 50 Hz"),
-        of("armrs, Python", "run", "armrs.simulate, recorded at 50 Hz"),
-        of("numba", "run", "a loop compiled from Python, 50 Hz"),
-        of("Pinocchio, C++", "run", "aba, path from a table"),
-        of("MuJoCo, C", "run", "mj_step, path from a table"),
-        of("MuJoCo, Python", "run", "rollout, profiling clock off"),
-        of("MuJoCo, Python", "run:clock", "rollout, profiling clock on"),
+
+def _runs() -> list[Measured]:
+    rows = [
+        ("limit", "run", "one loop, the handle's path computed in every step"),
+        ("limit", "run:table", "one loop, the path from a table"),
+        ("armrs, Rust", "run", "recorded at 50 Hz"),
+        ("armrs, Rust", "run:ends", "first and last sample only"),
+        ("armrs, Rust", "run:fourth", "fourth order, recorded at 50 Hz"),
+        ("armrs, Python", "run", "armrs.simulate, recorded at 50 Hz"),
+        ("numba", "run", "a loop compiled from Python, 50 Hz"),
+        ("Pinocchio, C++", "run", "aba, path from a table"),
+        ("MuJoCo, C", "run", "mj_step, path from a table"),
+        ("MuJoCo, Python", "run", "rollout, profiling clock off"),
+        ("MuJoCo, Python", "run:clock", "rollout, profiling clock on"),
     ]
+    return _each("W2", STEPS, rows)
 
 
 def _batches() -> list[Measured]:
-    def of(tool: str, task: str, name: str) -> Measured:
-        return Measured("W3", tool, task, name, BATCH_STEPS, slow=True)
-
-    return [
-        of("limit", "batch:scalar", "one run after another"),
-        of("limit", "batch:avx2", "four runs in a register"),
-        of("limit", "batch:avx512", "eight runs in a register or two"),
-        of("armrs, Rust", "batch", "simulate_batch, one thread"),
-        of("armrs, Rust", "batch:wall:1", "simulate_batch, one thread, wall clock"),
-        of("armrs, Rust", "batch:wall:2", "simulate_batch, two threads, wall clock"),
-        of("MuJoCo, Python", "batch", "rollout of 20 of the runs, profiling clock off"),
-        of("MuJoCo, Python", "batch:clock", "rollout of 20 of the runs, profiling clock on"),
+    rows = [
+        ("limit", "batch:scalar", "one run after another"),
+        ("limit", "batch:avx2", "four runs in a register"),
+        ("limit", "batch:avx512", "eight runs in a register or two"),
+        ("armrs, Rust", "batch", "simulate_batch, one thread"),
+        ("armrs, Rust", "batch:wall:1", "simulate_batch, one thread, wall clock"),
+        ("armrs, Rust", "batch:wall:2", "simulate_batch, two threads, wall clock"),
+        ("MuJoCo, Python", "batch", "rollout of 20 of the runs, profiling clock off"),
+        ("MuJoCo, Python", "batch:clock", "rollout of 20 of the runs, profiling clock on"),
     ]
+    return _each("W3", BATCH_STEPS, rows, slow=True)
 
 
 def _cascades() -> list[Measured]:

@@ -3,29 +3,31 @@
 // The spring is an actuator on the site at the tip: force = SPRING (ctrl - position), which MuJoCo knows without a callback.
 #include <mujoco/mujoco.h>
 
-#include "peer.h"
+#include "engine.h"
 
-enum { LONG_STEPS = 80000, LONG_SAMPLES = LONG_STEPS / RECORD + 1 };
-static double *states, *starts, table[2 * (LONG_STEPS + 1)], record[3 * LONG_SAMPLES], out[3 * STATES];
+static mjModel *free_arm, *led;
+static mjData *free_data, *led_data;
 
-static void kernels(const mjModel *model, mjData *data, int forward) {
+static void kernels(int forward) {
+    mjData *data = free_data;
     for (int i = 0; i < STATES; ++i) {
         memcpy(data->qpos, states + 3 * i, 3 * sizeof(double));
         memcpy(data->qvel, states + 3 * (STATES + i), 3 * sizeof(double));
         if (forward) {
             memcpy(data->qfrc_applied, states + 3 * (2 * STATES + i), 3 * sizeof(double));
-            mj_forward(model, data);
+            mj_forward(free_arm, data);
             memcpy(out + 3 * i, data->qacc, 3 * sizeof(double));
         } else {
             memcpy(data->qacc, states + 3 * (2 * STATES + i), 3 * sizeof(double));
-            mj_inverse(model, data);
+            mj_inverse(free_arm, data);
             memcpy(out + 3 * i, data->qfrc_inverse, 3 * sizeof(double));
         }
     }
 }
 
-static void run(const mjModel *model, mjData *data) {
-    mj_resetData(model, data);
+static void run(void) {
+    mjData *data = led_data;
+    mj_resetData(led, data);
     memcpy(data->qpos, starts, 3 * sizeof(double));
     double *to = record;
     for (int i = 0;; ++i) {
@@ -36,7 +38,7 @@ static void run(const mjModel *model, mjData *data) {
         if (i == LONG_STEPS) return;
         data->ctrl[0] = table[2 * i];
         data->ctrl[1] = table[2 * i + 1];
-        mj_step(model, data);
+        mj_step(led, data);
     }
 }
 
@@ -51,39 +53,7 @@ static mjModel *load(const char *name) {
     return model;
 }
 
-int main(void) {
-    states = read_doubles("states.f64", 9 * STATES);
-    starts = read_doubles("starts.f64", 3 * (1 + RUNS));
-    for (int i = 0; i <= LONG_STEPS; ++i) handle_at(i * STEP, LONG, table + 2 * i);
-    mjModel *free_arm = load("free.xml"), *led = load("led.xml");
-    mjData *free_data = mj_makeData(free_arm), *led_data = mj_makeData(led);
-    char word[64];
-    double seconds;
-    while (scanf("%63s", word) == 1) {
-        const int check = !strncmp(word, "check:", 6);
-        const char *task = check ? word + 6 : word;
-        const int forward = !strcmp(task, "forward_dynamics");
-        if (forward || !strcmp(task, "inverse_dynamics")) {
-            if (check) {
-                kernels(free_arm, free_data, forward);
-                print_values(out, 3 * STATES);
-            } else {
-                SECONDS_OF(seconds, kernels(free_arm, free_data, forward));
-                printf("{\"seconds\": %.9g}", seconds / STATES);
-            }
-        } else if (!strcmp(task, "run")) {
-            if (check) {
-                run(led, led_data);
-                print_values(record, 3 * LONG_SAMPLES);
-            } else {
-                SECONDS_OF(seconds, run(led, led_data));
-                printf("{\"seconds\": %.9g}", seconds);
-            }
-        } else {
-            printf("null");
-        }
-        printf("\n");
-        fflush(stdout);
-    }
-    return 0;
+static void set_up(void) {
+    free_arm = load("free.xml"), led = load("led.xml");
+    free_data = mj_makeData(free_arm), led_data = mj_makeData(led);
 }

@@ -7,12 +7,9 @@
 
 #include <pinocchio/multibody.hpp>
 
-#include "peer.h"
+#include "engine.h"
 
 namespace pin = pinocchio;
-enum { LONG_STEPS = 80000, LONG_SAMPLES = LONG_STEPS / RECORD + 1 };
-static double *states, *starts, table[2 * (LONG_STEPS + 1)], record[3 * LONG_SAMPLES], out[3 * STATES];
-
 static pin::Model arm() {
     pin::Model model;
     model.gravity.linear(Eigen::Vector3d(0.0, 0.0, -GRAVITY));
@@ -30,7 +27,12 @@ static pin::Model arm() {
     return model;
 }
 
-static void kernels(const pin::Model &model, pin::Data &data, bool forward) {
+static const pin::Model model = arm();
+static pin::Data data(model);
+
+static void set_up() {}
+
+static void kernels(int forward) {
     typedef Eigen::Map<const Eigen::VectorXd> Map;
     for (int i = 0; i < STATES; ++i) {
         const Map q(states + 3 * i, 3), qd(states + 3 * (STATES + i), 3), third(states + 3 * (2 * STATES + i), 3);
@@ -43,7 +45,7 @@ static void kernels(const pin::Model &model, pin::Data &data, bool forward) {
 }
 
 // Kinematics, spring at the tip through the Jacobian, articulated bodies, semi-implicit Euler.
-static void run(const pin::Model &model, pin::Data &data) {
+static void run() {
     Eigen::VectorXd q = Eigen::Map<Eigen::VectorXd>(starts, 3), qd = Eigen::VectorXd::Zero(3), torque(3);
     double *to = record;
     for (int i = 0;; ++i) {
@@ -63,41 +65,5 @@ static void run(const pin::Model &model, pin::Data &data) {
         }
         qd += STEP * pin::aba(model, data, q, qd, torque);
         q += STEP * qd;
-    }
-}
-
-int main() {
-    states = read_doubles("states.f64", 9 * STATES);
-    starts = read_doubles("starts.f64", 3 * (1 + RUNS));
-    for (int i = 0; i <= LONG_STEPS; ++i) handle_at(i * STEP, LONG, table + 2 * i);
-    const pin::Model model = arm();
-    pin::Data data(model);
-    char word[64];
-    double seconds;
-    while (scanf("%63s", word) == 1) {
-        const bool check = !strncmp(word, "check:", 6);
-        const char *task = check ? word + 6 : word;
-        const bool forward = !strcmp(task, "forward_dynamics");
-        if (forward || !strcmp(task, "inverse_dynamics")) {
-            if (check) {
-                kernels(model, data, forward);
-                print_values(out, 3 * STATES);
-            } else {
-                SECONDS_OF(seconds, kernels(model, data, forward));
-                printf("{\"seconds\": %.9g}", seconds / STATES);
-            }
-        } else if (!strcmp(task, "run")) {
-            if (check) {
-                run(model, data);
-                print_values(record, 3 * LONG_SAMPLES);
-            } else {
-                SECONDS_OF(seconds, run(model, data));
-                printf("{\"seconds\": %.9g}", seconds);
-            }
-        } else {
-            printf("null");
-        }
-        printf("\n");
-        fflush(stdout);
     }
 }
