@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from .errors import IdentificationError as IdentificationError
     from .errors import SimulationError as SimulationError
     from .errors import SlaveError as SlaveError
+    from .fitting import Fitted as Fitted
+    from .fitting import fit_by_simulation as fit_by_simulation
     from .fmu.check import check_fmu as check_fmu
     from .fmu.export import export_fmu as export_fmu
     from .identification import Estimate as Estimate
@@ -79,6 +81,7 @@ _HOMES = {
     "demo": ("Demonstration", "run_demo"),
     "discrepancy": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
+    "fitting": ("Fitted", "fit_by_simulation"),
     "fmu.check": ("check_fmu",),
     "fmu.export": ("export_fmu",),
     "identification": ("Estimate", "Identified", "identify"),

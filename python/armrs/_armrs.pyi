@@ -18,6 +18,7 @@ __all__ = [
     "distances",
     "effects",
     "find_gap",
+    "fit_by_simulation",
     "forecast",
     "identify",
     "literature",
@@ -125,6 +126,13 @@ def find_gap(
     trials: Sequence[Mapping[str, Any]],
     settings: Mapping[str, Any],
     progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]: ...
+def fit_by_simulation(
+    rig: Rig,
+    drive: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    recorded: Mapping[str, Any],
+    free: Sequence[tuple[int, int, float, float]],
 ) -> dict[str, Any]: ...
 def forecast(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], tasks: Sequence[Mapping[str, Any]]) -> dict[str, Any]: ...
 def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...

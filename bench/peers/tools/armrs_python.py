@@ -53,6 +53,26 @@ def write_fit() -> bool:
     return True
 
 
+def fit() -> object:
+    """Time the fit of viscosities and stiffnesses by simulation."""
+    data = np.fromfile(FOLDER / "fit.f64").reshape(-1, 5)
+    bounds = {
+        f"{kind}{joint + 1} {name}": (0.0, problem.UPPER[2 * joint + number])
+        for joint in range(3)
+        for number, (kind, name) in enumerate((("viscous", "viscosity"), ("elastic", "stiffness")))
+    }
+    found = {}
+
+    def solve() -> None:
+        fitted = armrs.fit_by_simulation(
+            model(problem.GUESS), movement, data[:, :3], data[:, 3:], bounds,
+            angle_noise=problem.NOISE[0], force_noise=problem.NOISE[3], integrator="euler", dt=problem.STEP,
+        )  # fmt: skip
+        found.update(x=list(fitted.values.values()), cost=fitted.residual_rms**2 * data.size)
+
+    return line.seconds_of(solve) | found
+
+
 def batch(kernel: line.Task) -> dict[str, float]:
     """Time a kernel over many states, a state."""
     return {"seconds": line.seconds_of(lambda: kernel(*many))["seconds"] / BATCH}
@@ -68,6 +88,7 @@ line.serve(
         "inverse_dynamics": lambda: line.seconds_of(lambda: arm.inverse_dynamics(q[0], qd[0], third[0])),
         "forward_dynamics:batch": lambda: batch(arm.forward_dynamics),
         "inverse_dynamics:batch": lambda: batch(arm.inverse_dynamics),
+        "fit": fit,
         "run": lambda: line.seconds_of(run),
         "write_fit": write_fit,
     }

@@ -14,6 +14,7 @@
 //! Everything is `f64`, has a fixed order of operations and takes its transcendental functions from `libm`: the same input gives the same bits on
 //! every platform.
 
+pub mod by_simulation;
 pub mod calibration;
 pub mod cascade;
 pub mod coloured;

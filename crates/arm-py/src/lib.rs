@@ -5,6 +5,7 @@ mod catalogue;
 mod convert;
 mod cosim;
 mod errors;
+mod fit;
 mod gap;
 mod ident;
 mod lab;
@@ -32,6 +33,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<cosim::ArmSlave>()?;
     m.add_class::<cosim::ArmState>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
+    m.add_function(wrap_pyfunction!(fit::fit_by_simulation, m)?)?;
     m.add_function(wrap_pyfunction!(gap::find_gap, m)?)?;
     m.add_function(wrap_pyfunction!(gap::distances, m)?)?;
     m.add_function(wrap_pyfunction!(gap::look, m)?)?;

@@ -1,6 +1,7 @@
 //! One module per source file, or more where one is not enough; `noise`, `synthetic` and `joint_method` are what they share.
 
 mod bits;
+mod by_simulation;
 mod coloured;
 mod condense;
 mod covariance;

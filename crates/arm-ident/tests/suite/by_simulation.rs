@@ -1,0 +1,137 @@
+//! Fits by simulation.
+
+use arm_ident::IdentError;
+use arm_ident::by_simulation::{Fit, Free, Recorded, fit};
+use arm_sim::{Experiment, Integrator, Recording, models, simulate};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{RngCore, SeedableRng};
+
+/// Viscosity and stiffness of each joint, as the recorded arm has them.
+const TRUE: [f64; 6] = [0.15, 0.4, 0.25, 0.6, 0.2, 0.5];
+const ANGLE_NOISE: f64 = 1.7e-3;
+const FORCE_NOISE: f64 = 0.2;
+
+fn experiment(joints: [f64; 6]) -> Experiment<3> {
+    let mut experiment = models::human_experiment(2.0, [0.0; 3]).expect("a sample experiment");
+    experiment.integrator = Integrator::SemiImplicitEuler;
+    experiment.output_interval = Some(0.02);
+    for (effect, value) in experiment.effects.iter_mut().zip(joints) {
+        effect.parameters[0] = value;
+    }
+    experiment
+}
+
+fn free(max: f64) -> Vec<Free> {
+    (0..6)
+        .map(|effect| Free {
+            effect,
+            parameter: 0,
+            min: 0.0,
+            max,
+        })
+        .collect()
+}
+
+fn fitted(recording: &Recording<3>, start: [f64; 6], max: f64) -> Result<Fit, IdentError> {
+    let recorded = Recorded {
+        q: &recording.q,
+        force_on_arm: &recording.force_on_arm,
+        angle_noise: [ANGLE_NOISE; 3],
+        force_noise: [FORCE_NOISE; 2],
+    };
+    fit(&experiment(start), &recorded, &free(max), 1)
+}
+
+#[test]
+fn exact_records_give_back_what_made_them() {
+    let recording = simulate(&experiment(TRUE)).expect("runs");
+    let found = fitted(&recording, [0.1, 1.0, 0.1, 1.0, 0.1, 1.0], 20.0).expect("a fit");
+    assert!(found.settled);
+    for (value, expected) in found.values.iter().zip(TRUE) {
+        assert!((value - expected).abs() < 1e-5, "{value} for {expected}");
+    }
+    assert!(found.squares < 1e-6, "{}", found.squares);
+}
+
+#[test]
+fn noise_moves_the_estimate_by_its_standard_deviations() {
+    let mut recording = simulate(&experiment(TRUE)).expect("runs");
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    // The sum of twelve even numbers: nearly normal, of unit variance.
+    let mut noise = || {
+        (0..12)
+            .map(|_| (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64)
+            .sum::<f64>()
+            - 6.0
+    };
+    recording
+        .q
+        .iter_mut()
+        .for_each(|v| *v += ANGLE_NOISE * noise());
+    recording
+        .force_on_arm
+        .iter_mut()
+        .for_each(|v| *v += FORCE_NOISE * noise());
+    let found = fitted(&recording, [0.1, 1.0, 0.1, 1.0, 0.1, 1.0], 20.0).expect("a fit");
+    assert_eq!(found.residuals, 101 * 5);
+    assert!(
+        (found.squares / 499.0 - 1.0).abs() < 0.25,
+        "{}",
+        found.squares
+    );
+    for ((value, sd), expected) in found.values.iter().zip(&found.sd).zip(TRUE) {
+        assert!(
+            (value - expected).abs() < 4.0 * sd,
+            "{value} ± {sd} for {expected}"
+        );
+    }
+}
+
+#[test]
+fn bounds_hold_and_are_said() {
+    let recording = simulate(&experiment(TRUE)).expect("runs");
+    let found = fitted(&recording, [0.1; 6], 0.45).expect("a fit");
+    assert_eq!(found.values[3], 0.45);
+    assert_eq!(found.active[3], 1);
+    assert!(found.values.iter().all(|&v| (0.0..=0.45).contains(&v)));
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused() {
+    let recording = simulate(&experiment(TRUE)).expect("runs");
+    let recorded = Recorded {
+        q: &recording.q,
+        force_on_arm: &recording.force_on_arm[2..],
+        angle_noise: [ANGLE_NOISE; 3],
+        force_noise: [FORCE_NOISE; 2],
+    };
+    let run = |recorded: &Recorded<3>, free: &[Free]| fit(&experiment(TRUE), recorded, free, 1);
+    assert!(matches!(
+        run(&recorded, &free(20.0)),
+        Err(IdentError::Length { .. })
+    ));
+    assert!(matches!(
+        run(&recorded, &[]),
+        Err(IdentError::TooFew { .. })
+    ));
+    assert!(matches!(
+        run(&recorded, &free(0.3)),
+        Err(IdentError::OutOfRange { .. })
+    ));
+    let missing = Free {
+        effect: 9,
+        ..free(20.0)[0]
+    };
+    assert!(matches!(
+        run(&recorded, &[missing]),
+        Err(IdentError::OutOfRange { .. })
+    ));
+    let silent = Recorded {
+        angle_noise: [0.0; 3],
+        ..recorded
+    };
+    assert!(matches!(
+        run(&silent, &free(20.0)),
+        Err(IdentError::OutOfRange { .. })
+    ));
+}

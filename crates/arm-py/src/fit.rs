@@ -1,0 +1,88 @@
+//! Fits by simulation.
+
+use arm_core::Chain;
+use arm_ident::by_simulation::{self, Free, Recorded};
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arm::{AnyChain, each_short_length};
+use crate::errors::{bad_input, identification};
+use crate::rig::Rig;
+use crate::sim::{Driven, Settings, experiment};
+
+/// What was recorded, C-contiguous, and the noise of its channels.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Records<'py> {
+    /// Shape (n, n_joints) [rad].
+    q: PyReadonlyArray2<'py, f64>,
+    /// Shape (n, 2) [N].
+    force_on_arm: PyReadonlyArray2<'py, f64>,
+    /// [rad]
+    angle_noise: f64,
+    /// [N]
+    force_noise: f64,
+}
+
+/// Fits parameters of effects by simulation; see `armrs.fit_by_simulation`.
+#[pyfunction]
+pub fn fit_by_simulation<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    drive: Driven<'py>,
+    settings: Settings,
+    recorded: Records<'py>,
+    free: Vec<(usize, usize, f64, f64)>,
+) -> PyResult<Bound<'py, PyDict>> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (drive, settings, recorded): (&Driven<'py>, &Settings, &Records<'py>),
+        free: &[Free],
+    ) -> PyResult<Bound<'py, PyDict>> {
+        if recorded.q.shape()[1] != N {
+            let found = recorded.q.shape()[1];
+            return Err(bad_input(
+                "angles of each sample",
+                found,
+                &format!("{N}, one a joint"),
+            ));
+        }
+        let experiment = experiment(chain, rig, drive, settings)?;
+        let values = Recorded {
+            q: recorded.q.as_slice()?,
+            force_on_arm: recorded.force_on_arm.as_slice()?,
+            angle_noise: [recorded.angle_noise; N],
+            force_noise: [recorded.force_noise; 2],
+        };
+        let outcome = py.detach(|| by_simulation::fit(&experiment, &values, free, 1));
+        crate::own::failed()?;
+        let fit = outcome.map_err(identification)?;
+        let out = PyDict::new(py);
+        out.set_item("values", fit.values)?;
+        out.set_item("sd", fit.sd)?;
+        out.set_item("active", fit.active)?;
+        out.set_item("squares", fit.squares)?;
+        out.set_item("residuals", fit.residuals)?;
+        out.set_item("rounds", fit.rounds)?;
+        out.set_item("settled", fit.settled)?;
+        Ok(out)
+    }
+    let free: Vec<Free> = free
+        .into_iter()
+        .map(|(effect, parameter, min, max)| Free {
+            effect,
+            parameter,
+            min,
+            max,
+        })
+        .collect();
+    let given = (&drive, &settings, &recorded);
+    each_short_length!(
+        &rig.arm.get().chain,
+        c => run(py, c, rig, given, &free),
+        Err(bad_input("segments", rig.arm.get().n_joints(), "1 to 4 segments for a fit by simulation"))
+    )
+}
