@@ -1,6 +1,6 @@
 //! The widest vectors of the processor, found at run time.
 //!
-//! What goes through [`widest`] is compiled a second time for AVX2. Its operations and their order stay what they are and none are
+//! What goes through [`widest`] is compiled again for AVX2 and for AVX-512. Its operations and their order stay what they are and none are
 //! fused, so the bits are the same; only more numbers go through one instruction.
 
 pub use pulp::NullaryFnOnce as Computation;
