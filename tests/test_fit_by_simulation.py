@@ -40,7 +40,7 @@ def test_bound_is_said(record):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"free": ["coulomb1 torque"]}, "free parameter.*coulomb1 torque.*viscous1 viscosity"),
+        ({"free": ["stribeck1 torque"]}, "free parameter.*stribeck1 torque.*viscous1 viscosity"),
         ({"free": {FREE[0]: (0.2, 0.1)}}, "bounds of viscous1 viscosity"),
         ({"free": {FREE[0]: (0.2, 0.3)}}, "start of a free parameter"),
         ({"free": []}, "free parameters"),

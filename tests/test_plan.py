@@ -111,7 +111,7 @@ def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture
         (["--angles-deg=-80:-10"], "angles: found 1 ranges, allowed 2, one a joint"),
         (["--angles-deg=-80,20:110"], "--angles-deg: found '-80', allowed LOW:HIGH in degrees"),
         (["--angles-deg=-10:-80,20:110"], "angles of joint 1: found -0.174533 to -1.39626 rad, allowed the smaller angle first"),
-        (["--angles-deg=-80:-10,20:110", "--speed-rad-s", "nan"], "speed: found nan"),
+        (["--angles-deg=-80:-10,20:110", "--speed-rad-s", "nan"], "--speed-rad-s: found nan"),
         (["--angles-deg=-80:-10,20:110", "--repeats", "0"], "repeats: found 0"),
         (["--angles-deg=-80:-10,20:110", "--with", "frition"], "nearest known"),
     ],

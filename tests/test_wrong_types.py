@@ -70,6 +70,7 @@ ROUGH: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
     "Parameter": (armrs.Parameter, {"name": "a", "unit": "m", "min": 0.0, "max": 1.0, "default": 0.0, "linear": True}),
     "own_effect": (armrs.own_effect, {"kind": "for the test of types", "law": None, "parameters": [PARAMETER], "summary": "", "shapes": None, "angles": (-1.0, 1.0), "speed": 20.0}),
     "simulate": (armrs.simulate, {"model": MODEL, "drive": MOVEMENT, "engine": "native", "integrator": "rk4", "dt": 0.00025, "rate": 50.0, "duration": 0.02, "coupling": "compliant", "start": None, "start_speed": None, "sensors": armrs.Sensors(), "seeds": (1,)}),
+    "fit_by_simulation": (armrs.fit_by_simulation, {"model": MODEL, "drive": MOVEMENT, "q": STATES, "force_on_arm": STATES, "free": {"coulomb1 torque": (0.0, 1.0)}, "angle_noise": 0.001, "force_noise": 0.1, "integrator": "rk4", "dt": 0.00025, "rate": 50.0}),
     "forecast": (armrs.forecast, {"model": BELIEVED, "movements": [MOVEMENT], "repeats": 2, "with_effects": (), "instruments": armrs.Instruments()}),
     "plan": (armrs.plan, {"model": BELIEVED, "limits": armrs.Limits(((-1.1, -0.9), (0.9, 1.1)), duration=3.0), "speeds": (1.0,), "waypoints": 2, "repeats": 2, "with_effects": (), "instruments": armrs.Instruments(), "evaluations": 1, "seed": 1}),
     "Limits": (armrs.Limits, {"angles": ((-1.1, -0.9), (0.9, 1.1)), "speed": 2.0, "acceleration": 8.0, "robot_speed": 4.0, "force": 60.0, "duration": 3.0}),
@@ -154,6 +155,7 @@ def test_every_public_function_is_asked() -> None:
         "Sweep",
         "Swept",
         "OwnEffect",
+        "SimulationFit",
     }
     made_by_functions |= {"Plan", "Simulated", "GapFound", "Demonstration"}
     errors = {name for name in armrs.__all__ if name.endswith("Error") or name == "BadInput"}

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .errors import IdentificationError as IdentificationError
     from .errors import SimulationError as SimulationError
     from .errors import SlaveError as SlaveError
-    from .fitting import Fitted as Fitted
+    from .fitting import SimulationFit as SimulationFit
     from .fitting import fit_by_simulation as fit_by_simulation
     from .fmu.check import check_fmu as check_fmu
     from .fmu.export import export_fmu as export_fmu
@@ -81,7 +81,7 @@ _HOMES = {
     "demo": ("Demonstration", "run_demo"),
     "discrepancy": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
-    "fitting": ("Fitted", "fit_by_simulation"),
+    "fitting": ("SimulationFit", "fit_by_simulation"),
     "fmu.check": ("check_fmu",),
     "fmu.export": ("export_fmu",),
     "identification": ("Estimate", "Identified", "identify"),

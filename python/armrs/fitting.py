@@ -19,7 +19,7 @@ from .trial import Trial
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class SimulationFit:
     """What a fit by simulation found.
 
     Attributes
@@ -60,7 +60,7 @@ def fit_by_simulation(
     integrator: str = "rk4",
     dt: float = DEFAULT_DT,
     rate: float = DEFAULT_RATE,
-) -> Fitted:
+) -> SimulationFit:
     """Fit parameters of effects so that a simulated run comes closest to a recorded one.
 
     The fit starts from the model's values. Every round simulates the estimate and a run beside it for each parameter in one batch.
@@ -91,8 +91,8 @@ def fit_by_simulation(
     SimulationError
         When the first run stops early.
     """
-    if not isinstance(model, Model):
-        model = load_model(model)
+    model = checks.loaded("model", model, Model, load_model)
+    checks.instance("drive", drive, Movement, Trial, type(None))
     checks.choice("integrator", integrator, ("rk4", "euler"))
     for name, value, unit in (
         ("dt", dt, "s"),
@@ -108,7 +108,7 @@ def fit_by_simulation(
         if values.ndim != 2 or values.shape[1] != columns or len(values) != len(angles) or len(values) < 2:
             raise BadInput(name, f"an array of shape {values.shape}", f"rows of {columns}, as many of q as of force_on_arm, two or more")
     effects = all_effects(model)
-    names = list(free)
+    names = list(checks.texts("free", list(free) if isinstance(free, Mapping) else free, "parameters"))
     places = [_place(effects, name) for name in names]
     bounds = [
         checked_bounds(name, free[name]) if isinstance(free, Mapping) else place[2:] for name, place in zip(names, places, strict=True)
@@ -134,7 +134,7 @@ def fit_by_simulation(
         effect = effects[index]
         key = catalogue()[effect.kind].parameters[parameter].name
         effects[index] = Effect(effect.kind, effect.joint, effect.channel, {**effect.parameters, key: value})
-    return Fitted(
+    return SimulationFit(
         values=dict(zip(names, raw["values"], strict=True)),
         sd=dict(zip(names, raw["sd"], strict=True)),
         at_bound=tuple(name for name, active in zip(names, raw["active"], strict=True) if active),
@@ -147,7 +147,7 @@ def fit_by_simulation(
 
 def checked_bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:
     """Return bounds of a parameter, least before greatest."""
-    low, high = (float(v) for v in bounds)
+    low, high = checks.pair(f"bounds of {name}", bounds)
     if not low <= high:
         raise BadInput(f"bounds of {name}", (low, high), "least before greatest")
     return low, high

@@ -249,7 +249,11 @@ def identify(
         parameters=parameters,
         combinations=combinations,
         calibration=calibration,
-        contradictions=(*_contradictions(parameters), *_beyond_tolerance(calibration, settings), *_misfits(shares, _NO_FIT, np.inf)),
+        contradictions=(
+            *_contradictions(parameters),
+            *_beyond_tolerance(calibration, settings["tolerance"]),
+            *_misfits(shares, _NO_FIT, np.inf),
+        ),
         misfits=(*_misfits(shares, _POOR, _NO_FIT), *noisy),
         left_out=_left_out(method, effects),
         trades=tuple(raw["trades"]),
@@ -319,11 +323,11 @@ def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
     )
 
 
-def _beyond_tolerance(calibration: Sequence[Estimate], settings: dict[str, Any]) -> tuple[str, ...]:
+def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: dict[str, float]) -> tuple[str, ...]:
     """Return the calibrations that came out far larger than promised, a line each."""
     lines = []
     for e in calibration:
-        promised = next(settings[key] for key in _TOLERANCES if e.name.startswith(key.replace("_", " ")))
+        promised = next(tolerance[key] for key in _TOLERANCES if e.name.startswith(key.replace("_", " ")))
         if abs(e.value) > _BEYOND * promised:
             lines.append(f"{e.name} came out as {e.value:.3g} {e.unit}, {abs(e.value) / promised:.1f} times the declared tolerance")
     return tuple(lines)
