@@ -106,11 +106,11 @@ GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
 
 hidden: build
 	cargo test --quiet --release -p hidden-world
-	$(GENERATE) --family null --seed 300000 --count $(or $(HIDDEN_NULL),204)
-	$(GENERATE) --family single --seed 310000 --count $(or $(HIDDEN_SINGLE),72)
-	$(GENERATE) --family double --seed 320000 --count $(or $(HIDDEN_DOUBLE),16)
-	$(GENERATE) --family triple --seed 330000 --count $(or $(HIDDEN_TRIPLE),12)
-	$(GENERATE) --family outside --seed 340000 --count $(or $(HIDDEN_OUTSIDE),16)
+	$(GENERATE) --family null --seed 500000 --count $(or $(HIDDEN_NULL),204)
+	$(GENERATE) --family single --seed 510000 --count $(or $(HIDDEN_SINGLE),72)
+	$(GENERATE) --family double --seed 520000 --count $(or $(HIDDEN_DOUBLE),16)
+	$(GENERATE) --family triple --seed 530000 --count $(or $(HIDDEN_TRIPLE),12)
+	$(GENERATE) --family outside --seed 540000 --count $(or $(HIDDEN_OUTSIDE),16)
 	$(BIN)/python bench/hidden/score.py $(HIDDEN)
 
 clean:
