@@ -114,6 +114,16 @@ def test_json_does_not_replace_a_model(session: Session, capsys: pytest.CaptureF
     assert session.files() == before
 
 
+@pytest.mark.parametrize("place", ["out", "out/report.html", "./out/"])
+def test_json_in_place_of_a_result_is_refused_before_anything_is_written(
+    session: Session, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = refused(capsys, "convert", session.folder, "-o", "out", "--json", place)
+    assert text.startswith("--json: found ")
+    assert not (tmp_path / "out").exists()
+
+
 def test_json_to_a_device_leaves_the_device() -> None:
     done = run("effects", "--json", os.devnull)
     assert done.returncode == 0

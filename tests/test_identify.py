@@ -187,3 +187,21 @@ def test_the_cascade_holds_what_it_does_not_find(slow_arm: Path) -> None:
     rotor = armrs.Effect("motor_inertia", 1, parameters={"inertia": 0.01})
     with_rotor = armrs.identify(data.replace(model=data.model.replace(effects=(rotor,))), method="cascade", with_effects="coulomb")
     assert any("motor_inertia of joint 1" in line for line in with_rotor.left_out)
+
+
+def test_a_calibration_beyond_twice_its_tolerance_is_called_out(slow_arm: Path) -> None:
+    dataset = armrs.load_dataset(slow_arm)
+    promised = dataset.tolerance.time_delay_s
+
+    def late(trial: armrs.Trial, by: float) -> armrs.Trial:
+        assert trial.force_on_arm is not None
+        force = np.column_stack([np.interp(trial.t - by, trial.t, column) for column in trial.force_on_arm.T])
+        return dataclasses.replace(trial, force_on_arm=force)
+
+    def warnings(by: float) -> list[str]:
+        trials = tuple(late(t, by) for t in dataset.trials)
+        return [w for w in armrs.identify(dataset.replace(trials=trials), with_effects="coulomb").warnings if w.startswith("time delay")]
+
+    assert warnings(0.0) == []
+    (line,) = warnings(4.0 * promised)
+    assert line.endswith("times the declared tolerance: what the model lacks may be in it")

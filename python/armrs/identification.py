@@ -251,10 +251,17 @@ def identify(
         calibration=calibration,
         contradictions=(
             *_contradictions(parameters),
-            *_beyond_tolerance(calibration, settings["tolerance"]),
+            *_beyond_tolerance(calibration, settings["tolerance"], _BEYOND, np.inf),
             *_misfits(shares, _NO_FIT, np.inf),
         ),
-        misfits=(*_misfits(shares, _POOR, _NO_FIT), *noisy),
+        misfits=(
+            *_misfits(shares, _POOR, _NO_FIT),
+            *(
+                f"{line}: what the model lacks may be in it"
+                for line in _beyond_tolerance(calibration, settings["tolerance"], _FAR, _BEYOND)
+            ),
+            *noisy,
+        ),
         left_out=_left_out(method, effects),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
@@ -306,6 +313,8 @@ def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dic
     }
 
 
+_FAR = 2.0
+"""A calibration this many times its tolerance, four standard deviations of what was believed beforehand, stands for something else."""
 _BEYOND = 5.0
 """A calibration this many times its tolerance is no calibration."""
 _POOR = 0.2
@@ -323,12 +332,12 @@ def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
     )
 
 
-def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: dict[str, float]) -> tuple[str, ...]:
-    """Return the calibrations that came out far larger than promised, a line each."""
+def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: dict[str, float], above: float, to: float) -> tuple[str, ...]:
+    """Return the calibrations that came out larger than promised, more than `above` and up to `to` times, a line each."""
     lines = []
     for e in calibration:
         promised = next(tolerance[key] for key in _TOLERANCES if e.name.startswith(key.replace("_", " ")))
-        if abs(e.value) > _BEYOND * promised:
+        if above * promised < abs(e.value) <= to * promised:
             lines.append(f"{e.name} came out as {e.value:.3g} {e.unit}, {abs(e.value) / promised:.1f} times the declared tolerance")
     return tuple(lines)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import files
+from ..errors import BadInput
 
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is standard output.")]
 OutFolder = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write below; made when it does not exist.")]
@@ -55,10 +57,16 @@ def writable(out: Path | None, json: Path | None = None) -> Path | None:
     if json is not None and json != _STDOUT:
         files.may_replace(json, ".json")
         files.must_be_writable(json)
+        if out is not None and _is_inside(json, out) and json.suffix != ".json":
+            raise BadInput("--json", os.fspath(json), f"a name outside of {out}, where the results go, or a .json file in it")
     if out is None:
         return None
     files.must_be_writable(out)
     return files.output_folder(out, "-o")
+
+
+def _is_inside(path: Path, folder: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())
 
 
 def command_line(context: typer.Context) -> str:

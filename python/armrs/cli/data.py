@@ -81,8 +81,8 @@ def convert(
 
     suffix = "" if source.is_dir() else source.suffix.lower()
     chosen, named = listed(points), listed(coordinates)
+    writable(out, json)
     if suffix in MARKER_SUFFIXES:
-        writable(out, json)
         file, motion, notes = motions.convert_markers(source, out, to=to.value, points=chosen, up=up, forward=forward)
         console.warn(notes)
         present(
