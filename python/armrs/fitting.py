@@ -110,9 +110,7 @@ def fit_by_simulation(
     effects = all_effects(model)
     names = list(checks.texts("free", list(free) if isinstance(free, Mapping) else free, "parameters"))
     places = [_place(effects, name) for name in names]
-    bounds = [
-        checked_bounds(name, free[name]) if isinstance(free, Mapping) else place[2:] for name, place in zip(names, places, strict=True)
-    ]
+    bounds = [_bounds(name, free[name]) if isinstance(free, Mapping) else place[2:] for name, place in zip(names, places, strict=True)]
     settings: dict[str, Any] = {
         "engine": "native",
         "integrator": integrator,
@@ -145,7 +143,7 @@ def fit_by_simulation(
     )
 
 
-def checked_bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:
+def _bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:
     """Return bounds of a parameter, least before greatest."""
     low, high = checks.pair(f"bounds of {name}", bounds)
     if not low <= high:

@@ -38,7 +38,7 @@ const ELSEWHERE: f64 = 0.25;
 /// What an effect may explain, as a sum of squares, without being there: what the law of a named one misses of what it shows.
 ///
 /// * `gain` - what the named one explains
-pub(crate) fn mimicked(effect: &Effect<f64>, named: &Candidate, gain: f64) -> f64 {
+fn mimicked(effect: &Effect<f64>, named: &Candidate, gain: f64) -> f64 {
     let joints = |e: &Effect<f64>| match e.kind.info().place {
         Place::Joint => e.index + 1 - usize::from(e.kind.crosses())..e.index + 2,
         _ => 0..0,
@@ -46,6 +46,12 @@ pub(crate) fn mimicked(effect: &Effect<f64>, named: &Candidate, gain: f64) -> f6
     let (own, other) = (joints(effect), joints(&named.effect));
     let is_near = own.start < other.end && other.start < own.end;
     named.kind().probe().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
+}
+
+/// The most that an effect may explain without being there beside named ones that together explain so much.
+pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explained: f64) -> f64 {
+    let each = named.iter().map(|c| mimicked(effect, c, explained));
+    each.fold(0.0, f64::max)
 }
 
 /// One effect that was named.
@@ -221,12 +227,8 @@ impl<'a, const N: usize> Study<'a, N> {
                     _ => Vec::new(),
                 };
                 // A shape that is refined may stand for what the law of another one misses.
-                let named_others = fitted.asked.iter().enumerate().filter(|(o, _)| *o != slot);
-                let bent = named_others
-                    .map(|(_, o)| {
-                        mimicked(&fitted.asked[slot].effect, o, calibrated.cost - less.cost)
-                    })
-                    .fold(0.0, f64::max);
+                let explained = calibrated.cost - less.cost;
+                let bent = mimicked_by_any(&fitted.asked[slot].effect, &less.asked, explained);
                 let better = rivals.iter().find(|r| {
                     self.takes_over(
                         &r.alternative,

@@ -50,7 +50,7 @@ impl<const N: usize> Study<'_, N> {
         }
         progress("asking the catalogue", 0.6);
         let library = Library::build(self, &anchor, None)?;
-        let scan = Scan::new(self, &calibrated, &anchor, &library)?;
+        let scan = Scan::new(self, &calibrated, &anchor, &library)?.scaled();
         let lack = lack_of_fit(self, &anchor, &calibrated);
         let mut suspects: Vec<Suspect> = (0..scan.len())
             .filter_map(|c| {

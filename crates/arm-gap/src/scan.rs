@@ -26,8 +26,12 @@ pub struct Scan {
     pub spread: Vec<f64>,
     /// What each candidate must earn to be named.
     pub price: Vec<f64>,
-    /// Misfit for each degree of freedom that no choice of candidates would take away; at least one.
+    /// Misfit for each degree of freedom that no choice of candidates would take away; at least one, and one until it is measured
+    /// by [`Scan::scaled`].
     pub scale: f64,
+    /// Cost before any choice, and degrees of freedom of the data.
+    square: f64,
+    freedom: f64,
     bounds: Vec<(f64, f64)>,
 }
 
@@ -111,6 +115,8 @@ impl Scan {
                 })
                 .collect(),
             scale: 1.0,
+            square: normal.square,
+            freedom: normal.rows.saturating_sub(base.len() + 10).max(1) as f64,
             bounds,
         };
         for index in 0..scan.columns.len() {
@@ -128,11 +134,15 @@ impl Scan {
             let weights: Vec<(usize, f64)> = own.chain(others).collect();
             scan.spread[index] = spread(&clusters, &weights);
         }
-        let deepest = scan.search(&[], 5, 8, &|_, _| true);
-        let best = deepest.iter().map(|c| c.gain).fold(0.0, f64::max);
-        let dof = normal.rows.saturating_sub(base.len() + 10).max(1);
-        scan.scale = ((normal.square - best) / dof as f64).max(1.0);
         Ok(scan)
+    }
+
+    /// With the misfit measured that no choice takes away, in units of which worths and smallest sizes count.
+    pub fn scaled(mut self) -> Self {
+        let deepest = self.search(&[], 5, 8, &|_, _| true);
+        let best = deepest.iter().map(|c| c.gain).fold(0.0, f64::max);
+        self.scale = ((self.square - best) / self.freedom).max(1.0);
+        self
     }
 
     /// Number of candidates.

@@ -8,7 +8,7 @@ use crate::apart::{Apart, Line};
 use crate::candidate::{Candidate, Library};
 use crate::fit::{Fitted, Precision};
 use crate::hypothesis::Hypothesis;
-use crate::judge::{FLOOR, Named, mimicked};
+use crate::judge::{FLOOR, Named, mimicked_by_any};
 use crate::misfit::{Lack, lack_of_fit};
 use crate::scan::{Choice, Scan};
 use crate::session::Sight;
@@ -101,10 +101,10 @@ impl<const N: usize> Hunt<'_, N> {
     /// What a further effect must gain so as not to be the imperfect shape of a named one.
     fn least(&self, effect: &Effect<f64>) -> f64 {
         let explained = self.calibrated.cost - self.current.cost;
-        let named = self.current.asked.iter();
-        named
-            .map(|c| mimicked(effect, c, explained))
-            .fold(FLOOR * explained, f64::max)
+        f64::max(
+            FLOOR * explained,
+            mimicked_by_any(effect, &self.current.asked, explained),
+        )
     }
 }
 
@@ -271,7 +271,7 @@ impl<'a, const N: usize> Study<'a, N> {
             let scan = match Scan::new(self, &hunt.current, &hunt.anchor, &library) {
                 // What was found so far stands.
                 Err(GapError::Simulation { .. }) if !hunt.current.asked.is_empty() => break,
-                other => other?,
+                other => other?.scaled(),
             };
             hunt.asked = library.candidates.len() as f64;
             hunt.scale = scan.scale;
@@ -380,10 +380,7 @@ impl<'a, const N: usize> Study<'a, N> {
         let explained = calibrated.cost - current.cost;
         let least = |member: &usize| {
             let effect = &library.candidates[*member].effect;
-            let named = current.asked.iter();
-            named
-                .map(|c| mimicked(effect, c, explained))
-                .fold(0.0, f64::max)
+            mimicked_by_any(effect, &current.asked, explained)
         };
         let choices: Vec<Choice> = choices
             .into_iter()

@@ -6,9 +6,9 @@
 use arm_sim::{Experiment, Recording, simulate_batch};
 
 use crate::condense::Condenser;
+use crate::covariance::Bread;
 use crate::error::{IdentError, check_finite, check_least, check_len, check_range};
 use crate::factor::Factor;
-use crate::matrix::Matrix;
 use crate::program::Program;
 
 /// A parameter beside the estimate is this share of its size away: between rounding (1e-14 of an angle) and curvature.
@@ -246,23 +246,14 @@ impl<const N: usize> Search<'_, N> {
     }
 }
 
-/// Standard deviations of a factor in units of the noise: `√diag (RᵀR)⁻¹`.
+/// Standard deviations of a factor in units of the noise, as if no bound held.
 fn deviations(factor: &Factor) -> Vec<f64> {
     let p = factor.parameters();
-    if factor.solve().is_err() {
-        return vec![f64::INFINITY; p];
+    match Bread::new(&factor.r, &[]) {
+        Ok(bread) => {
+            let covariance = bread.white(1.0);
+            (0..p).map(|i| libm::sqrt(covariance[(i, i)])).collect()
+        }
+        Err(_) => vec![f64::INFINITY; p],
     }
-    let mut inverse = Matrix::identity(p);
-    for j in 0..p {
-        crate::orthogonal::solve_upper(&factor.r, p, inverse.column_mut(j));
-    }
-    (0..p)
-        .map(|i| {
-            libm::sqrt(
-                (0..p)
-                    .map(|j| inverse[(i, j)] * inverse[(i, j)])
-                    .sum::<f64>(),
-            )
-        })
-        .collect()
 }

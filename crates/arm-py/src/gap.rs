@@ -49,7 +49,15 @@ struct Asked<'a, 'py> {
     settings: &'a Settings,
 }
 
-impl Asked<'_, '_> {
+impl<'a, 'py> Asked<'a, 'py> {
+    fn of(rig: &'a Rig, trials: &'a [Columns<'py>], settings: &'a Settings) -> Self {
+        Self {
+            rig,
+            trials,
+            settings,
+        }
+    }
+
     fn session<const N: usize>(&self, chain: &Chain<f64, N>) -> PyResult<Session<N>> {
         let (rig, settings) = (self.rig, self.settings);
         Ok(Session {
@@ -115,12 +123,7 @@ pub fn play<'py>(
         own::failed()?;
         PyList::new(py, plays?)
     }
-    let (trials, settings) = (&trials[..], &settings);
-    let asked = Asked {
-        rig,
-        trials,
-        settings,
-    };
+    let asked = Asked::of(rig, &trials, &settings);
     each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked), Err(too_long()))
 }
 
@@ -144,12 +147,7 @@ pub fn find_gap<'py>(
         let (study, finding) = asked.studied(py, &session, |s| s.search(&tell(progress)))?;
         result(py, &study, &finding)
     }
-    let (trials, settings) = (&trials[..], &settings);
-    let asked = Asked {
-        rig,
-        trials,
-        settings,
-    };
+    let asked = Asked::of(rig, &trials, &settings);
     each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()), Err(too_long()))
 }
 
@@ -173,12 +171,7 @@ pub fn look<'py>(
         let (study, look) = asked.studied(py, &session, |s| s.look(&tell(progress)))?;
         first_look(py, &study, &look)
     }
-    let (trials, settings) = (&trials[..], &settings);
-    let asked = Asked {
-        rig,
-        trials,
-        settings,
-    };
+    let asked = Asked::of(rig, &trials, &settings);
     each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()), Err(too_long()))
 }
 
@@ -341,12 +334,7 @@ pub fn distances<'py>(
             Ok((Effect::new(own::kind(&kind)?, index).with(&values), free))
         })
         .collect::<PyResult<Vec<_>>>()?;
-    let (trials, settings) = (&trials[..], &settings);
-    let asked = Asked {
-        rig,
-        trials,
-        settings,
-    };
+    let asked = Asked::of(rig, &trials, &settings);
     each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, (&planned, &rivals)), Err(too_long()))
 }
 

@@ -15,6 +15,10 @@ struct Fault {
     spoil: fn(&Recipe<2>, &dyn Fn(f64) -> State<2>, &mut Trial<2>, f64),
 }
 
+fn each_force(trial: &mut Trial<2>, change: impl FnMut(&mut [f64; 2])) {
+    trial.force_on_arm.iter_mut().flatten().for_each(change);
+}
+
 fn faults() -> Vec<Fault> {
     vec![
         Fault {
@@ -42,13 +46,7 @@ fn faults() -> Vec<Fault> {
                 force_bias: 1.0,
                 ..EXACT
             },
-            spoil: |_, _, trial, size| {
-                trial
-                    .force_on_arm
-                    .iter_mut()
-                    .flatten()
-                    .for_each(|f| f[0] += size)
-            },
+            spoil: |_, _, trial, size| each_force(trial, |f| f[0] += size),
         },
         Fault {
             name: "force bias Fz",
@@ -57,13 +55,7 @@ fn faults() -> Vec<Fault> {
                 force_bias: 1.0,
                 ..EXACT
             },
-            spoil: |_, _, trial, size| {
-                trial
-                    .force_on_arm
-                    .iter_mut()
-                    .flatten()
-                    .for_each(|f| f[1] += size)
-            },
+            spoil: |_, _, trial, size| each_force(trial, |f| f[1] += size),
         },
         Fault {
             name: "force gain Fy",
@@ -72,13 +64,7 @@ fn faults() -> Vec<Fault> {
                 force_gain: 0.1,
                 ..EXACT
             },
-            spoil: |_, _, trial, size| {
-                trial
-                    .force_on_arm
-                    .iter_mut()
-                    .flatten()
-                    .for_each(|f| f[0] *= 1.0 + size)
-            },
+            spoil: |_, _, trial, size| each_force(trial, |f| f[0] *= 1.0 + size),
         },
         Fault {
             name: "force gain Fz",
@@ -87,13 +73,7 @@ fn faults() -> Vec<Fault> {
                 force_gain: 0.1,
                 ..EXACT
             },
-            spoil: |_, _, trial, size| {
-                trial
-                    .force_on_arm
-                    .iter_mut()
-                    .flatten()
-                    .for_each(|f| f[1] *= 1.0 + size)
-            },
+            spoil: |_, _, trial, size| each_force(trial, |f| f[1] *= 1.0 + size),
         },
         Fault {
             name: "time delay",
