@@ -292,6 +292,7 @@ ARM = ([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])
         (lambda: armrs.Channel("much"), "deviation: found 'much'"),
         (lambda: armrs.identify(3), "dataset: found 3, allowed a Dataset or a path"),
         (lambda: armrs.simulate(true_model()), "duration: found none"),
+        (lambda: armrs.simulate(armrs.Model((armrs.Segment("s", 0.2, 1.0, 0.1, 0.01),) * 5), duration=0.1), r"segment\]\]: found 5, allowed 1 to 4"),
         (lambda: armrs.simulate(true_model(), duration=0.1, start=np.zeros(3)), "start angles: found 3 values, allowed 2"),
         (lambda: passive_moments("nowhere"), "nowhere: file: found No such file or directory"),
     ],

@@ -37,20 +37,29 @@ macro_rules! each_length {
 
 pub(crate) use each_length;
 
-/// The same for up to four segments, for what is large to compile and means nothing beyond; else `$otherwise`.
+/// The same for what is large to compile and means nothing beyond four segments: whatever simulates or identifies.
 macro_rules! each_short_length {
-    ($any:expr, $chain:ident => $body:expr, $otherwise:expr) => {
+    ($any:expr, $chain:ident => $body:expr) => {
         match $any {
             AnyChain::One($chain) => $body,
             AnyChain::Two($chain) => $body,
             AnyChain::Three($chain) => $body,
             AnyChain::Four($chain) => $body,
-            AnyChain::Five(_) | AnyChain::Six(_) => $otherwise,
+            AnyChain::Five(_) => Err(crate::arm::too_long(5)),
+            AnyChain::Six(_) => Err(crate::arm::too_long(6)),
         }
     };
 }
 
 pub(crate) use each_short_length;
+
+pub(crate) fn too_long(segments: usize) -> PyErr {
+    bad_input(
+        "[[arm.segment]]",
+        segments,
+        "1 to 4 segments; only kernels, passive moments and co-simulation take more",
+    )
+}
 
 impl AnyChain {
     fn new(

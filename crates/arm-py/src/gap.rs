@@ -37,11 +37,6 @@ pub struct Settings {
     own: Vec<String>,
 }
 
-/// The refusal of an arm that the search is not made for.
-fn too_long() -> PyErr {
-    bad_input("[[arm.segment]]", "more than 4", "1 to 4 segments")
-}
-
 /// What a call is about.
 struct Asked<'a, 'py> {
     rig: &'a Rig,
@@ -124,7 +119,7 @@ pub fn play<'py>(
         PyList::new(py, plays?)
     }
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked), Err(too_long()))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked))
 }
 
 /// Searches for what a model lacks; see `armrs.find_gap`.
@@ -148,7 +143,7 @@ pub fn find_gap<'py>(
         result(py, &study, &finding)
     }
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()), Err(too_long()))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()))
 }
 
 /// Calibrates a model, and asks every candidate alone to first order; see `armrs.discrepancy.calibrate`.
@@ -172,7 +167,7 @@ pub fn look<'py>(
         first_look(py, &study, &look)
     }
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()), Err(too_long()))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()))
 }
 
 fn first_look<'py, const N: usize>(
@@ -335,7 +330,7 @@ pub fn distances<'py>(
         })
         .collect::<PyResult<Vec<_>>>()?;
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, (&planned, &rivals)), Err(too_long()))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, (&planned, &rivals)))
 }
 
 fn result<'py, const N: usize>(

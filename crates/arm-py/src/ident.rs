@@ -10,7 +10,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arm::{AnyChain, each_length};
+use crate::arm::{AnyChain, each_short_length};
 use crate::convert::rows;
 use crate::errors::{bad_input, identification, invalid};
 use crate::rig::Rig;
@@ -217,7 +217,7 @@ pub fn identify<'py>(
         .map_err(identification)?;
         outcome(py, &result)
     }
-    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)))
 }
 
 fn outcome<'py, const N: usize>(

@@ -7,7 +7,7 @@ use numpy::ToPyArray;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arm::{AnyChain, each_length};
+use crate::arm::{AnyChain, each_short_length};
 use crate::errors::{bad_input, invalid, simulation};
 use crate::rig::Rig;
 use crate::sim::{Driven, Settings, experiment};
@@ -83,8 +83,7 @@ pub fn control<'py>(
         py.detach(|| arm_sim::control(&experiment, settings, fault, watch.seed))
             .map_err(simulation)
     }
-    let done =
-        each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, &watch)))?;
+    let done = each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, &watch)))?;
     let out = PyDict::new(py);
     out.set_item("time", done.time.to_pyarray(py))?;
     let angles = done.robot_q.to_pyarray(py);

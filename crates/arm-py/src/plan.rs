@@ -7,7 +7,7 @@ use numpy::{PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arm::{AnyChain, each_length};
+use crate::arm::{AnyChain, each_short_length};
 use crate::convert::rows;
 use crate::errors::{bad_input, identification};
 use crate::ident::{Settings, model};
@@ -110,7 +110,7 @@ pub fn forecast_py<'py>(
             .map_err(identification)?;
         plain(py, &found)
     }
-    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &tasks)))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &tasks)))
 }
 
 /// Movements that show every parameter well; see `armrs.plan`.
@@ -172,7 +172,7 @@ pub fn design_py<'py>(
         out.set_item("tasks", list)?;
         Ok(out)
     }
-    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &bounds)))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &bounds)))
 }
 
 fn plain<'py>(py: Python<'py>, found: &Forecast) -> PyResult<Bound<'py, PyDict>> {

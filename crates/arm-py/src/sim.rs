@@ -9,7 +9,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arm::{AnyChain, each_length};
+use crate::arm::{AnyChain, each_short_length};
 use crate::convert::rows;
 use crate::errors::{bad_input, simulation};
 use crate::rig::Rig;
@@ -114,7 +114,7 @@ pub fn simulate<'py>(
         }
         Ok(out)
     }
-    each_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
 }
 
 /// The experiment that Python describes.
