@@ -60,6 +60,14 @@ def test_a_trial_drives_the_arm_along_its_robot_angles(slow_arm: Path, tmp_path:
     assert json.loads((tmp_path / "simulated.json").read_text(encoding="utf-8"))["file"] == "simulated.parquet"
 
 
+def test_an_arm_that_runs_away_is_called_out(slow_arm: Path, data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Measured torques without a controller drive a model without friction anywhere."""
+    led = armrs.simulate(slow_arm / "truth.toml", armrs.load_movement(slow_arm / "movement.toml", 2))
+    assert led.warnings == ()
+    assert run("simulate", data / "dfki_a0" / "model.toml", "--trial", data / "dfki_a0" / "trials" / "track_2.csv") == 0
+    assert "warning: the arm runs away: from " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("lost", [slice(0, 100), slice(200, 300)])
 def test_a_gap_in_what_drives_the_arm_is_refused(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], lost: slice) -> None:
     head, *rows = (slow_arm / "trials" / "slow_1.csv").read_text(encoding="utf-8").splitlines()

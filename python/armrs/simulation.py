@@ -19,6 +19,8 @@ DEFAULT_DT = 0.25e-3
 """Step of the simulation [s]."""
 DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
+RUNAWAY = 30.0
+"""Speed of a joint beyond which a run is none of a led arm [rad/s]."""
 _MOST_STEPS = 10**9
 _CHANNELS = ("angle", "force", "moment", "robot", "torque")
 
@@ -157,6 +159,15 @@ class Simulated:
         size = f"{len(self.t)} samples, {self.t[-1]:.6g} s, {self.q.shape[1]} joints"
         return f"Simulated({size}; force on the arm up to {most:.4g} N; digest {self.digest})"
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is hardly a movement of an arm, a line each."""
+        fastest = float(np.abs(self.qd).max())
+        if fastest <= RUNAWAY:
+            return ()
+        first = self.t[np.argmax(np.abs(self.qd).max(axis=1) > RUNAWAY)]
+        return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)
+
 
 def simulate(
     model: Model | str | os.PathLike[str],
@@ -212,7 +223,9 @@ def simulate(
     checks.number("dt", dt, above=0.0, unit="s")
     checks.number("rate", rate, above=0.0, unit="Hz")
     steps = 1.0 / (rate * dt)
-    if abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
+    if steps < 1.0 - 1e-6:
+        raise BadInput("rate", rate, f"at most {1.0 / dt:g} Hz, a sample for every step of {dt:g} s")
+    if abs(steps - round(steps)) > 1e-6 * steps:
         raise BadInput("dt", dt, f"a whole part of the interval between samples, {1.0 / rate:g} s")
     if duration is not None:
         _check_duration(duration, dt, rate)

@@ -188,6 +188,17 @@ impl Scaled {
         let inverse = self.factor.inverse();
         DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] * self.scale[a] * self.scale[b])
     }
+
+    /// Vectors whose outer products add up to the inverse.
+    pub fn spread(&self) -> Vec<DVector<f64>> {
+        let n = self.scale.len();
+        let unit = |k: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == k)));
+        let solved = (0..n).map(|k| self.factor.l_dirty().tr_solve_lower_triangular(&unit(k)));
+        let scale = DVector::from_column_slice(&self.scale);
+        solved
+            .map(|x| x.unwrap_or_else(|| DVector::zeros(n)).component_mul(&scale))
+            .collect()
+    }
 }
 
 #[cfg(test)]
@@ -205,6 +216,18 @@ mod tests {
                 (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
             })
             .collect()
+    }
+
+    #[test]
+    fn outer_products_of_the_spread_are_the_inverse() {
+        let a = DMatrix::from_vec(8, 4, numbers(7, 32));
+        let gram = a.transpose() * &a;
+        let solver = factor(gram.clone()).unwrap();
+        let sum = solver
+            .spread()
+            .iter()
+            .fold(DMatrix::zeros(4, 4), |sum, v| sum + v * v.transpose());
+        assert!((sum * gram - DMatrix::identity(4, 4)).amax() < 1e-12);
     }
 
     #[test]

@@ -219,12 +219,13 @@ impl<'a, const N: usize> Study<'a, N> {
             .iter()
             .map(|c| c.prior.map_or(f64::INFINITY, |(_, sd)| sd))
             .collect();
-        let mut noise = Noise::of(deviations, range, told)?;
+        let mut noise = Noise::of((deviations, &[]), range, told)?;
         for _ in 0..TURNS {
             if known.is_empty() {
                 break;
             }
             let mut clean = deviations.to_vec();
+            let mut taken = Vec::new();
             for (deviation, columns) in clean.iter_mut().zip(shifts) {
                 let row = noise.whiten_thinned(deviation);
                 let each = columns.iter().map(|c| noise.whiten_thinned(c));
@@ -240,14 +241,15 @@ impl<'a, const N: usize> Study<'a, N> {
                 });
                 let score = DVector::from_fn(k, |a, _| dot(&whitened[a], &row));
                 let Some(solver) = factor(gram) else { continue };
-                for (share, column) in solver.solve(&score).iter().zip(columns.iter()) {
-                    let values = column.iter().flatten();
-                    for (value, shift) in deviation.iter_mut().flatten().zip(values) {
-                        *value -= share * shift;
-                    }
-                }
+                add(deviation, columns, (-solver.solve(&score)).as_slice());
+                taken.extend(solver.spread().iter().map(|shares| {
+                    let mut series: Vec<Vec<f64>> =
+                        deviation.iter().map(|c| vec![0.0; c.len()]).collect();
+                    add(&mut series, columns, shares.as_slice());
+                    series
+                }));
             }
-            noise = Noise::of(&clean, range, told)?;
+            noise = Noise::of((&clean, &taken), range, told)?;
         }
         Ok(noise)
     }
@@ -423,4 +425,13 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
 pub fn flat(channels: &Channels, stretches: &Stretches) -> Vec<Vec<f64>> {
     let picked = stretches.pick(channels).into_iter();
     picked.map(|pieces| pieces.concat()).collect()
+}
+
+/// Adds shares of columns, each with its channels, to a series.
+fn add(series: &mut [Vec<f64>], columns: &[Vec<Vec<f64>>], shares: &[f64]) {
+    for (share, column) in shares.iter().zip(columns) {
+        for (value, part) in series.iter_mut().flatten().zip(column.iter().flatten()) {
+            *value += share * part;
+        }
+    }
 }

@@ -18,13 +18,18 @@ pub fn parallel<R: Send>(threads: usize, jobs: usize, one: impl Fn(usize) -> R +
             done.push((job, one(job)));
         }
     };
-    let mut all: Vec<(usize, R)> = std::thread::scope(|scope| {
+    let mut results: Vec<Option<R>> = (0..jobs).map(|_| None).collect();
+    std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads.min(jobs)).map(|_| scope.spawn(work)).collect();
-        let joined = workers.into_iter().map(|worker| worker.join());
-        joined
-            .flat_map(|done| done.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .collect()
+        for worker in workers {
+            let done = worker
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            for (job, result) in done {
+                results[job] = Some(result);
+            }
+        }
     });
-    all.sort_by_key(|(job, _)| *job);
-    all.into_iter().map(|(_, result)| result).collect()
+    // Every job was taken by a worker that was waited for.
+    results.into_iter().flatten().collect()
 }

@@ -88,7 +88,7 @@ impl AutoRegression {
     /// # Errors
     /// As [`AutoRegression::yule_walker`].
     pub fn burg(series: &[&[f64]], order: usize) -> Result<Self, IdentError> {
-        let path = burg_path(prepared(series, order)?, order);
+        let path = burg_path(prepared(series, order)?, order, samples(series));
         Ok(path.last().cloned().unwrap_or(Self {
             coefficients: Vec::new(),
             sd: 0.0,
@@ -100,24 +100,34 @@ impl AutoRegression {
     /// # Errors
     /// As [`AutoRegression::yule_walker`], with `most` for the order.
     pub fn selected(series: &[&[f64]], most: usize) -> Result<Self, IdentError> {
-        Ok(Self::best(burg_path(prepared(series, most)?, most), series))
+        let n = samples(series);
+        Ok(Self::best(burg_path(prepared(series, most)?, most, n), n))
     }
 
     /// The same for series whose mean is known to be zero. A mean that is taken out of short series takes slow noise with it.
     ///
+    /// Whatever else was fitted and taken out takes some as well. What of it may have been noise counts in every product, and
+    /// not in the number of samples: the expectation step of restricted maximum likelihood (Dempster, Laird and Rubin 1977).
+    ///
+    /// * `taken` - series whose products add up to the covariance of what was taken out, as far as it is not known
+    ///
     /// # Errors
     /// As [`AutoRegression::selected`].
-    pub fn selected_about_zero(series: &[&[f64]], most: usize) -> Result<Self, IdentError> {
+    pub fn selected_about_zero(
+        series: &[&[f64]],
+        taken: &[&[f64]],
+        most: usize,
+    ) -> Result<Self, IdentError> {
         prepared(series, most)?;
-        let plain = series.iter().map(|s| s.to_vec()).collect();
-        Ok(Self::best(burg_path(plain, most), series))
+        let all = series.iter().chain(taken).map(|s| s.to_vec()).collect();
+        let n = samples(series);
+        Ok(Self::best(burg_path(all, most, n), n))
     }
 
-    fn best(path: Vec<Self>, series: &[&[f64]]) -> Self {
-        let n: usize = series.iter().map(|s| s.len()).sum();
+    fn best(path: Vec<Self>, samples: usize) -> Self {
         let criterion = |model: &Self| {
             let k = model.coefficients.len() as f64 + 1.0;
-            let n = n as f64;
+            let n = samples as f64;
             2.0 * n * libm::log(model.sd.max(f64::MIN_POSITIVE))
                 + 2.0 * k * n / (n - k - 1.0).max(1.0)
         };
@@ -142,11 +152,14 @@ impl AutoRegression {
     }
 }
 
-/// Burg's models of order 0, 1, … `order`.
-fn burg_path(mut forward: Vec<Vec<f64>>, order: usize) -> Vec<AutoRegression> {
+fn samples(series: &[&[f64]]) -> usize {
+    series.iter().map(|s| s.len()).sum()
+}
+
+/// Burg's models of order 0, 1, … `order` of series that stand for a number of samples.
+fn burg_path(mut forward: Vec<Vec<f64>>, order: usize, samples: usize) -> Vec<AutoRegression> {
     let mut backward = forward.clone();
-    let total: usize = forward.iter().map(Vec::len).sum();
-    let mut variance = forward.iter().fold(0.0, |sum, x| sum + dot(x, x)) / total as f64;
+    let mut variance = forward.iter().fold(0.0, |sum, x| sum + dot(x, x)) / samples as f64;
     let mut a: Vec<f64> = Vec::with_capacity(order);
     let mut path = vec![AutoRegression {
         coefficients: Vec::new(),

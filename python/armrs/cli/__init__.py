@@ -23,10 +23,21 @@ from .built_in import demo, reproduce
 from .data import convert, effects, report
 from .experiments import plan, record, simulate, sweep
 
-_VERBS: tuple[Callable[..., Any], ...] = (
-    effects, convert, demo, identify, gap, simulate, passive, plan, record, sweep, reproduce, report,
-)  # fmt: skip
-"""In the order in which the help lists them."""
+_VERBS: dict[Callable[..., Any], str] = {
+    effects: "Print the catalogue of effects.",
+    convert: "Convert between file formats; markers to angles.",
+    demo: "Do the main job on built-in data.",
+    identify: "Identify segments and joints, with intervals.",
+    gap: "Find and name what a model misses.",
+    simulate: "Simulate a robot that leads the arm.",
+    passive: "Compute passive joint moments.",
+    plan: "Propose movements, and forecast what they show.",
+    record: "Run an experiment in the virtual laboratory.",
+    sweep: "Simulate and identify many cases.",
+    reproduce: "Compute the tables and figures of the thesis.",
+    report: "Make one page of any results.",
+}
+"""With their lines in the list of commands, in its order."""
 
 app = typer.Typer(name="armrs", add_completion=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
 
@@ -55,9 +66,9 @@ def _root(
     """
 
 
-for _verb in _VERBS:
-    app.command()(_verb)
-app.add_typer(fmu.app)
+for _verb, _line in _VERBS.items():
+    app.command(short_help=_line)(_verb)
+app.add_typer(fmu.app, short_help="Export the arm for other tools; look at a unit, check it.")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -85,7 +85,7 @@ def simulate(
         )
     plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
     written = results.write_simulated(result, plain, folder, suffix=f".{to.value}", trial=measured) if folder else []
-    console.warn([*arm.warnings, *(() if reading is None else reading.warnings)])
+    console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *result.warnings])
     present(lambda: plain, json, lambda: words.simulated(plain, written))
 
 

@@ -32,7 +32,7 @@ class Fmi(str, enum.Enum):
     three = "3"
 
 
-@app.command("export")
+@app.command("export", short_help="Export an arm as a unit for co-simulation.")
 def fmu_export(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="The FMU to write; MODEL.fmu when absent.")] = None,
@@ -59,7 +59,7 @@ def fmu_export(
     present(lambda: data, json, lambda: print(written))
 
 
-@app.command("info")
+@app.command("info", short_help="Print what a unit says of itself.")
 def fmu_info(
     file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
     json: JsonFile = None,
@@ -72,7 +72,7 @@ def fmu_info(
     present(lambda: data, json, lambda: info_words(data))
 
 
-@app.command("check")
+@app.command("check", short_help="Check file, description and library of a unit.")
 def fmu_check(
     file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
     json: JsonFile = None,
@@ -99,7 +99,7 @@ def fmu_check(
     return 1 if wrong else 0
 
 
-@app.command("run")
+@app.command("run", short_help="Couple arms, units of any tool, and walls.")
 def fmu_run(
     context: typer.Context,
     system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],

@@ -245,17 +245,28 @@ def size(plays: Sequence[Mapping[str, Any]], version: str, channel: int) -> floa
 
 
 def _floor(dataset: Dataset, raw: Mapping[str, Any], channel: int, version: str) -> float | None:
-    """Return what repeats of one movement differ by, after their own simulated differences; None without repeats."""
-    square, freedom = 0.0, 0.0
+    """Return what test trials differ by from repeats of them, after their own simulated differences; None without repeats.
+
+    Their own noise, and not that of all trials: it is in what is left on them as well, so that the difference of both means something.
+    Where no test trial has a repeat, what the repeats of other movements differ by.
+    """
     groups = np.asarray(raw["groups"])
-    for group in np.unique(groups):
-        members = [k for k in np.flatnonzero(groups == group) if raw["trials"][k][version] is not None]
-        if len(members) < 2:
-            continue
-        length = min(len(dataset.trials[k]) for k in members)
-        rows = np.array([(raw["trials"][k]["measured"] - raw["trials"][k][version])[:length, channel] for k in members])
-        valid = np.all([raw["trials"][k]["counted"][:length] for k in members], axis=0)
-        deviation = (rows - rows.mean(axis=0))[:, valid]
-        square += float(np.sum(deviation**2))
-        freedom += deviation.shape[1] * (len(members) - 1)
-    return math.sqrt(square / freedom) if freedom else None
+    known = np.array([trial[version] is not None for trial in raw["trials"]])
+    test = np.array([trial.role == "test" for trial in dataset.trials])
+    for of in (test, ~test):
+        square, count = 0.0, 0
+        for group in np.unique(groups[of & known]):
+            members = np.flatnonzero((groups == group) & known)
+            n = len(members)
+            if n < 2:
+                continue
+            length = min(len(dataset.trials[k]) for k in members)
+            rows = np.array([(raw["trials"][k]["measured"] - raw["trials"][k][version])[:length, channel] for k in members])
+            valid = np.all([raw["trials"][k]["counted"][:length] for k in members], axis=0)
+            # The mean took one of n parts of the freedom.
+            deviation = math.sqrt(n / (n - 1)) * (rows - rows.mean(axis=0))[of[members]][:, valid]
+            square += float(np.sum(deviation**2))
+            count += deviation.size
+        if count:
+            return math.sqrt(square / count)
+    return None

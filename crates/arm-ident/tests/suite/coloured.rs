@@ -96,6 +96,37 @@ fn slow_noise_counts_for_few_samples() {
     assert_eq!(effective_samples(&[2.0; 10]).expect("constant"), 1.0);
 }
 
+/// Means that were taken out of short series take slow noise with them, unless what they may have been counts.
+#[test]
+fn noise_that_left_with_a_mean_is_counted() {
+    const RHO: f64 = 0.92;
+    const N: usize = 90;
+    let mut noise = Noise::new(11);
+    let series: Vec<Vec<f64>> = (0..400)
+        .map(|_| {
+            let slow = noise.slow(RHO, N);
+            let mean = slow.iter().sum::<f64>() / N as f64;
+            slow.iter().map(|v| v - mean).collect()
+        })
+        .collect();
+    let variance = (0..N).fold(1.0, |sum, k| {
+        sum + if k == 0 {
+            0.0
+        } else {
+            2.0 * (1.0 - k as f64 / N as f64) * RHO.powi(k as i32)
+        }
+    }) / N as f64;
+    let unknown = vec![variance.sqrt(); N];
+    let series: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
+    let taken = vec![unknown.as_slice(); series.len()];
+    let long = |taken: &[&[f64]]| {
+        let model = AutoRegression::selected_about_zero(&series, taken, 1).expect("long enough");
+        model.long_run_variance() * (1.0 - RHO) / (1.0 + RHO)
+    };
+    assert!(long(&[]) < 0.6, "{}", long(&[]));
+    assert!((long(&taken) - 1.0).abs() < 0.1, "{}", long(&taken));
+}
+
 #[test]
 fn refuses_what_cannot_be_fitted() {
     assert!(matches!(
