@@ -4,12 +4,13 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::anchor::Anchor;
-use crate::apart::{Apart, Line};
+use crate::apart::Apart;
 use crate::candidate::{Candidate, Library};
 use crate::fit::{Fitted, Precision};
 use crate::hypothesis::Hypothesis;
 use crate::judge::{FLOOR, Named, mimicked_by_any};
 use crate::misfit::{Lack, lack_of_fit};
+use crate::rhythm::Line;
 use crate::scan::{Choice, Scan};
 use crate::session::Sight;
 use crate::study::Study;

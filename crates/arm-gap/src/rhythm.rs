@@ -1,0 +1,385 @@
+//! Rhythms of muscles and the robot's ripple: what swings, too fast for the common band or with another phase in every trial.
+
+use std::sync::Arc;
+
+use arm_core::effect::{Effect, KINDS, Kind, Nature};
+use arm_core::{Joints, Pose, jacobian};
+use nalgebra::{DMatrix, DVector};
+
+use crate::GapError;
+use crate::anchor::Anchor;
+use crate::apart::{Apart, shapes_of};
+use crate::groups::same_rate;
+use crate::normal::factor;
+use crate::predict::{Channels, Course, smooth};
+use crate::spectrum::{coefficient, line};
+use crate::study::Study;
+
+/// Where a line is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// In what repeats differ by, where the model's own errors cancel: a rhythm of muscles has another phase in every trial.
+    BetweenRepeats,
+    /// Where tip and handle come apart: only the robot can be behind it.
+    OfTheRobot,
+}
+
+/// Slowest rhythm of muscles \[Hz\]: below it movements have power of their own.
+const SLOWEST_RHYTHM: f64 = 2.0;
+/// Slowest ripple of the robot \[Hz\].
+const SLOWEST_RIPPLE: f64 = 0.4;
+/// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
+const FASTEST_RIPPLE: f64 = 8.0;
+/// Gain below which a line is no rhythm: many frequencies and channels were looked at.
+const PLAIN: f64 = 60.0;
+/// Share of what is left in some channel that a rhythm must be.
+const SEEN: f64 = 0.05;
+/// Gain in which two explanations of a rhythm count as equal.
+const TIE: f64 = 10.0;
+/// Coherence of the phases of trials above which a rhythm is locked to their start.
+const LOCKED: f64 = 0.8;
+
+impl<const N: usize> Study<'_, N> {
+    /// Rhythms and ripple: a line in the spectrum of what is left, named by the pattern in which the channels follow.
+    ///
+    /// # Errors
+    /// [`GapError::Simulation`] where the hypothesis cannot be simulated.
+    pub fn rhythm(&self, anchor: &Anchor<N>, place: Line) -> Result<Option<Apart>, GapError> {
+        let residuals = self.raw_residuals(anchor)?;
+        let rate = self.courses[self.fitted[0]].rate;
+        if self
+            .fitted
+            .iter()
+            .any(|&t| !same_rate(self.courses[t].rate, rate))
+        {
+            return Ok(None);
+        }
+        let found = match place {
+            Line::BetweenRepeats => {
+                let differences = self.differences(&residuals);
+                let all: Vec<&Channels> = differences.iter().collect();
+                line(&all, rate, SLOWEST_RHYTHM)
+            }
+            Line::OfTheRobot => {
+                let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
+                    .map(|(residual, &trial)| self.closure(residual, trial))
+                    .collect();
+                let all: Vec<&Channels> = closures.iter().collect();
+                line(&all, rate, SLOWEST_RIPPLE)
+            }
+        };
+        let Some(frequency) = found else {
+            return Ok(None);
+        };
+        let mut best: Vec<(f64, Explained)> = Vec::new();
+        for columns in self.swings(frequency) {
+            if place == Line::OfTheRobot && columns[0].kind.probe().nature != Nature::Periodic {
+                continue;
+            }
+            if let Some(explained) = self.explain(anchor, &residuals, frequency, &columns) {
+                let worth = explained.gain - 8.0 * columns.len() as f64;
+                best.push((worth, explained));
+            }
+        }
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut list = best.into_iter();
+        // The steps of encoders sound in the springs of the contact: what looks like a fast ripple is that.
+        let sounds = |e: &Explained| {
+            e.effect.kind.probe().nature == Nature::Periodic && frequency >= FASTEST_RIPPLE
+        };
+        let Some((most, first)) = list
+            .next()
+            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && !sounds(e))
+        else {
+            return Ok(None);
+        };
+        let rivals = list
+            .filter(|(worth, other)| {
+                let same = (other.effect.kind, other.effect.index)
+                    == (first.effect.kind, first.effect.index);
+                worth + TIE > most && !same
+            })
+            .map(|(worth, other)| (other.effect, most - worth))
+            .collect();
+        Ok(Some(Apart {
+            effect: first.effect,
+            sd: first.sd,
+            trial: None,
+            gain: first.gain,
+            rivals,
+            locked: first.locked,
+            columns: first.columns,
+            sizes: first.sizes,
+        }))
+    }
+
+    /// What each trial differs by from the mean of its repeats, over the samples that all have; trials without repeats
+    /// are left out.
+    fn differences(&self, residuals: &[Channels]) -> Vec<Channels> {
+        let mut out = Vec::new();
+        for (m, &trial) in self.fitted.iter().enumerate() {
+            let group = self.group_of[trial];
+            let members: Vec<&Channels> = std::iter::zip(residuals, &self.fitted)
+                .filter(|(_, t)| self.group_of[**t] == group)
+                .map(|(r, _)| r)
+                .collect();
+            if members.len() < 2 {
+                continue;
+            }
+            let count = members.iter().map(|r| r[0].len()).min().unwrap_or(0);
+            let n = members.len() as f64;
+            let scale = libm::sqrt(n / (n - 1.0));
+            let one = |c: usize| {
+                let mean = |i: usize| members.iter().map(|r| r[c][i]).sum::<f64>() / n;
+                (0..count)
+                    .map(|i| scale * (residuals[m][c][i] - mean(i)))
+                    .collect()
+            };
+            out.push((0..self.session.channels()).map(one).collect());
+        }
+        out
+    }
+
+    /// What is left between the arm's tip and the handle, stretch of the contact taken off: y and z \[m\].
+    fn closure(&self, residual: &Channels, trial: usize) -> Channels {
+        let course = &self.courses[trial];
+        let count = residual[0].len();
+        let mut out = vec![Vec::new(); 2];
+        for i in 0..count {
+            let q = Joints::<f64, N>::from_fn(|j, _| course.seen[j][i]);
+            let moved = Joints::<f64, N>::from_fn(|j, _| residual[j][i]);
+            let tip = jacobian(&self.session.chain, &Pose::new(&q)) * moved;
+            for axis in 0..2 {
+                let stretch = residual[N + axis][i] / self.session.contact.stiffness[axis];
+                out[axis].push(tip[axis] + stretch);
+            }
+        }
+        out
+    }
+
+    /// Takes a rhythm out of the measured channels, so that it does not disturb what is fitted to them.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for channels that the filter refuses.
+    pub fn take_out(&mut self, anchor: &Anchor<N>, apart: &Apart) -> Result<(), GapError> {
+        for (sizes, &trial) in apart.sizes.iter().zip(&self.fitted.clone()) {
+            let Some(line) = anchor.lines.get(self.group_of[trial]) else {
+                continue;
+            };
+            let mut course = Course::clone(&self.courses[trial]);
+            for (k, column) in apart.columns.iter().enumerate() {
+                for quarter in [false, true] {
+                    let size = sizes[2 * k + usize::from(quarter)];
+                    let mut changed = anchor.hypothesis.clone();
+                    changed.named.push(small(column, apart.wave()[0], quarter));
+                    let Ok(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
+                        continue;
+                    };
+                    for (channel, swing) in course.raw.iter_mut().zip(&swing) {
+                        for (value, swing) in channel.iter_mut().zip(swing) {
+                            *value -= size * swing;
+                        }
+                    }
+                }
+            }
+            course.seen = smooth(&course.raw, course.band, course.rate)?;
+            self.courses[trial] = Arc::new(course);
+        }
+        Ok(())
+    }
+
+    /// What can swing at a frequency: for each explanation the effects whose swings it adds up.
+    fn swings(&self, frequency: f64) -> Vec<Vec<Effect<f64>>> {
+        let mut list = Vec::new();
+        for &kind in KINDS {
+            match kind.probe().nature {
+                Nature::Rhythm => {
+                    list.extend((0..N).map(|j| vec![swinging(kind, j, 0, frequency)]));
+                }
+                Nature::Periodic => {
+                    let axes: Vec<Effect<f64>> = kind.probe().questions[0]
+                        .free
+                        .iter()
+                        .map(|&p| swinging(kind, 0, p, frequency))
+                        .collect();
+                    list.extend(axes.iter().map(|&axis| vec![axis]));
+                    list.push(axes);
+                }
+                Nature::Lasting | Nature::Burst => {}
+            }
+        }
+        list
+    }
+
+    /// How much of the line some swings explain, with a size and phase of their own in every trial.
+    fn explain(
+        &self,
+        anchor: &Anchor<N>,
+        residuals: &[Channels],
+        frequency: f64,
+        columns: &[Effect<f64>],
+    ) -> Option<Explained> {
+        let rate = self.courses[self.fitted[0]].rate;
+        let channels = self.session.channels();
+        // The noise of each channel next to the line.
+        let beside = [-0.9, -0.6, 0.6, 0.9].map(|d| frequency + d);
+        let noise: Vec<f64> = (0..channels)
+            .map(|c| {
+                let powers = residuals.iter().flat_map(|r| {
+                    beside
+                        .iter()
+                        .map(move |&f| coefficient(&r[c], f, rate))
+                        .map(|[a, b]| a * a + b * b)
+                });
+                let (sum, count) = powers.fold((0.0, 0.0), |(s, n), p| (s + p, n + 1.0));
+                f64::max(sum / f64::max(count, 1.0), 1e-30)
+            })
+            .collect();
+        let swing = |group: usize| -> Option<Vec<Vec<[f64; 2]>>> {
+            let line = anchor.lines.get(group)?;
+            columns
+                .iter()
+                .map(|effect| {
+                    let mut changed = anchor.hypothesis.clone();
+                    changed.named.push(small(effect, frequency, false));
+                    let response = line.response_raw(&changed, UNIT, (false, false)).ok()?;
+                    let swings = response.iter().map(|c| coefficient(c, frequency, rate));
+                    Some(swings.collect())
+                })
+                .collect()
+        };
+        let swings = self.parallel(self.references.len(), swing);
+        let k = columns.len();
+        let (mut gain, mut sizes) = (0.0, Vec::new());
+        let mut information = 0.0;
+        for (residual, &trial) in residuals.iter().zip(&self.fitted) {
+            let swings = swings[self.group_of[trial]].as_ref()?;
+            // Complex least squares as real ones: each column turned by 0 and by 90°.
+            let mut gram = DMatrix::zeros(2 * k, 2 * k);
+            let mut score = DVector::zeros(2 * k);
+            for c in 0..channels {
+                let seen = coefficient(&residual[c], frequency, rate);
+                let turned: Vec<[f64; 2]> = swings
+                    .iter()
+                    .flat_map(|s| [s[c], [-s[c][1], s[c][0]]])
+                    .collect();
+                for (a, x) in turned.iter().enumerate() {
+                    score[a] += (x[0] * seen[0] + x[1] * seen[1]) / noise[c];
+                    for (b, y) in turned.iter().enumerate() {
+                        gram[(a, b)] += (x[0] * y[0] + x[1] * y[1]) / noise[c];
+                    }
+                }
+            }
+            information += gram[(0, 0)];
+            let solution = factor(gram)?.solve(&score);
+            gain += 2.0 * solution.dot(&score);
+            sizes.push(solution);
+        }
+        let share = (0..channels)
+            .map(|c| {
+                let (mut line, mut all) = (0.0, 0.0);
+                for residual in residuals {
+                    let [a, b] = coefficient(&residual[c], frequency, rate);
+                    let count = residual[c].len() as f64;
+                    line += 0.5 * (a * a + b * b);
+                    let mean = residual[c].iter().sum::<f64>() / count;
+                    all += residual[c]
+                        .iter()
+                        .map(|v| (v - mean) * (v - mean))
+                        .sum::<f64>()
+                        / count;
+                }
+                line / f64::max(all, 1e-300)
+            })
+            .fold(0.0, f64::max);
+        let n = sizes.len() as f64;
+        let size = |a: usize| {
+            let square = |s: &DVector<f64>| s[2 * a] * s[2 * a] + s[2 * a + 1] * s[2 * a + 1];
+            libm::sqrt(sizes.iter().map(square).sum::<f64>() / n)
+        };
+        let mean = |i: usize| sizes.iter().map(|s| s[i]).sum::<f64>() / n;
+        let coherence = libm::hypot(mean(0), mean(1)) / size(0).max(1e-300);
+        let locked = coherence > LOCKED;
+        let phase = if locked {
+            libm::atan2(mean(1), mean(0))
+        } else {
+            libm::atan2(sizes[0][1], sizes[0][0])
+        };
+        // The columns are cosines, the kinds are sines.
+        let phase = phase + 0.5 * core::f64::consts::PI;
+        let mut effect = columns[0];
+        for (a, column) in columns.iter().enumerate() {
+            let p = size_of(column);
+            // Two axes swing in step or against each other.
+            let sign = if a > 0 && mean(0) * mean(2 * a) + mean(1) * mean(2 * a + 1) < 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
+            effect.parameters[p] = sign * size(a);
+        }
+        let [f, ph] = shapes_of(effect.kind);
+        effect.parameters[f] = frequency;
+        effect.parameters[ph] = phase;
+        Some(Explained {
+            effect,
+            sd: 1.0 / libm::sqrt(2.0 * information.max(1e-300)),
+            gain,
+            locked,
+            sizes: sizes.iter().map(|s| s.iter().copied().collect()).collect(),
+            columns: columns.to_vec(),
+            share,
+        })
+    }
+}
+
+struct Explained {
+    effect: Effect<f64>,
+    sd: f64,
+    gain: f64,
+    locked: bool,
+    sizes: Vec<Vec<f64>>,
+    columns: Vec<Effect<f64>>,
+    /// Largest share of the variance of a channel's residual.
+    share: f64,
+}
+
+/// The size with which swings are tried.
+const UNIT: f64 = 1e-3;
+
+/// Position of the size that is one in a swing.
+fn size_of(swing: &Effect<f64>) -> usize {
+    let free = free_of(swing.kind);
+    let one = free.iter().find(|&&p| swing.parameters[p] == 1.0);
+    one.copied().unwrap_or(free[0])
+}
+
+/// A swing of a small size, a quarter of a period earlier on demand.
+fn small(swing: &Effect<f64>, frequency: f64, earlier: bool) -> Effect<f64> {
+    let mut effect = *swing;
+    effect.parameters[size_of(swing)] = UNIT;
+    let [f, phase] = shapes_of(swing.kind);
+    effect.parameters[f] = frequency;
+    if earlier {
+        effect.parameters[phase] += 0.5 * core::f64::consts::PI;
+    }
+    effect
+}
+
+fn free_of(kind: Kind) -> &'static [usize] {
+    kind.probe().questions[0].free
+}
+
+/// A kind that swings with one of its sizes at one, the others at zero.
+fn swinging(kind: Kind, index: usize, size: usize, frequency: f64) -> Effect<f64> {
+    let mut effect = Effect::new(kind, index);
+    for &p in free_of(kind) {
+        effect.parameters[p] = 0.0;
+    }
+    effect.parameters[size] = 1.0;
+    let [f, phase] = shapes_of(kind);
+    effect.parameters[f] = frequency;
+    // The swing as a cosine, so that its coefficient is real.
+    effect.parameters[phase] = 0.5 * core::f64::consts::PI;
+    effect
+}
