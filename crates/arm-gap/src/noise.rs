@@ -61,19 +61,11 @@ impl Noise {
         told: &[f64],
     ) -> Result<Self, GapError> {
         let channels = range.len();
-        let least = |c: usize| (LEAST * range[c]).max(1e-12);
-        let noisy: Vec<Vec<Vec<f64>>> = deviations
-            .iter()
-            .enumerate()
-            .map(|(s, series)| {
-                let each = series.iter().enumerate();
-                each.map(|(c, values)| roughened(values, least(c), s * channels + c))
-                    .collect()
-            })
-            .collect();
         let mut whiteners = Vec::with_capacity(channels);
-        for c in 0..channels {
-            let series: Vec<&[f64]> = noisy.iter().map(|d| d[c].as_slice()).collect();
+        for (c, range) in range.iter().enumerate() {
+            let least = (LEAST * range).max(1e-12);
+            let noisy: Vec<Vec<f64>> = deviations.iter().map(|d| roughened(&d[c], least)).collect();
+            let series: Vec<&[f64]> = noisy.iter().map(Vec::as_slice).collect();
             let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
             let model = if varies {
                 let taken: Vec<&[f64]> = taken.iter().map(|d| d[c].as_slice()).collect();
@@ -83,14 +75,14 @@ impl Noise {
             } else {
                 AutoRegression {
                     coefficients: Vec::new(),
-                    sd: least(c),
+                    sd: least,
                 }
             };
             whiteners.push(Whitener::new(&model)?);
         }
         let mut correlation = vec![0.0; channels * channels];
         let count: usize = deviations.iter().map(|d| d[0].len()).sum();
-        for series in noisy.iter().chain(taken) {
+        for series in deviations.iter().chain(taken) {
             let mut white = series.clone();
             for (values, whitener) in white.iter_mut().zip(&whiteners) {
                 whitener.apply(values);
@@ -106,6 +98,8 @@ impl Noise {
                 let both = count as f64 * f64::min(told[a], told[b]);
                 correlation[a * channels + b] /= f64::max(both, 1.0);
             }
+            // The white noise that is believed in belongs to each channel alone.
+            correlation[a * (channels + 1)] = correlation[a * (channels + 1)].max(1.0);
         }
         Ok(Self {
             whiteners,
@@ -198,11 +192,9 @@ impl Noise {
     }
 }
 
-/// A series with white noise of a given size on it, the same in every run and another one for each `stream`.
-fn roughened(series: &[f64], size: f64, stream: usize) -> Vec<f64> {
-    // Weyl's sequence: the golden ratio in 64 bits sets neighbouring streams far apart.
-    const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-    let mut state = GOLDEN.wrapping_mul(stream as u64 + 1);
+/// A series with white noise of a given size on it, the same in every run.
+fn roughened(series: &[f64], size: f64) -> Vec<f64> {
+    let mut state: u64 = 0x9e37_79b9_7f4a_7c15;
     let mut uniform = || {
         // Knuth's multiplier; the upper bits are good enough for a floor of noise.
         state = state
