@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.dataset import Dataset
+from armrs.discrepancy import compare
 from armrs.discrepancy.results import gap_data, write_gap
 from armrs.discrepancy.shapes import portrait
 from armrs.discrepancy.suspicion import examine
@@ -132,6 +134,7 @@ def changed(data: Dataset, **columns: object) -> Dataset:
         ({"force_on_arm": lambda f: -f}, "force_on"),
         ({"force_on_arm": lambda f: 1000.0 * f}, "mN"),
         ({"force_on_arm": lambda f: f[:, ::-1]}, "swapped"),
+        ({"force_on_arm": lambda f: f * [1.0, -1.0]}, "^Fz_N: found the opposite"),
         ({"q": lambda q: q * [57.29578, 57.29578]}, "degrees"),
         ({"force_on_arm": lambda f: f * [1.0, 0.0]}, "in every sample"),
     ],
@@ -139,6 +142,27 @@ def changed(data: Dataset, **columns: object) -> Dataset:
 def test_what_only_a_label_can_explain_is_refused(columns: dict[str, object], word: str) -> None:
     with pytest.raises(BadInput, match=word):
         armrs.find_gap(changed(session(), **columns))
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [(lambda f: -f, r"_1\.csv: force_on: found"), (lambda f: 1e-3 * f, r"_1\.csv: Fy_N, Fz_N: found 0\.0.* kN labelled as N")],
+)
+def test_one_trial_with_another_label_is_refused(change: Callable[[np.ndarray], np.ndarray], word: str) -> None:
+    data = session()
+    first, *rest = data.trials
+    other = data.replace(trials=(dataclasses.replace(first, force_on_arm=change(first.force_on_arm)), *rest))
+    for function in (armrs.find_gap, compare):
+        with pytest.raises(BadInput, match=word):
+            function(other)
+
+
+def test_without_repeats_a_movement_that_separates_rivals_is_found() -> None:
+    """The samples of a planned movement weigh the same, however those of the trials that were made weigh."""
+    data = session(armrs.Effect("stribeck", 2, parameters={"torque": 0.3, "speed": 0.2}))
+    found = armrs.find_gap(data.replace(trials=tuple(t for t in data.trials if t.repeat in (1, 4))), threads=2)
+    assert found.effects[0].kind == "stribeck" and found.effects[0].joint == 2
+    assert any(a.separating_movement for a in found.effects[0].alternatives)
 
 
 @pytest.mark.parametrize("share", [0.6, 0.9])

@@ -59,6 +59,7 @@ impl<const N: usize> Study<'_, N> {
                 .filter_map(see)
                 .collect();
             let others = self.repeats_of(m);
+            let shrink = shrunk(others.len());
             for one in &asked {
                 let along = dot(&one.row, &deviations[m]);
                 // Of two repeats both deviate alike: the disturbed one is further from the model.
@@ -80,10 +81,10 @@ impl<const N: usize> Study<'_, N> {
                 let gain = gain / scatter;
                 if gain > least {
                     let mut effect = one.effect;
-                    effect.parameters[0] = size;
+                    effect.parameters[0] = size / shrink;
                     best = Some(Apart {
                         effect,
-                        sd: libm::sqrt(scale * scatter / one.square),
+                        sd: libm::sqrt(scale * scatter / one.square) / shrink,
                         trial: Some(trial),
                         gain,
                         rivals: Vec::new(),
@@ -138,7 +139,7 @@ impl<const N: usize> Study<'_, N> {
             return white[m].clone();
         }
         let n = others.len() as f64;
-        let shrink = 1.0 / libm::sqrt(1.0 + 1.0 / n);
+        let shrink = shrunk(others.len());
         (0..white[m].len())
             .map(|i| {
                 let mean = others.iter().map(|&o| white[o][i]).sum::<f64>() / n;
@@ -200,6 +201,14 @@ impl<const N: usize> Study<'_, N> {
             }
         }
         list
+    }
+}
+
+/// Factor by which the difference of a trial and the mean of some repeats has the noise of one trial; one without repeats.
+fn shrunk(repeats: usize) -> f64 {
+    match repeats {
+        0 => 1.0,
+        n => 1.0 / libm::sqrt(1.0 + 1.0 / n as f64),
     }
 }
 

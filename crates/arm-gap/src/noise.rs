@@ -143,6 +143,14 @@ impl Noise {
         Ok(noise)
     }
 
+    /// The same for other trials than those it was read off: there every sample weighs the same.
+    pub fn of_others(&self) -> Self {
+        Self {
+            weights: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
     pub fn whiten(&self, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
         let picked = stretches.pick(channels);

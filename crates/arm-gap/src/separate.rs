@@ -91,7 +91,7 @@ impl<'a, const N: usize> Contest<'a, N> {
                     trials: vec![trial.clone()],
                     ..self.study.session.clone()
                 };
-                let mut study = Study::with_noise(&session, self.study.noise.clone(), 1)?;
+                let mut study = Study::with_noise(&session, self.study.noise.of_others(), 1)?;
                 let anchor = rested(&mut study, &self.named)?;
                 clusters(&self.rivals, &study, &anchor)?
             }

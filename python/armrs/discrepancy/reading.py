@@ -23,6 +23,8 @@ Coloured noise is never quite white, and nulls reach 4.3.
 """
 _NEGLIGIBLE = 0.05
 """Share of the calibrated model's lack of fit that may be left where effects were named: shapes are never exact."""
+_NEAR_NOISE = 2.0
+"""Misfit for each degree of freedom beyond which no share is negligible: what is left is then larger than the noise."""
 
 
 def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequence[str]) -> GapFound:
@@ -32,7 +34,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
     effects = tuple(sorted((*together, *apart), key=lambda e: -e.share))
     (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
-    if after_z >= MISFIT and not (effects and share < _NEGLIGIBLE):
+    if after_z >= MISFIT and not (effects and share < _NEGLIGIBLE and after_ratio < _NEAR_NOISE):
         verdict = "unexplained"
     else:
         verdict = "explained" if effects else "nothing_missing"

@@ -101,6 +101,7 @@ def compare(dataset: Source, model: Model | None = None) -> Compared:
     led = reading.is_led(data)
     warnings = suspicion.examine(data, led)
     plays = _armrs.play(rig(data.model), core_trials(data), core_settings(data, led, 1))
+    suspicion.refuse_mislabelled(data, led, plays)
     known = [p for p in plays if p["given"] is not None]
     trials = [t for t, p in zip(data.trials, plays, strict=True) if p["given"] is not None]
     found = maps.discrepancies(data.replace(trials=tuple(trials)), led, known, "given") if trials else []

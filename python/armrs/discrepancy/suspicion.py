@@ -93,30 +93,44 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
     Raises
     ------
     BadInput
-        Forces wrong by 1000, with reversed sign, or with swapped channels.
+        Forces wrong by 1000, with reversed sign, or with swapped channels, in all trials together or in one.
     """
     if not led:
         return
     n = dataset.model.n_joints
-    measured = np.concatenate([p["measured"] for p in plays if p["given"] is not None])
-    given = np.concatenate([p["given"] for p in plays if p["given"] is not None])
-    if not len(measured):
+    pairs = zip(dataset.trials, plays, strict=True)
+    shown = [(trial.file, p["measured"][:, n:], p["given"][:, n:]) for trial, p in pairs if p["given"] is not None]
+    if not shown:
         return
-    forces, expected = measured[:, n:], given[:, n:]
+    _refuse_forces(dataset, np.concatenate([f for _, f, _ in shown]), np.concatenate([e for _, _, e in shown]))
+    # One trial alone may be labelled otherwise than the rest.
+    for file, forces, expected in shown:
+        _refuse_forces(dataset, forces, expected, f"{file}: ")
+
+
+def _refuse_forces(dataset: Dataset, forces: np.ndarray, expected: np.ndarray, at: str = "") -> None:
+    """Refuse forces, (n_samples, 2), that are those expected of the arm in another unit, order or direction."""
     size, usual = np.sqrt(np.mean(forces**2)), np.sqrt(np.mean(expected**2))
     for factor, unit in ((1000.0, "mN labelled as N"), (0.001, "kN labelled as N")):
         if usual > 0 and abs(np.log10(size / usual / factor)) < 0.5:
-            raise BadInput(
-                "Fy_N, Fz_N", Text(f"{size:.3g} N on average where the model expects {usual:.3g} N"), f"forces in newtons ({unit}?)"
-            )
+            found = f"{size:.3g} N on average where the model expects {usual:.3g} N"
+            raise BadInput(f"{at}Fy_N, Fz_N", Text(found), f"forces in newtons ({unit}?)")
     own = [_correlation(forces[:, c], expected[:, c]) for c in (0, 1)]
     cross = [_correlation(forces[:, c], expected[:, 1 - c]) for c in (0, 1)]
-    same = float(np.sum(forces * expected) / max(np.sqrt(np.sum(forces**2) * np.sum(expected**2)), 1e-300))
-    if same < -_ALIKE:
+    if _alike(forces, expected) < -_ALIKE:
         found = f"force_on = {dataset.force_on!r} with forces opposite to those that carry the arm"
-        raise BadInput("force_on", Text(found), '"arm" or "robot", whichever the force acts on')
+        raise BadInput(f"{at}force_on", Text(found), '"arm" or "robot", whichever the force acts on')
+    for c, name in enumerate(("Fy_N", "Fz_N")):
+        # Both in its mean and in how it changes: a bias turns the one, a law of speed the other.
+        if own[c] < -_ALIKE and _alike(forces[:, c], expected[:, c]) < -_ALIKE:
+            raise BadInput(f"{at}{name}", Text("the opposite of what carries the arm"), "Fy along the horizontal, Fz up: a reversed axis?")
     if min(cross) > _ALIKE and max(own) < 0.7:
-        raise BadInput("Fy_N, Fz_N", Text("each follows what the other should be"), "Fy along the horizontal, Fz up: swapped columns?")
+        raise BadInput(f"{at}Fy_N, Fz_N", Text("each follows what the other should be"), "Fy along the horizontal, Fz up: swapped columns?")
+
+
+def _alike(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the cosine of the angle between two signals, means included."""
+    return float(np.sum(a * b) / max(np.sqrt(np.sum(a**2) * np.sum(b**2)), 1e-300))
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:

@@ -67,7 +67,7 @@ def verdict(result: Mapping[str, Any]) -> str:
     listed = names[0] if len(names) == 1 else "; ".join(names)
     lacks = f"The model lacks {listed}." if len(names) == 1 else f"The model lacks {len(names)} things: {listed}."
     if result["verdict"] == "explained":
-        rest = f"With {'it' if len(names) == 1 else 'them'}, what is left is noise." if is_tested else _UNTESTED
+        rest = f"With {'it' if len(names) == 1 else 'them'}, {_left(result)}." if is_tested else _UNTESTED
         return f"{lacks} {rest}{_judged(result)}"
     rest = "something is missing that the catalogue has no name for"
     looks = result["unexplained"]["looks_like"]
@@ -75,12 +75,20 @@ def verdict(result: Mapping[str, Any]) -> str:
     return (f"{lacks} Beyond that, {rest}." if names else f"{rest[0].upper()}{rest[1:]}.") + tail + _judged(result)
 
 
+def _left(result: Mapping[str, Any]) -> str:
+    """Say what is left where effects explain the data."""
+    if result["lack_of_fit"]["amended"]["z"] < MISFIT:
+        return "what is left is noise"
+    return f"{max(result['unexplained']['share'], 0.001):.1%} of the misfit is left, less than the noise: the laws are not exact"
+
+
 def _judged(result: Mapping[str, Any]) -> str:
     """Say what the names are worth on the test trials, by the channel that gained most."""
     seen = {n: g for n, g in result["gap"].items() if None not in (g["calibrated"], g["after"]) and g["calibrated"]}
     if not seen or not any(not e.get("trial") for e in result["effects"]):
         return ""
-    name = max(seen, key=lambda n: seen[n]["calibrated"] / max(seen[n]["after"], 1e-300))
+    # Not by what calibration alone has spoilt.
+    name = max(seen, key=lambda n: min(seen[n]["before"] or seen[n]["calibrated"], seen[n]["calibrated"]) / max(seen[n]["after"], 1e-300))
     gap = seen[name]
     quantity, held_in = name.rsplit("_", 1)
     held_in = {"Nm": "N m"}.get(held_in, held_in)
