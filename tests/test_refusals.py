@@ -269,6 +269,10 @@ def test_a_unit_like_no_other_gets_no_guess(slow_arm: Path, tmp_path: Path, caps
 ARM = ([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])
 
 
+def five_segments() -> armrs.Model:
+    return armrs.Model(tuple(armrs.Segment(f"s{k}", 0.2, 1.0, 0.1, 0.01) for k in range(5)), tuple(armrs.Joint(f"j{k}") for k in range(5)))
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -294,7 +298,7 @@ ARM = ([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])
         (lambda: armrs.identify(3), "dataset: found 3, allowed a Dataset or a path"),
         (lambda: armrs.simulate(true_model()), "duration: found none"),
         (
-            lambda: armrs.simulate(armrs.Model((armrs.Segment("s", 0.2, 1.0, 0.1, 0.01),) * 5), duration=0.1),
+            lambda: armrs.simulate(five_segments(), duration=0.1),
             r"segment\]\]: found 5, allowed 1 to 4",
         ),
         (lambda: armrs.simulate(true_model(), duration=0.1, start=np.zeros(3)), "start angles: found 3 values, allowed 2"),

@@ -36,6 +36,8 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
     if after_z >= MISFIT and not (effects and share < _NEGLIGIBLE and after_ratio < _NEAR_NOISE):
         verdict = "unexplained"
+        # An interval rests on the structure, and that was rejected.
+        effects = tuple(_without_intervals(effect) for effect in effects)
     else:
         verdict = "explained" if effects else "nothing_missing"
     return GapFound(
@@ -54,6 +56,11 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         dataset=dataset,
         raw=raw,
     )
+
+
+def _without_intervals(effect: Missing) -> Missing:
+    values = {name: dataclasses.replace(value, std=None) for name, value in effect.parameters.items()}
+    return dataclasses.replace(effect, parameters=values)
 
 
 def is_led(dataset: Dataset) -> bool:
