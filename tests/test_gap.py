@@ -165,6 +165,15 @@ def test_without_repeats_a_movement_that_separates_rivals_is_found() -> None:
     assert any(a.separating_movement for e in found.effects for a in e.alternatives)
 
 
+def test_a_gap_that_keeps_repeats_from_being_compared_is_warned_of() -> None:
+    data = session()
+    first, *rest = data.trials
+    lost = np.arange(len(first.t)) // 40 != 3
+    assert examine(data, led=True) == []
+    [line] = examine(data.replace(trials=(dataclasses.replace(first, valid=lost), *rest)), led=True)
+    assert line.startswith(f"samples are missing in {first.file}: repeats of 'slow' are not compared")
+
+
 @pytest.mark.parametrize("share", [0.6, 0.9])
 def test_a_cut_off_channel_is_warned_of(share: float) -> None:
     data = session()

@@ -10,6 +10,7 @@ import numpy as np
 from ..dataset import Dataset
 from ..errors import BadInput, Text
 from ..plausibility import constant, refuse_implausible
+from ..trial import Trial
 
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
@@ -44,7 +45,19 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
             if level:  # zero is an arm that swings freely
                 found = Text(f"{level:g} N m in every sample")
                 raise BadInput(f"column {name}", found, "a torque that changes with the movement", file=trial.file, hint="a dead sensor?")
-    return lines + _saturated(dataset, led)
+    return lines + _uneven_repeats(fit) + _saturated(dataset, led)
+
+
+def _uneven_repeats(trials: Sequence[Trial]) -> list[str]:
+    """Return the movements whose repeats have no common samples, since a gap of one of them was too long to be bridged."""
+    lines = []
+    for name in dict.fromkeys(t.configuration for t in trials):
+        own = [t for t in trials if t.configuration == name]
+        broken = [t for t in own if not t.valid.all()]
+        if any(not np.array_equal(t.valid, broken[0].valid) for t in own if broken):
+            files = ", ".join(t.file for t in broken)
+            lines.append(f"samples are missing in {files}: repeats of {name!r} are not compared, and no noise is read off them")
+    return lines
 
 
 def _saturated(dataset: Dataset, led: bool) -> list[str]:
