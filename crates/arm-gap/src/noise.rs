@@ -56,7 +56,8 @@ impl Noise {
     /// # Errors
     /// [`GapError::Numerics`] for series too short.
     pub fn of(
-        (deviations, taken): (&[Vec<Vec<f64>>], &[Vec<Vec<f64>>]),
+        deviations: &[Vec<Vec<f64>>],
+        taken: &[Vec<Vec<f64>>],
         range: &[f64],
         told: &[f64],
     ) -> Result<Self, GapError> {
@@ -304,7 +305,7 @@ mod tests {
         let series: Vec<Vec<Vec<f64>>> = (0..400)
             .map(|_| (0..CHANNELS).map(|_| slow()).collect())
             .collect();
-        let noise = Noise::of((&series, &[]), &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
+        let noise = Noise::of(&series, &[], &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
         for c in 0..CHANNELS {
             let squares = series.iter().map(|s| {
                 let sum: f64 = noise.whiten_thinned(s)[c * N..(c + 1) * N].iter().sum();

@@ -219,7 +219,7 @@ impl<'a, const N: usize> Study<'a, N> {
             .iter()
             .map(|c| c.prior.map_or(f64::INFINITY, |(_, sd)| sd))
             .collect();
-        let mut noise = Noise::of((deviations, &[]), range, told)?;
+        let mut noise = Noise::of(deviations, &[], range, told)?;
         for _ in 0..TURNS {
             if known.is_empty() {
                 break;
@@ -249,7 +249,7 @@ impl<'a, const N: usize> Study<'a, N> {
                     series
                 }));
             }
-            noise = Noise::of((&clean, &taken), range, told)?;
+            noise = Noise::of(&clean, &taken, range, told)?;
         }
         Ok(noise)
     }

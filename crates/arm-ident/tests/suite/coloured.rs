@@ -109,13 +109,12 @@ fn noise_that_left_with_a_mean_is_counted() {
             slow.iter().map(|v| v - mean).collect()
         })
         .collect();
-    let variance = (0..N).fold(1.0, |sum, k| {
-        sum + if k == 0 {
-            0.0
-        } else {
-            2.0 * (1.0 - k as f64 / N as f64) * RHO.powi(k as i32)
-        }
-    }) / N as f64;
+    let (mut sum, mut correlation) = (1.0, 1.0);
+    for k in 1..N {
+        correlation *= RHO;
+        sum += 2.0 * (1.0 - k as f64 / N as f64) * correlation;
+    }
+    let variance: f64 = sum / N as f64;
     let unknown = vec![variance.sqrt(); N];
     let series: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
     let taken = vec![unknown.as_slice(); series.len()];
