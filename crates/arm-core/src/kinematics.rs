@@ -20,12 +20,7 @@ impl<T: Scalar, const N: usize> Pose<T, N> {
     // Always, so that a loop which is compiled for wider vectors takes it along.
     #[inline(always)]
     pub fn new(q: &Joints<T, N>) -> Self {
-        let mut angle = T::ZERO;
-        let (mut sin, mut cos) = ([T::ZERO; N], [T::ONE; N]);
-        for i in 0..N {
-            angle += q[i];
-            (sin[i], cos[i]) = angle.sin_cos();
-        }
+        let [sin, cos] = T::sines_and_cosines(&to_links(q));
         Self { sin, cos }
     }
 

@@ -4,7 +4,7 @@ use core::array::from_fn;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use crate::scalar::Scalar;
-use crate::series::{DOUBLE, LARGEST_REDUCED, exp, reduced_sin_cos, tanh, turned};
+use crate::series::{exp, tanh};
 
 /// `L` numbers that are computed with together; each lane has the bits of the same computation in `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,18 +94,7 @@ impl<const L: usize> Scalar for Lanes<L> {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         // One loop over lanes and not lanes within each operation: the compiler then uses the widest vectors.
-        let (mut sin, mut cos) = ([0.0; L], [0.0; L]);
-        let mut small = true;
-        for i in 0..L {
-            let x = self.0[i];
-            (sin[i], cos[i]) = turned(reduced_sin_cos(x, &DOUBLE));
-            small &= f64::abs(x) <= LARGEST_REDUCED;
-        }
-        if !small {
-            for i in 0..L {
-                (sin[i], cos[i]) = Scalar::sin_cos(self.0[i]);
-            }
-        }
+        let [sin, cos] = f64::sines_and_cosines(&self.0);
         (Self(sin), Self(cos))
     }
     #[inline(always)]

@@ -60,7 +60,7 @@ pub use kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_vel
 pub use lanes::Lanes;
 pub use regressor::{Regressor, regressor};
 pub use robot::{Elbow, Robot};
-pub use scalar::{Real, Scalar, sines_and_cosines};
+pub use scalar::{Real, Scalar};
 pub use setup::{Reading, Setup};
 pub use trajectory::{Limits, Path, Profile, Route, Sample, Shape};
 

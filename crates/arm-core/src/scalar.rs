@@ -52,6 +52,15 @@ pub trait Scalar:
     /// ±0.8, 1.45 within ±10³, 2.1 within ±10⁵ (absolute 1.5·10⁻¹⁶), beyond which `libm` takes over; in single precision
     /// 7·10⁻⁸ absolute, and NaN beyond 10⁸, where no angle can be told.
     fn sin_cos(self) -> (Self, Self);
+    /// [`Scalar::sin_cos`] of several angles \[rad\]: all sines, all cosines.
+    #[inline(always)]
+    fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
+        let [mut sines, mut cosines] = [[Self::ZERO; K]; 2];
+        for i in 0..K {
+            (sines[i], cosines[i]) = angles[i].sin_cos();
+        }
+        [sines, cosines]
+    }
     /// Exponential; within 1 unit in the last place of `libm`, zero below −708.
     fn exp(self) -> Self;
     /// Hyperbolic tangent; within 3 units in the last place of `libm`.
@@ -133,25 +142,6 @@ fn far_sin_cos(x: f64) -> (f64, f64) {
     libm::sincos(x)
 }
 
-/// Sines and cosines of many angles \[rad\], with the bits of [`Scalar::sin_cos`]: in one pass without a branch, which the
-/// compiler makes for several at once.
-#[inline(always)]
-pub fn sines_and_cosines<const K: usize>(angles: &[f64; K]) -> [[f64; K]; 2] {
-    let [mut sines, mut cosines] = [[0.0; K]; 2];
-    let mut beyond = 0;
-    for i in 0..K {
-        (sines[i], cosines[i]) = turned(reduced_sin_cos(angles[i], &DOUBLE));
-        let within = f64::abs(angles[i]) <= LARGEST_REDUCED;
-        beyond |= u64::from(!within);
-    }
-    if beyond != 0 {
-        for i in 0..K {
-            (sines[i], cosines[i]) = Scalar::sin_cos(angles[i]);
-        }
-    }
-    [sines, cosines]
-}
-
 /// Beyond 10⁸ neighbouring numbers are more than a turn apart: no angle, and NaN.
 #[cold]
 #[inline(never)]
@@ -197,6 +187,22 @@ impl Scalar for f64 {
         } else {
             far_sin_cos(self)
         }
+    }
+    /// In one pass without a branch, which the compiler makes for several at once.
+    #[inline(always)]
+    fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
+        let [mut sines, mut cosines] = [[0.0; K]; 2];
+        let mut within = true;
+        for i in 0..K {
+            (sines[i], cosines[i]) = turned(reduced_sin_cos(angles[i], &DOUBLE));
+            within &= f64::abs(angles[i]) <= LARGEST_REDUCED;
+        }
+        if !within {
+            for i in 0..K {
+                (sines[i], cosines[i]) = Scalar::sin_cos(angles[i]);
+            }
+        }
+        [sines, cosines]
     }
     #[inline]
     fn exp(self) -> Self {

@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use arm_core::{Chain, Plane, Robot, sines_and_cosines};
+use arm_core::{Chain, Plane, Robot, Scalar};
 
 use crate::movement::Way;
 use crate::{Interpolation, Jet, JointMotion, Movement, Series, SimulationError};
@@ -205,7 +205,7 @@ fn tip_motion<const P: usize, const N: usize>(
             speed[t] += qd;
             acceleration[t] += qdd;
         }
-        let [sin, cos] = sines_and_cosines(&angle);
+        let [sin, cos] = f64::sines_and_cosines(&angle);
         for t in 0..P {
             let [y, z] = [segment.length * cos[t], segment.length * sin[t]];
             let inward = speed[t] * speed[t];
