@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -32,6 +33,17 @@ def test_the_same_seed_gives_the_same_plan_within_what_is_allowed() -> None:
         assert np.hypot(*run.force_on_arm.T).max() <= 1.01 * LIMITS.force
         assert run.t[-1] <= LIMITS.duration
         assert np.abs(run.columns["robot_qd"]).max() <= 1.01 * LIMITS.robot_speed
+        assert np.abs(run.columns["robot_qdd"]).max() <= 1.01 * LIMITS.robot_acceleration
+
+
+def test_a_plan_respects_the_acceleration_of_the_robot() -> None:
+    arm = check_plan.truth()
+    free = armrs.plan(arm, LIMITS, evaluations=20)
+    most = 0.5 * free.robot_acceleration
+    gentle = armrs.plan(arm, dataclasses.replace(LIMITS, robot_acceleration=most), evaluations=60)
+    assert 0.0 < gentle.robot_acceleration <= most < free.robot_acceleration
+    asked = [np.abs(armrs.simulate(arm, m).columns["robot_qdd"]).max() for m in gentle.movements]
+    assert max(asked) == pytest.approx(gentle.robot_acceleration, rel=0.02)
 
 
 def test_more_trials_narrow_what_noise_alone_widens() -> None:
@@ -112,6 +124,7 @@ def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture
         (["--angles-deg=-80,20:110"], "--angles-deg: found '-80', allowed LOW:HIGH in degrees"),
         (["--angles-deg=-10:-80,20:110"], "angles of joint 1: found -0.174533 to -1.39626 rad, allowed the smaller angle first"),
         (["--angles-deg=-80:-10,20:110", "--speed-rad-s", "nan"], "--speed-rad-s: found nan"),
+        (["--angles-deg=-80:-10,20:110", "--robot-acceleration-rad-s2", "0"], "--robot-acceleration-rad-s2: found 0"),
         (["--angles-deg=-80:-10,20:110", "--repeats", "0"], "repeats: found 0"),
         (["--angles-deg=-80:-10,20:110", "--with", "frition"], "nearest known"),
     ],
@@ -121,6 +134,33 @@ def test_refuses(tmp_path: Path, options: list[str], message: str, capsys: pytes
     assert main(["plan", str(tmp_path / "model.toml"), *options, "-o", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert message in error and error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+FAR = "waypoints_deg = [[60, 0], [80, 0]]\n"
+STILL = "waypoints_deg = [[-60, 60], [-60, 60]]\n"
+
+
+@pytest.mark.parametrize(("table", "message"), [(FAR, "handle at 0 s: found "), (STILL, "length of the movement [s]: found 0")])
+def test_a_movement_that_cannot_be_made_is_refused_with_its_file(
+    tmp_path: Path, table: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, out = tmp_path / "model.toml", ["-o", str(tmp_path / "out")]
+    check_plan.truth().write(model)
+    (tmp_path / "movement.toml").write_text(f"[movement]\n{table}", encoding="utf-8")
+    (tmp_path / "experiment.toml").write_text(f'model = "model.toml"\n[[movement]]\nconfiguration = "a"\n{table}', encoding="utf-8")
+    movement = str(tmp_path / "movement.toml")
+    asked = [
+        ("movement.toml: ", ["simulate", str(model), "--movement", movement]),
+        ("experiment.toml: [[movement]] 1 (a), ", ["record", str(tmp_path / "experiment.toml")]),
+    ]
+    if table == FAR:  # of one that rests a forecast can be made: it shows little
+        limits = ["--angles-deg=-80:-10,20:110", "--evaluations", "1"]
+        asked.append(("movement.toml: ", ["plan", str(model), *limits, "--compare", movement]))
+    for place, command in asked:
+        assert main([*command, *out]) == 2
+        error = capsys.readouterr().err
+        assert f"{place}{message}" in error and error.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 

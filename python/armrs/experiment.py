@@ -175,6 +175,8 @@ class Experiment:
         Standard deviation of a constant moment in each joint, one draw for a trial.
     faults : tuple of Fault
     tolerance : Tolerance
+    file : str, optional
+        Where it was read, for refusals.
     """
 
     name: str
@@ -189,6 +191,7 @@ class Experiment:
     variation_Nm: np.ndarray
     faults: tuple[Fault, ...]
     tolerance: Tolerance
+    file: str | None = None
 
 
 def load_experiment(path: str | os.PathLike[str]) -> Experiment:
@@ -288,6 +291,7 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
         variation_Nm=np.array([checks.number("[variation], moment_Nm", v, least=0.0, unit="N m") for v in moments]),
         faults=faults,
         tolerance=part_of(Tolerance, "[tolerance]", document.get("tolerance", {})),
+        file=str(path),
     )
 
 

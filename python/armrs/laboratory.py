@@ -151,13 +151,17 @@ def check_required(experiment: Experiment) -> None:
     """Refuse movements that ask more of the robot than its supervisor allows."""
     safety = experiment.safety
     for number, run in enumerate(experiment.runs, start=1):
-        asked = simulate(experiment.truth, run.movement, rate=RECORDING_RATE).columns
+        place = f"[[movement]] {number} ({run.configuration})"
+        try:
+            asked = simulate(experiment.truth, run.movement, rate=RECORDING_RATE).columns
+        except BadInput as error:
+            raise error.within(file=experiment.file, place=place) from None
         for column, unit, name in (("robot_qd", "rad/s", "speed_rad_s"), ("robot_qdd", "rad/s²", "acceleration_rad_s2")):
             most, allowed = float(np.abs(asked[column]).max()), getattr(safety, name)
             if most > allowed:
                 found = Text(f"{most:.3g} {unit} of a joint of the robot")
                 hint = "slower, or away from where the robot is stretched out"
-                raise BadInput(f"[[movement]] {number} ({run.configuration})", found, f"at most [safety] {name} = {allowed:g}", hint=hint)
+                raise BadInput(place, found, f"at most [safety] {name} = {allowed:g}", file=experiment.file, hint=hint)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from .experiment import Safety
 from .identification import core_settings, effects_of
 from .model import Model
 from .rig import rig
-from .simulation import Movement
+from .simulation import Movement, about
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,8 @@ class Limits:
         Largest of any joint [rad/s, rad/s²].
     robot_speed : float
         Largest of any joint of the robot, where the model has one [rad/s]; that of the laboratory's supervisor when absent.
+    robot_acceleration : float
+        The same of its accelerations [rad/s²].
     force : float
         Largest force on the arm [N].
     duration : float
@@ -73,6 +75,7 @@ class Limits:
     speed: float = 2.0
     acceleration: float = 8.0
     robot_speed: float = Safety.speed_rad_s
+    robot_acceleration: float = Safety.acceleration_rad_s2
     force: float = 60.0
     duration: float = 20.0
 
@@ -90,8 +93,13 @@ class Limits:
         checks.number("speed", self.speed, above=0.0, most=100.0, unit="rad/s")
         checks.number("acceleration", self.acceleration, above=0.0, most=1e4, unit="rad/s²")
         checks.number("robot_speed", self.robot_speed, above=0.0, most=100.0, unit="rad/s")
+        checks.number("robot_acceleration", self.robot_acceleration, above=0.0, most=1e4, unit="rad/s²")
         checks.number("force", self.force, above=0.0, most=1e4, unit="N")
         checks.number("duration", self.duration, above=0.0, most=600.0, unit="s")
+
+
+_SCALARS = ("speed", "acceleration", "robot_speed", "robot_acceleration", "force", "duration")
+"""Limits that are a single number."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +150,8 @@ class Plan:
         The worst relative standard deviation from the data alone.
     force, speed, robot_speed : float
         Largest force on the arm [N], largest speed of a joint, and of a joint of the robot, zero without one [rad/s].
+    robot_acceleration : float
+        Largest acceleration of a joint of the robot, zero without one [rad/s²].
     duration : float
         Of all trials together [s].
     model : Model
@@ -154,6 +164,7 @@ class Plan:
     force: float
     speed: float
     robot_speed: float
+    robot_acceleration: float
     duration: float
     model: Model = field(repr=False)
 
@@ -179,6 +190,7 @@ class Plan:
             "largest_force_N": self.force,
             "largest_speed_rad_s": self.speed,
             "largest_robot_speed_rad_s": self.robot_speed,
+            "largest_robot_acceleration_rad_s2": self.robot_acceleration,
             "duration_s": self.duration,
         }
 
@@ -232,7 +244,11 @@ def forecast(
     tasks = [_task(m, model, repeats) for m in movements]
     if not tasks:
         raise BadInput("movements", Text("none"), "at least one")
-    return asked.plan(movements, _armrs.forecast(asked.rig, asked.settings, asked.sensing, tasks))
+    try:
+        return asked.plan(movements, _armrs.forecast(asked.rig, asked.settings, asked.sensing, tasks))
+    except BadInput as error:
+        # Of several movements nobody says which it was.
+        raise about(movements[0], error) if len(movements) == 1 else error from None
 
 
 def plan(
@@ -283,7 +299,7 @@ def plan(
         raise BadInput("speeds", Text("none"), "at least one share")
     bounds = {
         "angle": [list(ends) for ends in limits.angles],
-        **{name: float(getattr(limits, name)) for name in ("speed", "acceleration", "robot_speed", "force", "duration")},
+        **{name: float(getattr(limits, name)) for name in _SCALARS},
         "speeds": [checks.number("speeds", v, above=0.0, most=1.0) for v in shares],
         "waypoints": checks.whole("waypoints", waypoints, least=2, most=100),
         "repeats": repeats,
@@ -361,7 +377,7 @@ class _Question:
             repeats=self.repeats,
             predictions=tuple(predictions),
             model=self.model,
-            **{key: raw[key] for key in ("worst", "force", "speed", "robot_speed", "duration")},
+            **{key: raw[key] for key in ("worst", "force", "speed", "robot_speed", "robot_acceleration", "duration")},
         )
 
 

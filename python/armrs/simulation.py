@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -41,6 +42,8 @@ class Movement:
         Rest in every waypoint on the way [s].
     shape : {"trapezoid", "smooth"}
         Velocity profile: straight ramps as in the thesis, or ramps with continuous acceleration.
+    file : str, optional
+        Where it was read, for refusals.
     """
 
     waypoints: np.ndarray
@@ -48,6 +51,7 @@ class Movement:
     acceleration: float = 0.6
     pause: float = 0.0
     shape: str = "trapezoid"
+    file: str | None = None
 
     def __post_init__(self) -> None:
         points = checks.numbers("waypoints", self.waypoints, "rad")
@@ -59,6 +63,8 @@ class Movement:
         checks.number("acceleration", self.acceleration, above=0.0, unit="rad/s²")
         checks.number("pause", self.pause, least=0.0, unit="s")
         checks.choice("shape", self.shape, ("trapezoid", "smooth"))
+        if self.file is not None:
+            checks.text("file", self.file)
         points.flags.writeable = False
         object.__setattr__(self, "waypoints", points)
 
@@ -249,10 +255,7 @@ def simulate(
     try:
         raw = _armrs.simulate(rig(model), led, settings, sensing)
     except BadInput as error:
-        if error.place != "duration" or drive is None:
-            raise
-        kind = type(drive).__name__.lower()
-        raise BadInput(f"length of the {kind} [s]", error.found, f"{error.allowed}; a step is {dt:g} s", file=error.file) from None
+        raise about(drive, error, f"; a step is {dt:g} s") from None
     return Simulated(
         t=raw["time"],
         q=raw["q"],
@@ -271,6 +274,16 @@ def simulate(
             "coupling": coupling,
         },
     )
+
+
+def about(drive: Movement | Trial | None, error: BadInput, more: str = "") -> BadInput:
+    """Return a refusal of the core with the file of the drive, where it is about how that leads the arm; `more` is said of its length."""
+    if drive is None:
+        return error
+    if error.place == "duration":
+        place = f"length of the {type(drive).__name__.lower()} [s]"
+        return BadInput(place, error.found, f"{error.allowed}{more}", file=drive.file, hint=error.hint)
+    return error.within(file=drive.file) if error.place.startswith("handle at ") else error
 
 
 def _check_duration(duration: float, dt: float, rate: float) -> None:
@@ -325,7 +338,7 @@ def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
 
     def made(document: dict[str, Any], _: object) -> Movement:
         checks.keys("", document, required=["movement"])
-        return movement_of(checks.table("movement", document["movement"]), n_joints)
+        return dataclasses.replace(movement_of(checks.table("movement", document["movement"]), n_joints), file=os.fspath(path))
 
     return tomlfile.load(path, made)
 

@@ -272,7 +272,7 @@ def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     print(
         f"\n{len(result['movements'])} movements, {result['duration_s']:.3g} s with all repeats; force on the arm up to "
         f"{result['largest_force_N']:.3g} N, joints up to {result['largest_speed_rad_s']:.3g} rad/s, "
-        f"the robot's up to {result['largest_robot_speed_rad_s']:.3g} rad/s; "
+        f"the robot's up to {result['largest_robot_speed_rad_s']:.3g} rad/s and {result['largest_robot_acceleration_rad_s2']:.3g} rad/s²; "
         f"worst relative deviation {100 * result['worst_relative_std']:.2g} %"
         + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
     )

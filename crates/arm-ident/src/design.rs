@@ -25,6 +25,8 @@ pub struct Allowed<const N: usize> {
     pub acceleration: f64,
     /// Largest speed of a joint of the robot \[rad/s\].
     pub robot_speed: f64,
+    /// Largest acceleration of a joint of the robot \[rad/s²\].
+    pub robot_acceleration: f64,
     /// Largest force on the arm \[N\].
     pub force: f64,
     /// Longest trial \[s\].
@@ -115,6 +117,7 @@ fn respects<const N: usize>(forecast: &Forecast, allowed: &Allowed<N>) -> bool {
     forecast.force <= allowed.force
         && forecast.speed <= 1.1 * allowed.speed
         && forecast.robot_speed <= allowed.robot_speed
+        && forecast.robot_acceleration <= allowed.robot_acceleration
         && forecast.durations.iter().all(|&d| d <= allowed.duration)
 }
 

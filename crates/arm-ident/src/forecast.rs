@@ -112,6 +112,8 @@ pub struct Forecast {
     pub speed: f64,
     /// Largest speed of a joint of the robot, zero without one \[rad/s\].
     pub robot_speed: f64,
+    /// Largest acceleration of a joint of the robot, zero without one \[rad/s²\].
+    pub robot_acceleration: f64,
     /// Time of all trials together \[s\].
     pub duration: f64,
     /// Duration of one trial of each movement \[s\].
@@ -207,6 +209,9 @@ pub fn forecast<const N: usize>(
         speed: recordings().map(|r| largest(&r.qd)).fold(0.0, f64::max),
         robot_speed: recordings()
             .map(|r| largest(&r.robot_qd))
+            .fold(0.0, f64::max),
+        robot_acceleration: recordings()
+            .map(|r| largest(&r.robot_qdd))
             .fold(0.0, f64::max),
         duration: durations
             .iter()

@@ -1,6 +1,7 @@
 //! Plans: what movements will show, and movements that show much.
 
 use arm_core::{Chain, Joints, Shape};
+use arm_ident::IdentError;
 use arm_ident::design::{Allowed, design};
 use arm_ident::forecast::{Accuracy, Forecast, Question, Task, forecast};
 use numpy::{PyReadonlyArray2, ToPyArray};
@@ -9,7 +10,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::arm::{AnyChain, each_short_length};
 use crate::convert::rows;
-use crate::errors::{bad_input, identification};
+use crate::errors::{bad_input, identification, simulation};
 use crate::ident::{Settings, model};
 use crate::rig::Rig;
 
@@ -43,6 +44,7 @@ pub struct Bounds {
     speed: f64,
     acceleration: f64,
     robot_speed: f64,
+    robot_acceleration: f64,
     force: f64,
     duration: f64,
     speeds: Vec<f64>,
@@ -107,7 +109,11 @@ pub fn forecast_py<'py>(
             .collect::<PyResult<Vec<_>>>()?;
         let found = py
             .detach(|| forecast(&question, &tasks))
-            .map_err(identification)?;
+            .map_err(|error| match error {
+                // The movement is the caller's own; where a search finds none, it is not.
+                IdentError::Simulation(error) => simulation(error),
+                other => identification(other),
+            })?;
         plain(py, &found)
     }
     each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &tasks)))
@@ -142,6 +148,7 @@ pub fn design_py<'py>(
             speed: bounds.speed,
             acceleration: bounds.acceleration,
             robot_speed: bounds.robot_speed,
+            robot_acceleration: bounds.robot_acceleration,
             force: bounds.force,
             duration: bounds.duration,
             speeds: bounds.speeds.clone(),
@@ -194,6 +201,7 @@ fn plain<'py>(py: Python<'py>, found: &Forecast) -> PyResult<Bound<'py, PyDict>>
     out.set_item("force", found.force)?;
     out.set_item("speed", found.speed)?;
     out.set_item("robot_speed", found.robot_speed)?;
+    out.set_item("robot_acceleration", found.robot_acceleration)?;
     out.set_item("duration", found.duration)?;
     out.set_item("durations", found.durations.clone())?;
     Ok(out)

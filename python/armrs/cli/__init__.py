@@ -107,7 +107,8 @@ def run() -> None:
 
 _OPTIONS = {
     "with_effects": "--with", "cutoff": "--cutoff-hz", "rate": "--rate-hz", "duration": "--duration-s",
-    "robot_speed": "--robot-speed-rad-s", "speed": "--speed-rad-s", "acceleration": "--acceleration-rad-s2", "force": "--force-n",
+    "robot_speed": "--robot-speed-rad-s", "robot_acceleration": "--robot-acceleration-rad-s2",
+    "speed": "--speed-rad-s", "acceleration": "--acceleration-rad-s2", "force": "--force-n",
     **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "evaluations", "integrator", "jobs", "level", "method")},
     **{name: f"--{name}" for name in ("motion", "repeats", "seed")},
 }  # fmt: skip

@@ -99,6 +99,7 @@ def plan(
     speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint [rad/s].")] = 2.0,
     acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint [rad/s²].")] = 8.0,
     robot_speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint of the robot [rad/s].")] = 4.0,
+    robot_acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint of the robot [rad/s²].")] = 60.0,
     force_n: Annotated[float, typer.Option(help="Largest force on the arm [N].")] = 60.0,
     duration_s: Annotated[float, typer.Option(help="Longest trial [s].")] = 20.0,
     repeats: Annotated[int, typer.Option(help="Trials of each movement.")] = 5,
@@ -118,7 +119,15 @@ def plan(
 
     folder = writable(out, json)
     arm = load_model(model)
-    limits = planning.Limits(planning.angles_of(angles_deg), speed_rad_s, acceleration_rad_s2, robot_speed_rad_s, force_n, duration_s)
+    limits = planning.Limits(
+        planning.angles_of(angles_deg),
+        speed=speed_rad_s,
+        acceleration=acceleration_rad_s2,
+        robot_speed=robot_speed_rad_s,
+        robot_acceleration=robot_acceleration_rad_s2,
+        force=force_n,
+        duration=duration_s,
+    )
     other = None if compare is None else load_movement(compare, arm.n_joints)
     kinds = listed(with_)
     with console.progress("planning"):

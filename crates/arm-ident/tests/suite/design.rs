@@ -56,6 +56,7 @@ fn allowed(evaluations: usize) -> Allowed<2> {
         speed: 2.0,
         acceleration: 8.0,
         robot_speed: f64::INFINITY,
+        robot_acceleration: f64::INFINITY,
         force: 60.0,
         duration: 15.0,
         speeds: vec![1.0, 0.3],
@@ -129,7 +130,7 @@ fn a_longer_search_is_no_worse_and_the_same_seed_gives_the_same_plan() {
 }
 
 #[test]
-fn a_plan_respects_the_speed_of_the_robot() {
+fn a_plan_respects_the_speed_and_the_acceleration_of_the_robot() {
     let mut question = question(Tolerance::default());
     question.robot = Some(Robot::new([0.45, 0.45], [1.0, -0.1], Elbow::Up).expect("valid"));
     let free = design(&question, &allowed(15), || {}).expect("a plan").1;
@@ -141,10 +142,19 @@ fn a_plan_respects_the_speed_of_the_robot() {
     };
     let held = design(&question, &slow, || {}).expect("a plan").1;
     assert!(held.robot_speed <= limit);
-    // Without a robot there is no such speed.
+    let limit = 0.5 * free.robot_acceleration;
+    assert!(limit > 0.0);
+    let gentle = Allowed {
+        robot_acceleration: limit,
+        ..allowed(60)
+    };
+    let held = design(&question, &gentle, || {}).expect("a plan").1;
+    assert!(held.robot_acceleration <= limit);
+    // Without a robot there is neither.
     question.robot = None;
     let none = forecast(&question, &[task(1)]).expect("a forecast");
     assert_eq!(none.robot_speed.to_bits(), 0.0_f64.to_bits());
+    assert_eq!(none.robot_acceleration.to_bits(), 0.0_f64.to_bits());
 }
 
 #[test]
