@@ -82,6 +82,46 @@ def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert (tmp_path / "out/figures/history.png").stat().st_size > 10_000
 
 
+def named(result: Identified, name: str, subject: str | None = None) -> Identified:
+    """The same result of a data set of another name, or of a subject that is named."""
+    return dataclasses.replace(result, dataset=result.dataset.replace(name=name, subject=armrs.Subject(name=subject)))
+
+
+def test_the_history_of_another_subject_is_refused(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "s1.sqlite"
+    sessions.add(file, named(identified, "S1 2026-03-14"), "2026-03-14")
+    assert len(sessions.add(file, named(identified, "2026-04-11 (S1)"), "2026-04-11")[0].dates) == 2
+    assert len(sessions.add(file, named(identified, "follow-up", "S1"), "2026-05-09")[0].dates) == 3
+    before = file.read_bytes()
+    for other in (named(identified, "S2 2026-03-14"), named(identified, "S1 2026-03-14", "S2")):
+        with pytest.raises(BadInput, match=r"s1\.sqlite: history: found the history of 'S1', allowed that of 'S2': one subject a file"):
+            sessions.add(file, other, "2026-06-01")
+    with pytest.raises(BadInput, match="found a data set '2026-06-01' that names no subject"):
+        sessions.add(file, named(identified, "2026-06-01"), "2026-06-01")
+    assert file.read_bytes() == before
+
+
+def test_a_history_of_an_older_version_belongs_to_its_first_data_set(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "old.sqlite"
+    _written(file, "DROP TABLE subject", "UPDATE session SET name = 'S1 2026-01-01'")
+    with pytest.raises(BadInput, match="found the history of 'S1', allowed that of 'S2'"):
+        sessions.add(file, named(identified, "S2"), "2026-02-01")
+    sessions.add(file, named(identified, "S1"), "2026-02-01")
+    with sqlite3.connect(file) as kept:
+        assert kept.execute("SELECT name FROM subject").fetchall() == [("S1",)]
+    kept.close()
+
+
+def test_the_verb_refuses_another_subject(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "s.sqlite"
+    _written(file)
+    before = file.read_bytes()
+    assert main(["identify", str(slow_arm), "--history", str(file), "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert "s.sqlite: --history: found the history of 'a', allowed that of" in error and error.count("\n") == 1
+    assert file.read_bytes() == before and not (tmp_path / "out").exists()
+
+
 def test_the_date_is_in_the_name_or_today() -> None:
     assert sessions.session_date("S1 2026-03-14") == "2026-03-14"
     assert sessions.session_date("S1 2026-03-14", "2025-01-02") == "2025-01-02"
@@ -110,7 +150,9 @@ def test_refuses_other_files(slow_arm: Path, tmp_path: Path, capsys: pytest.Capt
     other.close()
     with sqlite3.connect(tmp_path / "three.sqlite") as three:
         three.executescript(f"PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA}")
-        three.execute("INSERT INTO session (name, date, method, joints) VALUES ('a', '2026-01-01', 'joint', 3)")
+        three.execute(
+            "INSERT INTO session (name, date, method, joints) VALUES (?, '2026-01-01', 'joint', 3)", (armrs.load_dataset(slow_arm).name,)
+        )
     three.close()
     cases = {
         "text.sqlite": "found file is not a database",
@@ -132,7 +174,8 @@ def test_refuses_other_files(slow_arm: Path, tmp_path: Path, capsys: pytest.Capt
 def _written(file: Path, *changes: str) -> None:
     """Write a history with one estimate, and then change it by hand."""
     with sqlite3.connect(file) as made:
-        made.executescript(f"PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA}")
+        made.executescript(f"PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA} {sessions._WHOSE}")
+        made.execute("INSERT INTO subject VALUES ('a')")
         made.execute("INSERT INTO session (name, date, method, joints) VALUES ('a', '2026-01-01', 'joint', 2)")
         made.execute("INSERT INTO estimate VALUES (1, 'm2*l2', 'combination', 0, 0.13, 0.001, 'kg m', 'data')")
         for change in changes:
@@ -152,16 +195,18 @@ def _written(file: Path, *changes: str) -> None:
         ("UPDATE estimate SET std = -1", "a history in which a number is none"),
         ("UPDATE session SET date = 'yesterday'", "a history in which a date is none"),
         ("UPDATE session SET joints = 'x'", "a history in which a number of joints is none"),
+        ("INSERT INTO subject VALUES ('b')", "a history in which there are two subjects"),
+        ("UPDATE subject SET name = ''", "a history in which a subject has no name"),
     ],
 )
 def test_refuses_a_history_that_was_changed_by_hand(tmp_path: Path, change: str, message: str) -> None:
     file = tmp_path / "s.sqlite"
     _written(file)
-    sessions.check(file, 2)
+    sessions.check(file, 2, "a")
     file.unlink()
     _written(file, change)
     before = file.read_bytes()
-    for ask in (lambda: sessions.check(file, 2), lambda: sessions.read(file)):
+    for ask in (lambda: sessions.check(file, 2, "a"), lambda: sessions.read(file)):
         with pytest.raises(BadInput, match=rf"s\.sqlite: history: found {message}, allowed a history that armrs wrote"):
             ask()
     assert file.read_bytes() == before
@@ -173,7 +218,7 @@ def test_refuses_a_history_that_is_cut_off(tmp_path: Path, keep: int) -> None:
     _written(file)
     file.write_bytes(file.read_bytes()[:keep])
     with pytest.raises(BadInput, match=r"s\.sqlite: history: found "):
-        sessions.check(file, 2)
+        sessions.check(file, 2, "a")
     assert file.stat().st_size == keep
 
 
@@ -185,7 +230,7 @@ def test_refuses_a_history_that_is_damaged(tmp_path: Path, at: int) -> None:
     content[at : at + 400] = bytes(range(200)) * 2
     file.write_bytes(bytes(content[: file.stat().st_size]))
     with pytest.raises(BadInput, match=r"s\.sqlite: history: found "):
-        sessions.check(file, 2)
+        sessions.check(file, 2, "a")
 
 
 @pytest.mark.parametrize("given", ["20260101", "2026-W01-1", "2026-1-1", " 2026-01-01", "", 3, b"2026-01-01"])
@@ -196,6 +241,6 @@ def test_a_date_has_one_form(given: object) -> None:
 
 def test_a_place_that_cannot_be_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="found File name too long"):
-        sessions.check(tmp_path / ("a" * 300), 2)
+        sessions.check(tmp_path / ("a" * 300), 2, "a")
     with pytest.raises(BadInput, match="history: found 3, allowed a path"):
-        sessions.check(3, 2)  # type: ignore[arg-type]
+        sessions.check(3, 2, "a")  # type: ignore[arg-type]

@@ -25,10 +25,11 @@ FILE = "dataset.toml"
 
 @dataclass(frozen=True)
 class Subject:
-    """Whose arm it is; used for the literature values.
+    """Whose arm it is; body mass, height and sex are used for the literature values, the name for a history.
 
     Attributes
     ----------
+    name : str, optional
     body_mass : float, optional
         [kg]
     height : float, optional
@@ -39,8 +40,11 @@ class Subject:
     body_mass: float | None = None
     height: float | None = None
     sex: str | None = None
+    name: str | None = None
 
     def __post_init__(self) -> None:
+        if self.name is not None:
+            checks.text("name", self.name)
         if self.body_mass is not None:
             mass = checks.number("body_mass", self.body_mass, least=1.0, most=500.0, unit="kg")
             object.__setattr__(self, "body_mass", mass)

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from . import checks, files
-from .errors import BadInput, Text
+from .dataset import Dataset
+from .errors import BadInput, Text, show
 from .identification import Estimate, Identified
 
 APPLICATION = 0x61726D73
@@ -34,6 +35,8 @@ CREATE TABLE IF NOT EXISTS estimate (
     PRIMARY KEY (session, name, kind, joint)
 );
 """
+_WHOSE = "CREATE TABLE IF NOT EXISTS subject (name TEXT NOT NULL);"
+"""Beside it; histories of older versions have no such table."""
 _MAGIC = b"SQLite format 3\0"
 _TABLES = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
 _IMPOSSIBLE = {
@@ -45,8 +48,14 @@ _IMPOSSIBLE = {
     "a number of joints is none": "SELECT count(*) FROM session WHERE typeof(joints) != 'integer' OR joints < 1",
 }
 """What the tables would take and armrs never writes, with a query that counts it."""
+_IMPOSSIBLE_SUBJECT = {
+    "there are two subjects": "SELECT count(*) > 1 FROM subject",
+    "a subject has no name": "SELECT count(*) FROM subject WHERE typeof(name) != 'text' OR name = ''",
+}
 _OUTPUTS = (".json", ".toml", ".html", ".png", ".csv", ".parquet")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+_AROUND = " _-.,;:/|()[]"
+"""What may stand between a subject and a date in the name of a data set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +137,26 @@ def session_date(name: str, given: str | None = None) -> str:
     return given
 
 
-def check(path: str | os.PathLike[str], joints: int) -> None:
+def subject_of(dataset: Dataset) -> str:
+    """Return the name of the subject: as the data set states it, or the data set's own name without its date.
+
+    Raises
+    ------
+    BadInput
+        When neither says anything.
+    """
+    name = dataset.subject.name or _without_date(dataset.name)
+    if not name:
+        found = Text(f"a data set {show(dataset.name)} that names no subject")
+        raise BadInput("history", found, "[subject] name in dataset.toml, or a name of the data set besides its date")
+    return name
+
+
+def _without_date(name: str) -> str:
+    return _DATE.sub("", name).strip(_AROUND)
+
+
+def check(path: str | os.PathLike[str], joints: int, subject: str) -> None:
     """Refuse a history file that cannot be added to, before any work is done."""
     file = checks.path("history", path)
     files.must_be_writable(file)
@@ -139,7 +167,7 @@ def check(path: str | os.PathLike[str], joints: int) -> None:
         raise BadInput("history", Text(f"a name that ends with {file.suffix}"), "another, such as .sqlite", file=file)
     if file.exists():
         with _reading(file) as connection:
-            _same_arm(connection, joints, file)
+            _same_arm(connection, joints, subject, file)
 
 
 def add(path: str | os.PathLike[str], result: Identified, date: str) -> tuple[Course, ...]:
@@ -164,16 +192,17 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
     Raises
     ------
     BadInput
-        For a file of another kind or of another arm.
+        For a file of another kind, of another arm or of another subject.
     """
-    file = Path(path)
-    check(file, result.dataset.model.n_joints)
+    file, subject = Path(path), subject_of(result.dataset)
+    check(file, result.dataset.model.n_joints, subject)
     made = [folder for folder in file.absolute().parents if not folder.exists()]
     file.parent.mkdir(parents=True, exist_ok=True)
     is_new, is_kept = not file.exists(), False
     try:
         with closing(_open(file)) as connection:
-            connection.executescript(f"PRAGMA application_id = {APPLICATION}; {_SCHEMA}")
+            connection.executescript(f"PRAGMA application_id = {APPLICATION}; {_SCHEMA} {_WHOSE}")
+            connection.execute("INSERT INTO subject SELECT ? WHERE NOT EXISTS (SELECT * FROM subject)", (subject,))
             _insert(connection, result, date)
             yield _courses(connection, result.method)
             # Not committed otherwise: what is open when a connection closes is undone.
@@ -276,24 +305,43 @@ def _wrong(connection: sqlite3.Connection) -> str | None:
         return "a database of another program"
     with closing(sqlite3.connect(":memory:")) as ours:
         ours.executescript(_SCHEMA)
-        if tables != ours.execute(_TABLES).fetchall():
+        older = ours.execute(_TABLES).fetchall()
+        ours.executescript(_WHOSE)
+        if tables not in (older, ours.execute(_TABLES).fetchall()):
             return "a history with other tables than armrs makes"
     damage = connection.execute("PRAGMA integrity_check(1)").fetchone()[0]
     if damage != "ok":
         return f"a damaged history ({damage})"
-    return next((f"a history in which {what}" for what, query in _IMPOSSIBLE.items() if connection.execute(query).fetchone()[0]), None)
+    impossible = _IMPOSSIBLE if tables == older else _IMPOSSIBLE | _IMPOSSIBLE_SUBJECT
+    return next((f"a history in which {what}" for what, query in impossible.items() if connection.execute(query).fetchone()[0]), None)
 
 
 def _no_history(file: Path, found: str) -> BadInput:
     return BadInput("history", Text(found), "a history that armrs wrote, or a new file", file=file)
 
 
-def _same_arm(connection: sqlite3.Connection, joints: int, file: Path) -> None:
+def _same_arm(connection: sqlite3.Connection, joints: int, subject: str, file: Path) -> None:
     if not connection.execute(_TABLES).fetchall():
         return
+    whose = _whose(connection)
+    if whose not in (None, subject):
+        hint = "[subject] name in dataset.toml says whose arm it is, whatever the data set is called"
+        raise BadInput(
+            "history", Text(f"the history of {show(whose)}"), f"that of {show(subject)}: one subject a file", file=file, hint=hint
+        )
     other = connection.execute("SELECT joints FROM session WHERE joints != ?", (joints,)).fetchone()
     if other is not None:
         raise BadInput("history", Text(f"the history of an arm of {other[0]} joints"), f"one of {joints}: one subject a file", file=file)
+
+
+def _whose(connection: sqlite3.Connection) -> str | None:
+    """Return the subject of a history: as stored, or by the first data set in a file that stores none; None in an empty one."""
+    if connection.execute("SELECT count(*) FROM sqlite_master WHERE name = 'subject'").fetchone()[0]:
+        stored = connection.execute("SELECT name FROM subject").fetchone()
+        if stored is not None:
+            return str(stored[0])
+    first = connection.execute("SELECT name FROM session ORDER BY id LIMIT 1").fetchone()
+    return None if first is None else _without_date(str(first[0])) or None
 
 
 def _deviation(estimate: Estimate, level: float) -> float:

@@ -65,7 +65,7 @@ def identify(
         raise BadInput("--date", date, "--date together with --history")
     day = sessions.session_date(data.name, date)
     if history is not None:
-        sessions.check(history, data.model.n_joints)
+        sessions.check(history, data.model.n_joints, sessions.subject_of(data))
     with console.progress("identifying"):
         result = run_identification(
             data,
