@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from armrs import cli
@@ -69,6 +70,8 @@ def test_the_virtual_experiments_find_what_was_simulated(items: dict[str, dict[s
     for key in ("equation-5.3", "passive-moment-uncertainty"):
         assert values[key]["jacobian_over_monte_carlo_most_off"] < 0.05
     assert values["tables-4.6-4.8-virtual"]["intervals_that_hold"] >= 0.9 * values["tables-4.6-4.8-virtual"]["intervals"]
+    spread = values["figures-D.4-D.5"]
+    assert all(0.0 < spread[f"angle_std_{joint}_rad"] < most for joint, most in {"shoulder": 0.05, "elbow": 0.1, "wrist": 0.2}.items())
     slow = values["figure-3.7"]
     assert slow["inertial_most_at_0.25_rad_s_Nm"] == pytest.approx(0.2, abs=0.1)
     assert 0.0027 < slow["velocity_most_at_0.25_rad_s_Nm"] < 0.0082
@@ -86,10 +89,31 @@ def test_the_page_is_clicked_through(made: Path, items: dict[str, dict[str, Any]
             assert all(width > 300 for width in widths)
             pictures += len(widths)
             films += page.locator(f"#{key} .film").count()
+            cut = page.eval_on_selector_all(f"#{key} .wide", "boxes => boxes.filter(b => b.scrollWidth > b.clientWidth + 1).length")
+            assert cut == 0, key
+            assert "`" not in page.locator(f"#{key}").inner_text()
         assert pictures == sum(len(item["figures"]) for item in items.values())
         assert films == sum(len(item["animations"]) for item in items.values()) > 0
         assert page.locator("#equations tr").count() > 15
         assert page.locator("article").count() == len(items)
+
+
+def test_links_jump_to_what_they_name(made: Path) -> None:
+    """The heading stands below the buttons, which stay where they are."""
+    with opened(made / "report.html") as seen:
+        page = seen.page
+        page.goto(page.url + "#table-4.5")
+        top = page.locator("[id='table-4.5'] h2").bounding_box()["y"]
+        buttons = page.locator("nav").bounding_box()
+        assert buttons["y"] + buttons["height"] <= top < 300
+
+
+def test_the_robot_holds_the_arm_in_every_frame(made: Path, items: dict[str, dict[str, Any]]) -> None:
+    films = [film for item in items.values() for film in item["animations"]]
+    for film in films:
+        robot, arm = (np.array(chain["points_m"])[:, -1] for chain in film["chains"])
+        assert np.hypot(*(robot - arm).T).max() < 0.005  # the contact gives way by 1 mm for 10 N
+        assert np.ptp(arm, axis=0).max() > 0.05
 
 
 def test_the_animation_moves_stops_and_is_dragged(made: Path) -> None:

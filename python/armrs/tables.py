@@ -28,6 +28,11 @@ class Table:
     left: int = 1
 
 
+def minus(text: str) -> str:
+    """Return the text of a number with the sign that is as wide as a plus."""
+    return text.replace("-", "−")
+
+
 def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: float) -> Table:
     """Return estimates with uncertainty, interval and what decided them."""
     rows = [

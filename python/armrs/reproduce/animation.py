@@ -50,6 +50,7 @@ def html(data: Mapping[str, Any], number: int) -> str:
         ghosts = np.linspace(0, len(points) - 1, GHOSTS).astype(int)
         shapes += [_line("ghost", chain, _path(points[k], low, high)) for k in ghosts]
     shapes += [_line("stick", chain, _path(points[0], low, high)) for chain, points in chains]
+    shapes.append(_scale(size))
     frames = [[[_path(pose, low, high) for pose in points] for _, points in chains], data["t_s"]]
     key = " ".join(f'<span style="color:{chain["colour"]}">▬ {escape(chain["name"])}</span>' for chain, _ in chains)
     stored = json.dumps(frames, separators=(",", ":"))
@@ -60,6 +61,16 @@ def html(data: Mapping[str, Any], number: int) -> str:
         f'aria-label="time"> <output>0.00 s</output> <span class="key">{key}</span></p>\n'
         f'<script type="application/json">{stored}</script>\n'
         f"<figcaption><strong>{escape(data['title'])}.</strong> {escape(data['text'])}</figcaption></figure>\n"
+    )
+
+
+def _scale(size: np.ndarray) -> str:
+    """Return a bar of 0.1 m and the direction of gravity, in the lower left corner of a picture of that size [m]."""
+    left, foot = 0.02, size[1] - 0.02
+    return (
+        f'<g class="scale"><path d="M{left:.3f} {foot:.3f}h.1m0 -.01v.02m-.1 0v-.02M{left + 0.15:.3f} {foot - 0.07:.3f}v.07m-.012 '
+        f'-.018l.012 .018l.012 -.018"/><text x="{left + 0.015:.3f}" y="{foot - 0.015:.3f}">0.1 m</text>'
+        f'<text x="{left + 0.17:.3f}" y="{foot - 0.02:.3f}">g</text></g>'
     )
 
 
@@ -76,6 +87,8 @@ CSS = """
 .film svg { display: block; width: 100%; max-height: 26rem; }
 .film polyline { fill: none; stroke-linejoin: round; stroke-linecap: round; }
 .film .stick { stroke-width: .014; }
+.film .scale path { fill: none; stroke: var(--soft); stroke-width: .003; }
+.film .scale text { font-size: .024px; fill: var(--soft); }
 .film .ghost { stroke-width: .005; opacity: .22; }
 .controls { display: flex; gap: .7rem; align-items: center; flex-wrap: wrap; max-width: none; }
 .controls input { flex: 1; min-width: 8rem; }

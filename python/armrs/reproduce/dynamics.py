@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +15,13 @@ from ..model import Joint, Model, Segment
 from ..rig import arm as kernel
 from ..simulation import Movement, Simulated, simulate
 from ..tables import Table
+from . import drawing
 from .item import Found, Group, Sheet
 from .people import RATE, TABLE_4_10, WORKING_ROBOT, WRIST, arm
+from .sessions import SHOULDER_HELD, holding, subject_one
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 GROUP = Group("dynamics", "Slow and fast (3.2, D)")
 
@@ -28,7 +35,9 @@ REVERSAL = 1.2
 """Largest acceleration at the slowest speed, section 3.2 [rad/s²]; faster movements get as much more as they are faster."""
 PRINTED = {"inertial": 0.2, "velocity": 0.001}
 """At the slowest speed, section 3.2 [N m]."""
-JOINTS = ("shoulder", "elbow", "wrist")
+JOINTS = tuple(drawing.JOINTS)
+REPEATABILITY = (0.05, 0.1, 0.2)
+"""Standard deviations of the angles over six trials, section 3 of appendix D [rad]."""
 TRANSVERSE = (0.0155, 0.0055, 0.0030)
 """Moments of inertia about the axis that turns, after de Leva, the hand with the handle [kg m²]."""
 
@@ -54,9 +63,74 @@ def parts(run: Simulated) -> dict[str, np.ndarray]:
     return {name: run.columns[f"torque.{name}"] for name in ("inertial", "centrifugal", "coriolis", "gravity")}
 
 
+def _by_speed(columns: Mapping[str, Sequence[np.ndarray]]) -> Figure:
+    """Draw quantities of the joints over time: a row for each speed, a column for each quantity, named with its unit."""
+    figure = plotting.figure(10.4, 9.2)
+    axes = figure.subplots(len(SPEEDS), len(columns), sharex="row")
+    for column, (name, quantities) in zip(axes.T, columns.items(), strict=True):
+        for ax, speed, values in zip(column, SPEEDS, quantities, strict=True):
+            for j, (joint, colour) in enumerate(drawing.JOINTS.items()):
+                ax.plot(movement(speed).t, values[:, j], plotting.DASHES[j], color=colour, label=joint, lw=1.3)
+        column[0].set_title(name)
+        column[-1].set_xlabel("time [s]")
+    for ax, speed in zip(axes[:, 0], SPEEDS, strict=True):
+        ax.set_ylabel(f"{speed:g} rad/s")
+    drawing.legend(figure, axes[0, 0])
+    return figure
+
+
+@GROUP.item(
+    "figures-D.4-D.5",
+    "Figures 4 and 5 of appendix D: how repeatable the movement is, and its angles, speeds and accelerations",
+    "appendix D, section 3",
+    "Six trials at 0.25 rad/s, whose angles have standard deviations within 0.05 rad (shoulder), 0.1 rad (elbow) and 0.2 rad (wrist); "
+    "angle, speed and acceleration at four speeds, differences of first order of angles that a Butterworth low-pass of 8 Hz has "
+    "smoothed.",
+)
+def kinematics() -> Found:
+    """Draw the spread of six trials, and the movement at four speeds."""
+    found, name = subject_one(), holding("shoulder", SHOULDER_HELD[0])
+    own = [trial for trial in found.dataset.trials if trial.configuration == name]
+    q = np.array([trial.q for trial in own])
+    spread = np.std(q, axis=0, ddof=1).max(axis=0)
+    repeats = plotting.figure(9.4, 3.4)
+    for j, (ax, (joint, colour)) in enumerate(zip(repeats.subplots(1, 3), drawing.JOINTS.items(), strict=True)):
+        drawing.over_trials(ax, own[0].t, np.degrees(q[:, :, [j]]), {joint: colour})
+        ax.set(title=joint, xlabel="time [s]", ylabel="angle [°]")
+    runs = [movement(speed) for speed in SPEEDS]
+    profiles = _by_speed(
+        {
+            "angle [°]": [np.degrees(run.q) for run in runs],
+            "speed [rad/s]": [run.qd for run in runs],
+            "acceleration [rad/s²]": [run.qdd for run in runs],
+        }
+    )
+    rows = [[joint, f"{printed:g}", f"{ours:.4f}"] for joint, printed, ours in zip(JOINTS, REPEATABILITY, spread, strict=True)]
+    still = [max(np.abs(run.qd[:, j]).max() for run in runs) for j in (0, 2)]
+    return Found(
+        ours=(
+            f"Angles of six virtual trials have standard deviations up to {spread[0]:.3f}, {spread[1]:.3f} and {spread[2]:.3f} rad. "
+            f"While the elbow moves, the shoulder turns at up to {still[0]:.2f} rad/s and the wrist at up to {still[1]:.2f} rad/s."
+        ),
+        why=(
+            "A virtual robot repeats its path exactly and a virtual subject sits as before; only the tone of the muscles and the "
+            "sensors differ between trials, so that angles scatter by a part of what the thesis measured. The six trials are those of "
+            "figure 4.1, at 0.3 rad/s. Speeds and accelerations are those of the simulation and need no filter; the ripples after each "
+            "start are the hand on the stiffness of the contact. The thesis calls its profiles trapezoidal; here their corners are "
+            "rounded."
+        ),
+        values={f"angle_std_{joint}_rad": float(v) for joint, v in zip(JOINTS, spread, strict=True)},
+        sheets=[Sheet("Largest standard deviations of the angles [rad]", Table(["joint", "printed, within", "ours"], rows))],
+        figures=[
+            Drawn("figure-D.4", "Figure 4 of appendix D: repeatability", "Means of six trials, bars of one standard deviation.", repeats),
+            Drawn("figure-D.5", "Figure 5 of appendix D: the movement at four speeds", "Rows are speeds; scales differ.", profiles),
+        ],
+    )
+
+
 @GROUP.item(
     "figure-3.7",
-    "Figure 3.7 and figures 4 to 6 of appendix D: torques at four speeds",
+    "Figure 3.7 and figure 6 of appendix D: torques at four speeds",
     "section 3.2, appendix D",
     "At 0.25 rad/s inertial torques reach 0.2 N m and Coriolis torques 0.001 N m; gravity does not depend on the speed. The curves "
     "themselves are pictures without numbers.",
@@ -73,29 +147,24 @@ def at_four_speeds() -> Found:
             rows.append([f"{speed:g} rad/s", joint, *(f"{v:.4f}" for v in values)])
         most[speed] = (np.abs(torques["inertial"]).max(), np.abs(velocity).max(), np.abs(velocity[:, 0]).max())
     slow, fast = most[SPEEDS[0]], most[SPEEDS[-1]]
-    figure = plotting.figure(10.4, 9.2)
-    axes = figure.subplots(4, 3, sharex="row")
-    for number, (row, (speed, run)) in enumerate(zip(axes, runs.items(), strict=True)):
-        torques = parts(run)
-        shown = (torques["inertial"], torques["centrifugal"] + torques["coriolis"], torques["gravity"])
-        for ax, values, name in zip(row, shown, ("inertial", "centrifugal and Coriolis", "gravity"), strict=True):
-            for j, joint in enumerate(JOINTS):
-                ax.plot(run.t, values[:, j], ("-", "--", "-.")[j], color=plotting.CYCLE[j], label=joint, lw=1.3)
-            ax.set_title("" if number else name)
-        row[0].set_ylabel(f"{speed:g} rad/s\ntorque [N m]")
-    for ax in axes[-1]:
-        ax.set_xlabel("time [s]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
+    figure = _by_speed(
+        {
+            "inertial [N m]": [parts(run)["inertial"] for run in runs.values()],
+            "centrifugal and Coriolis [N m]": [parts(run)["centrifugal"] + parts(run)["coriolis"] for run in runs.values()],
+            "gravity [N m]": [parts(run)["gravity"] for run in runs.values()],
+        }
+    )
     return Found(
         ours=(
             f"At 0.25 rad/s inertial torques reach {slow[0]:.2f} N m, centrifugal and Coriolis torques together {slow[1]:.4f} N m. At 1 "
             f"rad/s it is {fast[0]:.2f} and {fast[1]:.3f} N m, beside {np.abs(parts(runs[1.0])['gravity']).max():.1f} N m of gravity."
         ),
         why=(
-            f"The inertial torque is of the printed size. That of the velocities is {slow[1] / PRINTED['velocity']:.0f} times the printed "
-            "one; both are negligible at this speed. The thesis calls the diagonal of C centrifugal and the rest Coriolis; it is the other "
-            "way round, and with the elbow moving alone nearly all is centrifugal. The elbow's range and the ramps are chosen, since they "
-            "are not printed."
+            f"The inertial torque is of the printed size. That of the velocities is {slow[1] / PRINTED['velocity']:.0f} times the "
+            "printed one; both are negligible at this speed. The thesis calls the diagonal of C centrifugal and the rest Coriolis; it "
+            "is the other way round, and with the elbow moving alone nearly all is centrifugal. It acts in the shoulder: appendix D "
+            "says mostly in the elbow, where a speed of the elbow itself makes none. The elbow's range and the ramps are chosen, since "
+            "they are not printed."
         ),
         values={
             f"{name}_most_at_{speed:g}_rad_s_Nm": float(value)
@@ -106,7 +175,7 @@ def at_four_speeds() -> Found:
         figures=[
             Drawn(
                 "figure-3.7",
-                "Torques at four speeds",
+                "Figure 3.7: torques at four speeds",
                 "Rows are speeds, as in the thesis, where the second column shows Coriolis torques; scales differ.",
                 figure,
             )

@@ -213,7 +213,7 @@ def _bars(table: str, number: int) -> tuple[Drawn, Drawn]:
         names = [row[0] for row in block]
         groups = {
             "identified": (plotting.BLUE, [row[2] for row in block]),
-            "literature": (plotting.RED, [np.nan if row[1] is None else row[1] for row in block]),
+            "literature": (plotting.GREEN, [np.nan if row[1] is None else row[1] for row in block]),
         }
         drawing.bars(ax, names, groups, ylabel="kg m, kg, m, N m", title=f"configuration {configuration}")
         against = [row for row in block if row[1] is not None]
@@ -225,7 +225,7 @@ def _bars(table: str, number: int) -> tuple[Drawn, Drawn]:
         for one in (ax, ax_errors):
             one.tick_params(axis="x", labelsize=8)
     for figure, one in ((values, ax), (errors, ax_errors)):
-        figure.legend(*one.get_legend_handles_labels(), loc="outside upper left", ncols=2)
+        drawing.legend(figure, one)
     subject = f"subject {SUBJECTS[table]}"
     return (
         Drawn(
@@ -245,8 +245,7 @@ def _bars(table: str, number: int) -> tuple[Drawn, Drawn]:
     "Figures 4.27 to 4.30 and figure 6 of appendix C: forces, torques and their fits, human arm",
     "section 4.2.2",
     "Averages of ten measurements with larger deviations than the mechanical arm's; differences between measured and identified torques "
-    "are "
-    "read as passive moments.",
+    "are read as passive moments.",
 )
 def fits() -> Found:
     """Draw forces and torques of ten measurements, and the cascade's fit of each joint."""
@@ -255,31 +254,49 @@ def fits() -> Found:
     force = -np.array([trial.force_on_arm for trial in found.dataset.trials])
     torque = np.array([people.static_torque(found.run.model, trial) for trial in found.dataset.trials])
     names = ("shoulder", "elbow", "wrist")
-    figure = drawing.forces_and_torques(t, force, torque, names)
-    figures = [Drawn("figure-4.27", "Figure 4.27: forces and torques", "Ten virtual measurements; sensors alone differ.", figure)]
+    figure = drawing.forces_and_torques(t, force, torque)
+    figures = [
+        Drawn(
+            "figure-4.27",
+            "Figure 4.27: forces and torques",
+            "Means of ten virtual measurements, of which the noise of the sensors alone differs, with bars of one standard deviation.",
+            figure,
+        )
+    ]
     shown = found.cascade[0].explained[0]
-    rows = []
+    rows, sizes = [], list[tuple[float, float]]()
+    rise = [np.ptp(x[:, 0]) for x in (shown.fitted, shown.measured)]
     simulated = found.run.columns["torque.resisting"]
     for j, name in enumerate(names):
         fit = plotting.figure(9.4, 2.9)
-        plotting.torque(shown.t, shown.measured[:, j], shown.fitted[:, j], fit.subplots(), title=name)
+        ax = plotting.torque(shown.t, shown.measured[:, j], shown.fitted[:, j], fit.subplots(), title=name)
+        ax.set_ylabel("torque of the force\non the arm [N m]")
         text = "The torque that force and angles ask for, and the cascade's fit with masses alone."
+        text += " The moment of the strap, which is known, is taken off." if name == "wrist" else ""
         figures.append(Drawn(f"figure-4.{28 + j}", f"Figure 4.{28 + j}: {name}", text, fit))
         size = np.mean(np.abs(shown.measured[:, j] - shown.fitted[:, j]))
-        rows.append([name, f"{size:.3f}", f"{np.mean(np.abs(simulated[:, j])):.3f}", f"{np.ptp(simulated[:, j]):.3f}"])
+        printed = next(row[2] for row in HUMAN["4.6"][2] if row[0] == f"τp{j + 1}")
+        sizes.append((float(size), float(np.mean(np.abs(simulated[:, j])))))
+        rows.append([name, f"{printed:.3f}", f"{size:.3f}", f"{sizes[-1][1]:.3f}", f"{np.ptp(simulated[:, j]):.3f}"])
     return Found(
         ours=(
-            "What the fit leaves is a few tenths of a newton metre, as in the thesis; it is a fraction of the passive moments that were "
-            "simulated."
+            f"What the fit leaves has a mean size of {sizes[0][0]:.2f}, {sizes[1][0]:.2f} and {sizes[2][0]:.2f} N m at shoulder, elbow "
+            f"and wrist, where the passive moments that were simulated have {sizes[0][1]:.2f}, {sizes[1][1]:.2f} and {sizes[2][1]:.2f} N "
+            f"m. The shoulder's torque rises by {rise[1]:.1f} N m, its fit by {rise[0]:.1f} N m."
         ),
         why=(
-            "A passive moment that is constant, or goes with the angle, looks like weight over so small a movement, and the fit takes it "
-            "as mass. Only what changes sign with the direction, and noise, is left: that is what equation 3.32 calls the passive moment."
+            "A passive moment that is constant looks like weight over so small a movement, and the fit takes it as mass. How a weight's "
+            "torque goes with the angle is given by its size: what springs add to that the fit cannot follow. It is left, with the dry "
+            "friction, which changes sign where the movement turns, and the noise; equation 3.32 calls the mean size of all that the "
+            "passive moment. The wrist's spring is the strap, which is known and taken off before the fit. The thesis' subject had other "
+            "springs, and its numbers are those of table 4.6."
         ),
         sheets=[
             Sheet(
                 "Passive moments [N m]",
-                Table(["joint", "by equation 3.32", "simulated, mean size", "simulated, range in the movement"], rows),
+                Table(
+                    ["joint", "printed, table 4.6", "by equation 3.32", "simulated, mean size", "simulated, range in the movement"], rows
+                ),
             )
         ],
         figures=figures,
@@ -290,9 +307,8 @@ def fits() -> Found:
     "tables-4.6-4.8-virtual",
     "Tables 4.6 to 4.8 on virtual subjects whose masses are known",
     "section 4.2.2",
-    "Errors against the literature of −80 to 189 %, different in every configuration, put down to the subjects, to the rigid model and to "
-    "passive "
-    "moments that differ from place to place.",
+    "Errors against the literature of −80 to 189 %, different in every configuration, put down to the subjects, to the rigid model and "
+    "to passive moments that differ from place to place.",
 )
 def virtual_subjects() -> Found:
     """Identify three virtual subjects in four configurations by both methods."""

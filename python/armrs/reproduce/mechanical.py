@@ -134,7 +134,7 @@ def forces() -> Found:
         t = found.dataset.trials[0].t
         force = -np.array([trial.force_on_arm for trial in found.dataset.trials])
         torque = np.array([people.static_torque(found.run.model, trial) for trial in found.dataset.trials])
-        figure = drawing.forces_and_torques(t, force, torque, ("shoulder", "elbow"))
+        figure = drawing.forces_and_torques(t, force, torque)
         title = f"Figure 4.{number}: {'with' if brakes else 'without'} brakes"
         figures.append(Drawn(f"figure-4.{number}", title, "Mean of ten measurements, bars of one standard deviation.", figure))
         half = len(t) // 2
@@ -167,14 +167,13 @@ def _fit(brakes: bool) -> tuple[Drawn, Drawn]:
         plotting.torque(shown.t, shown.measured[:, j], shown.fitted[:, j], top, title=f"{joint}, {'with' if brakes else 'without'} brakes")
         left = shown.measured[:, j] - shown.fitted[:, j]
         middle.plot(shown.t, left, color=plotting.BLUE)
-        middle.plot(shown.t, np.full_like(shown.t, np.mean(np.abs(left))), "--", color=plotting.INK)
+        middle.axhline(np.mean(np.abs(left)), ls="--", color=plotting.INK, label="mean size, equation 3.32")
+        middle.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.97), borderaxespad=0.0)
         bottom.plot(found.run.t, found.cell[:, j], color=plotting.GREEN)
-        top.set_xlabel("")
-        middle.set(ylabel="identified [N m]")
-        bottom.set(ylabel="load cell [N m]", xlabel="time [s]")
-        text = (
-            "Above, the cascade on one measurement; below, what is left (dashed: its mean size, equation 3.32) and what a load cell reads."
-        )
+        top.set(xlabel="", ylabel="torque of the force\non the arm [N m]")
+        middle.set(ylabel=f"τp{j + 1}, identified\n[N m]")
+        bottom.set(ylabel=f"τp{j + 1}, load cell\n[N m]", xlabel="time [s]")
+        text = "Above, the cascade on one measurement; in the middle what its fit leaves; below what a load cell at the brake reads."
         drawn.append(Drawn(f"figure-4.{number}", f"Figure 4.{number}: {joint}", text, figure))
     return drawn[0], drawn[1]
 
@@ -200,13 +199,13 @@ def _bars(brakes: bool) -> tuple[Drawn, Drawn]:
             {k: (c, [v[name] for name in own]) for k, (c, v) in values.items()},
             ylabel=f"[{', '.join(dict.fromkeys(UNITS[name] for name in own))}]",
         )
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=4)
+    drawing.legend(figure, ax)
     errors = plotting.figure(9.4, 3.4)
     shown = NAMES if brakes else NAMES[:4]
     groups = {k: (c, [100 * (v[name] / reference[name] - 1) for name in shown]) for k, (c, v) in values.items() if k != "reference"}
     ax = errors.subplots()
-    drawing.bars(ax, shown, groups, ylabel="error [%]")
-    ax.legend(fontsize=8, ncols=3)
+    drawing.bars(ax, shown, groups, ylabel="error [%]", digits=1)
+    drawing.legend(errors, ax)
     left_out = "" if brakes else " Friction is left out: its reference is almost zero."
     return (
         Drawn(

@@ -15,7 +15,7 @@ from ..trial import Trial
 from . import drawing
 from .item import Found, Group, Sheet
 from .people import HANDLE, ORTHOSIS, TABLE_4_10, arm, mechanical, points
-from .sessions import ELBOW_HELD, SEED, SHOULDER_HELD, subject_one
+from .sessions import ELBOW_HELD, SEED, SHOULDER_HELD, holding, subject_one
 from .simulation import HUMAN_PATH, MECHANICAL_PATH
 
 GROUP = Group("movements", "Movements (3.1, 3.4, 3.5)")
@@ -33,12 +33,14 @@ def movements() -> Found:
     session = subject_one()
     figure = plotting.figure(9.4, 5.6)
     axes = figure.subplots(2, 2)
-    for (above, below), name in zip(axes.T, (f"shoulder at {SHOULDER_HELD[0]:g}", f"elbow at {ELBOW_HELD[0]:g}"), strict=True):
+    for (above, below), name in zip(axes.T, (holding("shoulder", SHOULDER_HELD[0]), holding("elbow", ELBOW_HELD[0])), strict=True):
         run = session.runs[name]
-        plotting.angles(run.t, run.q, ("shoulder", "elbow", "wrist"), above)
-        above.set_title(name + "°")
+        for j, (joint, colour) in enumerate(drawing.JOINTS.items()):
+            above.plot(run.t, np.degrees(run.q[:, j]), plotting.DASHES[j], color=colour, label=joint)
+        above.set(title=name + "°", xlabel="time [s]", ylabel="angle [°]")
         drawing.stick(below, run.model, run.q[: len(run.q) // 2 + 1])
-    drift = max(np.ptp(np.degrees(session.runs[f"shoulder at {held:g}"].q[:, 0])) for held in SHOULDER_HELD)
+    drawing.legend(figure, axes[0, 0])
+    drift = max(np.ptp(np.degrees(session.runs[holding("shoulder", held)].q[:, 0])) for held in SHOULDER_HELD)
     wrist = max(np.abs(np.degrees(run.q[:, 2])).max() for run in session.runs.values())
     rows = [
         ["main text, section 3.4.2", "−68, −40, −16, −10, −36", "27, 40, 50, 60, 70"],
@@ -57,7 +59,14 @@ def movements() -> Found:
         ),
         values={"shoulder_drift_deg": float(drift), "wrist_most_deg": float(wrist)},
         sheets=[Sheet("Fixation angles as printed", Table(["where", "shoulder [°]", "elbow [°]"], rows))],
-        figures=[Drawn("figure-3.9", "Movements", "Left the elbow moves, right the shoulder. Below, the arm at six instants.", figure)],
+        figures=[
+            Drawn(
+                "figure-3.9",
+                "Figure 3.9: movements",
+                "Left the elbow moves, right the shoulder. Below, the arm at six instants on the way there; the first is drawn in full.",
+                figure,
+            )
+        ],
     )
 
 
@@ -70,7 +79,7 @@ def movements() -> Found:
 )
 def muscles() -> Found:
     """Let electrodes read an arm that is led, and the same movement made by its own muscles."""
-    run = subject_one().runs[f"shoulder at {SHOULDER_HELD[0]:g}"]
+    run = subject_one().runs[holding("shoulder", SHOULDER_HELD[0])]
     acceleration = np.gradient(run.qd, run.t, axis=0)
     needed = kernel(run.model).inverse_dynamics(run.q, run.qd, acceleration) + run.columns["torque.resisting"]
     draw = np.random.default_rng([SEED, 36])
@@ -113,7 +122,12 @@ def muscles() -> Found:
         values={f"{way.split()[0]}_uV": dict(zip(names, values, strict=True)) for way, values in mean.items()},
         sheets=[Sheet("Mean activity [µV]", Table(["muscle", *ways], rows))],
         figures=[
-            Drawn("figure-3.5", "Figure 3.5: the movement", "The elbow is led from one end to the other and back.", path),
+            Drawn(
+                "figure-3.5",
+                "Figure 3.5: the movement",
+                "The elbow is led from one end to the other and back; right, the arm on the way there.",
+                path,
+            ),
             Drawn("figure-3.6", "Figure 3.6: muscle activity", "Left the arm moves itself, right the robot leads it.", figure),
         ],
     )
@@ -171,7 +185,12 @@ def small_movements() -> Found:
             )
         ],
         figures=[
-            Drawn("figure-3.12", "The movements of the identification", "Six instants of each; where they are made is chosen.", figure)
+            Drawn(
+                "figure-3.12",
+                "Figure 3.12: the movements of the identification",
+                "Six instants of each, the first drawn in full; where they are made is chosen.",
+                figure,
+            )
         ],
     )
 

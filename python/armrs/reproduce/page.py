@@ -24,6 +24,9 @@ h3 { font-size: 1rem; margin: 1.3rem 0 .2rem; }
 td code { white-space: normal; overflow-wrap: anywhere; }
 .equations th, .equations td { white-space: normal; vertical-align: top; text-align: left; }
 figure img { max-width: 100%; }
+article { scroll-margin-top: 6.5rem; }
+.part thead th { white-space: normal; vertical-align: bottom; }
+.part th, .part td { padding: .32rem .5rem; }
 """
 
 _SCRIPT = """
@@ -69,7 +72,7 @@ def _item(item: Mapping[str, Any], folder: Path, films: Any) -> str:
     if item["virtual"]:
         out += '<p><span class="label">Virtual data: simulated, not measured</span></p>\n'
     rows = (("Printed", item["printed"]), ("Here", item["ours"]), ("Why", item["why"]))
-    out += "<dl>" + "".join(f"<dt>{name}</dt><dd>{report.escape(text)}</dd>" for name, text in rows) + "</dl>\n"
+    out += "<dl>" + "".join(f"<dt>{name}</dt><dd>{_marked(text)}</dd>" for name, text in rows) + "</dl>\n"
     for sheet in item["tables"]:
         out += f"<h3>{report.escape(sheet['title'])}</h3>\n" + report.table(tables.Table(sheet["head"], sheet["rows"], sheet["left"]))
     out += "".join(animation.html(film, next(films)) for film in item["animations"])
@@ -89,7 +92,7 @@ def _equations(rows: list[list[str]]) -> str:
 
 
 def _marked(text: str) -> str:
-    """Return a cell of the table of equations, its names between backticks as code."""
+    """Return text, its names between backticks as code."""
     pieces = text.split("`")
     return "".join(f"<code>{report.escape(p)}</code>" if k % 2 else report.escape(p) for k, p in enumerate(pieces))
 

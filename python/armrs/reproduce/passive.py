@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from .. import plotting
 from ..figures import Drawn
 from ..moments import PassiveCurve
 from ..rig import arm as kernel
-from ..tables import Table
+from ..tables import Table, minus
 from . import drawing
 from .item import Found, Group, Sheet
-from .sessions import ELBOW_STD, SHOULDER_HELD, SHOULDER_STD, Session, configurations, session, subject_one
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .sessions import ELBOW_STD, SHOULDER_HELD, SHOULDER_STD, Session, configurations, holding, session, subject_one
 
 GROUP = Group("passive", "Passive moments (4.1)")
-JOINTS = ("shoulder", "elbow", "wrist")
-COLOURS = (plotting.BLUE, plotting.ORANGE, plotting.GREEN)
-FORCE_COLOURS = (plotting.RED, plotting.INK)
-"""Others than those of the joints, beside which forces stand."""
+JOINTS = tuple(drawing.JOINTS)
 
 
 def curve_of(found: Session, name: str, joint: int) -> PassiveCurve:
@@ -47,12 +38,11 @@ def hidden(found: Session, name: str, joint: int, angle: np.ndarray) -> tuple[np
     "Figure 3.10 and figure 8 of appendix B: the hysteresis of the elbow",
     "section 3.4.1",
     "A loop against the elbow's angle with the shoulder at −68°; the upper branch belongs to flexion, the mean of both is the elastic "
-    "moment. "
-    "The curve rises with the angle, “at small angles sometimes a descending one”.",
+    "moment. The curve rises with the angle, “at small angles sometimes a descending one”.",
 )
 def hysteresis() -> Found:
     """Recompute figure 3.10 from one trial."""
-    found, name = subject_one(), f"shoulder at {SHOULDER_HELD[0]:g}"
+    found, name = subject_one(), holding("shoulder", SHOULDER_HELD[0])
     first = next(m for m in found.moments.trials if m.trial.configuration == name)
     curve = curve_of(found, name, 2)
     elastic, half = hidden(found, name, 2, curve.angle)
@@ -62,7 +52,7 @@ def hysteresis() -> Found:
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     left.plot(np.degrees(first.q[:, 1]), first.moment[:, 1], color=plotting.BLUE, label="passive moment")
     left.plot(np.degrees(curve.angle), ours, "--", color=plotting.INK, label="elastic moment")
-    left.plot(np.degrees(curve.angle), elastic, color=plotting.GREEN, lw=1.0, label="simulated")
+    left.plot(np.degrees(curve.angle), elastic, color=plotting.GREEN, lw=1.0, label="elastic moment as simulated")
     at = len(first.q) // 4
     left.annotate(
         "", (np.degrees(first.q[at + 12, 1]), first.moment[at + 12, 1]), (np.degrees(first.q[at, 1]), first.moment[at, 1]),
@@ -82,8 +72,8 @@ def hysteresis() -> Found:
         ),
         why=(
             "The method works as described. Nothing descends here, since the virtual elbow has no such part and its masses are exact. "
-            f"Masses that are 10 % too large would tilt the loop by {tilt:.2f} N m over its range: enough to make the flat part of a soft "
-            "elbow descend, as the thesis suspects."
+            f"Masses that are 10 % too large would tilt the loop by {minus(f'{tilt:.2f}')} N m over its range: enough to make the flat "
+            "part of a soft elbow descend, as the thesis suspects."
         ),
         values={
             "half_width_Nm": float(np.nanmean(width)),
@@ -91,7 +81,13 @@ def hysteresis() -> Found:
             "elastic_rms_error_Nm": error,
         },
         figures=[
-            Drawn("figure-3.10", "Hysteresis of the elbow", "One trial. Samples near the reversals are rounded by the low-pass.", figure)
+            Drawn(
+                "figure-3.10",
+                "Figure 3.10: hysteresis of the elbow",
+                "One trial; the arrow is the direction of motion. Samples near the reversals are rounded by the low-pass. Right, the "
+                "movement.",
+                figure,
+            )
         ],
     )
 
@@ -106,7 +102,7 @@ def hysteresis() -> Found:
 def forces_and_angles() -> Found:
     """Draw means and deviations over trials of forces and angles."""
     found = subject_one()
-    rows, figures = [], []
+    rows, figures, most = [], [], []
     for number, (pair, title) in enumerate(_pairs(), start=1):
         figure = plotting.figure(9.4, 7.4)
         axes = figure.subplots(3, 2, height_ratios=(1.0, 1.0, 0.9))
@@ -115,26 +111,29 @@ def forces_and_angles() -> Found:
             t = own[0].t
             force = -np.array([trial.force_on_arm for trial in own])
             q = np.degrees([trial.q for trial in own])
-            for k, label in enumerate(("$F_y$", "$F_z$")):
-                drawing.over_trials(top, t, force[:, :, k], label, FORCE_COLOURS[k])
-            for j, label in enumerate(JOINTS):
-                drawing.over_trials(middle, t, q[:, :, j], label, COLOURS[j])
-            top.set(title=name + "°", ylabel="force on the robot [N]")
+            drawing.over_trials(top, t, force, drawing.FORCES)
+            drawing.over_trials(middle, t, q, drawing.JOINTS)
+            top.set(title=name + "°", ylabel="force on the robot [N]", xlabel="time [s]")
             middle.set(ylabel="angle [°]", xlabel="time [s]")
             drawing.stick(bottom, found.runs[name].model, found.runs[name].q[: len(q[0]) // 2])
             deviations = [np.std(x, axis=0, ddof=1).max(axis=0) for x in (force, q)]
+            most.append([x.max() for x in deviations])
             rows.append([name + "°", *(f"{v:.2f}" for v in (*deviations[0], *deviations[1]))])
-        _legends(figure, axes[0, 0], axes[1, 0])
+        drawing.legend(figure, axes[0, 0], axes[1, 0])
         figures.append(
             Drawn(f"figure-4.{number}", f"Figure 4.{number}: {title}", "Bars are one standard deviation over six trials.", figure)
         )
     head = ["configuration", "F_y [N]", "F_z [N]", "shoulder [°]", "elbow [°]", "wrist [°]"]
     return Found(
-        ours="The same pictures of a virtual subject: forces scatter by newtons, angles by a degree or less.",
+        ours=(
+            f"The same pictures of a virtual subject. Standard deviations of forces reach {min(f for f, _ in most):.0f} to "
+            f"{max(f for f, _ in most):.0f} N, those of angles {min(q for _, q in most):.1f} to {max(q for _, q in most):.1f}°."
+        ),
         why=(
             "What differs between trials is the tone of the muscles, drawn so that it is as large as tables 4.1 and 4.2 say, while the "
-            "robot repeats its path. Shapes follow from weight and path; sizes depend on the chosen subject. M_x is not simulated: the "
-            "handle turns freely."
+            "robot repeats its path. A force that points nearly through the shoulder has to be large to bear a tone there: it scatters "
+            "most where the arm is stretched. Shapes follow from weight and path; sizes depend on the chosen subject. M_x is not "
+            "simulated: the handle turns freely."
         ),
         sheets=[Sheet("Largest standard deviations over six trials", Table(head, rows))],
         figures=figures,
@@ -147,15 +146,6 @@ def _pairs() -> list[tuple[tuple[str, str], str]]:
     return [((a, b), f"{a}°, {b}°") for a, b in zip(names[::2], names[1::2], strict=True)]
 
 
-def _legends(figure: Figure, *axes: Axes) -> None:
-    handles, labels = [], []
-    for ax in axes:
-        more, names = ax.get_legend_handles_labels()
-        handles += more
-        labels += names
-    figure.legend(handles, labels, loc="outside upper left", ncols=len(labels))
-
-
 @GROUP.item(
     "figures-4.6-4.10",
     "Figures 4.6 to 4.10 and figure 6 of appendix B: passive moments over time",
@@ -165,24 +155,28 @@ def _legends(figure: Figure, *axes: Axes) -> None:
 def over_time() -> Found:
     """Draw means and deviations over trials of the passive moments."""
     found = subject_one()
-    rows, figures = [], []
+    rows, figures, most = [], [], list[np.ndarray]()
     for number, (pair, title) in enumerate(_pairs(), start=6):
         figure = plotting.figure(9.4, 3.8)
         axes = figure.subplots(1, 2)
         for ax, name in zip(axes, pair, strict=True):
             own = [m for m in found.moments.trials if m.trial.configuration == name]
             values = np.array([m.moment for m in own])
-            for j, label in enumerate(JOINTS):
-                drawing.over_trials(ax, own[0].trial.t, values[:, :, j], label, COLOURS[j])
+            drawing.over_trials(ax, own[0].trial.t, values, drawing.JOINTS)
             ax.set(title=name + "°", xlabel="time [s]", ylabel="passive moment [N m]")
             deviation = np.nanstd(values, axis=0, ddof=1).max(axis=0)
+            most.append(deviation)
             rows.append([name + "°", *(f"{v:.2f}" for v in deviation)])
-        _legends(figure, axes[0])
+        drawing.legend(figure, axes[0])
         figures.append(
             Drawn(f"figure-4.{number}", f"Figure 4.{number}: {title}", "Bars are one standard deviation over six trials.", figure)
         )
     return Found(
-        ours="The joint that moves scatters most, since that is where the tone was put; the wrist hardly scatters.",
+        ours=(
+            f"The joint that moves scatters most, the shoulder by up to {max(m[0] for m in most):.1f} N m and the elbow by up to "
+            f"{max(m[1] for m in most):.1f} N m, since that is where the tone was put; the wrist by at most "
+            f"{max(m[2] for m in most):.1f} N m."
+        ),
         why=(
             "The thesis puts larger deviations at the shoulder down to the number of multiplications in Jᵀ F. It is the lever arm: a "
             "newton at the hand is half a newton metre at the shoulder and a tenth of one at the wrist."

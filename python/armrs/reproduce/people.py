@@ -92,6 +92,6 @@ def points(model: Model, q: np.ndarray) -> np.ndarray:
 
 
 def static_torque(model: Model, trial: Trial) -> np.ndarray:
-    """Return Jᵀ F of the force on the robot, shape (n, n_joints): the thesis' τ_end [N m]."""
+    """Return Jᵀ F of the force on the arm, shape (n, n_joints): τ_j of equations 3.23 to 3.25, weight and passive moments [N m]."""
     assert trial.force_on_arm is not None
-    return -kernel(model).static_torque(trial.q, trial.force_on_arm)
+    return kernel(model).static_torque(trial.q, trial.force_on_arm)

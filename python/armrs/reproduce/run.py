@@ -6,12 +6,15 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import files, plotting
 from ..results import origin
 from . import dynamics, equations, humans, mechanical, movements, page, passive, propagation, simulation, six
 from .item import Found, Item
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 GROUPS = (movements.GROUP, dynamics.GROUP, passive.GROUP, six.GROUP, mechanical.GROUP, humans.GROUP, simulation.GROUP, propagation.GROUP)
 """The parts of the page, in the order of the thesis."""
@@ -78,11 +81,19 @@ def _draw(found: Found, out: Path, virtual: bool) -> list[Path]:
         path = out / "figures" / f"{drawn.name}.png"
         files.may_replace(path, ".png")
         if virtual:
-            drawn.figure.text(0.998, 0.004, "virtual data", ha="right", va="bottom", fontsize=7, color=plotting.SILVER)
+            _stamp(drawn.figure)
         with plotting.style(), files.replacing(path) as temporary:
             drawn.figure.savefig(temporary, format="png", dpi=110)
         paths.append(path)
     return paths
+
+
+def _stamp(figure: Figure) -> None:
+    """Say at the foot of a figure that its data are virtual, in a strip of its own."""
+    foot = 0.16 / figure.get_figheight()
+    layout: Any = figure.get_layout_engine()
+    layout.set(rect=(0.0, foot, 1.0, 1.0 - foot))
+    figure.text(0.998, 0.02 / figure.get_figheight(), "virtual data", ha="right", va="bottom", fontsize=7, color=plotting.GREY)
 
 
 def _plain(item: Item, found: Found) -> dict[str, Any]:

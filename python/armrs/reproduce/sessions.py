@@ -11,6 +11,7 @@ from ..dataset import Added, Dataset, Subject
 from ..model import Effect, Joint, Model, Segment
 from ..moments import PassiveMoments, passive_moments
 from ..simulation import Movement, Simulated
+from ..tables import minus
 from . import people
 
 SHOULDER_HELD = (-68.0, -40.0, -16.0, 10.0, 36.0)
@@ -36,12 +37,17 @@ def shoulder_movement(held: float) -> Movement:
     return Movement(np.radians([[-65.0, held, 0.0], [-15.0, held, 0.0], [-65.0, held, 0.0]]), speed=0.2, acceleration=0.6, shape="smooth")
 
 
+def holding(joint: str, angle: float) -> str:
+    """Return the name of a configuration, by the joint that is held and where [deg]."""
+    return f"{joint} at {minus(f'{angle:g}')}"
+
+
 def configurations() -> list[tuple[str, int, Movement, float]]:
     """Return name, moving joint, movement and the printed deviation over trials, the pairs of figures 4.1 to 4.5 after one another."""
     found = []
     for shoulder, elbow, elbow_std, shoulder_std in zip(SHOULDER_HELD, ELBOW_HELD, ELBOW_STD, SHOULDER_STD, strict=True):
-        found.append((f"shoulder at {shoulder:g}", 2, elbow_movement(shoulder), elbow_std))
-        found.append((f"elbow at {elbow:g}", 1, shoulder_movement(elbow), shoulder_std))
+        found.append((holding("shoulder", shoulder), 2, elbow_movement(shoulder), elbow_std))
+        found.append((holding("elbow", elbow), 1, shoulder_movement(elbow), shoulder_std))
     return found
 
 

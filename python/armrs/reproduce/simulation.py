@@ -15,7 +15,8 @@ from ..figures import Drawn
 from ..laboratory import record
 from ..model import Effect, Joint, Model
 from ..simulation import Movement, Simulated, simulate
-from ..tables import Table
+from ..tables import Table, minus
+from . import drawing
 from .animation import film
 from .item import Found, Group, Sheet
 from .people import RATE, TABLE_4_10, arm, mechanical, points
@@ -49,6 +50,12 @@ class Comparison:
         for j in range(trial.q.shape[1]):
             out[f"q{j + 1}_deg"] = _rms(np.degrees(np.interp(trial.t, self.simulated.t, self.simulated.q[:, j]) - trial.q[:, j]))
         return out
+
+
+def _turn(angle: np.ndarray) -> float:
+    """Return by how much an angle changes from the start of a movement to its middle, each the mean of ten samples."""
+    half = len(angle) // 2
+    return float(np.nanmean(angle[half - 5 : half + 5]) - np.nanmean(angle[:10]))
 
 
 def _rms(values: np.ndarray) -> float:
@@ -127,7 +134,8 @@ def _film(comparison: Comparison, title: str) -> dict[str, object]:
     )
 
 
-def _figures(comparison: Comparison, names: tuple[str, str]) -> list[Drawn]:
+def _figures(comparison: Comparison, names: tuple[str, str], free: Simulated | None = None) -> list[Drawn]:
+    """Draw forces and angles, simulated and measured, and the forces of another simulation without the spring."""
     run, trial = comparison.simulated, comparison.measured.trials[0]
     assert trial.force_on_arm is not None
     joints = [j.name for j in run.model.joints]
@@ -136,19 +144,29 @@ def _figures(comparison: Comparison, names: tuple[str, str]) -> list[Drawn]:
     for k, (ax, axis) in enumerate(zip(forces.subplots(1, 2), ("forward (y)", "up (z)"), strict=True)):
         ax.plot(trial.t, -trial.force_on_arm[:, k], color=plotting.SILVER, lw=1.0, label="virtual measurement")
         ax.plot(run.t, -run.force_on_arm[:, k], color=plotting.RED, lw=1.5, label="simulation")
+        if free is not None:
+            ax.plot(free.t, -free.force_on_arm[:, k], "--", color=plotting.BLUE, lw=1.2, label="simulation without the spring $K_e$")
         ax.set(title=axis, xlabel="time [s]", ylabel="force on the robot [N]")
-    forces.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2)
-    angles = plotting.figure(4.7 * n, 3.4)
+    drawing.legend(forces, ax)
+    angles = plotting.figure(9.4, 3.4)
     for j, (ax, joint) in enumerate(zip(angles.subplots(1, n, squeeze=False)[0], joints, strict=True)):
         ax.plot(trial.t, np.degrees(trial.q[:, j]), color=plotting.SILVER, lw=1.0, label="virtual measurement")
         ax.plot(run.t, np.degrees(run.q[:, j]), color=plotting.RED, lw=1.5, label="simulation")
         ax.set(title=joint, xlabel="time [s]", ylabel="angle [°]")
-    angles.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2)
+    drawing.legend(angles, ax)
     return [
         Drawn(
-            f"figure-{names[0]}", "Contact forces, simulation and virtual measurement", "Forces act on the robot, as in the thesis.", forces
+            f"figure-{names[0]}",
+            f"Figure {names[0]}: contact forces, simulation and virtual measurement",
+            "Forces act on the robot, as in the thesis.",
+            forces,
         ),
-        Drawn(f"figure-{names[1]}", "Joint angles, simulation and virtual measurement", "Measured by markers above the joints.", angles),
+        Drawn(
+            f"figure-{names[1]}",
+            f"Figure {names[1]}: joint angles, simulation and virtual measurement",
+            "Measured by markers above the joints.",
+            angles,
+        ),
     ]
 
 
@@ -188,7 +206,7 @@ def mechanical_arm() -> Found:
             Sheet("Table 4.9, used as printed", Table(["segment", "a [m]", "l [m]", "m [kg]"], rows)),
             _differences(("as in the thesis", with_spring), ("without the spring", without)),
         ],
-        figures=_figures(found, ("4.38", "4.39")),
+        figures=_figures(found, ("4.38", "4.39"), free.simulated),
         animations=[_film(found, "Figure 4.37: the mechanical arm led by the robot")],
     )
 
@@ -204,6 +222,8 @@ def human_arm() -> Found:
     found = of_human_arm()
     values = found.differences()
     first = of_mechanical_arm().differences()
+    simulated, trial = found.simulated, found.measured.trials[0]
+    turns = [minus(f"{_turn(np.degrees(q[:, 2])):+.1f}") for q in (simulated.q, trial.q)]
     rows = [[s.name, f"{s.length:g}", f"{s.com:g}", f"{s.mass:g}"] for s in TABLE_4_10]
     return Found(
         ours=(
@@ -211,10 +231,12 @@ def human_arm() -> Found:
             f"{first['Fz_N']:.2f}), angles by {values['q1_deg']:.2f}, {values['q2_deg']:.2f} and {values['q3_deg']:.2f}°."
         ),
         why=(
-            "As in the thesis: the robot prescribes the hand's place and with it the angles, while the forces carry every wrong mass and "
-            "every passive moment. The virtual subject has masses up to 8 % off the literature, springs with rest angles, dry friction and "
-            "a spring over both joints, none of which the simulation knows; how large they are is chosen. The wrist has a spring of 6 N "
-            "m/rad on both sides, without which a hand held by two forces alone would fall."
+            "As in the thesis: the robot prescribes the hand's place and with it nearly the angles of shoulder and elbow, while the "
+            f"forces carry every wrong mass and every passive moment. The wrist is free to turn about the handle, and goes {turns[0]}° "
+            f"on the way there in the simulation and {turns[1]}° in the measurement; the thesis shows no wrist. The virtual subject has "
+            "masses up to 8 % off the literature, springs with rest angles, dry friction and a spring over both joints, none of which "
+            "the simulation knows; how large they are is chosen. The wrist has a spring of 6 N m/rad on both sides, without which a "
+            "hand held by two forces alone would fall."
         ),
         values={f"difference_{k}": v for k, v in values.items()},
         sheets=[

@@ -11,12 +11,15 @@ from ..figures import Drawn
 from ..tables import Table
 from .item import Found, Group, Sheet
 from .passive import curve_of
-from .sessions import ELBOW_HELD, MASSES, REPEATS, SHOULDER_HELD, Session, configurations, session
+from .sessions import ELBOW_HELD, MASSES, REPEATS, SHOULDER_HELD, Session, configurations, holding, session
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GROUP = Group("six", "Six subjects (4.1.2)")
+
+
+BRANCHES = "the upper branch of each colour with growing angle, the lower with shrinking"
 
 
 def _loop(ax: Axes, found: Session, name: str, joint: int, colour: Any, label: str) -> None:
@@ -42,11 +45,11 @@ def against_angles() -> Found:
         for ax, joint, held in zip(figure.subplots(1, 2), (2, 1), (SHOULDER_HELD, ELBOW_HELD), strict=True):
             names = [name for name, moved, *_ in configurations() if moved == joint]
             for k, (name, angle) in enumerate(zip(names, held, strict=True)):
-                _loop(ax, found, name, joint, plotting.shade(k / 4), f"{('elbow', 'shoulder')[joint - 1]} at {angle:g}°")
+                _loop(ax, found, name, joint, plotting.shade(k / 4), holding(("elbow", "shoulder")[joint - 1], angle) + "°")
             joint_name = ("shoulder", "elbow")[joint - 1]
             ax.set(title=joint_name, xlabel=f"{joint_name} [°]", ylabel="passive moment [N m]")
-            ax.legend(fontsize=8)
-        text = f"Mean of {REPEATS[number - 1]} trials, the upper branch with growing angle."
+            ax.legend(fontsize=8, loc="upper left")
+        text = f"Mean of {REPEATS[number - 1]} trials, {BRANCHES}."
         figures.append(Drawn(f"figure-4.{10 + number}", f"Figure 4.{10 + number}: virtual subject {number}", text, figure))
         for fitted in found.moments.dependence:
             c = fitted["coupling"]
@@ -97,7 +100,9 @@ def six_together() -> Found:
     """Draw all subjects in two configurations."""
     figure = plotting.figure(9.4, 4.2)
     widths = []
-    for ax, joint, name in zip(figure.subplots(1, 2), (2, 1), ("shoulder at -68", "elbow at 27"), strict=True):
+    for ax, joint, name in zip(
+        figure.subplots(1, 2), (2, 1), (holding("shoulder", SHOULDER_HELD[0]), holding("elbow", ELBOW_HELD[0])), strict=True
+    ):
         for number in range(1, 7):
             found = session(number)
             _loop(ax, found, name, joint, plotting.CYCLE[number - 1], f"subject {number}")
@@ -111,5 +116,5 @@ def six_together() -> Found:
             f"{max(widths[6:]):.2f} N m at the shoulder."
         ),
         why="Sizes of friction and springs were drawn with 30 % between subjects; the thesis prints no numbers of the real ones.",
-        figures=[Drawn("figure-B.9", "Six virtual subjects", "Each loop is a mean over the trials of one subject.", figure)],
+        figures=[Drawn("figure-B.9", "Figure 9 of appendix B: six virtual subjects", f"Means over trials, {BRANCHES}.", figure)],
     )
