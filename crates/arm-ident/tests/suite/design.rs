@@ -142,7 +142,8 @@ fn a_plan_respects_the_speed_and_the_acceleration_of_the_robot() {
     };
     let held = design(&question, &slow, || {}).expect("a plan").1;
     assert!(held.robot_speed <= limit);
-    let limit = 0.5 * free.robot_acceleration;
+    let free = design(&question, &allowed(60), || {}).expect("a plan").1;
+    let limit = 0.8 * free.robot_acceleration;
     assert!(limit > 0.0);
     let gentle = Allowed {
         robot_acceleration: limit,
