@@ -147,8 +147,9 @@ impl Noise {
     /// The same for other trials than those it was read off: there every sample weighs the same.
     pub fn of_others(&self) -> Self {
         Self {
+            whiteners: self.whiteners.clone(),
             weights: Vec::new(),
-            ..self.clone()
+            mix: self.mix.clone(),
         }
     }
 

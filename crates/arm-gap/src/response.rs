@@ -12,7 +12,7 @@ use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Reading, Scalar, Setup, inverse_dynamics, jacobian,
     joint_force, static_torque, tip,
 };
-use arm_sim::{HandlePath, SimulationError};
+use arm_sim::{HandlePath, SimulationError, altered};
 use nalgebra::SMatrix;
 use std::sync::Arc;
 
@@ -43,12 +43,9 @@ struct Plant<const N: usize> {
 
 impl<const N: usize> Plant<N> {
     fn new(session: &Session<N>, hypothesis: &Hypothesis<N>) -> Result<Self, SimulationError> {
-        let mut setup = hypothesis.setup(&session.chain, session.contact)?;
+        let setup = hypothesis.setup(&session.chain, session.contact)?;
         let effects = hypothesis.effects();
-        for effect in &effects {
-            effect.validate(N)?;
-            effect.alter(&mut setup);
-        }
+        let setup = altered(&setup, &effects)?;
         Ok(Self {
             chain: setup.chain()?,
             contact: setup.contact,

@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
-use arm_core::{Joints, Pose, jacobian};
+use arm_core::{Contact, Joints, Pose, jacobian};
+use arm_sim::{SimulationError, altered};
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::apart::{Apart, shapes_of};
 use crate::groups::same_rate;
+use crate::hypothesis::Hypothesis;
 use crate::normal::factor;
 use crate::predict::{Channels, Course, smooth};
 use crate::spectrum::{coefficient, line};
@@ -32,6 +34,9 @@ const SLOWEST_RIPPLE: f64 = 0.4;
 const FASTEST_RIPPLE: f64 = 8.0;
 /// Gain below which a line is no rhythm: many frequencies and channels were looked at.
 const PLAIN: f64 = 60.0;
+/// Share of the squared sizes of a ripple over trials that may differ from one size: the robot makes the same one in every movement,
+/// a vibration of the arm follows what it does.
+const UNSTEADY: f64 = 0.05;
 /// Share of what is left in some channel that a rhythm must be.
 const SEEN: f64 = 0.05;
 /// Gain in which two explanations of a rhythm count as equal.
@@ -61,8 +66,9 @@ impl<const N: usize> Study<'_, N> {
                 line(&all, rate, SLOWEST_RHYTHM)
             }
             Line::OfTheRobot => {
+                let contact = self.contact(&anchor.hypothesis)?;
                 let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
-                    .map(|(residual, &trial)| self.closure(residual, trial))
+                    .map(|(residual, &trial)| self.closure(residual, trial, &contact))
                     .collect();
                 let all: Vec<&Channels> = closures.iter().collect();
                 line(&all, rate, SLOWEST_RIPPLE)
@@ -89,7 +95,7 @@ impl<const N: usize> Study<'_, N> {
         };
         let Some((most, first)) = list
             .next()
-            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && !sounds(e))
+            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && e.is_steady() && !sounds(e))
         else {
             return Ok(None);
         };
@@ -140,18 +146,32 @@ impl<const N: usize> Study<'_, N> {
         out
     }
 
+    /// The contact as it is believed.
+    fn contact(&self, hypothesis: &Hypothesis<N>) -> Result<Contact<f64>, GapError> {
+        let nominal = (&self.session.chain, self.session.contact);
+        let rig = hypothesis.setup(nominal.0, nominal.1);
+        let rig = rig.map_err(SimulationError::from);
+        let rig = rig.and_then(|rig| altered(&rig, &hypothesis.effects()));
+        let trial = self.fitted[0];
+        Ok(rig
+            .map_err(|source| GapError::Simulation { trial, source })?
+            .contact)
+    }
+
     /// What is left between the arm's tip and the handle, stretch of the contact taken off: y and z \[m\].
-    fn closure(&self, residual: &Channels, trial: usize) -> Channels {
+    fn closure(&self, residual: &Channels, trial: usize, contact: &Contact<f64>) -> Channels {
         let course = &self.courses[trial];
-        let count = residual[0].len();
+        let stretches = [0, 1].map(|axis| {
+            let spring = (contact.stiffness[axis], contact.damping[axis]);
+            stretch(&residual[N + axis], spring, course.rate)
+        });
         let mut out = vec![Vec::new(); 2];
-        for i in 0..count {
+        for i in 0..residual[0].len() {
             let q = Joints::<f64, N>::from_fn(|j, _| course.seen[j][i]);
             let moved = Joints::<f64, N>::from_fn(|j, _| residual[j][i]);
             let tip = jacobian(&self.session.chain, &Pose::new(&q)) * moved;
             for axis in 0..2 {
-                let stretch = residual[N + axis][i] / self.session.contact.stiffness[axis];
-                out[axis].push(tip[axis] + stretch);
+                out[axis].push(tip[axis] + stretches[axis][i]);
             }
         }
         out
@@ -333,6 +353,26 @@ impl<const N: usize> Study<'_, N> {
     }
 }
 
+/// How far a force \[N\] stretches a spring \[N/m\] with a damper \[N s/m\] beside it \[m\], by the trapezoidal rule.
+///
+/// The damper counts: it carries an eighth of the force of a muscle that trembles at 8 Hz, which would pass for a ripple of the
+/// robot.
+fn stretch(force: &[f64], (stiffness, damping): (f64, f64), rate: f64) -> Vec<f64> {
+    let slow = damping * rate;
+    let mut out: Vec<f64> = Vec::with_capacity(force.len());
+    for (i, now) in force.iter().enumerate() {
+        let next = match out.last() {
+            None => now / stiffness,
+            Some(last) => {
+                let mean = 0.5 * (now + force[i - 1]);
+                (mean - (0.5 * stiffness - slow) * last) / (0.5 * stiffness + slow)
+            }
+        };
+        out.push(next);
+    }
+    out
+}
+
 struct Explained {
     effect: Effect<f64>,
     sd: f64,
@@ -342,6 +382,20 @@ struct Explained {
     columns: Vec<Effect<f64>>,
     /// Largest share of the variance of a channel's residual.
     share: f64,
+}
+
+impl Explained {
+    /// Whether a ripple is as large in one trial as in another, but for noise; rhythms of muscles need not be.
+    fn is_steady(&self) -> bool {
+        let trials = self.sizes.len() as f64;
+        let squares = self.sizes.iter();
+        let squares = squares.map(|s| s.iter().map(|v| v * v).sum::<f64>());
+        let (sum, square) = squares.fold((0.0, 0.0), |(a, b), s| (a + libm::sqrt(s), b + s));
+        // Of each swing the noise makes two numbers, which gain one unit each.
+        let noise = 2.0 * self.columns.len() as f64 * trials / self.gain;
+        let alike = sum * sum / (trials * square);
+        self.effect.kind.probe().nature != Nature::Periodic || 1.0 - alike < UNSTEADY + noise
+    }
 }
 
 /// The size with which swings are tried.
@@ -382,4 +436,55 @@ fn swinging(kind: Kind, index: usize, size: usize, frequency: f64) -> Effect<f64
     // The swing as a cosine, so that its coefficient is real.
     effect.parameters[phase] = 0.5 * core::f64::consts::PI;
     effect
+}
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::TAU;
+
+    use super::*;
+
+    #[test]
+    fn a_damper_beside_a_spring_is_no_stretch() {
+        let (rate, stiffness, damping, omega) = (50.0, 1e4, 50.0, TAU * 6.0);
+        let times: Vec<f64> = (0..500).map(|i| f64::from(i) / rate).collect();
+        let swing = |t: &f64| 1e-4 * libm::sin(omega * t);
+        let force: Vec<f64> = times
+            .iter()
+            .map(|t| stiffness * swing(t) + damping * omega * 1e-4 * libm::cos(omega * t))
+            .collect();
+        let off = |found: &[f64]| {
+            let errors = std::iter::zip(found, &times).skip(50);
+            errors
+                .map(|(f, t)| (f - swing(t)).abs())
+                .fold(0.0, f64::max)
+        };
+        let with = off(&stretch(&force, (stiffness, damping), rate));
+        let without = off(&stretch(&force, (stiffness, 0.0), rate));
+        assert!(without > 1.5e-5, "{without}");
+        assert!(with < 0.1 * without, "{with} {without}");
+    }
+
+    #[test]
+    fn a_ripple_is_as_large_in_one_trial_as_in_another() {
+        let mut kinds = KINDS.iter().copied();
+        let ripple = kinds.find(|k| k.probe().nature == Nature::Periodic);
+        let effect = Effect::new(ripple.expect("a periodic kind"), 0);
+        let steady = |sizes: &[f64], gain| {
+            let explained = Explained {
+                effect,
+                sd: 0.0,
+                gain,
+                locked: false,
+                sizes: sizes.iter().map(|s| vec![0.6 * s, -0.8 * s]).collect(),
+                columns: vec![effect],
+                share: 1.0,
+            };
+            explained.is_steady()
+        };
+        assert!(steady(&[1.0, 1.2, 0.8, 1.1, 0.9, 1.0], 1000.0));
+        assert!(!steady(&[1.0, 1.0, 1.0, 2.0, 2.0, 2.0], 1000.0));
+        // Noise alone makes sizes differ where there is hardly a line.
+        assert!(steady(&[1.0, 1.0, 1.0, 2.0, 2.0, 2.0], 100.0));
+    }
 }

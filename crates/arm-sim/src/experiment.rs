@@ -62,7 +62,10 @@ impl<const N: usize> Experiment<N> {
 }
 
 /// A rig with all effects applied that alter it.
-pub(crate) fn altered<const N: usize>(
+///
+/// # Errors
+/// [`SimulationError::Invalid`] for an effect with a value or a place outside what its kind allows.
+pub fn altered<const N: usize>(
     setup: &Setup<f64, N>,
     effects: &[Effect<f64>],
 ) -> Result<Setup<f64, N>, SimulationError> {

@@ -52,8 +52,8 @@ pub use controlled::{Controlled, Controller, Fault, Safety, control};
 pub use digest::digest;
 pub use error::SimulationError;
 pub use experiment::{
-    Coupling, Drive, Engine, Experiment, Integrator, Partial, Start, simulate, simulate_partial,
-    simulate_with,
+    Coupling, Drive, Engine, Experiment, Integrator, Partial, Start, altered, simulate,
+    simulate_partial, simulate_with,
 };
 pub use movement::{JointMotion, Movement};
 pub use noise::Normal;

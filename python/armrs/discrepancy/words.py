@@ -79,7 +79,9 @@ def _left(result: Mapping[str, Any]) -> str:
     """Say what is left where effects explain the data."""
     if result["lack_of_fit"]["amended"]["z"] < MISFIT:
         return "what is left is noise"
-    return f"{max(result['unexplained']['share'], 0.001):.1%} of the misfit is left, less than the noise: the laws are not exact"
+    share = result["unexplained"]["share"]
+    size = f"{share:.1%}" if share >= 0.001 else "less than 0.1%"
+    return f"{size} of the misfit is left, less than the noise: the laws are not exact"
 
 
 def _judged(result: Mapping[str, Any]) -> str:
