@@ -106,6 +106,13 @@ def test_links_jump_to_what_they_name(made: Path) -> None:
         top = page.locator("[id='table-4.5'] h2").bounding_box()["y"]
         buttons = page.locator("nav").bounding_box()
         assert buttons["y"] + buttons["height"] <= top < 300
+    with opened(made / "report.html", width=400) as seen:
+        page = seen.page
+        page.click("nav button[data-part=humans]")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+        page.mouse.wheel(0, 3000)
+        page.wait_for_function("scrollY > 500")
+        assert page.locator("nav").bounding_box()["y"] < -100  # on a small screen the buttons do not stay in the way
 
 
 def test_the_robot_holds_the_arm_in_every_frame(made: Path, items: dict[str, dict[str, Any]]) -> None:

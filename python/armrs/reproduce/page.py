@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from .. import report, tables
 from . import animation
 
+_NEGATIVE = re.compile(r"-\d")
 _CSS = """
 nav { position: sticky; top: 0; z-index: 1; display: flex; flex-wrap: wrap; gap: .4rem; padding: .6rem 0; background: var(--paper);
   border-bottom: 1px solid var(--line); }
@@ -26,7 +28,8 @@ td code { white-space: normal; overflow-wrap: anywhere; }
 figure img { max-width: 100%; }
 article { scroll-margin-top: 6.5rem; }
 .part thead th { white-space: normal; vertical-align: bottom; }
-.part th, .part td { padding: .32rem .5rem; }
+.part th, .part td { padding: .32rem .4rem; }
+@media (max-width: 45rem) { nav { position: static; } dl { grid-template-columns: 1fr; } article { scroll-margin-top: 1rem; } }
 """
 
 _SCRIPT = """
@@ -71,12 +74,19 @@ def _item(item: Mapping[str, Any], folder: Path, films: Any) -> str:
     out = f'<article id="{item["key"]}">\n{report.heading(item["title"])}' + report.paragraph(item["place"], "soft")
     if item["virtual"]:
         out += '<p><span class="label">Virtual data: simulated, not measured</span></p>\n'
-    rows = (("Printed", item["printed"]), ("Here", item["ours"]), ("Why", item["why"]))
-    out += "<dl>" + "".join(f"<dt>{name}</dt><dd>{_marked(text)}</dd>" for name, text in rows) + "</dl>\n"
+    said = (("Printed", item["printed"]), ("Here", item["ours"]), ("Why", item["why"]))
+    out += "<dl>" + "".join(f"<dt>{name}</dt><dd>{_marked(text)}</dd>" for name, text in said) + "</dl>\n"
     for sheet in item["tables"]:
-        out += f"<h3>{report.escape(sheet['title'])}</h3>\n" + report.table(tables.Table(sheet["head"], sheet["rows"], sheet["left"]))
+        rows = [[_signed(cell) for cell in row] for row in sheet["rows"]]
+        out += f"<h3>{report.escape(sheet['title'])}</h3>\n" + report.table(tables.Table(sheet["head"], rows, sheet["left"]))
     out += "".join(animation.html(film, next(films)) for film in item["animations"])
     return out + "".join(report.picture(entry, folder) for entry in item["figures"]) + "</article>\n"
+
+
+def _signed(cell: Any) -> str | None:
+    """Return the text of a cell, a number with a minus that is seen."""
+    text = None if cell is None else str(cell)
+    return tables.minus(text) if text and _NEGATIVE.match(text) else text
 
 
 def _equations(rows: list[list[str]]) -> str:
