@@ -2,7 +2,7 @@
 
 use crate::inertia::{link_motion, to_joint_matrix};
 use crate::kinematics::{to_joint_torque, to_links};
-use crate::{Chain, JointMatrix, Joints, Pose, Scalar, joints};
+use crate::{Chain, JointMatrix, Joints, Pose, Products, Scalar, joints};
 
 /// Derivative of `M_ik` to θ_i; to θ_k it is the opposite.
 #[inline]
@@ -24,7 +24,7 @@ pub fn coriolis<T: Scalar, const N: usize>(
     pose: &Pose<T, N>,
     qd: &Joints<T, N>,
 ) -> Joints<T, N> {
-    to_joint_torque(&link_motion(chain, pose, &to_links(qd)).1)
+    to_joint_torque(&link_motion(&Products::of(chain), pose, &to_links(qd)).1)
 }
 
 /// The matrix `C(q,q̇)` of Christoffel symbols, for which `Ḃ − 2C` is skew-symmetric \[N m s/rad\].

@@ -2,11 +2,11 @@
 
 use core::array::from_fn;
 
-use crate::gravity::{link_gravity, weight_moments};
+use crate::gravity::link_gravity;
 use crate::inertia::link_motion;
 use crate::kinematics::{to_joint_torque, to_links};
 use crate::unroll::each;
-use crate::{Chain, Joints, Plane, Pose, Scalar, joints};
+use crate::{Chain, Joints, Plane, Pose, Products, Scalar, joints};
 
 /// What acts on the arm from outside and in its joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +64,7 @@ pub fn inverse_dynamics<T: Scalar, const N: usize>(
     qdd: &Joints<T, N>,
 ) -> Joints<T, N> {
     let acceleration = to_links(qdd);
-    let (m, mut rows) = link_motion(chain, pose, &to_links(qd));
+    let (m, mut rows) = link_motion(&Products::of(chain), pose, &to_links(qd));
     let weight = link_gravity(chain, pose);
     for i in 0..N {
         rows[i] += weight[i] + m[i][i] * acceleration[i];
@@ -87,17 +87,28 @@ pub fn forward_dynamics<T: Scalar, const N: usize>(
     qd: &Joints<T, N>,
     load: &Load<T, N>,
 ) -> Joints<T, N> {
-    let (m, mut rows) = link_motion(chain, pose, &to_links(qd));
+    accelerations(&Products::of(chain), pose, qd, load)
+}
+
+/// [`forward_dynamics`] of an arm whose products are at hand, with the same bits.
+#[inline(always)]
+pub fn accelerations<T: Scalar, const N: usize>(
+    products: &Products<T, N>,
+    pose: &Pose<T, N>,
+    qd: &Joints<T, N>,
+    load: &Load<T, N>,
+) -> Joints<T, N> {
+    let (m, mut rows) = link_motion(products, pose, &to_links(qd));
     let [fy, fz] = load.force_on_arm;
     each!(i in 0, N => {
         // Weight and force at the tip turn the link with the same two lever arms.
-        let [level, upright] = weight_moments(chain, i);
-        let a = chain.segments[i].length;
+        let [level, upright] = products.weight[i];
+        let a = products.length[i];
         let pushed = (a * fz + level) * pose.cos[i] - (a * fy + upright) * pose.sin[i];
         let beyond = if i + 1 < N { load.torque[i + 1] } else { -load.moment_on_arm };
         rows[i] = load.torque[i] - beyond + pushed - rows[i];
     });
-    solve(m, &mut rows);
+    solve(m, products.first, &mut rows);
     joints(from_fn(|i| {
         if i == 0 {
             rows[0]
@@ -107,12 +118,15 @@ pub fn forward_dynamics<T: Scalar, const N: usize>(
     }))
 }
 
-/// Solves `M x = b` in place for symmetric positive definite M, given by its rows up to the diagonal, by `L D Lᵀ`.
+/// Solves `M x = b` in place for symmetric positive definite M, given by its rows up to the diagonal, by `L D Lᵀ`;
+/// `first` is one over its first entry.
 #[inline(always)]
-fn solve<T: Scalar, const N: usize>(mut m: [[T; N]; N], b: &mut [T; N]) {
-    let mut reciprocal = [T::ONE; N];
+fn solve<T: Scalar, const N: usize>(mut m: [[T; N]; N], first: T, b: &mut [T; N]) {
+    let mut reciprocal = [first; N];
     each!(k in 0, N => {
-        reciprocal[k] = T::ONE / m[k][k];
+        if k > 0 {
+            reciprocal[k] = T::ONE / m[k][k];
+        }
         each!(i in k + 1, N => {
             let factor = m[i][k] * reciprocal[k];
             each!(c in i, N => {

@@ -6,7 +6,7 @@ use crate::kinematics::to_joint_torque;
 use crate::{Chain, Joints, Pose, Scalar};
 
 /// Row of each link: how its weight and that of all beyond it resist turning \[N m\].
-#[inline]
+#[inline(always)]
 pub(crate) fn link_gravity<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,

@@ -1,7 +1,7 @@
 //! The inertia matrix.
 
 use crate::unroll::each;
-use crate::{Chain, JointMatrix, Pose, Scalar};
+use crate::{Chain, JointMatrix, Pose, Products, Scalar};
 
 /// Inertia matrix in link angles θ \[kg m²\]: `M_jj = J_j`, `M_ij = a_i (X_j cos(θ_i−θ_j) + H_j sin(θ_i−θ_j))` for i < j.
 ///
@@ -11,18 +11,17 @@ pub fn link_inertia<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
 ) -> JointMatrix<T, N> {
-    let rows = link_motion(chain, pose, &[T::ZERO; N]).0;
+    let rows = link_motion(&Products::of(chain), pose, &[T::ZERO; N]).0;
     JointMatrix::from_fn(|i, k| if i < k { rows[k][i] } else { rows[i][k] })
 }
 
 /// The inertia matrix in link angles, rows up to the diagonal, and the centrifugal part of each link's row.
 ///
 /// One pass over the pairs i < k of links, with their angle θ_i − θ_k: `M_ik = a_i (X_k cos + H_k sin)`, and its slope
-/// `a_i (H_k cos − X_k sin)` to θ_i takes the squared speed of k from row i and gives that of i to row k. Products of
-/// parameters come first: they do not change during a run.
+/// `a_i (H_k cos − X_k sin)` to θ_i takes the squared speed of k from row i and gives that of i to row k.
 #[inline(always)]
 pub(crate) fn link_motion<T: Scalar, const N: usize>(
-    chain: &Chain<T, N>,
+    products: &Products<T, N>,
     pose: &Pose<T, N>,
     speed: &[T; N],
 ) -> ([[T; N]; N], [T; N]) {
@@ -30,18 +29,15 @@ pub(crate) fn link_motion<T: Scalar, const N: usize>(
     each!(k in 0, N => {
         each!(i in 0, k => {
             let (c, s) = pose.difference(i, k);
-            let a = chain.segments[i].length;
-            let (along, normal) = (a * chain.x[k], a * chain.h[k]);
+            let [along, normal] = products.coupling[k][i];
             let slope = normal * c - along * s;
             m[k][i] = along * c + normal * s;
             turning[i] -= slope * speed[k].squared();
             turning[k] += slope * speed[i].squared();
         });
-        // A rotor turns with the angle between two links.
-        m[k][k] = chain.j[k] + chain.rotor[k];
+        m[k][k] = products.diagonal[k];
         if k > 0 {
-            m[k - 1][k - 1] += chain.rotor[k];
-            m[k][k - 1] -= chain.rotor[k];
+            m[k][k - 1] -= products.rotor[k];
         }
     });
     (m, turning)

@@ -68,7 +68,7 @@ pub(crate) fn to_links<T: Scalar, const N: usize>(values: &Joints<T, N>) -> [T; 
 }
 
 /// Sums from the distal end: what acts on each link to what acts at each joint.
-#[inline]
+#[inline(always)]
 pub(crate) fn to_joint_torque<T: Scalar, const N: usize>(links: &[T; N]) -> Joints<T, N> {
     let mut torque = *links;
     for i in (0..N.saturating_sub(1)).rev() {

@@ -36,6 +36,7 @@ mod kinematics;
 mod lanes;
 pub mod models;
 pub mod monitor;
+mod products;
 mod regressor;
 mod robot;
 mod scalar;
@@ -50,7 +51,9 @@ pub use compensation::{Carry, Compensation};
 pub use contact::Contact;
 pub use contribution::{Contributions, contributions};
 pub use coriolis::{centrifugal, coriolis, coriolis_matrix};
-pub use dynamics::{Load, forward_dynamics, inverse_dynamics, joint_force, static_torque};
+pub use dynamics::{
+    Load, accelerations, forward_dynamics, inverse_dynamics, joint_force, static_torque,
+};
 pub use energy::{kinetic_energy, potential_energy};
 pub use equation::{Equation, Measured, Needed, Prior};
 pub use error::{Invalid, Shown};
@@ -58,6 +61,7 @@ pub use gravity::gravity;
 pub use inertia::{inertia, link_inertia};
 pub use kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};
 pub use lanes::Lanes;
+pub use products::Products;
 pub use regressor::{Regressor, regressor};
 pub use robot::{Elbow, Robot};
 pub use scalar::{Real, Scalar};

@@ -8,9 +8,9 @@ use arm_core::{Contact, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup};
 use crate::breaks::step_in_pieces;
 use crate::feed::{Ahead, Feed};
 use crate::model::{Input, Link, Model, Plain, State};
-use crate::native::diverged;
-use crate::prepare::{Prepared, add_ripple, commands};
-use crate::recorder::Recorder;
+use crate::native::{PlainSteps, diverged};
+use crate::prepare::{Prepared, add_ripple, commands, has_ripple};
+use crate::recorder::{Instant, Recorder, Row};
 use crate::step::{Inputs, Memory, step};
 use crate::widest::{Computation, widest};
 use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
@@ -79,12 +79,8 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && a.integrator() == b.integrator()
         && discriminant(&a.model.link) == discriminant(&b.model.link)
         && a.model.base.is_some() == b.model.base.is_some()
-        && has_ripple(a) == has_ripple(b)
+        && has_ripple(&a.setup) == has_ripple(&b.setup)
         && kinds(a) == kinds(b)
-}
-
-fn has_ripple<const N: usize>(prepared: &Prepared<N>) -> bool {
-    prepared.setup.ripple.iter().any(|a| *a != 0.0)
 }
 
 /// The runs in the lanes of one. A group of fewer than eight repeats its last run in the lanes left over.
@@ -107,7 +103,7 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     let model = Model::new(&setup, link, effects.collect())?;
     let one_drive = prepared
         .iter()
-        .all(|p| p.experiment.drive == first.experiment.drive && !has_ripple(p));
+        .all(|p| p.experiment.drive == first.experiment.drive && !has_ripple(&p.setup));
     let mut each: [Vec<Input<f64, N>>; LANES] = Default::default();
     let mut own = |half_steps: &[usize], out: &mut Vec<Input<Wide, N>>| {
         for (i, inputs) in each.iter_mut().enumerate() {
@@ -121,7 +117,6 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
         }
     };
     let mut memory = Memory::<Wide>::new(model.effects.len());
-    let mut lane_memory = vec![0.0; model.effects.len()];
     let mut state = State {
         q: Joints::from_fn(|j, _| pack(|i| lane(i).start.0[j])),
         qd: Joints::from_fn(|j, _| pack(|i| lane(i).start.1[j])),
@@ -129,17 +124,24 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     };
     let mut recorders: Vec<_> = prepared.iter().map(Recorder::new).collect();
     let mut stopped: Vec<Option<SimulationError>> = vec![None; prepared.len()];
+    let mut row = Row::new();
     let mut sample =
         |steps: usize, state: &State<Wide, N>, memory: &[Wide], stopped: &[Option<_>]| {
             let time = schedule.time(steps);
-            let common = one_drive.then(|| first.input(time));
+            let input = if one_drive {
+                first.input(time).wide()
+            } else {
+                pack_input(|i| lane(i).input(time))
+            };
+            row.fill(&Instant {
+                model: &model,
+                input: &input,
+                state,
+                memory,
+            });
             for (i, recorder) in recorders.iter_mut().enumerate() {
                 if stopped[i].is_none() {
-                    for (one, all) in lane_memory.iter_mut().zip(memory) {
-                        *one = all.0[i];
-                    }
-                    let input = common.unwrap_or_else(|| lane(i).input(time));
-                    recorder.push(&input, &state.lane(i), &lane_memory);
+                    recorder.push(&row, |all| all.0[i]);
                 }
             }
         };
@@ -250,45 +252,46 @@ where
             }
             return ahead.steps;
         };
-        // Copies of which nobody else knows: without them the compiler must fear that the rig changes with the state.
-        let (rig, mut now) = (*rig, *state);
-        let mut made = 0;
-        while made < ahead.steps {
-            plain_step(&rig, steps.h, ahead.step(made).start, &mut now);
-            made += 1;
-            if !now.is_finite() {
-                break;
-            }
-        }
-        *state = now;
-        made
+        // A copy of which nobody else knows: without it the compiler must fear that the rig changes with the state.
+        let (rig, h) = (*rig, steps.h);
+        Abreast { rig, ahead, h }.advance(ahead.steps, state)
     }
 }
 
-/// A step of plain rigs: one loop over lanes around all of it, of which the compiler makes vectors.
-#[inline(always)]
-fn plain_step<const N: usize>(
-    rig: &Plain<Wide, N>,
+/// Steps of plain rigs in lanes.
+struct Abreast<'a, T, const N: usize> {
+    rig: Plain<Wide, N>,
+    ahead: Ahead<'a, T, N>,
     h: f64,
-    input: &impl Drives<N>,
-    state: &mut State<Wide, N>,
-) {
-    let pose = Pose::new(&state.q);
-    // Into another place: what a lane writes is nothing that another one reads.
-    let mut next = *state;
-    for i in 0..LANES {
-        let mut lane = state.lane(i);
-        let now = rig.lane(i).evaluate(&input.lane(i), &pose.lane(i), &lane);
-        lane.advance(h, &now);
-        next.set_lane(i, &lane);
+}
+
+impl<T: Scalar, const N: usize> PlainSteps<Wide, N> for Abreast<'_, T, N>
+where
+    Input<T, N>: Drives<N>,
+{
+    /// One loop over lanes around all of it, of which the compiler makes vectors.
+    #[inline(always)]
+    fn step(&self, number: usize, state: &mut State<Wide, N>) {
+        let input = self.ahead.step(number).start;
+        let pose = Pose::new(&state.q);
+        // Into another place: what a lane writes is nothing that another one reads.
+        let mut next = *state;
+        for i in 0..LANES {
+            let mut lane = state.lane(i);
+            let rig = self.rig.lane(i);
+            let now = rig.evaluate(&input.handle(i), &pose.lane(i), &lane);
+            lane.advance(self.h, &now);
+            next.set_lane(i, &lane);
+        }
+        *state = next;
     }
-    *state = next;
 }
 
 /// What drives all lanes, the same for each or not.
 trait Drives<const N: usize> {
     fn wide(&self) -> Input<Wide, N>;
-    fn lane(&self, lane: usize) -> Input<f64, N>;
+    /// The handle of one lane.
+    fn handle(&self, lane: usize) -> Handle<f64>;
 }
 
 impl<const N: usize> Drives<N> for Input<f64, N> {
@@ -297,8 +300,8 @@ impl<const N: usize> Drives<N> for Input<f64, N> {
         pack_input(|_| *self)
     }
     #[inline(always)]
-    fn lane(&self, _: usize) -> Input<f64, N> {
-        *self
+    fn handle(&self, _: usize) -> Handle<f64> {
+        self.handle
     }
 }
 
@@ -308,16 +311,12 @@ impl<const N: usize> Drives<N> for Input<Wide, N> {
         *self
     }
     #[inline(always)]
-    fn lane(&self, lane: usize) -> Input<f64, N> {
+    fn handle(&self, lane: usize) -> Handle<f64> {
         let plane = |of: &Plane<Wide>| [of[0].0[lane], of[1].0[lane]];
-        Input {
-            time: self.time.0[lane],
-            handle: Handle {
-                position: plane(&self.handle.position),
-                velocity: plane(&self.handle.velocity),
-                acceleration: plane(&self.handle.acceleration),
-            },
-            torque: Joints::from_fn(|j, _| self.torque[j].0[lane]),
+        Handle {
+            position: plane(&self.handle.position),
+            velocity: plane(&self.handle.velocity),
+            acceleration: plane(&self.handle.acceleration),
         }
     }
 }

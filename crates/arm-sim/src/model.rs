@@ -2,8 +2,9 @@
 
 use arm_core::effect::{Effect, Local, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Invalid, Joints, Lanes, Load, Plane, Pose, Scalar, Setup, forward_dynamics,
-    joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
+    Chain, Contact, Invalid, Joints, Lanes, Load, Plane, Pose, Products, Scalar, Setup,
+    accelerations, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip,
+    tip_velocity,
 };
 
 use crate::Handle;
@@ -161,6 +162,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             {
                 Some(Plain {
                     chain: self.chain,
+                    products: Products::of(&self.chain),
                     contact: *contact,
                     affine: self.affine,
                 })
@@ -421,11 +423,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 }
 
-/// A rig of which a step takes no decision: its base stands still, its tip is on springs and dampers without play, and all that
-/// resists in its joints is linear in their motion.
+/// A rig of which a step takes no decision: its base stands still, its tip is on springs and dampers without play, no motors
+/// turn its joints, and all that resists in these is linear in their motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain<T, const N: usize> {
     chain: Chain<T, N>,
+    products: Products<T, N>,
     contact: Contact<T>,
     affine: [[T; 3]; N],
 }
@@ -437,25 +440,22 @@ impl<T: Scalar, const N: usize> Plain<T, N> {
     #[inline(always)]
     pub fn evaluate(
         &self,
-        input: &Input<T, N>,
+        handle: &Handle<T>,
         pose: &Pose<T, N>,
         state: &State<T, N>,
     ) -> Outcome<T, N> {
         let State { q, qd, .. } = state;
-        let resisting = affine(&self.affine, q, qd);
+        let (still, resisting) = (Joints::<T, N>::repeat(T::ZERO), affine(&self.affine, q, qd));
         let (at, v) = (tip(&self.chain, pose), tip_velocity(&self.chain, pose, qd));
-        let (gap, rate) = apart(&input.handle, at, v);
+        let (gap, rate) = apart(handle, at, v);
         let (force, lost) = pull(self.contact.linear(gap, rate), rate);
-        let net = load(&difference(&input.torque, &resisting), force);
+        let net = load(&difference(&still, &resisting), force);
+        let [led, _, resisted, _] =
+            powers((force, handle.velocity), [&still, &resisting], qd, lost);
         Outcome {
-            qdd: forward_dynamics(&self.chain, pose, qd, &net),
+            qdd: accelerations(&self.products, pose, qd, &net),
             force_on_arm: force,
-            power: powers(
-                (force, input.handle.velocity),
-                [&input.torque, &resisting],
-                qd,
-                lost,
-            ),
+            power: [led, T::ZERO, resisted, lost],
             joint_force: [T::ZERO; N],
         }
     }
@@ -468,6 +468,7 @@ impl<const L: usize, const N: usize> Plain<Lanes<L>, N> {
         let plane = |of: &Plane<Lanes<L>>| [of[0].0[lane], of[1].0[lane]];
         Plain {
             chain: self.chain.lane(lane),
+            products: self.products.lane(lane),
             contact: Contact {
                 stiffness: plane(&self.contact.stiffness),
                 damping: plane(&self.contact.damping),
@@ -528,7 +529,10 @@ fn powers<T: Scalar, const N: usize>(
 }
 
 #[inline(always)]
-fn load<T: Scalar, const N: usize>(torque: &Joints<T, N>, force_on_arm: Plane<T>) -> Load<T, N> {
+pub(crate) fn load<T: Scalar, const N: usize>(
+    torque: &Joints<T, N>,
+    force_on_arm: Plane<T>,
+) -> Load<T, N> {
     Load {
         torque: *torque,
         force_on_arm,
@@ -562,7 +566,10 @@ pub(crate) fn sum<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>)
 }
 
 #[inline(always)]
-fn difference<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>) -> Joints<T, N> {
+pub(crate) fn difference<T: Scalar, const N: usize>(
+    a: &Joints<T, N>,
+    b: &Joints<T, N>,
+) -> Joints<T, N> {
     let mut c = *a;
     for i in 0..N {
         c[i] -= b[i];

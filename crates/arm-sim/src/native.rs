@@ -4,11 +4,11 @@ use crate::breaks::step_in_pieces;
 use crate::feed::{Ahead, Feed};
 use crate::model::{Plain, State};
 use crate::prepare::Prepared;
-use crate::recorder::Recorder;
+use crate::recorder::{Instant, Recorder, Row};
 use crate::step::{Memory, step};
 use crate::widest::{Computation, widest};
 use crate::{Experiment, Partial, SimulationError};
-use arm_core::Pose;
+use arm_core::{Pose, Scalar};
 
 /// Runs an experiment; the loop does not allocate.
 pub(crate) fn run<const N: usize>(
@@ -23,7 +23,17 @@ pub(crate) fn run<const N: usize>(
         qd: prepared.start.1,
         work: [0.0; 4],
     };
-    recorder.push(&prepared.input(0.0), &state, &memory.state);
+    let mut row = Row::new();
+    let mut sample = |steps: usize, state: &State<f64, N>, memory: &[f64]| {
+        row.fill(&Instant {
+            model: &prepared.model,
+            input: &prepared.input(schedule.time(steps)),
+            state,
+            memory,
+        });
+        recorder.push(&row, |value| *value);
+    };
+    sample(0, &state, &memory.state);
     let mut feed = Feed::new(prepared.integrator());
     let plain = prepared.plain();
     let mut stopped = None;
@@ -58,8 +68,7 @@ pub(crate) fn run<const N: usize>(
         }
         if done == sampled + schedule.every {
             sampled = done;
-            let input = prepared.input(schedule.time(done));
-            recorder.push(&input, &state, &memory.state);
+            sample(done, &state, &memory.state);
         }
     }
     Ok(Partial {
@@ -100,18 +109,57 @@ impl<const N: usize> Computation for Steps<'_, N> {
             }
             return ahead.steps;
         };
-        let mut now = *state;
-        let mut made = 0;
-        while made < ahead.steps {
-            let outcome = rig.evaluate(ahead.step(made).start, &Pose::new(&now.q), &now);
-            now.advance(h, &outcome);
-            made += 1;
-            if !now.is_finite() {
-                break;
+        let rig = *rig;
+        Alone { rig, ahead, h }.advance(ahead.steps, state)
+    }
+}
+
+/// Steps of plain rigs. A trait, as closures cannot be made to be inlined.
+pub(crate) trait PlainSteps<T: Scalar, const N: usize> {
+    /// Makes one of them, counted from zero.
+    fn step(&self, number: usize, state: &mut State<T, N>);
+
+    /// Makes some, up to the first after which the state is not finite; returns their number.
+    ///
+    /// What is not finite stays so: it is looked for after all of them, and only where there is any they are made again one by
+    /// one.
+    #[inline(always)]
+    fn advance(&self, steps: usize, state: &mut State<T, N>) -> usize {
+        let (mut made, mut stride) = (0, if state.is_finite() { steps } else { 1 });
+        while made < steps {
+            let mut now = *state;
+            for number in made..made + stride {
+                self.step(number, &mut now);
+            }
+            let finite = now.is_finite();
+            if finite || stride == 1 {
+                *state = now;
+                made += stride;
+            }
+            if !finite {
+                if stride == 1 {
+                    break;
+                }
+                stride = 1;
             }
         }
-        *state = now;
         made
+    }
+}
+
+/// Steps of one plain rig.
+struct Alone<'a, const N: usize> {
+    rig: Plain<f64, N>,
+    ahead: Ahead<'a, f64, N>,
+    h: f64,
+}
+
+impl<const N: usize> PlainSteps<f64, N> for Alone<'_, N> {
+    #[inline(always)]
+    fn step(&self, number: usize, state: &mut State<f64, N>) {
+        let handle = &self.ahead.step(number).start.handle;
+        let outcome = self.rig.evaluate(handle, &Pose::new(&state.q), state);
+        state.advance(self.h, &outcome);
     }
 }
 

@@ -1,5 +1,7 @@
 //! From an experiment to what a run needs: checks, effects applied, schedule, robot angles.
 
+use std::array::from_fn;
+
 use arm_core::effect::{Effect, Place};
 use arm_core::{Joints, Scalar, Setup};
 
@@ -148,8 +150,10 @@ impl<'a, const N: usize> Prepared<'a, N> {
     pub fn inputs(&self, half_steps: &[usize], out: &mut Vec<Input<f64, N>>) {
         let from = out.len();
         commands(&self.experiment.drive, &self.schedule, half_steps, out);
-        for input in &mut out[from..] {
-            add_ripple(input, &self.setup);
+        if has_ripple(&self.setup) {
+            for input in &mut out[from..] {
+                add_ripple(input, &self.setup);
+            }
         }
     }
 
@@ -162,10 +166,6 @@ impl<'a, const N: usize> Prepared<'a, N> {
 
     pub fn integrator(&self) -> Integrator {
         self.experiment.integrator
-    }
-
-    pub fn has_handle(&self) -> bool {
-        !matches!(self.model.link, Link::Free)
     }
 }
 
@@ -192,20 +192,6 @@ pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64,
 /// Points of time whose commands are computed side by side.
 const ABREAST: usize = 16;
 
-struct Abreast<'a, const N: usize> {
-    path: &'a HandlePath<N>,
-    times: &'a [f64; ABREAST],
-}
-
-impl<const N: usize> Computation for Abreast<'_, N> {
-    type Output = [Handle<f64>; ABREAST];
-
-    #[inline(always)]
-    fn call(self) -> Self::Output {
-        self.path.abreast(self.times)
-    }
-}
-
 /// [`command`] after each of some numbers of half steps, appended to `out`; the same bits.
 pub(crate) fn commands<const N: usize>(
     drive: &Drive<N>,
@@ -213,35 +199,56 @@ pub(crate) fn commands<const N: usize>(
     half_steps: &[usize],
     out: &mut Vec<Input<f64, N>>,
 ) {
-    let times = half_steps.iter().map(|&half| schedule.half_time(half));
     let Drive::Handle { path, .. } = drive else {
+        let times = half_steps.iter().map(|&half| schedule.half_time(half));
         out.extend(times.map(|time| command(drive, time)));
         return;
     };
-    let torque = Joints::zeros();
-    let mut group = [0.0; ABREAST];
-    for halves in half_steps.chunks(ABREAST) {
-        for (i, time) in group.iter_mut().enumerate() {
+    widest(Abreast {
+        path,
+        schedule,
+        half_steps,
+        out,
+    });
+}
+
+struct Abreast<'a, const N: usize> {
+    path: &'a HandlePath<N>,
+    schedule: &'a Schedule,
+    half_steps: &'a [usize],
+    out: &'a mut Vec<Input<f64, N>>,
+}
+
+impl<const N: usize> Computation for Abreast<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for halves in self.half_steps.chunks(ABREAST) {
             // A last group that is not full repeats its end.
-            *time = schedule.half_time(halves[i.min(halves.len() - 1)]);
+            let half = |i: usize| halves[i.min(halves.len() - 1)];
+            let times: [f64; ABREAST] = from_fn(|i| self.schedule.half_time(half(i)));
+            let handles = self.path.abreast(&times);
+            let inputs = times.iter().zip(handles).take(halves.len());
+            self.out.extend(inputs.map(|(&time, handle)| Input {
+                time,
+                handle,
+                torque: Joints::zeros(),
+            }));
         }
-        let handles = widest(Abreast {
-            path,
-            times: &group,
-        });
-        let inputs = group.iter().zip(handles).take(halves.len());
-        out.extend(inputs.map(|(&time, handle)| Input {
-            time,
-            handle,
-            torque,
-        }));
     }
+}
+
+/// Whether the robot's position has a periodic error, in any lane.
+#[inline]
+pub(crate) fn has_ripple<T: Scalar, const N: usize>(setup: &Setup<T, N>) -> bool {
+    !setup.ripple.iter().all(|a| a.every(|a| a == 0.0))
 }
 
 /// The periodic error of the robot's position on top of the commanded handle: `amplitude · sin(2π f t + phase)`.
 #[inline]
 pub(crate) fn add_ripple<T: Scalar, const N: usize>(input: &mut Input<T, N>, setup: &Setup<T, N>) {
-    if setup.ripple.iter().all(|a| a.every(|a| a == 0.0)) {
+    if !has_ripple(setup) {
         return;
     }
     let omega = T::of(core::f64::consts::TAU) * setup.ripple_frequency;

@@ -83,7 +83,7 @@ mod world;
 
 use crate::model::{Link, State};
 use crate::prepare::Prepared;
-use crate::recorder::Recorder;
+use crate::recorder::{Instant, Recorder, Row};
 use crate::{Experiment, Partial, SimulationError, Vibration};
 use leapfrog::Arm;
 
@@ -122,7 +122,7 @@ pub fn simulate_rapier<const N: usize>(
     check(&prepared, settings)?;
     let schedule = prepared.schedule;
     let mut arm = Arm::new(&prepared, settings)?;
-    let mut recorder = Recorder::new(&prepared);
+    let (mut recorder, mut row) = (Recorder::new(&prepared), Row::new());
     let (mut work, mut power) = ([0.0; 4], [0.0; 4]);
     let mut stopped = None;
     let mut input = prepared.input(0.0);
@@ -153,7 +153,14 @@ pub fn simulate_rapier<const N: usize>(
                 qd: sample.qd,
                 work,
             };
-            recorder.push_with(&input, &state, &arm.memory, &sample.forces);
+            let instant = Instant {
+                model: &prepared.model,
+                input: &input,
+                state: &state,
+                memory: &arm.memory,
+            };
+            row.fill_with(&instant, &sample.forces);
+            recorder.push(&row, |value| *value);
         }
         arm.remember(&sample);
         input = next;

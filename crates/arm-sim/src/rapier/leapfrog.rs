@@ -50,7 +50,7 @@ struct Speeds<const N: usize> {
 pub(super) struct Sample<const N: usize> {
     pub q: Joints<f64, N>,
     pub qd: Joints<f64, N>,
-    pub forces: Forces<N>,
+    pub forces: Forces<f64, N>,
     /// By handle and drive, against resistance and damping \[W\].
     pub power: [f64; 4],
     /// Half a step later.

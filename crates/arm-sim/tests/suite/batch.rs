@@ -141,3 +141,26 @@ fn a_lane_that_diverges_does_not_touch_the_others() {
     ));
     same_bits(&experiments, 1);
 }
+
+#[test]
+fn the_step_that_diverges_is_found_wherever_samples_are_taken() {
+    for speed in [1e5, 1e10, 1e25, 1e50, 1e100] {
+        let mut experiment = smooth(0.05);
+        experiment.integrator = Integrator::SemiImplicitEuler;
+        experiment.start = Start::Given {
+            q: [0.0; 3].into(),
+            qd: [speed, 0.0, 0.0].into(),
+        };
+        let step = |interval| {
+            let mut run = experiment.clone();
+            run.output_interval = interval;
+            match simulate(&run) {
+                Err(SimulationError::Diverged { step, .. }) => step,
+                other => panic!("{other:?} from {speed} rad/s"),
+            }
+        };
+        // After every step, and after many made at once.
+        assert_eq!(step(None), step(Some(0.05)), "{speed} rad/s");
+        assert!(step(None) > 1, "{speed} rad/s");
+    }
+}
