@@ -28,8 +28,7 @@ def main() -> None:
         target = f"{platform.machine()}-unknown-linux-gnu"
         command = ["cargo", "zigbuild", "--target", f"{target}.{OLDEST[0]}.{OLDEST[1]}"]
         built = ROOT / "target" / target / "release"
-    # With what crosscheck needs as well, so that shared packages have the same features and are compiled once for both.
-    subprocess.run([*command, "--quiet", "--release", "-p", "arm-fmu", "-p", "arm-ident"], cwd=ROOT, check=True)
+    subprocess.run([*command, "--quiet", "--release", "-p", "arm-fmu"], cwd=ROOT, check=True)
     name = NAMES.get(sys.platform, "libarm_fmu.so")
     content = (built / name).read_bytes()
     needed = glibc(content)

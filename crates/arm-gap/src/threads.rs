@@ -1,35 +1,42 @@
 //! Jobs on several threads.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Results of jobs in their order, whatever the number of threads.
 pub fn parallel<R: Send>(threads: usize, jobs: usize, one: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let results: Vec<Mutex<Option<R>>> = (0..jobs).map(|_| Mutex::new(None)).collect();
+    run(threads, jobs, &|job| {
+        let result = one(job);
+        *results[job].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+    });
+    // Every job was taken by a worker that was waited for.
+    let each = results.into_iter();
+    each.filter_map(|r| r.into_inner().unwrap_or_else(PoisonError::into_inner))
+        .collect()
+}
+
+/// Not generic, so that what makes threads is compiled once.
+fn run(threads: usize, jobs: usize, one: &(dyn Fn(usize) + Sync)) {
     if threads <= 1 || jobs <= 1 {
-        return (0..jobs).map(one).collect();
+        return (0..jobs).for_each(one);
     }
     let next = AtomicUsize::new(0);
     let work = || {
-        let mut done = Vec::new();
         loop {
             let job = next.fetch_add(1, Ordering::Relaxed);
             if job >= jobs {
-                return done;
+                return;
             }
-            done.push((job, one(job)));
+            one(job);
         }
     };
-    let mut results: Vec<Option<R>> = (0..jobs).map(|_| None).collect();
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads.min(jobs)).map(|_| scope.spawn(work)).collect();
         for worker in workers {
-            let done = worker
+            worker
                 .join()
                 .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            for (job, result) in done {
-                results[job] = Some(result);
-            }
         }
     });
-    // Every job was taken by a worker that was waited for.
-    results.into_iter().flatten().collect()
 }

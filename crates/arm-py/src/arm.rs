@@ -37,14 +37,14 @@ macro_rules! each_length {
 
 pub(crate) use each_length;
 
-/// The same for what is large to compile and means nothing beyond four segments: whatever simulates or identifies.
+/// The same for what is large to compile and made for arms of shoulder, elbow and wrist: whatever simulates or identifies.
 macro_rules! each_short_length {
     ($any:expr, $chain:ident => $body:expr) => {
         match $any {
             AnyChain::One($chain) => $body,
             AnyChain::Two($chain) => $body,
             AnyChain::Three($chain) => $body,
-            AnyChain::Four($chain) => $body,
+            AnyChain::Four(_) => Err(crate::arm::too_long(4)),
             AnyChain::Five(_) => Err(crate::arm::too_long(5)),
             AnyChain::Six(_) => Err(crate::arm::too_long(6)),
         }
@@ -57,7 +57,7 @@ pub(crate) fn too_long(segments: usize) -> PyErr {
     bad_input(
         "[[arm.segment]]",
         segments,
-        "1 to 4 segments; only kernels, passive moments and co-simulation take more",
+        "1 to 3 segments; only kernels, passive moments and co-simulation take more",
     )
 }
 
