@@ -269,7 +269,7 @@ def test_a_unit_like_no_other_gets_no_guess(slow_arm: Path, tmp_path: Path, caps
 ARM = ([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])
 
 
-def five_segments() -> armrs.Model:
+def four_segments() -> armrs.Model:
     return armrs.Model(tuple(armrs.Segment(f"s{k}", 0.2, 1.0, 0.1, 0.01) for k in range(4)), tuple(armrs.Joint(f"j{k}") for k in range(4)))
 
 
@@ -298,7 +298,7 @@ def five_segments() -> armrs.Model:
         (lambda: armrs.identify(3), "dataset: found 3, allowed a Dataset or a path"),
         (lambda: armrs.simulate(true_model()), "duration: found none"),
         (
-            lambda: armrs.simulate(five_segments(), duration=0.1),
+            lambda: armrs.simulate(four_segments(), duration=0.1),
             r"segment\]\]: found 4, allowed 1 to 3",
         ),
         (lambda: armrs.simulate(true_model(), duration=0.1, start=np.zeros(3)), "start angles: found 3 values, allowed 2"),
