@@ -1,14 +1,15 @@
 //! `armrs.Arm`: the kernels of the core, each also over a batch.
 
-use arm_core::{Chain, Invalid, Joints, Load, Pose, Segment};
+use arm_core::{Chain, Invalid, Segment};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
-use crate::convert::{Numbers, Rows, joints, over_rows};
+use crate::convert::{Numbers, Rows, over_rows};
 use crate::errors::{bad_input, invalid};
+use crate::kernel;
 
 /// Longest arm that is compiled in.
-const MOST: usize = 6;
+pub(crate) const MOST: usize = 6;
 
 /// A chain whose length is known at run time.
 #[derive(Clone, Debug)]
@@ -87,14 +88,6 @@ impl AnyChain {
             n => return Err(bad_input("segments", n, &format!("1 to {MOST} segments"))),
         }
         .map_err(invalid)
-    }
-}
-
-fn put<const R: usize, const C: usize>(matrix: &nalgebra::SMatrix<f64, R, C>, out: &mut [f64]) {
-    for r in 0..R {
-        for c in 0..C {
-            out[r * C + c] = matrix[(r, c)];
-        }
     }
 }
 
@@ -234,64 +227,33 @@ impl Arm {
 
     /// Position of the tip, shape (2,) or (n_samples, 2) [m].
     fn forward_kinematics<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
-            over_rows(py, [q], &[2], |[q], out| {
-                out.copy_from_slice(&arm_core::tip(c, &Pose::new(&joints(q))))
-            })
-        }
-        let q = Rows::new("q", &q, self.n_joints())?;
-        each_length!(&self.chain, c => run(c, py, q))
+        let rows = [Rows::new("q", &q, self.n_joints())?];
+        each_length!(&self.chain, c => over_rows(py, kernel::ForwardKinematics, c, rows))
     }
 
     /// Derivative of the tip position to the joint angles, shape (2, n_joints) or (n_samples, 2, n_joints) [m/rad].
     fn jacobian<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
-            over_rows(py, [q], &[2, N], |[q], out| {
-                put(&arm_core::jacobian(c, &Pose::new(&joints(q))), out)
-            })
-        }
-        let q = Rows::new("q", &q, self.n_joints())?;
-        each_length!(&self.chain, c => run(c, py, q))
+        let rows = [Rows::new("q", &q, self.n_joints())?];
+        each_length!(&self.chain, c => over_rows(py, kernel::Jacobian, c, rows))
     }
 
     /// Inertia matrix B(q), shape (n_joints, n_joints), with the batch in front [kg m²].
     fn inertia<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
-            over_rows(py, [q], &[N, N], |[q], out| {
-                put(&arm_core::inertia(c, &Pose::new(&joints(q))), out)
-            })
-        }
-        let q = Rows::new("q", &q, self.n_joints())?;
-        each_length!(&self.chain, c => run(c, py, q))
+        let rows = [Rows::new("q", &q, self.n_joints())?];
+        each_length!(&self.chain, c => over_rows(py, kernel::Inertia, c, rows))
     }
 
     /// Coriolis and centrifugal torques C(q, q̇) q̇, shape of `q` [N m].
     fn coriolis<'py>(&self, py: Python<'py>, q: Numbers<'py>, qd: Numbers<'py>) -> Array<'py> {
-        fn run<'py, const N: usize>(
-            c: &Chain<f64, N>,
-            py: Python<'py>,
-            rows: [Rows<'_>; 2],
-        ) -> Array<'py> {
-            over_rows(py, rows, &[N], |[q, qd], out| {
-                out.copy_from_slice(
-                    arm_core::coriolis(c, &Pose::new(&joints(q)), &joints(qd)).as_slice(),
-                );
-            })
-        }
         let n = self.n_joints();
         let rows = [Rows::new("q", &q, n)?, Rows::new("qd", &qd, n)?];
-        each_length!(&self.chain, c => run(c, py, rows))
+        each_length!(&self.chain, c => over_rows(py, kernel::Coriolis, c, rows))
     }
 
     /// Gravity torques G(q), shape of `q` [N m].
     fn gravity<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        fn run<'py, const N: usize>(c: &Chain<f64, N>, py: Python<'py>, q: Rows<'_>) -> Array<'py> {
-            over_rows(py, [q], &[N], |[q], out| {
-                out.copy_from_slice(arm_core::gravity(c, &Pose::new(&joints(q))).as_slice());
-            })
-        }
-        let q = Rows::new("q", &q, self.n_joints())?;
-        each_length!(&self.chain, c => run(c, py, q))
+        let rows = [Rows::new("q", &q, self.n_joints())?];
+        each_length!(&self.chain, c => over_rows(py, kernel::Gravity, c, rows))
     }
 
     /// Joint torques of a force on the arm at its tip, Jᵀ F, shape of `q` [N m].
@@ -303,22 +265,11 @@ impl Arm {
         q: Numbers<'py>,
         force_on_arm: Numbers<'py>,
     ) -> Array<'py> {
-        fn run<'py, const N: usize>(
-            c: &Chain<f64, N>,
-            py: Python<'py>,
-            rows: [Rows<'_>; 2],
-        ) -> Array<'py> {
-            over_rows(py, rows, &[N], |[q, force], out| {
-                let torque =
-                    arm_core::static_torque(c, &Pose::new(&joints(q)), [force[0], force[1]], 0.0);
-                out.copy_from_slice(torque.as_slice());
-            })
-        }
         let rows = [
             Rows::new("q", &q, self.n_joints())?,
             Rows::new("force_on_arm", &force_on_arm, 2)?,
         ];
-        each_length!(&self.chain, c => run(c, py, rows))
+        each_length!(&self.chain, c => over_rows(py, kernel::StaticTorque, c, rows))
     }
 
     /// Joint torques of a motion of the rigid arm, B q̈ + C q̇ + G, shape of `q` [N m].
@@ -329,25 +280,8 @@ impl Arm {
         qd: Numbers<'py>,
         qdd: Numbers<'py>,
     ) -> Array<'py> {
-        fn run<'py, const N: usize>(
-            c: &Chain<f64, N>,
-            py: Python<'py>,
-            rows: [Rows<'_>; 3],
-        ) -> Array<'py> {
-            over_rows(py, rows, &[N], |[q, qd, qdd], out| {
-                out.copy_from_slice(
-                    arm_core::inverse_dynamics(
-                        c,
-                        &Pose::new(&joints(q)),
-                        &joints(qd),
-                        &joints(qdd),
-                    )
-                    .as_slice(),
-                );
-            })
-        }
         let rows = self.rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
-        each_length!(&self.chain, c => run(c, py, rows))
+        each_length!(&self.chain, c => over_rows(py, kernel::InverseDynamics, c, rows))
     }
 
     /// Joint accelerations under joint torques, the inverse of `inverse_dynamics`, shape of `q` [rad/s²].
@@ -358,23 +292,8 @@ impl Arm {
         qd: Numbers<'py>,
         tau: Numbers<'py>,
     ) -> Array<'py> {
-        fn run<'py, const N: usize>(
-            c: &Chain<f64, N>,
-            py: Python<'py>,
-            rows: [Rows<'_>; 3],
-        ) -> Array<'py> {
-            over_rows(py, rows, &[N], |[q, qd, torque], out| {
-                let load = Load {
-                    torque: joints(torque),
-                    ..Load::none()
-                };
-                let qdd: Joints<f64, N> =
-                    arm_core::forward_dynamics(c, &Pose::new(&joints(q)), &joints(qd), &load);
-                out.copy_from_slice(qdd.as_slice());
-            })
-        }
         let rows = self.rows([("q", &q), ("qd", &qd), ("tau", &tau)])?;
-        each_length!(&self.chain, c => run(c, py, rows))
+        each_length!(&self.chain, c => over_rows(py, kernel::ForwardDynamics, c, rows))
     }
 
     /// The regressor of the base parameters, shape (n_joints, 3·n_joints) with the batch in front.
@@ -388,23 +307,7 @@ impl Arm {
         qd: Numbers<'py>,
         qdd: Numbers<'py>,
     ) -> Array<'py> {
-        fn run<'py, const N: usize>(
-            c: &Chain<f64, N>,
-            py: Python<'py>,
-            rows: [Rows<'_>; 3],
-        ) -> Array<'py> {
-            over_rows(py, rows, &[N, 3 * N], |[q, qd, qdd], out| {
-                let y = arm_core::regressor(c, &Pose::new(&joints(q)), &joints(qd), &joints(qdd));
-                for r in 0..N {
-                    for k in 0..N {
-                        out[r * 3 * N + k] = y.x[(r, k)];
-                        out[r * 3 * N + N + k] = y.h[(r, k)];
-                        out[r * 3 * N + 2 * N + k] = y.j[(r, k)];
-                    }
-                }
-            })
-        }
         let rows = self.rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
-        each_length!(&self.chain, c => run(c, py, rows))
+        each_length!(&self.chain, c => over_rows(py, kernel::Regressor, c, rows))
     }
 }

@@ -1,8 +1,10 @@
 //! Arrays in and out: the only place where shapes are checked and copies are made.
 
 use std::borrow::Cow;
+use std::marker::PhantomData;
 
-use arm_core::Joints;
+use arm_core::{Chain, Joints, Lanes, Scalar};
+use arm_sim::widest::{Computation, widest};
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{
     IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
@@ -11,6 +13,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::errors::bad_input;
+use crate::kernel::Kernel;
 
 /// Anything NumPy can read as real numbers; what is none is refused where the name of the argument is known.
 pub struct Numbers<'py>(PyResult<PyReadonlyArrayDyn<'py, f64>>);
@@ -113,7 +116,7 @@ impl<'a> Rows<'a> {
             Ok(slice) => Cow::Borrowed(slice),
             Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
         };
-        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+        if let Some(at) = first_not_finite(&values) {
             let place = format!("{name}[{}, {}]", at / width, at % width);
             return Err(bad_input(&place, values[at], "a finite number"));
         }
@@ -135,19 +138,37 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Values of a row as joint values.
-pub fn joints<const N: usize>(row: &[f64]) -> Joints<f64, N> {
-    Joints::from_column_slice(row)
+/// The first of many values that is not finite: looked for only where a whole stretch of them is not.
+fn first_not_finite(values: &[f64]) -> Option<usize> {
+    let finite = |v: &f64| v.is_finite();
+    let stretches = values.chunks(64).enumerate();
+    let (number, stretch) = stretches
+        .into_iter()
+        .find(|(_, stretch)| !stretch.iter().fold(true, |all, v| all & finite(v)))?;
+    let within = stretch.iter().position(|v| !finite(v))?;
+    Some(64 * number + within)
 }
 
-/// Calls `f` for every row of a batch and collects what it writes, `inner` being the shape of one result.
+/// Values of a row as joint values.
+#[inline(always)]
+pub fn joints<T: Scalar, const N: usize>(row: &[T]) -> Joints<T, N> {
+    // Not from a slice, which copies numbers one by one where they are of many lanes.
+    Joints::from_fn(|i, _| row[i])
+}
+
+/// Rows that are computed side by side.
+const LANES: usize = 8;
+/// Most numbers in a row of an argument.
+const MOST: usize = crate::arm::MOST;
+
+/// A kernel over every row of a batch; arguments that are single rows serve all rows of the others.
 ///
-/// Arguments that are single rows serve all rows of the others.
-pub fn over_rows<'py, const K: usize>(
+/// Eight rows at a time are the lanes of one call, in which each has the bits of a call of its own.
+pub fn over_rows<'py, F: Kernel<K>, const K: usize, const N: usize>(
     py: Python<'py>,
+    _: F,
+    chain: &Chain<f64, N>,
     inputs: [Rows<'_>; K],
-    inner: &[usize],
-    f: impl Fn([&[f64]; K], &mut [f64]) + Send + Sync,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let batch = inputs.iter().find_map(|r| r.batch);
     if let (Some(n), Some(other)) = (
@@ -163,11 +184,22 @@ pub fn over_rows<'py, const K: usize>(
             &format!("{n} rows as the other arguments, or a single one"),
         ));
     }
-    let (n, size) = (batch.unwrap_or(1), inner.iter().product::<usize>());
+    let mut shape = F::shape(N);
+    let (n, size) = (batch.unwrap_or(1), shape.iter().product::<usize>());
     let mut out = vec![0.0; n * size];
     let mut run = || {
-        for (i, chunk) in out.chunks_exact_mut(size).enumerate() {
-            f(std::array::from_fn(|k| inputs[k].row(i)), chunk);
+        // Longer arms are rare, and code for their lanes long to compile.
+        if const { N <= 4 } && batch.is_some() {
+            return widest(Groups {
+                kernel: PhantomData::<F>,
+                chain: chain.cast(),
+                inputs: &inputs,
+                size,
+                out: &mut out,
+            });
+        }
+        for (i, result) in out.chunks_exact_mut(size).enumerate() {
+            F::write(chain, inputs.each_ref().map(|r| r.row(i)), result);
         }
     };
     // Below some hundred rows, letting other threads run costs more than it gives.
@@ -176,7 +208,7 @@ pub fn over_rows<'py, const K: usize>(
     } else {
         run()
     }
-    if let Some(at) = out.iter().position(|v| !v.is_finite()) {
+    if let Some(at) = first_not_finite(&out) {
         let names = inputs.each_ref().map(|r| r.name).join(", ");
         let row = batch.map_or(String::new(), |_| format!(" in row {}", at / size));
         return Err(bad_input(
@@ -185,10 +217,55 @@ pub fn over_rows<'py, const K: usize>(
             "numbers that an arm can have, in SI units and radians",
         ));
     }
-    let shape: Vec<usize> = batch.into_iter().chain(inner.iter().copied()).collect();
+    if let Some(n) = batch {
+        shape.insert(0, n);
+    }
     let array =
         ArrayD::from_shape_vec(IxDyn(&shape), out).expect("the buffer was made for this shape");
     Ok(array.into_pyarray(py))
+}
+
+/// All rows of a batch, [`LANES`] after [`LANES`].
+struct Groups<'a, F, const K: usize, const N: usize> {
+    kernel: PhantomData<F>,
+    chain: Chain<Lanes<LANES>, N>,
+    inputs: &'a [Rows<'a>; K],
+    /// Numbers of a result.
+    size: usize,
+    out: &'a mut [f64],
+}
+
+impl<F: Kernel<K>, const K: usize, const N: usize> Computation for Groups<'_, F, K, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { chain, inputs, .. } = self;
+        let mut given = [[Lanes::<LANES>::ZERO; MOST]; K];
+        let mut found = vec![Lanes::<LANES>::ZERO; self.size];
+        for (group, results) in self.out.chunks_mut(LANES * self.size).enumerate() {
+            let last = results.len() / self.size - 1;
+            for (rows, wide) in inputs.iter().zip(&mut given) {
+                for lane in 0..LANES {
+                    // A last group that is not full repeats its end.
+                    let row = rows.row(LANES * group + lane.min(last));
+                    for (all, value) in wide.iter_mut().zip(row) {
+                        all.0[lane] = *value;
+                    }
+                }
+            }
+            F::write(
+                &chain,
+                given.each_ref().map(|row| row.as_slice()),
+                &mut found,
+            );
+            for (lane, result) in results.chunks_exact_mut(self.size).enumerate() {
+                for (value, all) in result.iter_mut().zip(&found) {
+                    *value = all.0[lane];
+                }
+            }
+        }
+    }
 }
 
 /// Calls `f` for every row in its order, each with `width` results: for what remembers the rows before.

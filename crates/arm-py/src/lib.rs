@@ -8,6 +8,7 @@ mod errors;
 mod fit;
 mod gap;
 mod ident;
+mod kernel;
 mod lab;
 mod own;
 mod plan;
