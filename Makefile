@@ -71,7 +71,7 @@ python: $(STAMPS)/build $(STAMPS)/dev
 	$(BIN)/ruff check --quiet python tests scripts examples bench
 	$(BIN)/mypy --no-error-summary
 	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
-	$(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 format: $(STAMPS)/dev
 	cargo fmt --all
@@ -108,11 +108,11 @@ GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
 
 hidden: build
 	cargo test --quiet --release -p hidden-world
-	$(GENERATE) --family null --seed 500000 --count $(or $(HIDDEN_NULL),204)
-	$(GENERATE) --family single --seed 510000 --count $(or $(HIDDEN_SINGLE),72)
-	$(GENERATE) --family double --seed 520000 --count $(or $(HIDDEN_DOUBLE),16)
-	$(GENERATE) --family triple --seed 530000 --count $(or $(HIDDEN_TRIPLE),12)
-	$(GENERATE) --family outside --seed 540000 --count $(or $(HIDDEN_OUTSIDE),16)
+	$(GENERATE) --family null --seed 600000 --count $(or $(HIDDEN_NULL),204)
+	$(GENERATE) --family single --seed 610000 --count $(or $(HIDDEN_SINGLE),72)
+	$(GENERATE) --family double --seed 620000 --count $(or $(HIDDEN_DOUBLE),16)
+	$(GENERATE) --family triple --seed 630000 --count $(or $(HIDDEN_TRIPLE),12)
+	$(GENERATE) --family outside --seed 640000 --count $(or $(HIDDEN_OUTSIDE),16)
 	$(BIN)/python bench/hidden/score.py $(HIDDEN)
 
 clean:

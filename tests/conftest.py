@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+LONG = ("test_reproduce.py", "test_docs.py", "test_sweep.py", "test_gap.py")
+"""Files that take longest. They come first, so that no process works on one of them alone at the end."""
+
 MODEL = """\
 [arm]
 gravity = 9.81
@@ -194,3 +197,7 @@ def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     write_dataset(Dataset("slow arm", handed_over(truth), trials, "robot", synthetic=True), folder)
     return folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.path.name not in LONG)

@@ -189,7 +189,7 @@ pub fn over_rows<'py, F: Kernel<K>, const K: usize, const N: usize>(
     let mut out = vec![0.0; n * size];
     let mut run = || {
         // Longer arms are rare, and code for their lanes long to compile.
-        if const { N <= 4 } && batch.is_some() {
+        if const { F::IN_LANES && N <= 3 } && batch.is_some() {
             return widest(Groups {
                 kernel: PhantomData::<F>,
                 chain: chain.cast(),

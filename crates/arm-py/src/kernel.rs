@@ -8,6 +8,9 @@ use crate::convert::joints;
 /// A function of a chain and a row of each of `K` arguments. A trait, as closures cannot be made to be inlined, and only what is
 /// inlined goes through the widest vectors.
 pub trait Kernel<const K: usize> {
+    /// Whether a batch goes through lanes: only where it takes long enough to be worth their compilation.
+    const IN_LANES: bool;
+
     /// Shape of a result for an arm with some joints.
     fn shape(joints: usize) -> Vec<usize>;
 
@@ -16,10 +19,12 @@ pub trait Kernel<const K: usize> {
 }
 
 macro_rules! kernels {
-    ($($name:ident: |$n:ident| $shape:expr, |$chain:ident, [$($given:ident),*], $out:ident| $body:expr;)*) => {$(
+    ($($name:ident, in lanes $lanes:literal: |$n:ident| $shape:expr, |$chain:ident, [$($given:ident),*], $out:ident| $body:expr;)*) => {$(
         pub struct $name;
 
         impl Kernel<{ [$(stringify!($given)),*].len() }> for $name {
+            const IN_LANES: bool = $lanes;
+
             fn shape($n: usize) -> Vec<usize> {
                 $shape.to_vec()
             }
@@ -37,33 +42,33 @@ macro_rules! kernels {
 }
 
 kernels! {
-    ForwardKinematics: |_n| [2], |chain, [q], out| {
+    ForwardKinematics, in lanes false: |_n| [2], |chain, [q], out| {
         out.copy_from_slice(&arm_core::tip(chain, &Pose::new(&joints(q))));
     };
-    Jacobian: |n| [2, n], |chain, [q], out| {
+    Jacobian, in lanes false: |n| [2, n], |chain, [q], out| {
         put(&arm_core::jacobian(chain, &Pose::new(&joints(q))), out);
     };
-    Inertia: |n| [n, n], |chain, [q], out| {
+    Inertia, in lanes false: |n| [n, n], |chain, [q], out| {
         put(&arm_core::inertia(chain, &Pose::new(&joints(q))), out);
     };
-    Coriolis: |n| [n], |chain, [q, qd], out| {
+    Coriolis, in lanes false: |n| [n], |chain, [q, qd], out| {
         put(&arm_core::coriolis(chain, &Pose::new(&joints(q)), &joints(qd)), out);
     };
-    Gravity: |n| [n], |chain, [q], out| {
+    Gravity, in lanes false: |n| [n], |chain, [q], out| {
         put(&arm_core::gravity(chain, &Pose::new(&joints(q))), out);
     };
-    StaticTorque: |n| [n], |chain, [q, force], out| {
+    StaticTorque, in lanes false: |n| [n], |chain, [q, force], out| {
         let pose = Pose::new(&joints(q));
         put(&arm_core::static_torque(chain, &pose, [force[0], force[1]], T::ZERO), out);
     };
-    InverseDynamics: |n| [n], |chain, [q, qd, qdd], out| {
+    InverseDynamics, in lanes true: |n| [n], |chain, [q, qd, qdd], out| {
         put(&arm_core::inverse_dynamics(chain, &Pose::new(&joints(q)), &joints(qd), &joints(qdd)), out);
     };
-    ForwardDynamics: |n| [n], |chain, [q, qd, torque], out| {
+    ForwardDynamics, in lanes true: |n| [n], |chain, [q, qd, torque], out| {
         let load = Load { torque: joints(torque), ..Load::none() };
         put(&arm_core::forward_dynamics(chain, &Pose::new(&joints(q)), &joints(qd), &load), out);
     };
-    Regressor: |n| [n, 3 * n], |chain, [q, qd, qdd], out| {
+    Regressor, in lanes false: |n| [n, 3 * n], |chain, [q, qd, qdd], out| {
         let y = arm_core::regressor(chain, &Pose::new(&joints(q)), &joints(qd), &joints(qdd));
         for (r, row) in out.chunks_exact_mut(3 * N).enumerate() {
             for k in 0..N {

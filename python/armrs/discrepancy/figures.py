@@ -80,12 +80,13 @@ def _sizes(result: GapFound) -> Drawn:
         ax.grid(visible=False, axis="y")
         ax.tick_params(axis="y", length=0)
         ax.set_xlabel(f"root mean square {unit}")
-    _legend(figure, _steps(result), floor=any(g.floor is not None for g in result.gap.values()))
-    text = (
-        "Simulated less measured, over all test trials: trials on which nothing was chosen and nothing fitted. The step from "
-        "calibrated to the named effects is what the names are worth; the green line is what repeats of one movement differ by, and no"
-        " model can be nearer."
-    )
+    floor = any(g.floor is not None for g in result.gap.values())
+    _legend(figure, _steps(result), floor=floor)
+    text = "Simulated less measured, over all test trials: trials on which nothing was chosen and nothing fitted."
+    if len(_steps(result)) > 2:
+        text += " The step from calibrated to the named effects is what the names are worth."
+    if floor:
+        text += " The green line is what repeats of one movement differ by, and no model can be nearer."
     return Drawn("gap", "The gap of every channel", text, figure, "gap")
 
 

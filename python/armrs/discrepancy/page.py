@@ -110,7 +110,12 @@ def _ruled_out(data: Mapping[str, Any]) -> str:
     out += table(content)
     near = words.nearest(data)
     if near.rows:
-        out += paragraph("What came nearest to being named, in units of twice the log-likelihood:", "soft") + table(near)
+        out += paragraph(
+            "What came nearest to being named, in units of twice the log-likelihood. One that would explain more than it would have to and "
+            "was not named explains no more than the laws of the named ones may miss, or less than a fifth of what is left:",
+            "soft",
+        )
+        out += table(near)
     return out
 
 

@@ -39,7 +39,7 @@ class Compared:
 
     gap: Mapping[str, float]
     where: tuple[Place, ...]
-    discrepancies: tuple[maps.Discrepancy, ...]
+    discrepancies: tuple[maps.Discrepancy, ...] = field(repr=False)
     warnings: tuple[str, ...]
 
 

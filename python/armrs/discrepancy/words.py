@@ -105,9 +105,11 @@ def others(result: Mapping[str, Any]) -> list[str]:
         listed = [f"{effect_name(a)} ({_how(a)})" for a in effect["alternatives"]]
         if listed:
             lines.append(f"Instead of {effect_name(effect)} it may be {_joined(listed, 'or')}.")
-        lines += [
-            f"To tell {effect_name(effect)} from {effect_name(a)}: {_separating(a)}" for a in effect["alternatives"] if _separating(a)
-        ]
+        # What several are told by stands once.
+        told: dict[str, list[str]] = {}
+        for a in effect["alternatives"]:
+            told.setdefault(_separating(a), []).append(effect_name(a))
+        lines += [f"To tell {effect_name(effect)} from {_joined(names, 'or')}: {how}" for how, names in told.items() if how]
     return lines
 
 
@@ -125,7 +127,9 @@ def _separating(alternative: Mapping[str, Any]) -> str:
 
 def _how(alternative: Mapping[str, Any]) -> str:
     worse = alternative.get("worse")
-    return alternative["why"] + (f", misfit greater by {max(worse, 0.0):.2g}" if worse is not None else "")
+    if worse is None:
+        return str(alternative["why"])
+    return alternative["why"] + (f", misfit greater by {worse:.2g}" if worse >= 0.1 else ", misfit no greater")
 
 
 def apart(result: Mapping[str, Any]) -> list[str]:
