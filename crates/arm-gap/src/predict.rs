@@ -6,8 +6,7 @@ use arm_ident::equation::Kinematics;
 use arm_ident::motion::{is_quiet, low_pass, measured, relative_speed_noise};
 use arm_ident::trial::Trial;
 use arm_sim::{
-    Coupling, Drive, Experiment, HandlePath, Recording, Sensors, SimulationError, Start, altered,
-    simulate,
+    Coupling, Drive, Experiment, HandlePath, Recording, Sensors, SimulationError, Start, simulate,
 };
 
 use crate::GapError;
@@ -345,8 +344,7 @@ impl<const N: usize> Session<N> {
             return Ok(Vec::new());
         };
         let effects = hypothesis.effects();
-        let setup = hypothesis.setup(&self.chain, self.contact)?;
-        let chain = altered(&setup, &effects)?.chain()?;
+        let chain = self.rig(hypothesis)?.chain()?;
         let offset = offsets(&effects);
         let mut states = vec![0.0; effects.len()];
         let mut before: Option<Motion<f64, N>> = None;

@@ -12,7 +12,7 @@ use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Reading, Scalar, Setup, inverse_dynamics, jacobian,
     joint_force, static_torque, tip,
 };
-use arm_sim::{HandlePath, SimulationError, altered};
+use arm_sim::{HandlePath, SimulationError};
 use nalgebra::SMatrix;
 use std::sync::Arc;
 
@@ -43,14 +43,12 @@ struct Plant<const N: usize> {
 
 impl<const N: usize> Plant<N> {
     fn new(session: &Session<N>, hypothesis: &Hypothesis<N>) -> Result<Self, SimulationError> {
-        let setup = hypothesis.setup(&session.chain, session.contact)?;
-        let effects = hypothesis.effects();
-        let setup = altered(&setup, &effects)?;
+        let setup = session.rig(hypothesis)?;
         Ok(Self {
             chain: setup.chain()?,
             contact: setup.contact,
             setup,
-            effects,
+            effects: hypothesis.effects(),
         })
     }
 

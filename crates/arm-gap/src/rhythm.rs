@@ -4,14 +4,12 @@ use std::sync::Arc;
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
 use arm_core::{Contact, Joints, Pose, jacobian};
-use arm_sim::{SimulationError, altered};
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::anchor::Anchor;
 use crate::apart::{Apart, shapes_of};
 use crate::groups::same_rate;
-use crate::hypothesis::Hypothesis;
 use crate::normal::factor;
 use crate::predict::{Channels, Course, smooth};
 use crate::spectrum::{coefficient, line};
@@ -66,9 +64,11 @@ impl<const N: usize> Study<'_, N> {
                 line(&all, rate, SLOWEST_RHYTHM)
             }
             Line::OfTheRobot => {
-                let contact = self.contact(&anchor.hypothesis)?;
+                let trial = self.fitted[0];
+                let rig = self.session.rig(&anchor.hypothesis);
+                let rig = rig.map_err(|source| GapError::Simulation { trial, source })?;
                 let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
-                    .map(|(residual, &trial)| self.closure(residual, trial, &contact))
+                    .map(|(residual, &trial)| self.closure(residual, trial, &rig.contact))
                     .collect();
                 let all: Vec<&Channels> = closures.iter().collect();
                 line(&all, rate, SLOWEST_RIPPLE)
@@ -144,18 +144,6 @@ impl<const N: usize> Study<'_, N> {
             out.push((0..self.session.channels()).map(one).collect());
         }
         out
-    }
-
-    /// The contact as it is believed.
-    fn contact(&self, hypothesis: &Hypothesis<N>) -> Result<Contact<f64>, GapError> {
-        let nominal = (&self.session.chain, self.session.contact);
-        let rig = hypothesis.setup(nominal.0, nominal.1);
-        let rig = rig.map_err(SimulationError::from);
-        let rig = rig.and_then(|rig| altered(&rig, &hypothesis.effects()));
-        let trial = self.fitted[0];
-        Ok(rig
-            .map_err(|source| GapError::Simulation { trial, source })?
-            .contact)
     }
 
     /// What is left between the arm's tip and the handle, stretch of the contact taken off: y and z \[m\].

@@ -1,8 +1,9 @@
 //! What is challenged and by what: the model as given, the trials, and what the calibration promises.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place, Promise};
-use arm_core::{Chain, Contact};
+use arm_core::{Chain, Contact, Setup};
 use arm_ident::trial::{Role, Tolerance, Trial};
+use arm_sim::{SimulationError, altered};
 
 use crate::GapError;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
@@ -48,6 +49,15 @@ const KNOWN: f64 = 0.05;
 const DAMPED: f64 = 0.3;
 
 impl<const N: usize> Session<N> {
+    /// The rig as a hypothesis has it, with all effects applied that alter it.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for segments that cannot be, or an effect with a value or a place outside what its kind allows.
+    pub fn rig(&self, hypothesis: &Hypothesis<N>) -> Result<Setup<f64, N>, SimulationError> {
+        let setup = hypothesis.setup(&self.chain, self.contact)?;
+        altered(&setup, &hypothesis.effects())
+    }
+
     /// All kinds that are asked.
     pub fn kinds(&self) -> impl Iterator<Item = Kind> + '_ {
         KINDS.iter().chain(&self.own).copied()

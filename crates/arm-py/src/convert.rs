@@ -141,10 +141,9 @@ impl<'a> Rows<'a> {
 /// The first of many values that is not finite: looked for only where a whole stretch of them is not.
 fn first_not_finite(values: &[f64]) -> Option<usize> {
     let finite = |v: &f64| v.is_finite();
-    let stretches = values.chunks(64).enumerate();
-    let (number, stretch) = stretches
-        .into_iter()
-        .find(|(_, stretch)| !stretch.iter().fold(true, |all, v| all & finite(v)))?;
+    let mut stretches = values.chunks(64).enumerate();
+    let (number, stretch) =
+        stretches.find(|(_, stretch)| !stretch.iter().fold(true, |all, v| all & finite(v)))?;
     let within = stretch.iter().position(|v| !finite(v))?;
     Some(64 * number + within)
 }
