@@ -1,7 +1,9 @@
 """Build the shared library that travels in FMUs, with the licences of what is in it, and put both into the package.
 
 It says which glibc the library needs: that of the system it is built on, roughly. With `--portable`, for a release on Linux, it is
-linked against glibc 2.17, so that FMUs run on older systems as well; this needs `pip install ziglang cargo-zigbuild`.
+linked against glibc 2.17, so that FMUs run on older systems as well; this needs `pip install ziglang cargo-zigbuild`. With
+`--of-tests`, and the packages that cargo is to test after it, it is the one that the Rust tests are compiled with: of the same bits,
+slower, and there without compiling anything twice.
 """
 
 from __future__ import annotations
@@ -22,15 +24,14 @@ OLDEST = (2, 17)
 def main() -> None:
     """Build and copy what came out."""
     portable = "--portable" in sys.argv
-    built = ROOT / "target" / "release"
-    command = ["cargo", "build"]
+    command = ["cargo", "build", "--release", "-p", "arm-fmu"]
     if portable:
-        target = f"{platform.machine()}-unknown-linux-gnu"
-        command = ["cargo", "zigbuild", "--target", f"{target}.{OLDEST[0]}.{OLDEST[1]}"]
-        built = ROOT / "target" / target / "release"
-    subprocess.run([*command, "--quiet", "--release", "-p", "arm-fmu"], cwd=ROOT, check=True)
+        command[1:2] = ["zigbuild", "--target", f"{platform.machine()}-unknown-linux-gnu.{OLDEST[0]}.{OLDEST[1]}"]
+    elif sys.argv[1:2] == ["--of-tests"]:
+        command = ["cargo", "test", "--no-run", "--tests", *sys.argv[2:]]
     name = NAMES.get(sys.platform, "libarm_fmu.so")
-    content = (built / name).read_bytes()
+    built = library(command, name)
+    content = built.read_bytes()
     needed = glibc(content)
     if portable and needed > OLDEST:
         sys.exit(f"fmu_library: the library needs glibc {version(needed)}, allowed is {version(OLDEST)} at most")
@@ -40,10 +41,18 @@ def main() -> None:
     # Renamed into its place: a process that has the old one loaded keeps it.
     part = place / f"{name}.part"
     part.write_bytes(content)
-    shutil.copymode(built / name, part)
+    shutil.copymode(built, part)
     part.replace(place / name)
     if any(needed):
         print(f"the library for FMUs needs glibc {version(needed)}")
+
+
+def library(command: list[str], name: str) -> Path:
+    """Run cargo, and return where it put the library."""
+    run = subprocess.run([*command, "--quiet", "--message-format=json-render-diagnostics"], cwd=ROOT, check=True, stdout=subprocess.PIPE)
+    made = [message for message in map(json.loads, run.stdout.splitlines()) if message["reason"] == "compiler-artifact"]
+    files = [Path(file) for message in made if message["target"]["name"] == "arm_fmu" for file in message["filenames"]]
+    return next(file for file in files if file.name == name)
 
 
 def glibc(library: bytes) -> tuple[int, ...]:

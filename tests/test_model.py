@@ -202,9 +202,10 @@ def test_models_can_be_hashed_and_pickled(path: Path) -> None:
 
 
 def test_the_catalogue_has_sound_defaults() -> None:
-    kinds = catalogue.catalogue()
+    # Other tests declare kinds of their own in the same process.
+    kinds = [kind for kind in catalogue.catalogue().values() if not kind.own]
     assert len(kinds) == 32
-    for kind in kinds.values():
+    for kind in kinds:
         assert kind.address in ("joint", "channel", None)
         for p in kind.parameters:
             assert p.min <= p.default <= p.max, (kind.kind, p.name)
