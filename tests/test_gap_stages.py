@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,11 @@ import pytest
 
 import armrs
 from armrs import cli
-from armrs.dataset import write_dataset
+from armrs.dataset import Dataset, write_dataset
 from armrs.discrepancy import Alternative, calibrate, compare, confirm, detectable, separate
 from armrs.discrepancy.results import gap_data, write_gap
 from armrs.errors import BadInput
-from gap_sessions import session
+from gap_sessions import model, session
 
 VISCOUS = armrs.Effect("viscous", 2, parameters={"viscosity": 0.4})
 
@@ -46,14 +47,72 @@ def test_calibration_and_a_first_look(found: armrs.GapFound) -> None:
     for name, gap in first.gap.items():
         assert gap.after is None
         assert gap.before == pytest.approx(found.gap[name].before, rel=1e-12)
-        assert gap.calibrated == pytest.approx(found.gap[name].calibrated, rel=1e-3)
+        assert gap.calibrated == pytest.approx(found.gap[name].calibrated, rel=0.01)
 
 
 def test_a_result_is_confirmed_on_its_own_test_trials_as_it_was_measured(found: armrs.GapFound) -> None:
     for name, gap in confirm(found).items():
         for step in ("before", "calibrated", "after", "floor"):
-            # The simulation starts elsewhere by rounding.
-            assert getattr(gap, step) == pytest.approx(getattr(found.gap[name], step), rel=1e-9), (name, step)
+            # The place of the handle in a trial follows slopes that were simulated there, and not on a repeat.
+            assert getattr(gap, step) == pytest.approx(getattr(found.gap[name], step), rel=0.01), (name, step)
+
+
+def led(
+    contact: armrs.Contact,
+    effects: Sequence[armrs.Effect] = (),
+    *,
+    phases: Sequence[float] = (0.0,) * 4,
+    moved: float = 0.0,
+    shape: str = "smooth",
+) -> Dataset:
+    """Return a session that the rapier engine makes, with a contact that the model does not know, a tremor whose phase each trial
+    has to itself, and a handle that is held elsewhere along the forearm in each trial."""
+    movement = armrs.Movement(
+        np.radians([[-60, 50], [-30, 80]] * 5), speed=0.9, acceleration=12.0 if shape == "trapezoid" else 4.0, shape=shape
+    )
+    sensors = armrs.Sensors(angle=armrs.Channel(5e-4), force=armrs.Channel(0.1))
+    trials = []
+    for repeat, phase in enumerate(phases, start=1):
+        own = [dataclasses.replace(e, parameters={**e.parameters, "phase": phase}) if e.kind == "tremor" else e for e in effects]
+        upper, fore = model().segments
+        held = dataclasses.replace(fore, length=fore.length + moved * (-1) ** repeat)
+        true = model(*own).replace(contact=contact, segments=(upper, held))
+        read = armrs.simulate(true, movement, engine="rapier", rate=50.0, sensors=sensors, seeds=[repeat]).readings[0]
+        columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
+        role = "test" if repeat == len(phases) else "fit"
+        trials.append(armrs.Trial(file=f"led_{repeat}.csv", configuration="led", repeat=repeat, role=role, t=read["time"], **columns))
+    return Dataset("led", model(), tuple(trials), force_on="arm", synthetic=True)
+
+
+def test_the_contact_is_read_off_the_ringing_of_the_arm() -> None:
+    first = calibrate(led(armrs.Contact((1e4, 1e4), (32.0, 32.0)), shape="trapezoid"), threads=2)
+    absorbed = {a.name: a.value for a in first.absorbed}
+    for axis in "yz":
+        # 25 N s/m were believed.
+        assert absorbed[f"damping of the contact, {axis}"] == pytest.approx(32.0 / 25.0 - 1.0, abs=0.03)
+
+
+def test_where_the_handle_is_held_is_each_trials_own() -> None:
+    gap = calibrate(led(model().contact, moved=4e-4), threads=2).gap
+    for name in ("q1_rad", "q2_rad"):
+        channel = gap[name]
+        assert channel.calibrated is not None
+        # The noise alone; 0.4 mm turn these joints by more than a milliradian.
+        assert channel.before > 1.2e-3 and channel.calibrated < 6e-4, name
+
+
+def test_a_rhythm_is_in_the_model_and_in_its_own_phase_in_every_trial() -> None:
+    tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.15, "frequency": 6.3})
+    data = led(model().contact, [tremor], phases=(0.3, 2.2, 4.4, 5.5))
+    result = armrs.find_gap(data, threads=2)
+    assert [(e.kind, e.joint) for e in result.effects] == [("tremor", 2)]
+    assert [(e.kind, e.joint) for e in result.model.effects] == [("tremor", 2)]
+    for name in ("Fy_N", "Fz_N"):
+        gap = result.gap[name]
+        assert gap.calibrated is not None and gap.after is not None and gap.floor is not None
+        assert gap.calibrated > 3.0 * gap.floor
+        assert (gap.calibrated - gap.after) / (gap.calibrated - gap.floor) > 0.95, (name, gap)
+    assert confirm(result)["Fy_N"].after == pytest.approx(result.gap["Fy_N"].after, rel=0.01)
 
 
 def test_a_result_is_confirmed_on_another_day(found: armrs.GapFound) -> None:

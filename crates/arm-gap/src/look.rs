@@ -5,6 +5,7 @@ use arm_core::effect::Effect;
 use crate::GapError;
 use crate::candidate::{Candidate, Library};
 use crate::fit::Fitted;
+use crate::hypothesis::Hypothesis;
 use crate::misfit::{Lack, lack_of_fit};
 use crate::scan::Scan;
 use crate::search::Progress;
@@ -15,6 +16,8 @@ use crate::study::Study;
 pub struct Look<const N: usize> {
     /// The model after refitting what was never exact.
     pub calibrated: Fitted<N>,
+    /// The same as it is in each trial; see [`crate::in_trial`].
+    pub in_trials: Vec<Hypothesis<N>>,
     /// Its lack of fit.
     pub lack: Lack,
     /// Every candidate alone, the one that is most worth its price first.
@@ -80,8 +83,12 @@ impl<const N: usize> Study<'_, N> {
                 None => best.push(suspect),
             }
         }
+        if let Some(hypothesis) = self.tuned(&calibrated.hypothesis) {
+            calibrated.hypothesis = hypothesis;
+        }
         progress("done", 1.0);
         Ok(Look {
+            in_trials: self.in_trials((&calibrated.hypothesis, &[]), &anchor),
             calibrated,
             lack,
             suspects: best,

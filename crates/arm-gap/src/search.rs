@@ -19,7 +19,7 @@ use crate::study::Study;
 const DISTURBANCES: usize = 4;
 /// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
 /// what a model lacks of them reach that far.
-const SLOW: f64 = 3.0;
+pub(crate) const SLOW: f64 = 3.0;
 /// Most effects that are named.
 const MOST: usize = 6;
 /// Choices that are converged by simulation in each round.
@@ -66,6 +66,8 @@ pub struct Finding<const N: usize> {
     pub named: Vec<Named>,
     /// What is not the same in every trial.
     pub apart: Vec<Apart>,
+    /// The calibrated and the amended model as they are in each trial; see [`crate::in_trial`].
+    pub in_trials: [Vec<Hypothesis<N>>; 2],
     /// Rounds of the search.
     pub ladder: Vec<Rung>,
     /// How well the amended model is known.
@@ -142,7 +144,7 @@ impl<'a, const N: usize> Study<'a, N> {
             && !hunt.current.asked.is_empty()
         {
             // What rang may have been what was named since.
-            let without = std::mem::replace(&mut self.courses, measured);
+            let without = std::mem::replace(&mut self.courses, measured.clone());
             let again = self.rhythm(&hunt.anchor, Line::BetweenRepeats)?;
             if again.is_some_and(|a| a.is_like(&apart[before])) {
                 self.courses = without;
@@ -225,12 +227,28 @@ impl<'a, const N: usize> Study<'a, N> {
         if let Some((hypothesis, known)) = self.refined(&amended) {
             (amended.hypothesis, precision) = (hypothesis, known);
         }
+        for fitted in [&mut calibrated, &mut amended] {
+            if let Some(hypothesis) = self.tuned(&fitted.hypothesis) {
+                fitted.hypothesis = hypothesis;
+            }
+        }
+        self.courses = measured;
+        let rhythms: Vec<Effect<f64>> = apart
+            .iter()
+            .filter(|a| a.trial.is_none())
+            .map(|a| a.effect)
+            .collect();
+        let in_trials = [
+            self.in_trials((&calibrated.hypothesis, &[]), &anchor),
+            self.in_trials((&amended.hypothesis, &rhythms), &anchor),
+        ];
         progress("done", 1.0);
         Ok(Finding {
             calibrated,
             amended,
             named,
             apart,
+            in_trials,
             ladder,
             precision,
             lack,

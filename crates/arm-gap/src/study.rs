@@ -283,6 +283,11 @@ impl<'a, const N: usize> Study<'a, N> {
         self.cut();
     }
 
+    /// Whether a disturbance has touched a trial.
+    pub fn is_touched(&self, trial: usize) -> bool {
+        self.touched.iter().any(|(touched, _, _)| *touched == trial)
+    }
+
     /// Takes everything that disturbances have touched back in.
     pub fn take_back(&mut self) {
         self.touched.clear();

@@ -93,18 +93,23 @@ impl<'a, 'py> Asked<'a, 'py> {
     }
 }
 
-/// What the model as given would show on every trial, beside what was measured; see [`shown`].
+/// What a model would show on every trial, beside what was measured; see [`shown`].
+///
+/// As it is, or with `own` as it is in each trial: where the hand holds the handle there, and in which phase a rhythm is.
 #[pyfunction]
+#[pyo3(signature = (rig, trials, settings, own=false))]
 pub fn play<'py>(
     py: Python<'py>,
     rig: &Rig,
     trials: Vec<Columns<'py>>,
     settings: Settings,
+    own: bool,
 ) -> PyResult<Bound<'py, PyList>> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         asked: &Asked<'_, 'py>,
+        own: bool,
     ) -> PyResult<Bound<'py, PyList>> {
         let session = asked.session(chain)?;
         session.check().map_err(gap)?;
@@ -112,14 +117,18 @@ pub fn play<'py>(
         let plays = (0..session.trials.len())
             .map(|i| {
                 let course = session.course(i).map_err(gap)?;
-                shown(py, (&session, &course), &[("given", &given)])
+                let believed = match own {
+                    true => py.detach(|| session.as_in_trial(&given, &course)),
+                    false => given.clone(),
+                };
+                shown(py, (&session, &course), &[("given", &believed)])
             })
             .collect::<PyResult<Vec<_>>>();
         own::failed()?;
         PyList::new(py, plays?)
     }
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked))
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, own))
 }
 
 /// Searches for what a model lacks; see `armrs.find_gap`.
@@ -194,11 +203,7 @@ fn first_look<'py, const N: usize>(
         })
         .collect();
     out.set_item("suspects", suspects)?;
-    let given = study.session.given();
-    let plays = [
-        ("given", &given),
-        ("calibrated", &look.calibrated.hypothesis),
-    ];
+    let plays = [("calibrated", look.in_trials.as_slice())];
     out.set_item("trials", played(py, study, &plays)?)?;
     Ok(out)
 }
@@ -244,17 +249,20 @@ fn shown<'py, const N: usize>(
     Ok(out)
 }
 
-/// What is shown of every trial, and the angles of a free run in `free`.
+/// What the model as given and other hypotheses, as they are in each trial, show of every trial, and the angles of a free run in `free`.
 fn played<'py, const N: usize>(
     py: Python<'py>,
     study: &Study<'_, N>,
-    plays: &[(&str, &Hypothesis<N>)],
+    plays: &[(&str, &[Hypothesis<N>])],
 ) -> PyResult<Bound<'py, PyList>> {
+    let given = study.session.given();
     let trials = std::iter::zip(0.., &study.courses)
         .map(|(i, course)| {
-            let one = shown(py, (study.session, course), plays)?;
+            let own = plays.iter().map(|(name, beliefs)| (*name, &beliefs[i]));
+            let plays: Vec<_> = std::iter::once(("given", &given)).chain(own).collect();
+            let one = shown(py, (study.session, course), &plays)?;
             let free = PyDict::new(py);
-            for (name, hypothesis) in plays {
+            for (name, hypothesis) in &plays {
                 let place = (i, course.as_ref());
                 let angles = py.detach(|| study.session.free_run(hypothesis, place));
                 set_table(&free, name, angles.ok())?;
@@ -344,6 +352,8 @@ fn result<'py, const N: usize>(
     out.set_item("scale", finding.scale)?;
     out.set_item("calibrated", fitted(py, &finding.calibrated)?)?;
     out.set_item("amended", fitted(py, &finding.amended)?)?;
+    let rhythms = finding.apart.iter().filter(|a| a.trial.is_none());
+    out.set_item("rhythms", rhythms.map(|a| entry(&a.effect)).collect::<Vec<_>>())?;
     out.set_item("lack", finding.lack.each_ref().map(lack))?;
     let known: Vec<_> = std::iter::zip(&finding.precision.coordinates, &finding.precision.sd)
         .filter_map(|(c, sd)| unknown(&finding.amended.hypothesis, c, *sd))
@@ -387,11 +397,10 @@ fn result<'py, const N: usize>(
         })
         .collect();
     out.set_item("ladder", ladder)?;
-    let given = study.session.given();
+    let [calibrated, amended] = &finding.in_trials;
     let plays = [
-        ("given", &given),
-        ("calibrated", &finding.calibrated.hypothesis),
-        ("amended", &finding.amended.hypothesis),
+        ("calibrated", calibrated.as_slice()),
+        ("amended", amended.as_slice()),
     ];
     out.set_item("trials", played(py, study, &plays)?)?;
     Ok(out)

@@ -52,7 +52,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         lack=((before_ratio, before_z), (after_ratio, after_z)),
         ladder=tuple(_rung(tried, before, after) for tried, before, after in raw["ladder"]),
         warnings=tuple(warnings),
-        model=amended(dataset.model, raw["amended"]),
+        model=amended(dataset.model, raw["amended"], rhythms=raw["rhythms"]),
         dataset=dataset,
         raw=raw,
     )
@@ -171,7 +171,13 @@ def _worded(kind: str, joint: int | None, channel: str | None) -> str:
     return kind.replace("_", " ") + (f" of joint {joint}" if joint else f" of {channel}" if channel else "")
 
 
-def amended(model: Model, fitted: Mapping[str, Any], *, joints: bool = True) -> Model:
+def lasting(result: GapFound) -> Model:
+    """Return the amended model without rhythms, whose phase is another one in every trial."""
+    effects = result.model.effects
+    return result.model.replace(effects=effects[: len(effects) - len(result.raw["rhythms"])])
+
+
+def amended(model: Model, fitted: Mapping[str, Any], *, joints: bool = True, rhythms: Sequence[Any] = ()) -> Model:
     """Return the model with refitted segments and known effects, and the named effects added; without `joints` no effect of it."""
     segments = tuple(
         Segment(
@@ -204,7 +210,7 @@ def amended(model: Model, fitted: Mapping[str, Any], *, joints: bool = True) -> 
         if joint.coulomb:
             values["coulomb"] = next(rest).parameters["torque"]
         listed.append(Joint(**values))
-    effects = (*rest, *map(effect, fitted["named"]))
+    effects = (*rest, *map(effect, fitted["named"]), *map(effect, rhythms))
     return model.replace(segments=segments, joints=tuple(listed), contact=contact, effects=effects)
 
 

@@ -17,7 +17,7 @@ from ..rig import all_effects, rig
 from ..simulation import Movement, Sensors, simulate
 from ..trial import Trial
 from .found import Alternative, GapFound, Missing, Separation
-from .reading import is_led
+from .reading import is_led, lasting
 from .search import core_settings, core_trials
 
 SPEEDS = (0.15, 1.2)
@@ -80,11 +80,12 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
     raw = next((item for item in result.raw["named"] if _is(item, effect)), None)
     if raw is None:
         return effect
-    own = [e for e in result.model.effects if (e.kind, e.joint, e.channel) == (effect.kind, effect.joint, effect.channel)][-1]
-    others = [e for e in all_effects(result.model) if e is not own]
+    model = lasting(result)
+    own = [e for e in model.effects if (e.kind, e.joint, e.channel) == (effect.kind, effect.joint, effect.channel)][-1]
+    others = [e for e in all_effects(model) if e is not own]
     rivals = [(entry[0], entry[1], list(entry[2]), list(free)) for (entry, free), *_ in raw["alternatives"]]
     rows = _armrs.distances(
-        rig(result.model, [*others, own]),
+        rig(model, [*others, own]),
         core_trials(result.dataset),
         core_settings(result.dataset, True, threads),
         [core_columns(c.trial) | {"configuration": 0} for c in family],
@@ -120,7 +121,7 @@ def _is(item: Any, effect: Missing) -> bool:
 
 def _family(result: GapFound) -> list[Candidate]:
     """Return the movements that are tried, simulated with the amended model."""
-    data, model = result.dataset, result.model
+    data, model = result.dataset, lasting(result)
     trials = [t for t in data.trials if t.force_on_arm is not None]
     q = np.concatenate([t.q[t.valid] for t in trials])
     low, high = q.min(axis=0), q.max(axis=0)

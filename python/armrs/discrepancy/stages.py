@@ -170,10 +170,12 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
     tests = data.test_trials or data.trials
     data = data.replace(trials=tuple(tests))
     columns, settings = [t | {"role": "fit"} for t in core_trials(data)], core_settings(data, led, 1)
-    plays: dict[str, list[dict[str, Any]]] = {}
-    for version in ("given", "calibrated", "amended"):
-        built = rig(data.model) if version == "given" else as_fitted(result.dataset.model, result.raw[version])
-        plays[version] = _armrs.play(built, columns, settings)
+    model, raw = result.dataset.model, result.raw
+    plays = {
+        "given": _armrs.play(rig(data.model), columns, settings),
+        "calibrated": _armrs.play(as_fitted(model, raw["calibrated"]), columns, settings, own=True),
+        "amended": _armrs.play(as_fitted(model, raw["amended"], raw["rhythms"]), columns, settings, own=True),
+    }
     gap = {}
     for c, name in enumerate(reading.channel_names(data, led)):
         size = {version: reading.size(listed, "given", c) for version, listed in plays.items()}
@@ -181,7 +183,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
     return gap
 
 
-def as_fitted(model: Model, fitted: Mapping[str, Any]) -> _armrs.Rig:
+def as_fitted(model: Model, fitted: Mapping[str, Any], rhythms: Sequence[Any] = ()) -> _armrs.Rig:
     """Return a model for the core with everything that was fitted, the imperfections of its sensors included."""
     if model.contact is None:
         model = model.replace(contact=Contact(*NO_CONTACT))
@@ -190,7 +192,7 @@ def as_fitted(model: Model, fitted: Mapping[str, Any]) -> _armrs.Rig:
         base = (robot.base[0] + fitted["shift"][0], robot.base[1] + fitted["shift"][1])
         robot = Robot(robot.lengths, base, robot.elbow)
     bare = reading.amended(model, {**fitted, "known": [], "named": []}, joints=False).replace(robot=robot)
-    effects = [*fitted["known"], *fitted["named"], *fitted["calibration"]]
+    effects = [*fitted["known"], *fitted["named"], *rhythms, *fitted["calibration"]]
     return rig(bare, [reading.effect(entry) for entry in effects])
 
 
