@@ -168,8 +168,13 @@ impl Candidate {
         let info = effect.kind.info();
         let free = self.free.iter().map(|&p| (p, self.step));
         let shapes = self.rest.iter().chain(self.refined);
+        let share = match effect.kind.probe().nature {
+            // A frequency that is a little off is out of step at the end of a trial.
+            Nature::Periodic => 0.0,
+            _ => 0.05,
+        };
         let shapes = shapes.map(|&p| {
-            let size = (0.05 * effect.parameters[p].abs()).max(1e-3);
+            let size = (share * effect.parameters[p].abs()).max(1e-3);
             (p, size)
         });
         free.chain(shapes)

@@ -22,7 +22,10 @@ const TURNS: usize = 2;
 
 /// Whether an effect swings with a phase of its own in every trial; a slow ripple keeps its phase.
 fn is_rhythm(effect: &Effect<f64>) -> bool {
-    let swings = matches!(effect.kind.probe().nature, Nature::Rhythm | Nature::Periodic);
+    let swings = matches!(
+        effect.kind.probe().nature,
+        Nature::Rhythm | Nature::Periodic
+    );
     swings && effect.parameters[shapes_of(effect.kind)[0]] > SLOW
 }
 
@@ -131,7 +134,9 @@ impl<const N: usize> Study<'_, N> {
         let one = |trial: usize| {
             let group = self.group_of[trial];
             let slopes: Vec<Channels> = anchor.own.iter().map(|r| r.0[group].clone()).collect();
-            let own = self.session.in_trial(believed, &self.courses[trial], &slopes);
+            let own = self
+                .session
+                .in_trial(believed, &self.courses[trial], &slopes);
             own.unwrap_or_else(|_| believed.0.clone())
         };
         self.parallel(self.courses.len(), one)

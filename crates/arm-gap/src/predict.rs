@@ -132,7 +132,9 @@ impl<const N: usize> Session<N> {
                 } else {
                     axes.to_vec()
                 };
-                (0..points.len()).map(|i| [axes[0][i], axes[1][i]]).collect()
+                (0..points.len())
+                    .map(|i| [axes[0][i], axes[1][i]])
+                    .collect()
             }
             _ => Vec::new(),
         };

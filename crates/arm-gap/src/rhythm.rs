@@ -12,7 +12,7 @@ use crate::apart::{Apart, shapes_of};
 use crate::groups::same_rate;
 use crate::normal::factor;
 use crate::predict::{Channels, Course, smooth};
-use crate::spectrum::{coefficient, line};
+use crate::spectrum::{Sum, coefficient, line};
 use crate::study::Study;
 
 /// Where a line is looked for.
@@ -57,32 +57,41 @@ impl<const N: usize> Study<'_, N> {
         {
             return Ok(None);
         }
-        let found = match place {
-            Line::BetweenRepeats => {
-                let differences = self.differences(&residuals);
-                let all: Vec<&Channels> = differences.iter().collect();
-                line(&all, rate, SLOWEST_RHYTHM)
-            }
+        let told = match place {
+            Line::BetweenRepeats => self.differences(&residuals),
             Line::OfTheRobot => {
                 let trial = self.fitted[0];
                 let rig = self.session.rig(&anchor.hypothesis);
                 let rig = rig.map_err(|source| GapError::Simulation { trial, source })?;
-                let closures: Vec<Channels> = std::iter::zip(&residuals, &self.fitted)
+                std::iter::zip(&residuals, &self.fitted)
                     .map(|(residual, &trial)| self.closure(residual, trial, &rig.contact))
-                    .collect();
-                let all: Vec<&Channels> = closures.iter().collect();
-                line(&all, rate, SLOWEST_RIPPLE)
+                    .collect()
             }
         };
-        let Some(frequency) = found else {
-            return Ok(None);
+        let all: Vec<&Channels> = told.iter().collect();
+        // A robot mostly starts its movements in the same phase of what shakes it.
+        let (lowest, sums) = match place {
+            Line::BetweenRepeats => (SLOWEST_RHYTHM, &[Sum::Powers][..]),
+            Line::OfTheRobot => (SLOWEST_RIPPLE, &[Sum::Swings, Sum::Powers][..]),
         };
+        let lines = sums.iter().filter_map(|sum| line(&all, rate, lowest, *sum));
+        let named = |frequency: f64| self.swinging_at(frequency, place, (anchor, &residuals));
+        Ok(lines.filter_map(named).next())
+    }
+
+    /// What swings at a frequency, where it is plain enough.
+    fn swinging_at(
+        &self,
+        frequency: f64,
+        place: Line,
+        (anchor, residuals): (&Anchor<N>, &[Channels]),
+    ) -> Option<Apart> {
         let mut best: Vec<(f64, Explained)> = Vec::new();
         for columns in self.swings(frequency) {
             if place == Line::OfTheRobot && columns[0].kind.probe().nature != Nature::Periodic {
                 continue;
             }
-            if let Some(explained) = self.explain(anchor, &residuals, frequency, &columns) {
+            if let Some(explained) = self.explain(anchor, residuals, frequency, &columns) {
                 let worth = explained.gain - 8.0 * columns.len() as f64;
                 best.push((worth, explained));
             }
@@ -93,12 +102,9 @@ impl<const N: usize> Study<'_, N> {
         let sounds = |e: &Explained| {
             e.effect.kind.probe().nature == Nature::Periodic && frequency >= FASTEST_RIPPLE
         };
-        let Some((most, first)) = list
+        let (most, first) = list
             .next()
-            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && e.is_steady() && !sounds(e))
-        else {
-            return Ok(None);
-        };
+            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && e.is_steady() && !sounds(e))?;
         let rivals = list
             .filter(|(worth, other)| {
                 let same = (other.effect.kind, other.effect.index)
@@ -107,7 +113,7 @@ impl<const N: usize> Study<'_, N> {
             })
             .map(|(worth, other)| (other.effect, most - worth))
             .collect();
-        Ok(Some(Apart {
+        Some(Apart {
             effect: first.effect,
             sd: first.sd,
             trial: None,
@@ -116,7 +122,7 @@ impl<const N: usize> Study<'_, N> {
             locked: first.locked,
             columns: first.columns,
             sizes: first.sizes,
-        }))
+        })
     }
 
     /// What each trial differs by from the mean of its repeats, over the samples that all have; trials without repeats

@@ -53,7 +53,11 @@ impl<const N: usize> Study<'_, N> {
             .map(|c| {
                 let moved = best.clone().with(c.target, best.get(c.target) + c.step);
                 let moved = joined(&self.above(&trials, &moved)?, &sizes);
-                Some(std::iter::zip(&left, moved).map(|(l, m)| (l - m) / c.step).collect())
+                Some(
+                    std::iter::zip(&left, moved)
+                        .map(|(l, m)| (l - m) / c.step)
+                        .collect(),
+                )
             })
             .collect::<Option<Vec<Left>>>()?;
         let gram = Arc::new(DMatrix::from_fn(slopes.len(), slopes.len(), |a, b| {

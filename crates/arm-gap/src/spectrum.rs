@@ -25,13 +25,44 @@ pub fn coefficient(column: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
     sum.map(|s| s * 4.0 / n)
 }
 
+/// How swings of several trials are put together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sum {
+    /// By their power: each may have a phase of its own.
+    Powers,
+    /// As they are: what has the same phase in every trial stands out, and noise and what movements do not share averages out.
+    Swings,
+}
+
+impl Sum {
+    /// Power of one channel of all trials at a frequency.
+    fn power(self, trials: &[&Vec<Vec<f64>>], c: usize, (frequency, rate): (f64, f64)) -> f64 {
+        let count = trials.len() as f64;
+        let each = trials.iter().map(|t| coefficient(&t[c], frequency, rate));
+        match self {
+            Self::Powers => each.map(|[a, b]| a * a + b * b).sum::<f64>() / count,
+            Self::Swings => {
+                let [a, b] = each.fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+                (a * a + b * b) / (count * count)
+            }
+        }
+    }
+
+    fn freedom(self, trials: usize) -> usize {
+        match self {
+            Self::Powers => 2 * trials,
+            Self::Swings => 2,
+        }
+    }
+}
+
 /// The strongest line: its frequency \[Hz\]; `None` when nothing stands out.
 ///
 /// * `trials` - channels of every trial, all at the same rate
 /// * `lowest` - frequency at which it begins to look \[Hz\]: below it movements have power of their own
 ///
-/// Each channel's power, averaged over trials, is compared with the median of its neighbourhood.
-pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64) -> Option<f64> {
+/// Each channel's power over trials is compared with the upper quartile of its neighbourhood.
+pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Option<f64> {
     if trials.is_empty() {
         return None;
     }
@@ -44,13 +75,7 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64) -> Option<f64> {
     let mut best: Option<(f64, f64)> = None;
     for c in 0..channels {
         let power: Vec<f64> = (0..count)
-            .map(|k| {
-                let one = |t: &&Vec<Vec<f64>>| {
-                    let [a, b] = coefficient(&t[c], frequency(k), rate);
-                    a * a + b * b
-                };
-                trials.iter().map(one).sum::<f64>() / trials.len() as f64
-            })
+            .map(|k| sum.power(trials, c, (frequency(k), rate)))
             .collect();
         for k in 0..count {
             let around: Vec<f64> = (0..count)
@@ -70,7 +95,7 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64) -> Option<f64> {
             // The larger of the quartiles above: red noise rises to one side.
             let level = sorted[sorted.len() * 3 / 4];
             let ratio = power[k] / level.max(f64::MIN_POSITIVE);
-            let dof = 2 * trials.len();
+            let dof = sum.freedom(trials.len());
             let chance = chi_square_tail(ratio * dof as f64, dof) * (count * channels) as f64;
             if chance < CHANCE && best.is_none_or(|(most, _)| ratio > most) {
                 best = Some((ratio, frequency(k)));
@@ -80,22 +105,15 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64) -> Option<f64> {
     let (_, near) = best?;
     // The peak of all channels together, on a finer grid.
     let total = |f: f64| -> f64 {
-        let mut sum = 0.0;
+        let mut all = 0.0;
         for c in 0..channels {
             let size: f64 = trials
                 .iter()
                 .map(|t| t[c].iter().map(|v| v * v).sum::<f64>())
                 .sum();
-            let power: f64 = trials
-                .iter()
-                .map(|t| {
-                    let [a, b] = coefficient(&t[c], f, rate);
-                    a * a + b * b
-                })
-                .sum();
-            sum += power / size.max(f64::MIN_POSITIVE);
+            all += sum.power(trials, c, (f, rate)) / size.max(f64::MIN_POSITIVE);
         }
-        sum
+        all
     };
     let fine = (-10..=10).map(|k| near + 0.1 * step * f64::from(k));
     fine.map(|f| (total(f), f))

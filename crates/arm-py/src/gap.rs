@@ -353,7 +353,10 @@ fn result<'py, const N: usize>(
     out.set_item("calibrated", fitted(py, &finding.calibrated)?)?;
     out.set_item("amended", fitted(py, &finding.amended)?)?;
     let rhythms = finding.apart.iter().filter(|a| a.trial.is_none());
-    out.set_item("rhythms", rhythms.map(|a| entry(&a.effect)).collect::<Vec<_>>())?;
+    out.set_item(
+        "rhythms",
+        rhythms.map(|a| entry(&a.effect)).collect::<Vec<_>>(),
+    )?;
     out.set_item("lack", finding.lack.each_ref().map(lack))?;
     let known: Vec<_> = std::iter::zip(&finding.precision.coordinates, &finding.precision.sd)
         .filter_map(|(c, sd)| unknown(&finding.amended.hypothesis, c, *sd))
