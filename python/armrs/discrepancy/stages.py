@@ -156,7 +156,8 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
     Parameters
     ----------
     result : GapFound
-        Its calibration, model and named effects are taken as they are; nothing is fitted.
+        Its calibration, model and named effects are taken as they are; nothing is fitted but what is each trial's own: where the hand
+        holds the handle, and the phase of a rhythm.
     dataset : Dataset or path, optional
         Its test trials are taken where there are such, else all; its model does not matter. That of the result when absent.
 
