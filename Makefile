@@ -118,11 +118,11 @@ GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
 
 hidden: build
 	cargo test --quiet --release -p hidden-world
-	$(GENERATE) --family null --seed 600000 --count $(or $(HIDDEN_NULL),204)
-	$(GENERATE) --family single --seed 610000 --count $(or $(HIDDEN_SINGLE),72)
-	$(GENERATE) --family double --seed 620000 --count $(or $(HIDDEN_DOUBLE),16)
-	$(GENERATE) --family triple --seed 630000 --count $(or $(HIDDEN_TRIPLE),12)
-	$(GENERATE) --family outside --seed 640000 --count $(or $(HIDDEN_OUTSIDE),16)
+	$(GENERATE) --family null --seed 700000 --count $(or $(HIDDEN_NULL),204)
+	$(GENERATE) --family single --seed 710000 --count $(or $(HIDDEN_SINGLE),72)
+	$(GENERATE) --family double --seed 720000 --count $(or $(HIDDEN_DOUBLE),16)
+	$(GENERATE) --family triple --seed 730000 --count $(or $(HIDDEN_TRIPLE),12)
+	$(GENERATE) --family outside --seed 740000 --count $(or $(HIDDEN_OUTSIDE),16)
 	$(BIN)/python bench/hidden/score.py $(HIDDEN)
 
 clean:
