@@ -27,6 +27,8 @@ TESTED := --workspace --exclude hidden-world --exclude speed
 
 .PHONY: demo test bench bench-kernels hidden crosscheck wheel clean build format rust python
 .DELETE_ON_ERROR:
+# One environment holds either of two builds; the halves of `test` are side by side all the same.
+.NOTPARALLEL:
 
 demo: build
 	$(BIN)/armrs demo -o out/demo
@@ -54,8 +56,10 @@ $(STAMPS)/build: $(PACKAGE) scripts/fmu_library.py | $(STAMPS)/venv
 
 # What the tests run on: what was made for speed where that is current, else what shares its dependencies with the Rust tests, in half
 # the time, and of the same bits. It takes the place of what was made for speed, which is then made anew when it is asked for.
-$(STAMPS)/dev: $(PACKAGE) scripts/fmu_library.py | $(STAMPS)/venv
-	@if $(MAKE) --question $(STAMPS)/build; then \
+MADE := $(PACKAGE) scripts/fmu_library.py
+
+$(STAMPS)/dev: $(MADE) | $(STAMPS)/venv
+	@if [ -e $(STAMPS)/build ] && [ -z "$$(find $(MADE) -newer $(STAMPS)/build)" ]; then \
 	  $(BIN)/maturin develop --release --quiet --extras dev,files; \
 	else \
 	  rm -f $(STAMPS)/build; \

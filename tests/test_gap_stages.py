@@ -101,17 +101,19 @@ def test_where_the_handle_is_held_is_each_trials_own() -> None:
         assert channel.before > 1.2e-3 and channel.calibrated < 6e-4, name
 
 
-def test_a_rhythm_is_in_the_model_and_in_its_own_phase_in_every_trial() -> None:
-    tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.15, "frequency": 6.3})
+@pytest.mark.parametrize("frequency", [2.5, 6.3])
+def test_a_rhythm_has_its_own_phase_in_every_trial(frequency: float) -> None:
+    tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.15, "frequency": frequency})
     data = led(model().contact, [tremor], phases=(0.3, 2.2, 4.4, 5.5))
     result = armrs.find_gap(data, threads=2)
     assert [(e.kind, e.joint) for e in result.effects] == [("tremor", 2)]
-    assert [(e.kind, e.joint) for e in result.model.effects] == [("tremor", 2)]
+    # No other trial could be foretold with the phase of one.
+    assert result.model.effects == ()
     for name in ("Fy_N", "Fz_N"):
         gap = result.gap[name]
         assert gap.calibrated is not None and gap.after is not None and gap.floor is not None
         assert gap.calibrated > 3.0 * gap.floor
-        assert (gap.calibrated - gap.after) / (gap.calibrated - gap.floor) > 0.95, (name, gap)
+        assert (gap.calibrated - gap.after) / (gap.calibrated - gap.floor) > 0.9, (name, gap)
     assert confirm(result)["Fy_N"].after == pytest.approx(result.gap["Fy_N"].after, rel=0.01)
 
 

@@ -1,8 +1,8 @@
 //! A hypothesis as it is in one trial: where the hand holds the handle there, and the phase that a rhythm is in.
 //!
 //! Neither is the same from one trial to the next, so that no other trial tells them. They are read off each trial by itself,
-//! whatever its role and whatever hypothesis is shown: two numbers for the handle, within what is declared of it, and one for
-//! a rhythm.
+//! whatever its role and whatever hypothesis is shown: two numbers for the handle, as far as what is declared of it lets them
+//! go, and one for a rhythm.
 
 use arm_core::effect::{Effect, Nature};
 use arm_sim::SimulationError;
@@ -11,30 +11,35 @@ use nalgebra::{DMatrix, DVector};
 use crate::anchor::Anchor;
 use crate::apart::shapes_of;
 use crate::hypothesis::{Coordinate, Hypothesis};
-use crate::normal::factor;
+use crate::normal::solve;
 use crate::predict::{Channels, Course, difference};
 use crate::search::SLOW;
-use crate::session::Session;
+use crate::session::{FURTHEST, Session};
 use crate::study::Study;
 
 /// Times that channels are weighed anew by what is left of them.
 const TURNS: usize = 2;
 
-/// Whether an effect swings with a phase of its own in every trial; a slow ripple keeps its phase.
+/// Whether an effect swings with a phase of its own in every trial: muscles do, and so does what shakes a robot fast.
 fn is_rhythm(effect: &Effect<f64>) -> bool {
-    let swings = matches!(
-        effect.kind.probe().nature,
-        Nature::Rhythm | Nature::Periodic
-    );
-    swings && effect.parameters[shapes_of(effect.kind)[0]] > SLOW
+    match effect.kind.probe().nature {
+        Nature::Rhythm => true,
+        Nature::Periodic => effect.parameters[shapes_of(effect.kind)[0]] > SLOW,
+        Nature::Lasting | Nature::Burst => false,
+    }
 }
 
 impl<const N: usize> Session<N> {
-    /// How the channels of a trial in the common band answer what is its own, for one unit each.
-    ///
-    /// # Errors
-    /// As [`Session::run`].
-    pub fn own_slopes(
+    /// A hypothesis as it is in a trial; as it was where it cannot be simulated.
+    pub fn as_in_trial(&self, hypothesis: &Hypothesis<N>, course: &Course<N>) -> Hypothesis<N> {
+        let own = self
+            .own_slopes(hypothesis, course)
+            .and_then(|slopes| self.in_trial((hypothesis, &[]), course, &slopes));
+        own.unwrap_or_else(|_| hypothesis.clone())
+    }
+
+    /// How the channels of a trial in the common band answer where the hand holds the handle, for one unit each.
+    fn own_slopes(
         &self,
         hypothesis: &Hypothesis<N>,
         course: &Course<N>,
@@ -49,69 +54,47 @@ impl<const N: usize> Session<N> {
         self.by_trial().into_iter().map(one).collect()
     }
 
-    /// A hypothesis and rhythms as they are in a trial.
+    /// A hypothesis and rhythms, its own known ones besides, as they are in a trial.
     ///
-    /// * `slopes` - see [`Session::own_slopes`]; those of a repeat do as well
-    ///
-    /// # Errors
-    /// As [`Session::run`].
-    pub fn in_trial(
+    /// * `slopes` - how the channels answer where the hand holds the handle, here or in a repeat
+    fn in_trial(
         &self,
         (hypothesis, rhythms): (&Hypothesis<N>, &[Effect<f64>]),
         course: &Course<N>,
         slopes: &[Channels],
     ) -> Result<Hypothesis<N>, SimulationError> {
         let mut own = hypothesis.clone();
+        let mut rhythms = rhythms.to_vec();
+        rhythms.extend(own.known.extract_if(.., |e| is_rhythm(e)));
         let placed = self.by_trial();
         if placed.is_empty() && rhythms.is_empty() {
             return Ok(own);
         }
-        let base = self.shown(hypothesis, course)?;
+        let base = self.shown(&own, course)?;
         let left = difference(&course.seen, &base);
         let mut columns = slopes.to_vec();
-        for rhythm in rhythms {
+        for rhythm in &rhythms {
             for phase in [0.0, 0.5 * core::f64::consts::PI] {
-                let mut swinging = hypothesis.clone();
+                let mut swinging = own.clone();
                 swinging.named.push(with_phase(rhythm, phase));
                 columns.push(difference(&self.shown(&swinging, course)?, &base));
             }
         }
-        let mut known: Vec<f64> = placed
-            .iter()
-            .map(|c| c.prior.map_or(0.0, |(_, sd)| 1.0 / (sd * sd)))
+        let sd: Vec<Option<f64>> = (0..columns.len())
+            .map(|i| placed.get(i)?.prior.map(|(_, sd)| sd))
             .collect();
-        known.resize(columns.len(), 0.0);
-        let mut sizes = vec![0.0; columns.len()];
-        for _ in 0..TURNS {
-            let weights = weights(&left, &columns, &sizes, &course.counted);
-            let product = |a: &Channels, b: &Channels| product((a, b), &weights, &course.counted);
-            let gram = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
-                let own = if a == b { known[a] } else { 0.0 };
-                product(&columns[a], &columns[b]) + own
-            });
-            let score = DVector::from_fn(columns.len(), |a, _| product(&columns[a], &left));
-            // What the trial does not tell stays as it is.
-            let Some(solver) = factor(gram) else { break };
-            sizes = solver.solve(&score).iter().copied().collect();
-        }
+        let sizes = sizes(&left, &columns, &sd, course);
         for (c, size) in std::iter::zip(&placed, &sizes) {
             own = own.with(c.target, *size);
         }
         for (rhythm, size) in std::iter::zip(rhythms, sizes[placed.len()..].chunks_exact(2)) {
-            let phase = libm::atan2(size[1], size[0]);
-            own.named.push(with_phase(rhythm, phase));
+            own.named.push(match size {
+                // What the trial does not tell stays as it is.
+                [0.0, 0.0] => rhythm,
+                _ => with_phase(&rhythm, libm::atan2(size[1], size[0])),
+            });
         }
         Ok(own)
-    }
-
-    /// A hypothesis as it is in a trial, the rhythms among its known effects included; as it was where it cannot be simulated.
-    pub fn as_in_trial(&self, hypothesis: &Hypothesis<N>, course: &Course<N>) -> Hypothesis<N> {
-        let mut lasting = hypothesis.clone();
-        let rhythms: Vec<_> = lasting.known.extract_if(.., |e| is_rhythm(e)).collect();
-        let own = self
-            .own_slopes(&lasting, course)
-            .and_then(|slopes| self.in_trial((&lasting, &rhythms), course, &slopes));
-        own.unwrap_or_else(|_| hypothesis.clone())
     }
 
     fn shown(
@@ -128,16 +111,21 @@ impl<const N: usize> Study<'_, N> {
     /// A hypothesis and rhythms as they are in every trial, whatever its role; as they were where one cannot be simulated.
     pub fn in_trials(
         &self,
-        believed: (&Hypothesis<N>, &[Effect<f64>]),
+        (hypothesis, rhythms): (&Hypothesis<N>, &[Effect<f64>]),
         anchor: &Anchor<N>,
     ) -> Vec<Hypothesis<N>> {
         let one = |trial: usize| {
             let group = self.group_of[trial];
             let slopes: Vec<Channels> = anchor.own.iter().map(|r| r.0[group].clone()).collect();
+            let course = &self.courses[trial];
             let own = self
                 .session
-                .in_trial(believed, &self.courses[trial], &slopes);
-            own.unwrap_or_else(|_| believed.0.clone())
+                .in_trial((hypothesis, rhythms), course, &slopes);
+            own.unwrap_or_else(|_| {
+                let mut all = hypothesis.clone();
+                all.named.extend_from_slice(rhythms);
+                all
+            })
         };
         self.parallel(self.courses.len(), one)
     }
@@ -147,6 +135,40 @@ fn with_phase(rhythm: &Effect<f64>, phase: f64) -> Effect<f64> {
     let mut effect = *rhythm;
     effect.parameters[shapes_of(effect.kind)[1]] = phase;
     effect
+}
+
+/// How much of each column is in what is left of a trial; zeros where it does not tell.
+///
+/// * `sd` - standard deviation of what is known of a column's size, which goes no further than [`FURTHEST`] of them
+fn sizes<const N: usize>(
+    left: &Channels,
+    columns: &[Channels],
+    sd: &[Option<f64>],
+    course: &Course<N>,
+) -> Vec<f64> {
+    let all: Vec<usize> = (0..columns.len()).collect();
+    let mut sizes = vec![0.0; columns.len()];
+    // In a band as many samples are independent as it has room for.
+    let share = f64::min(2.0 * course.band / course.rate, 1.0);
+    for _ in 0..TURNS {
+        let weights = weights(left, columns, &sizes, &course.counted);
+        let product =
+            |a: &Channels, b: &Channels| share * product((a, b), &weights, &course.counted);
+        let gram = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+            let known = sd[a].filter(|_| a == b).map_or(0.0, |sd| 1.0 / (sd * sd));
+            product(&columns[a], &columns[b]) + known
+        });
+        let score = DVector::from_fn(columns.len(), |a, _| product(&columns[a], left));
+        let bounds = |i: usize| {
+            let furthest = sd[i].map_or(f64::INFINITY, |sd| FURTHEST * sd);
+            (-furthest, furthest)
+        };
+        match solve(&gram, &score, &all, &bounds) {
+            Some((found, _)) => sizes = found,
+            None => break,
+        }
+    }
+    sizes
 }
 
 /// One over the mean square of what columns of so many sizes leave of each channel.

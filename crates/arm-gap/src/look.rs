@@ -7,8 +7,10 @@ use crate::candidate::{Candidate, Library};
 use crate::fit::Fitted;
 use crate::hypothesis::Hypothesis;
 use crate::misfit::{Lack, lack_of_fit};
+use crate::rhythm::Line;
 use crate::scan::Scan;
 use crate::search::Progress;
+use crate::session::Sight;
 use crate::study::Study;
 
 /// What a first look shows; nothing in it was converged by simulation but the calibration.
@@ -83,7 +85,11 @@ impl<const N: usize> Study<'_, N> {
                 None => best.push(suspect),
             }
         }
-        if let Some(hypothesis) = self.tuned(&calibrated.hypothesis) {
+        // What is left of a rhythm would pass for ringing.
+        if self.session.sight == Sight::Led
+            && self.rhythm(&anchor, Line::BetweenRepeats)?.is_none()
+            && let Some(hypothesis) = self.tuned(&calibrated.hypothesis)
+        {
             calibrated.hypothesis = hypothesis;
         }
         progress("done", 1.0);

@@ -25,9 +25,6 @@ const BAND: f64 = 5.0;
 /// Bandwidth of the handle's path, in bandwidths of the comparison: a robot that shakes at the edge of the comparison must
 /// keep its whole swing, or its forces are missed by newtons.
 const HANDLE_BAND: f64 = 4.0;
-/// Noise of the handle's path, in the force that it makes in the contact, over that of the force sensor, above which the path is
-/// low-passed: an arm that rings on its contact is driven from above any band.
-const ENCODER: f64 = 0.5;
 /// Steps that are tried, longest first \[s\]; the last one is taken even where dry friction would like it shorter.
 pub(crate) const STEPS: [f64; 3] = [1e-3, 5e-4, 2.5e-4];
 /// Samples at the start whose mean tells where the arm was at rest.
@@ -121,19 +118,10 @@ impl<const N: usize> Session<N> {
         let handle = match &trial.handle {
             Some(points) if self.sight == Sight::Led => {
                 let axis = |a: usize| points.iter().map(|p| p[a]).collect::<Vec<_>>();
-                let axes = [axis(0), axis(1)];
-                let noisy = |a: usize| {
-                    let pulled = self.contact.stiffness[a] * roughness(&axes[a]);
-                    pulled > ENCODER * roughness(&raw[N + a])
-                };
-                let axes = if noisy(0) || noisy(1) {
-                    let band = (HANDLE_BAND * band).min(0.4 * trial.rate);
-                    smooth(&axes, band, trial.rate)?
-                } else {
-                    axes.to_vec()
-                };
+                let band = (HANDLE_BAND * band).min(0.4 * trial.rate);
+                let smooth = smooth(&[axis(0), axis(1)], band, trial.rate)?;
                 (0..points.len())
-                    .map(|i| [axes[0][i], axes[1][i]])
+                    .map(|i| [smooth[0][i], smooth[1][i]])
                     .collect()
             }
             _ => Vec::new(),
@@ -441,16 +429,6 @@ fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, 
 /// [`GapError::Numerics`] for channels too short for the filter or not finite.
 pub fn smooth(channels: &[Vec<f64>], band: f64, rate: f64) -> Result<Channels, GapError> {
     Ok(low_pass(band, rate)?.both_ways_all(channels)?)
-}
-
-/// Size of the noise of a channel: what fourth differences leave of a movement, but for its jolts.
-fn roughness(channel: &[f64]) -> f64 {
-    /// Fourth difference of white noise, and its median, in standard deviations.
-    const OF_NOISE: f64 = 0.6745 * 8.366_600_265_340_756;
-    let fourth = |w: &[f64]| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs();
-    let mut sizes: Vec<f64> = channel.windows(5).map(fourth).collect();
-    sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).map_or(0.0, |m| m / OF_NOISE)
 }
 
 /// Channels less channels, over the samples that both have.

@@ -16,23 +16,64 @@ use crate::session::Sight;
 use crate::study::Study;
 
 /// Most steps of Gauss and Newton's method.
-const TURNS: usize = 3;
+const TURNS: usize = 4;
+/// Shares of a step that are tried.
+const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
 /// A step that lowers the cost by less than this share is the last.
 const ENOUGH: f64 = 1e-3;
 
 /// What a hypothesis leaves above the band, in sizes of each channel: one row of numbers for one trial of each movement.
 type Left = Vec<f64>;
 
+/// Where a contact is refitted to, and what it then leaves.
+struct Tuned<const N: usize> {
+    hypothesis: Hypothesis<N>,
+    left: Left,
+}
+
 impl<const N: usize> Study<'_, N> {
-    /// A hypothesis with stiffness and damping of the contact as the ringing on the fit trials tells them.
+    /// A hypothesis with stiffness and damping of the contact as the ringing tells them in one fit trial of each movement.
     ///
-    /// What the band of the comparison told is where they start from, and they may leave it as far as they were uncertain
-    /// before. `None` where no contact is compared, or the ringing tells nothing better.
+    /// What the band of the comparison told is where they start from and are drawn to, with the uncertainty from before; where
+    /// the ringing plainly speaks for the contact as given, that takes its place. `None` where no contact is compared, or the
+    /// ringing tells nothing better.
     pub fn tuned(&self, start: &Hypothesis<N>) -> Option<Hypothesis<N>> {
+        /// What the other start must gain, in squares of what is left: as an effect of as many parameters must.
+        const PLAIN: f64 = 12.0;
         if self.session.sight != Sight::Led {
             return None;
         }
         let trials = self.one_of_each();
+        let first = self.above(&trials, start)?;
+        let sizes = sizes(&first);
+        let before = joined(&first, &sizes);
+        let given = Hypothesis {
+            contact: self.session.given().contact,
+            ..start.clone()
+        };
+        let from = |start: &Hypothesis<N>| self.tuned_from(start, &trials, &sizes);
+        let mut best = from(start);
+        let is_far = |c: &Coordinate| {
+            let sd = c.prior.map_or(f64::INFINITY, |(_, sd)| sd);
+            (start.get(c.target) - given.get(c.target)).abs() > sd
+        };
+        let far = self.session.nuisances().iter().any(is_far);
+        if far && let Some(other) = from(&given) {
+            let least = best.as_ref().map_or(&before, |b| &b.left);
+            if dot(&other.left, &other.left) + PLAIN < dot(least, least) {
+                best = Some(other);
+            }
+        }
+        best.map(|b| b.hypothesis)
+    }
+
+    /// Gauss and Newton's method from a start, whose contact is what is believed; `None` where a step cannot be simulated.
+    fn tuned_from(
+        &self,
+        start: &Hypothesis<N>,
+        trials: &[usize],
+        sizes: &[f64],
+    ) -> Option<Tuned<N>> {
         let coordinates: Vec<Coordinate> = self
             .session
             .nuisances()
@@ -43,65 +84,82 @@ impl<const N: usize> Study<'_, N> {
                 ..c
             })
             .collect();
-        let first = self.above(&trials, start)?;
-        let sizes = sizes(&first);
-        let mut best = start.clone();
-        let mut left = joined(&first, &sizes);
-        // The ringing changes little from one step to the next: its slopes serve all of them.
-        let slopes = coordinates
-            .iter()
-            .map(|c| {
-                let moved = best.clone().with(c.target, best.get(c.target) + c.step);
-                let moved = joined(&self.above(&trials, &moved)?, &sizes);
-                Some(
-                    std::iter::zip(&left, moved)
-                        .map(|(l, m)| (l - m) / c.step)
-                        .collect(),
-                )
-            })
-            .collect::<Option<Vec<Left>>>()?;
-        let gram = Arc::new(DMatrix::from_fn(slopes.len(), slopes.len(), |a, b| {
-            dot(&slopes[a], &slopes[b])
-        }));
-        let all: Vec<usize> = (0..coordinates.len()).collect();
-        let mut tuned = None;
-        for _ in 0..TURNS {
-            let cluster = Cluster {
-                configuration: 0,
-                gram: Arc::clone(&gram),
-                score: DVector::from_fn(slopes.len(), |a, _| dot(&slopes[a], &left)),
-                square: dot(&left, &left),
-                rows: left.len(),
-            };
-            let normal = Normal::new(&[cluster], &priors(&best, &coordinates));
-            let bounds = |i: usize| {
-                let (c, value) = (&coordinates[i], best.get(coordinates[i].target));
-                (c.lower - value, c.upper - value)
-            };
-            let (steps, _) = solve(&normal.gram, &normal.score, &all, &bounds)?;
-            let next = std::iter::zip(&coordinates, &steps).fold(best.clone(), |h, (c, step)| {
-                let value = h.get(c.target) + step;
-                h.with(c.target, value)
-            });
-            let Some(after) = self.above(&trials, &next) else {
-                break;
-            };
-            let after = joined(&after, &sizes);
-            let known = priors(&next, &coordinates).into_iter().flatten();
-            let cost = known.fold(dot(&after, &after), |sum, (distance, sd)| {
+        let left = |h: &Hypothesis<N>| Some(joined(&self.above(trials, h)?, sizes));
+        let cost = |h: &Hypothesis<N>, left: &Left| {
+            let known = priors(h, &coordinates).into_iter().flatten();
+            known.fold(dot(left, left), |sum, (distance, sd)| {
                 sum + (distance / sd) * (distance / sd)
-            });
-            let gained = normal.square - cost;
-            if gained.is_nan() || gained <= 0.0 {
+            })
+        };
+        let mut best = Tuned {
+            hypothesis: start.clone(),
+            left: left(start)?,
+        };
+        for _ in 0..TURNS {
+            let before = cost(&best.hypothesis, &best.left);
+            let steps = self.step_of(&best, &coordinates, &left)?;
+            let shared = |share: f64| {
+                let next = std::iter::zip(&coordinates, &steps);
+                let next = next.fold(best.hypothesis.clone(), |h, (c, step)| {
+                    let value = h.get(c.target) + share * step;
+                    h.with(c.target, value)
+                });
+                let left = left(&next)?;
+                let gained = before - cost(&next, &left);
+                (gained > 0.0).then_some((
+                    Tuned {
+                        hypothesis: next,
+                        left,
+                    },
+                    gained,
+                ))
+            };
+            let Some((next, gained)) = SHARES.into_iter().find_map(shared) else {
                 break;
-            }
-            (best, left) = (next, after);
-            tuned = Some(best.clone());
-            if gained < ENOUGH * normal.square {
+            };
+            best = next;
+            if gained < ENOUGH * before {
                 break;
             }
         }
-        tuned
+        Some(best)
+    }
+
+    /// The step that lowers the cost most to first order, within bounds.
+    fn step_of(
+        &self,
+        at: &Tuned<N>,
+        coordinates: &[Coordinate],
+        left: &dyn Fn(&Hypothesis<N>) -> Option<Left>,
+    ) -> Option<Vec<f64>> {
+        let slope = |c: &Coordinate| {
+            let value = at.hypothesis.get(c.target);
+            let step = if value + c.step > c.upper {
+                -c.step
+            } else {
+                c.step
+            };
+            let moved = left(&at.hypothesis.clone().with(c.target, value + step))?;
+            let slope = std::iter::zip(&at.left, moved).map(|(l, m)| (l - m) / step);
+            Some(slope.collect())
+        };
+        let slopes: Vec<Left> = coordinates.iter().map(slope).collect::<Option<_>>()?;
+        let cluster = Cluster {
+            configuration: 0,
+            gram: Arc::new(DMatrix::from_fn(slopes.len(), slopes.len(), |a, b| {
+                dot(&slopes[a], &slopes[b])
+            })),
+            score: DVector::from_fn(slopes.len(), |a, _| dot(&slopes[a], &at.left)),
+            square: dot(&at.left, &at.left),
+            rows: at.left.len(),
+        };
+        let normal = Normal::new(&[cluster], &priors(&at.hypothesis, coordinates));
+        let all: Vec<usize> = (0..coordinates.len()).collect();
+        let bounds = |i: usize| {
+            let (c, value) = (&coordinates[i], at.hypothesis.get(coordinates[i].target));
+            (c.lower - value, c.upper - value)
+        };
+        solve(&normal.gram, &normal.score, &all, &bounds).map(|(steps, _)| steps)
     }
 
     /// The first trial of each movement that is fitted and that nothing has touched.

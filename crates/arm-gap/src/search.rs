@@ -227,17 +227,20 @@ impl<'a, const N: usize> Study<'a, N> {
         if let Some((hypothesis, known)) = self.refined(&amended) {
             (amended.hypothesis, precision) = (hypothesis, known);
         }
-        for fitted in [&mut calibrated, &mut amended] {
-            if let Some(hypothesis) = self.tuned(&fitted.hypothesis) {
-                fitted.hypothesis = hypothesis;
-            }
-        }
-        self.courses = measured;
         let rhythms: Vec<Effect<f64>> = apart
             .iter()
             .filter(|a| a.trial.is_none())
             .map(|a| a.effect)
             .collect();
+        // What is left of a rhythm would pass for ringing.
+        if rhythms.is_empty() {
+            for fitted in [&mut calibrated, &mut amended] {
+                if let Some(hypothesis) = self.tuned(&fitted.hypothesis) {
+                    fitted.hypothesis = hypothesis;
+                }
+            }
+        }
+        self.courses = measured;
         let in_trials = [
             self.in_trials((&calibrated.hypothesis, &[]), &anchor),
             self.in_trials((&amended.hypothesis, &rhythms), &anchor),
@@ -289,7 +292,11 @@ impl<'a, const N: usize> Study<'a, N> {
             let library = Library::build(self, &hunt.anchor, periodic)?;
             let scan = match Scan::new(self, &hunt.current, &hunt.anchor, &library) {
                 // What was found so far stands.
-                Err(GapError::Simulation { .. }) if !hunt.current.asked.is_empty() => break,
+                Err(GapError::Simulation { .. } | GapError::Singular { .. })
+                    if !hunt.current.asked.is_empty() =>
+                {
+                    break;
+                }
                 other => other?.scaled(),
             };
             hunt.asked = library.candidates.len() as f64;

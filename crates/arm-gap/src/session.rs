@@ -42,7 +42,7 @@ pub enum Sight {
 /// tolerance itself.
 const KEPT: f64 = 0.5;
 /// Standard deviations beyond which nothing that is known is refitted: what is further off is a fault, and has a name.
-const FURTHEST: f64 = 4.0;
+pub(crate) const FURTHEST: f64 = 4.0;
 /// Relative standard deviation of what the model says of its own effects, and of the compliance of its contact.
 const KNOWN: f64 = 0.05;
 /// Relative standard deviation of what the model says of the damping of its contact.

@@ -3,6 +3,7 @@
 use arm_core::Chain;
 use arm_core::effect::Effect;
 use arm_gap::GapError;
+use arm_gap::apart::Apart;
 use arm_gap::candidate::Candidate;
 use arm_gap::fit::Fitted;
 use arm_gap::hypothesis::{Coordinate, Hypothesis, Target};
@@ -352,11 +353,12 @@ fn result<'py, const N: usize>(
     out.set_item("scale", finding.scale)?;
     out.set_item("calibrated", fitted(py, &finding.calibrated)?)?;
     out.set_item("amended", fitted(py, &finding.amended)?)?;
-    let rhythms = finding.apart.iter().filter(|a| a.trial.is_none());
-    out.set_item(
-        "rhythms",
-        rhythms.map(|a| entry(&a.effect)).collect::<Vec<_>>(),
-    )?;
+    let rhythms = || finding.apart.iter().filter(|a| a.trial.is_none());
+    let entries = |list: &mut dyn Iterator<Item = &Apart>| -> Vec<Entry> {
+        list.map(|a| entry(&a.effect)).collect()
+    };
+    out.set_item("rhythms", entries(&mut rhythms()))?;
+    out.set_item("locked", entries(&mut rhythms().filter(|a| a.locked)))?;
     out.set_item("lack", finding.lack.each_ref().map(lack))?;
     let known: Vec<_> = std::iter::zip(&finding.precision.coordinates, &finding.precision.sd)
         .filter_map(|(c, sd)| unknown(&finding.amended.hypothesis, c, *sd))

@@ -52,7 +52,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         lack=((before_ratio, before_z), (after_ratio, after_z)),
         ladder=tuple(_rung(tried, before, after) for tried, before, after in raw["ladder"]),
         warnings=tuple(warnings),
-        model=amended(dataset.model, raw["amended"], rhythms=raw["rhythms"]),
+        model=amended(dataset.model, raw["amended"], rhythms=raw["locked"]),
         dataset=dataset,
         raw=raw,
     )
@@ -172,9 +172,9 @@ def _worded(kind: str, joint: int | None, channel: str | None) -> str:
 
 
 def lasting(result: GapFound) -> Model:
-    """Return the amended model without rhythms, whose phase is another one in every trial."""
+    """Return the amended model without rhythms, which are set apart from what is fitted."""
     effects = result.model.effects
-    return result.model.replace(effects=effects[: len(effects) - len(result.raw["rhythms"])])
+    return result.model.replace(effects=effects[: len(effects) - len(result.raw["locked"])])
 
 
 def amended(model: Model, fitted: Mapping[str, Any], *, joints: bool = True, rhythms: Sequence[Any] = ()) -> Model:
