@@ -13,7 +13,7 @@ BIN    := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 
 RUST    := $(shell find crates bench -type f \( -name '*.rs' -o -name Cargo.toml \)) Cargo.toml Cargo.lock clippy.toml
-PACKAGE := $(RUST) $(shell find python -type f -name "*.pyi") pyproject.toml
+PACKAGE := $(RUST) $(shell find python -type f -name "*.pyi") pyproject.toml scripts/fmu_library.py
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -49,17 +49,15 @@ $(STAMPS)/venv:
 	$(BIN)/python -m pip install "maturin>=1.9,<2"
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/build: $(PACKAGE) scripts/fmu_library.py | $(STAMPS)/venv
+$(STAMPS)/build: $(PACKAGE) | $(STAMPS)/venv
 	$(BIN)/python scripts/fmu_library.py
 	$(BIN)/maturin develop --release
 	@touch $@
 
 # What the tests run on: what was made for speed where that is current, else what shares its dependencies with the Rust tests, in half
 # the time, and of the same bits. It takes the place of what was made for speed, which is then made anew when it is asked for.
-MADE := $(PACKAGE) scripts/fmu_library.py
-
-$(STAMPS)/dev: $(MADE) | $(STAMPS)/venv
-	@if [ -e $(STAMPS)/build ] && [ -z "$$(find $(MADE) -newer $(STAMPS)/build)" ]; then \
+$(STAMPS)/dev: $(PACKAGE) | $(STAMPS)/venv
+	@if [ -e $(STAMPS)/build ] && [ -z "$$(find $(PACKAGE) -newer $(STAMPS)/build)" ]; then \
 	  $(BIN)/maturin develop --release --quiet --extras dev,files; \
 	else \
 	  rm -f $(STAMPS)/build; \

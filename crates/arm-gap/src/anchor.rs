@@ -244,7 +244,7 @@ impl<'a, const N: usize> Study<'a, N> {
     }
 
     /// A hypothesis with one number changed a little.
-    fn nudged(&self, hypothesis: &Hypothesis<N>, c: &Coordinate) -> Change<N> {
+    pub(crate) fn nudged(&self, hypothesis: &Hypothesis<N>, c: &Coordinate) -> Change<N> {
         let value = hypothesis.get(c.target);
         let step = if value + c.step > c.upper {
             -c.step
@@ -278,7 +278,7 @@ impl<'a, const N: usize> Study<'a, N> {
 }
 
 /// The difference of channels for one unit of a change.
-fn slope(up: &Channels, base: &Channels, size: f64) -> Channels {
+pub(crate) fn slope(up: &Channels, base: &Channels, size: f64) -> Channels {
     let mut out = difference(up, base);
     for value in out.iter_mut().flatten() {
         *value /= size;

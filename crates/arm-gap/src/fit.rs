@@ -63,18 +63,15 @@ pub fn priors<const N: usize>(
         .collect()
 }
 
-impl<'a, const N: usize> Study<'a, N> {
-    /// Cost of residuals under a hypothesis, for the trials that are fitted.
-    fn cost(&self, anchor: &Anchor<N>, hypothesis: &Hypothesis<N>, clusters: &[Cluster]) -> f64 {
-        let data: f64 = clusters.iter().map(|c| c.square).sum();
-        let known: f64 = priors(hypothesis, &anchor.coordinates)
-            .into_iter()
-            .flatten()
-            .map(|(distance, sd)| (distance / sd) * (distance / sd))
-            .sum();
-        data + known
-    }
+/// What the numbers of a hypothesis cost against what was known of them.
+pub fn departure<const N: usize>(hypothesis: &Hypothesis<N>, coordinates: &[Coordinate]) -> f64 {
+    let known = priors(hypothesis, coordinates).into_iter().flatten();
+    known
+        .map(|(distance, sd)| (distance / sd) * (distance / sd))
+        .sum()
+}
 
+impl<'a, const N: usize> Study<'a, N> {
     /// A hypothesis near an anchor with its residuals and their cost.
     fn state(
         &self,
@@ -84,7 +81,8 @@ impl<'a, const N: usize> Study<'a, N> {
     ) -> Result<Fitted<N>, GapError> {
         let residuals = self.residuals(anchor, &hypothesis)?;
         let squares = anchor.rows.squares(self, &residuals);
-        let cost = self.cost(anchor, &hypothesis, &squares);
+        let data: f64 = squares.iter().map(|c| c.square).sum();
+        let cost = data + departure(&hypothesis, &anchor.coordinates);
         Ok(Fitted {
             hypothesis,
             asked,
@@ -216,7 +214,7 @@ impl<'a, const N: usize> Study<'a, N> {
 
 /// The unknowns that the equations decide anything about, and the step of each that lowers the cost most within its bounds;
 /// `None` where they are singular.
-fn stepped<const N: usize>(
+pub(crate) fn stepped<const N: usize>(
     clusters: &[Cluster],
     hypothesis: &Hypothesis<N>,
     coordinates: &[Coordinate],

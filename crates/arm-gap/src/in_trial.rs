@@ -8,9 +8,10 @@ use arm_core::effect::{Effect, Nature};
 use arm_sim::SimulationError;
 use nalgebra::{DMatrix, DVector};
 
-use crate::anchor::Anchor;
+use crate::anchor::slope;
 use crate::apart::shapes_of;
-use crate::hypothesis::{Coordinate, Hypothesis};
+use crate::hypothesis::Hypothesis;
+use crate::noise::dot;
 use crate::normal::solve;
 use crate::predict::{Channels, Course, difference};
 use crate::search::SLOW;
@@ -30,38 +31,14 @@ fn is_rhythm(effect: &Effect<f64>) -> bool {
 }
 
 impl<const N: usize> Session<N> {
-    /// A hypothesis as it is in a trial; as it was where it cannot be simulated.
-    pub fn as_in_trial(&self, hypothesis: &Hypothesis<N>, course: &Course<N>) -> Hypothesis<N> {
-        let own = self
-            .own_slopes(hypothesis, course)
-            .and_then(|slopes| self.in_trial((hypothesis, &[]), course, &slopes));
-        own.unwrap_or_else(|_| hypothesis.clone())
-    }
-
-    /// How the channels of a trial in the common band answer where the hand holds the handle, for one unit each.
-    fn own_slopes(
-        &self,
-        hypothesis: &Hypothesis<N>,
-        course: &Course<N>,
-    ) -> Result<Vec<Channels>, SimulationError> {
-        let base = self.shown(hypothesis, course)?;
-        let one = |c: Coordinate| {
-            let moved = hypothesis.clone().with(c.target, c.step);
-            let mut slope = difference(&self.shown(&moved, course)?, &base);
-            slope.iter_mut().flatten().for_each(|v| *v /= c.step);
-            Ok(slope)
-        };
-        self.by_trial().into_iter().map(one).collect()
-    }
-
     /// A hypothesis and rhythms, its own known ones besides, as they are in a trial.
     ///
-    /// * `slopes` - how the channels answer where the hand holds the handle, here or in a repeat
-    fn in_trial(
+    /// # Errors
+    /// [`SimulationError`] where the trial cannot be simulated with them.
+    pub fn in_trial(
         &self,
         (hypothesis, rhythms): (&Hypothesis<N>, &[Effect<f64>]),
         course: &Course<N>,
-        slopes: &[Channels],
     ) -> Result<Hypothesis<N>, SimulationError> {
         let mut own = hypothesis.clone();
         let mut rhythms = rhythms.to_vec();
@@ -71,15 +48,20 @@ impl<const N: usize> Session<N> {
             return Ok(own);
         }
         let base = self.shown(&own, course)?;
-        let left = difference(&course.seen, &base);
-        let mut columns = slopes.to_vec();
+        let change = |changed: &Hypothesis<N>| self.shown(changed, course);
+        let mut columns = Vec::new();
+        for c in &placed {
+            let moved = own.clone().with(c.target, own.get(c.target) + c.step);
+            columns.push(slope(&change(&moved)?, &base, c.step));
+        }
         for rhythm in &rhythms {
             for phase in [0.0, 0.5 * core::f64::consts::PI] {
                 let mut swinging = own.clone();
                 swinging.named.push(with_phase(rhythm, phase));
-                columns.push(difference(&self.shown(&swinging, course)?, &base));
+                columns.push(difference(&change(&swinging)?, &base));
             }
         }
+        let left = difference(&course.seen, &base);
         let sd: Vec<Option<f64>> = (0..columns.len())
             .map(|i| placed.get(i)?.prior.map(|(_, sd)| sd))
             .collect();
@@ -109,21 +91,12 @@ impl<const N: usize> Session<N> {
 
 impl<const N: usize> Study<'_, N> {
     /// A hypothesis and rhythms as they are in every trial, whatever its role; as they were where one cannot be simulated.
-    pub fn in_trials(
-        &self,
-        (hypothesis, rhythms): (&Hypothesis<N>, &[Effect<f64>]),
-        anchor: &Anchor<N>,
-    ) -> Vec<Hypothesis<N>> {
+    pub fn in_trials(&self, believed: (&Hypothesis<N>, &[Effect<f64>])) -> Vec<Hypothesis<N>> {
         let one = |trial: usize| {
-            let group = self.group_of[trial];
-            let slopes: Vec<Channels> = anchor.own.iter().map(|r| r.0[group].clone()).collect();
-            let course = &self.courses[trial];
-            let own = self
-                .session
-                .in_trial((hypothesis, rhythms), course, &slopes);
+            let own = self.session.in_trial(believed, &self.courses[trial]);
             own.unwrap_or_else(|_| {
-                let mut all = hypothesis.clone();
-                all.named.extend_from_slice(rhythms);
+                let mut all = believed.0.clone();
+                all.named.extend_from_slice(believed.1);
                 all
             })
         };
@@ -152,13 +125,22 @@ fn sizes<const N: usize>(
     let share = f64::min(2.0 * course.band / course.rate, 1.0);
     for _ in 0..TURNS {
         let weights = weights(left, columns, &sizes, &course.counted);
-        let product =
-            |a: &Channels, b: &Channels| share * product((a, b), &weights, &course.counted);
+        let weighed = |channels: &Channels| -> Vec<f64> {
+            let each = std::iter::zip(channels, &weights);
+            each.flat_map(|(channel, weight)| {
+                let scale = libm::sqrt(share * weight);
+                let counted = std::iter::zip(channel, &course.counted);
+                counted.filter(|(_, c)| **c).map(move |(v, _)| scale * v)
+            })
+            .collect()
+        };
+        let rows: Vec<Vec<f64>> = columns.iter().map(weighed).collect();
         let gram = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
             let known = sd[a].filter(|_| a == b).map_or(0.0, |sd| 1.0 / (sd * sd));
-            product(&columns[a], &columns[b]) + known
+            dot(&rows[a], &rows[b]) + known
         });
-        let score = DVector::from_fn(columns.len(), |a, _| product(&columns[a], left));
+        let left = weighed(left);
+        let score = DVector::from_fn(columns.len(), |a, _| dot(&rows[a], &left));
         let bounds = |i: usize| {
             let furthest = sd[i].map_or(f64::INFINITY, |sd| FURTHEST * sd);
             (-furthest, furthest)
@@ -185,14 +167,4 @@ fn weights(left: &Channels, columns: &[Channels], sizes: &[f64], counted: &[bool
         count / sum
     };
     (0..left.len()).map(one).collect()
-}
-
-fn product((a, b): (&Channels, &Channels), weights: &[f64], counted: &[bool]) -> f64 {
-    let mut sum = 0.0;
-    for (c, weight) in weights.iter().enumerate() {
-        for (i, _) in counted.iter().enumerate().filter(|(_, counted)| **counted) {
-            sum += weight * a[c][i] * b[c][i];
-        }
-    }
-    sum
 }

@@ -94,7 +94,7 @@ impl<const N: usize> Study<'_, N> {
         }
         progress("done", 1.0);
         Ok(Look {
-            in_trials: self.in_trials((&calibrated.hypothesis, &[]), &anchor),
+            in_trials: self.in_trials((&calibrated.hypothesis, &[])),
             calibrated,
             lack,
             suspects: best,

@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::priors;
+use crate::fit::{departure, stepped};
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::noise::dot;
-use crate::normal::{Cluster, Normal, solve};
+use crate::normal::Cluster;
 use crate::predict::{Channels, away_from_gaps, difference, margin, smooth};
 use crate::session::Sight;
 use crate::study::Study;
@@ -51,14 +51,23 @@ impl<const N: usize> Study<'_, N> {
             contact: self.session.given().contact,
             ..start.clone()
         };
-        let from = |start: &Hypothesis<N>| self.tuned_from(start, &trials, &sizes);
-        let mut best = from(start);
+        let from = |hypothesis: &Hypothesis<N>, left: Left| {
+            let start = Tuned {
+                hypothesis: hypothesis.clone(),
+                left,
+            };
+            self.tuned_from(start, &trials, &sizes)
+        };
+        let mut best = from(start, before.clone());
         let is_far = |c: &Coordinate| {
             let sd = c.prior.map_or(f64::INFINITY, |(_, sd)| sd);
             (start.get(c.target) - given.get(c.target)).abs() > sd
         };
         let far = self.session.nuisances().iter().any(is_far);
-        if far && let Some(other) = from(&given) {
+        if far
+            && let Some(left) = self.above(&trials, &given)
+            && let Some(other) = from(&given, joined(&left, &sizes))
+        {
             let least = best.as_ref().map_or(&before, |b| &b.left);
             if dot(&other.left, &other.left) + PLAIN < dot(least, least) {
                 best = Some(other);
@@ -68,33 +77,19 @@ impl<const N: usize> Study<'_, N> {
     }
 
     /// Gauss and Newton's method from a start, whose contact is what is believed; `None` where a step cannot be simulated.
-    fn tuned_from(
-        &self,
-        start: &Hypothesis<N>,
-        trials: &[usize],
-        sizes: &[f64],
-    ) -> Option<Tuned<N>> {
+    fn tuned_from(&self, mut best: Tuned<N>, trials: &[usize], sizes: &[f64]) -> Option<Tuned<N>> {
         let coordinates: Vec<Coordinate> = self
             .session
             .nuisances()
             .into_iter()
             .filter(|c| matches!(c.target, Target::Contact(..)))
             .map(|c| Coordinate {
-                prior: c.prior.map(|(_, sd)| (start.get(c.target), sd)),
+                prior: c.prior.map(|(_, sd)| (best.hypothesis.get(c.target), sd)),
                 ..c
             })
             .collect();
         let left = |h: &Hypothesis<N>| Some(joined(&self.above(trials, h)?, sizes));
-        let cost = |h: &Hypothesis<N>, left: &Left| {
-            let known = priors(h, &coordinates).into_iter().flatten();
-            known.fold(dot(left, left), |sum, (distance, sd)| {
-                sum + (distance / sd) * (distance / sd)
-            })
-        };
-        let mut best = Tuned {
-            hypothesis: start.clone(),
-            left: left(start)?,
-        };
+        let cost = |h: &Hypothesis<N>, left: &Left| dot(left, left) + departure(h, &coordinates);
         for _ in 0..TURNS {
             let before = cost(&best.hypothesis, &best.left);
             let steps = self.step_of(&best, &coordinates, &left)?;
@@ -133,14 +128,9 @@ impl<const N: usize> Study<'_, N> {
         left: &dyn Fn(&Hypothesis<N>) -> Option<Left>,
     ) -> Option<Vec<f64>> {
         let slope = |c: &Coordinate| {
-            let value = at.hypothesis.get(c.target);
-            let step = if value + c.step > c.upper {
-                -c.step
-            } else {
-                c.step
-            };
-            let moved = left(&at.hypothesis.clone().with(c.target, value + step))?;
-            let slope = std::iter::zip(&at.left, moved).map(|(l, m)| (l - m) / step);
+            let change = self.nudged(&at.hypothesis, c);
+            let moved = left(&change.changed)?;
+            let slope = std::iter::zip(&at.left, moved).map(|(l, m)| (l - m) / change.size);
             Some(slope.collect())
         };
         let slopes: Vec<Left> = coordinates.iter().map(slope).collect::<Option<_>>()?;
@@ -153,13 +143,13 @@ impl<const N: usize> Study<'_, N> {
             square: dot(&at.left, &at.left),
             rows: at.left.len(),
         };
-        let normal = Normal::new(&[cluster], &priors(&at.hypothesis, coordinates));
-        let all: Vec<usize> = (0..coordinates.len()).collect();
-        let bounds = |i: usize| {
-            let (c, value) = (&coordinates[i], at.hypothesis.get(coordinates[i].target));
-            (c.lower - value, c.upper - value)
-        };
-        solve(&normal.gram, &normal.score, &all, &bounds).map(|(steps, _)| steps)
+        let (usable, steps) = stepped(&[cluster], &at.hypothesis, coordinates, 0.0)?;
+        let mut all = vec![0.0; coordinates.len()];
+        usable
+            .iter()
+            .zip(steps)
+            .for_each(|(&i, step)| all[i] = step);
+        Some(all)
     }
 
     /// The first trial of each movement that is fitted and that nothing has touched.

@@ -242,8 +242,8 @@ impl<'a, const N: usize> Study<'a, N> {
         }
         self.courses = measured;
         let in_trials = [
-            self.in_trials((&calibrated.hypothesis, &[]), &anchor),
-            self.in_trials((&amended.hypothesis, &rhythms), &anchor),
+            self.in_trials((&calibrated.hypothesis, &[])),
+            self.in_trials((&amended.hypothesis, &rhythms)),
         ];
         progress("done", 1.0);
         Ok(Finding {

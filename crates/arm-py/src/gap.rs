@@ -118,11 +118,13 @@ pub fn play<'py>(
         let plays = (0..session.trials.len())
             .map(|i| {
                 let course = session.course(i).map_err(gap)?;
+                // What cannot be simulated is told of below, with its trial.
                 let believed = match own {
-                    true => py.detach(|| session.as_in_trial(&given, &course)),
-                    false => given.clone(),
+                    true => py.detach(|| session.in_trial((&given, &[]), &course)).ok(),
+                    false => None,
                 };
-                shown(py, (&session, &course), &[("given", &believed)])
+                let believed = believed.as_ref().unwrap_or(&given);
+                shown(py, (&session, &course), &[("given", believed)])
             })
             .collect::<PyResult<Vec<_>>>();
         own::failed()?;
