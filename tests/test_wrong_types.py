@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from collections.abc import Callable
 from fractions import Fraction
@@ -132,7 +133,10 @@ def test_what_an_argument_cannot_be_is_refused(of: str, name: str, tmp_path: Pat
 def test_and_of_functions_of_a_data_set(of: str, name: str, slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     function, keywords = OF_A_DATA_SET[of]
     monkeypatch.chdir(tmp_path)
-    assert ends_wrongly(function, {"dataset": armrs.load_dataset(slow_arm), **keywords}, name) == []
+    whole = armrs.load_dataset(slow_arm)
+    # One trial to fit and one to test: what is accepted is worked through.
+    dataset = dataclasses.replace(whole, trials=whole.trials[2:])
+    assert ends_wrongly(function, {"dataset": dataset, **keywords}, name) == []
 
 
 @pytest.mark.parametrize("of", OF_A_DATA_SET)

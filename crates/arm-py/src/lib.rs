@@ -21,14 +21,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    m.add(
-        "build_profile",
-        if cfg!(debug_assertions) {
-            "debug"
-        } else {
-            "release"
-        },
-    )?;
+    m.add("build_profile", env!("BUILD_PROFILE"))?;
     m.add_class::<arm::Arm>()?;
     m.add_class::<rig::Rig>()?;
     m.add_class::<cosim::ArmSlave>()?;
