@@ -101,6 +101,30 @@ def test_where_the_handle_is_held_is_each_trials_own() -> None:
         assert channel.before > 1.2e-3 and channel.calibrated < 6e-4, name
 
 
+def test_a_handle_beside_the_hand_turns_the_wrist() -> None:
+    parts = (
+        armrs.Segment("upper arm", 0.32, 2.0, 0.15, 0.02),
+        armrs.Segment("forearm", 0.28, 1.3, 0.13, 0.012),
+        armrs.Segment("hand", 0.09, 0.5, 0.05, 0.001),
+    )
+    joints = tuple(armrs.Joint(name, viscosity=0.1) for name in ("shoulder", "elbow", "wrist"))
+    given = model().replace(segments=parts, joints=joints, effects=[armrs.Effect("elastic", 3, parameters={"stiffness": 0.6})])
+    movement = armrs.Movement(np.radians([[-60, 50, 0], [-30, 80, 0], [-60, 50, 0]]), speed=0.5, acceleration=2.0, shape="smooth")
+    sensors = armrs.Sensors(angle=armrs.Channel(1e-4), force=armrs.Channel(0.05))
+    trials = []
+    for repeat in range(1, 5):
+        held = dataclasses.replace(parts[2], length=parts[2].length + 4e-4 * (-1) ** repeat)
+        true = given.replace(segments=(*parts[:2], held))
+        read = armrs.simulate(true, movement, engine="rapier", rate=50.0, sensors=sensors, seeds=[repeat]).readings[0]
+        columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
+        role = "test" if repeat == 4 else "fit"
+        trials.append(armrs.Trial(file=f"led_{repeat}.csv", configuration="led", repeat=repeat, role=role, t=read["time"], **columns))
+    wrist = calibrate(Dataset("led", given, tuple(trials), force_on="arm", synthetic=True), threads=2).gap["q3_rad"]
+    assert wrist.calibrated is not None
+    # The force on a lever of 0.4 mm turns the wrist by milliradians; what is left is noise.
+    assert wrist.before > 1e-3 and wrist.calibrated < 2e-4
+
+
 @pytest.mark.parametrize("frequency", [2.5, 6.3])
 def test_a_rhythm_has_its_own_phase_in_every_trial(frequency: float) -> None:
     tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.15, "frequency": frequency})

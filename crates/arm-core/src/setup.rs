@@ -15,6 +15,8 @@ pub struct Setup<T, const N: usize> {
     pub gravity: Plane<T>,
     /// Contact between hand and handle.
     pub contact: Contact<T>,
+    /// Where the hand holds the handle beside its tip: along the last segment and to its left \[m\].
+    pub placement: Plane<T>,
     /// Movement of the base with the first joint's angle: metres for each radian from `base_rest`.
     pub base_motion: Plane<T>,
     /// First joint angle at which the base stands at `base` \[rad\].
@@ -38,6 +40,7 @@ impl<T: Scalar, const N: usize> Setup<T, N> {
             base: chain.base(),
             gravity: chain.gravity(),
             contact,
+            placement: [T::ZERO; 2],
             base_motion: [T::ZERO; 2],
             base_rest: T::ZERO,
             ripple: [T::ZERO; 2],

@@ -255,7 +255,7 @@ impl<'a, const N: usize> Study<'a, N> {
             changed: hypothesis.clone().with(c.target, value + step),
             size: step,
             sensing: self.session.is_sensing(hypothesis, c.target),
-            moves_handle: matches!(c.target, Target::Shift(_) | Target::Placement(_)),
+            moves_handle: matches!(c.target, Target::Shift(_)),
         }
     }
 

@@ -139,7 +139,9 @@ impl<const N: usize> Hypothesis<N> {
         let segments = self.believed(nominal.segments());
         let chain = Chain::new(segments, nominal.base(), nominal.gravity())?
             .with_rotor_inertia(*nominal.rotor_inertia())?;
-        Ok(Setup::new(&chain, contact))
+        let mut setup = Setup::new(&chain, contact);
+        setup.placement = self.placement;
+        Ok(setup)
     }
 }
 

@@ -1,7 +1,7 @@
-//! A hypothesis as it is in one trial: where the hand holds the handle there, and the phase that a rhythm is in.
+//! A hypothesis as it is in one trial: where the handle is there, in the hand and in the room, and the phase that a rhythm is in.
 //!
 //! Neither is the same from one trial to the next, so that no other trial tells them. They are read off each trial by itself,
-//! whatever its role and whatever hypothesis is shown: two numbers for the handle, as far as what is declared of it lets them
+//! whatever its role and whatever hypothesis is shown: two numbers each for the handle, as far as what is declared of it lets them
 //! go, and one for a rhythm.
 
 use arm_core::effect::{Effect, Nature};
@@ -67,7 +67,8 @@ impl<const N: usize> Session<N> {
             .collect();
         let sizes = sizes(&left, &columns, &sd, course);
         for (c, size) in std::iter::zip(&placed, &sizes) {
-            own = own.with(c.target, *size);
+            let value = own.get(c.target) + size;
+            own = own.with(c.target, value);
         }
         for (rhythm, size) in std::iter::zip(rhythms, sizes[placed.len()..].chunks_exact(2)) {
             own.named.push(match size {

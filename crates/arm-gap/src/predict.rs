@@ -46,14 +46,12 @@ pub struct Course<const N: usize> {
     pub counted: Vec<bool>,
     times: Vec<f64>,
     handle: Vec<Plane<f64>>,
-    /// Cosine and sine of the last segment's angle.
-    hand: Vec<[f64; 2]>,
     start: Joints<f64, N>,
     motion: Option<Kinematics<N>>,
 }
 
 impl<const N: usize> Course<N> {
-    /// The path of the handle under a hypothesis: its base may be shifted, the hand may hold it elsewhere.
+    /// The path of the handle under a hypothesis: its base may be shifted.
     ///
     /// # Errors
     /// As [`HandlePath::through_points`].
@@ -61,14 +59,11 @@ impl<const N: usize> Course<N> {
         &self,
         hypothesis: &Hypothesis<N>,
     ) -> Result<HandlePath<N>, SimulationError> {
-        let (shift, [along, left]) = (hypothesis.shift, hypothesis.placement);
-        let points: Vec<Plane<f64>> = std::iter::zip(&self.handle, &self.hand)
-            .map(|(p, [cos, sin])| {
-                [
-                    p[0] + shift[0] - (along * cos - left * sin),
-                    p[1] + shift[1] - (along * sin + left * cos),
-                ]
-            })
+        let shift = hypothesis.shift;
+        let points: Vec<Plane<f64>> = self
+            .handle
+            .iter()
+            .map(|p| [p[0] + shift[0], p[1] + shift[1]])
             .collect();
         HandlePath::through_points(&self.times, &points)
     }
@@ -126,14 +121,6 @@ impl<const N: usize> Session<N> {
             }
             _ => Vec::new(),
         };
-        let hand = match self.sight {
-            Sight::Torque => Vec::new(),
-            Sight::Led => {
-                let angle = |i: usize| (0..N).fold(0.0, |sum, j| sum + seen[j][i]);
-                let turned = (0..trial.len()).map(|i| libm::sincos(angle(i)));
-                turned.map(|(sin, cos)| [cos, sin]).collect()
-            }
-        };
         let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
         let span = first..(first + START).min(trial.len());
         let count = span.len() as f64;
@@ -154,7 +141,6 @@ impl<const N: usize> Session<N> {
             counted: away_from_gaps(&trial.valid, margin),
             times: (0..trial.len()).map(|i| i as f64 / trial.rate).collect(),
             handle,
-            hand,
             start,
             motion,
         })

@@ -9,8 +9,8 @@
 
 use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Joints, Plane, Pose, Reading, Scalar, Setup, inverse_dynamics, jacobian,
-    joint_force, static_torque, tip,
+    Chain, Contact, Joints, Placement, Plane, Pose, Reading, Scalar, Setup, inverse_dynamics,
+    jacobian, joint_force, static_torque, tip,
 };
 use arm_sim::{HandlePath, SimulationError};
 use nalgebra::SMatrix;
@@ -137,16 +137,20 @@ fn balance<const N: usize>(
     let (chain, (shift, drift)) = plant.based(state);
     let place = tip(&chain, &pose);
     let moving = jacobian(&chain, &pose) * state.qd;
+    let placement = Placement::of(&plant.setup);
+    let beside = placement.map_or([0.0; 2], |p| p.arm(&pose));
+    let turning = placement.map_or([0.0; 2], |p| p.velocity(&pose, &state.qd));
     let force = plant.contact.force_on_arm(
-        [0, 1].map(|a| at[a] - place[a] - shift[a]),
-        [0, 1].map(|a| rate[a] - moving[a] - drift[a]),
+        [0, 1].map(|a| at[a] - place[a] - beside[a] - shift[a]),
+        [0, 1].map(|a| rate[a] - moving[a] - turning[a] - drift[a]),
     );
+    let moment = placement.map_or(0.0, |p| p.moment(&pose, force));
     let through = joint_force(&chain, &pose, (&state.qd, &state.qdd), force);
     let mut motion = Motion::new(state.time, state.q, state.qd).with_joint_force(&through);
     motion.qdd = state.qdd;
     let mut torque = inverse_dynamics(&chain, &pose, &state.qd, &state.qdd)
         + resisting_torque(&plant.effects, &motion, memory)
-        - static_torque(&chain, &pose, force, 0.0);
+        - static_torque(&chain, &pose, force, moment);
     // The guide of a moving base carries the force through the first joint.
     let u = plant.setup.base_motion;
     torque[0] += u[0] * through[0][0] + u[1] * through[0][1];

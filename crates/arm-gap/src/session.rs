@@ -194,18 +194,23 @@ impl<const N: usize> Session<N> {
         self.trials.iter().all(Trial::is_unloaded)
     }
 
-    /// What differs from one trial to the next: where the hand holds the handle.
+    /// What differs from one trial to the next: where the hand holds the handle, and where the handle is in the room.
     pub fn by_trial(&self) -> Vec<Coordinate> {
         let sd = KEPT * self.tolerance.handle_placement;
-        let placed = |axis| Coordinate {
-            target: Target::Placement(axis),
+        let placed = |target| Coordinate {
+            target,
             prior: Some((0.0, sd)),
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
             step: 0.25 * sd,
         };
         match self.sight {
-            Sight::Led if sd > 0.0 => vec![placed(0), placed(1)],
+            Sight::Led if sd > 0.0 => vec![
+                placed(Target::Placement(0)),
+                placed(Target::Placement(1)),
+                placed(Target::Shift(0)),
+                placed(Target::Shift(1)),
+            ],
             _ => Vec::new(),
         }
     }

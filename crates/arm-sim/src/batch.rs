@@ -390,6 +390,7 @@ fn pack_setup<'a, const N: usize>(lane: impl Fn(usize) -> &'a Prepared<'a, N>) -
             damping: pack_plane(|i| setup(i).contact.damping),
             play: pack_plane(|i| setup(i).contact.play),
         },
+        placement: pack_plane(|i| setup(i).placement),
         base_motion: pack_plane(|i| setup(i).base_motion),
         base_rest: pack(|i| setup(i).base_rest),
         ripple: pack_plane(|i| setup(i).ripple),

@@ -2,7 +2,7 @@
 
 use arm_core::effect::{Effect, Local, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Invalid, Joints, Lanes, Load, Plane, Pose, Products, Scalar, Setup,
+    Chain, Contact, Invalid, Joints, Lanes, Load, Placement, Plane, Pose, Products, Scalar, Setup,
     accelerations, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip,
     tip_velocity,
 };
@@ -25,6 +25,8 @@ pub(crate) enum Link<T> {
 pub(crate) struct Model<T, const N: usize> {
     pub chain: Chain<T, N>,
     pub base: Option<MovingBase<T, N>>,
+    /// Where the handle is, unless at the tip.
+    pub placement: Option<Placement<T>>,
     pub link: Link<T>,
     /// The joint effects that are switched on.
     pub effects: Vec<Effect<T>>,
@@ -147,6 +149,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             others,
             chain: setup.chain()?,
             base: MovingBase::of(setup)?,
+            placement: Placement::of(setup),
             link,
             feels_joint_force: effects.iter().any(feels_joint_force),
             has_memory: effects.iter().any(|e| e.kind.info().memory),
@@ -158,7 +161,10 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     pub fn plain(&self) -> Option<Plain<T, N>> {
         match &self.link {
             Link::Compliant(contact)
-                if contact.has_no_play() && self.base.is_none() && self.others.is_empty() =>
+                if contact.has_no_play()
+                    && self.base.is_none()
+                    && self.placement.is_none()
+                    && self.others.is_empty() =>
             {
                 Some(Plain {
                     chain: self.chain,
@@ -171,7 +177,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         }
     }
 
-    /// Position of the tip \[m\].
+    /// Position of the tip where the handle holds it \[m\].
     #[inline(always)]
     pub fn tip(&self, q: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
         let mut point = tip(&self.chain, pose);
@@ -179,10 +185,14 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             let shift = base.displacement(q);
             point = [point[0] + shift[0], point[1] + shift[1]];
         }
+        if let Some(placement) = &self.placement {
+            let arm = placement.arm(pose);
+            point = [point[0] + arm[0], point[1] + arm[1]];
+        }
         point
     }
 
-    /// Velocity of the tip \[m/s\].
+    /// Velocity of the tip where the handle holds it \[m/s\].
     #[inline(always)]
     pub fn tip_velocity(&self, qd: &Joints<T, N>, pose: &Pose<T, N>) -> Plane<T> {
         let mut velocity = tip_velocity(&self.chain, pose, qd);
@@ -190,12 +200,16 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             let v = base.velocity(qd);
             velocity = [velocity[0] + v[0], velocity[1] + v[1]];
         }
+        if let Some(placement) = &self.placement {
+            let v = placement.velocity(pose, qd);
+            velocity = [velocity[0] + v[0], velocity[1] + v[1]];
+        }
         velocity
     }
 
-    /// Acceleration of the tip \[m/s²\].
+    /// Acceleration of the tip where the handle holds it \[m/s²\].
     pub fn tip_acceleration(&self, state: &State<T, N>, qdd: &Joints<T, N>) -> Plane<T> {
-        let (_, terms) = self.terms(state);
+        let terms = self.terms(&Pose::new(&state.q), &state.qd);
         let (change, turning) = (terms.tip_rate(qdd), terms.jacobian_rate);
         [change[0] + turning[0], change[1] + turning[1]]
     }
@@ -297,8 +311,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         (memory, resisting, force): (&[T], &mut Joints<T, N>, &mut Plane<T>),
     ) -> Joints<T, N> {
         let qd = motion.qd;
-        let terms =
-            (!self.in_link_form()).then(|| Terms::new(&self.chain, self.base.as_ref(), pose, &qd));
+        let terms = (!self.in_link_form()).then(|| self.terms(pose, &qd));
         let mut qdd = Joints::<T, N>::repeat(T::ZERO);
         for pass in 0..self.passes() {
             if pass > 0 {
@@ -323,7 +336,27 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         torque: &Joints<T, N>,
         force_on_arm: Plane<T>,
     ) -> Joints<T, N> {
-        forward_dynamics(&self.chain, pose, qd, &load(torque, force_on_arm))
+        forward_dynamics(
+            &self.chain,
+            pose,
+            qd,
+            &self.load(pose, torque, force_on_arm),
+        )
+    }
+
+    /// What the joints and the handle load the arm with.
+    #[inline(always)]
+    pub fn load(
+        &self,
+        pose: &Pose<T, N>,
+        torque: &Joints<T, N>,
+        force_on_arm: Plane<T>,
+    ) -> Load<T, N> {
+        let mut load = load(torque, force_on_arm);
+        if let Some(placement) = &self.placement {
+            load.moment_on_arm = placement.moment(pose, force_on_arm);
+        }
+        load
     }
 
     /// Evaluations of the dynamics for one state.
@@ -402,24 +435,29 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     /// The position by `iterations` Newton steps, so that lanes and single runs take the same ones; the velocity exactly.
     pub fn project(&self, input: &Input<T, N>, state: &mut State<T, N>, iterations: usize) {
         for _ in 0..iterations {
-            let (pose, terms) = self.terms(state);
+            let pose = Pose::new(&state.q);
+            let terms = self.terms(&pose, &state.qd);
             let at = self.tip(&state.q, &pose);
             let wanted = input.handle.position;
             let constraint = terms.constraint();
             let force = constraint.force([wanted[0] - at[0], wanted[1] - at[1]]);
             state.q = sum(&state.q, &constraint.response(force));
         }
-        let (_, terms) = self.terms(state);
+        let terms = self.terms(&Pose::new(&state.q), &state.qd);
         let (v, wanted) = (terms.tip_rate(&state.qd), input.handle.velocity);
         let constraint = terms.constraint();
         let force = constraint.force([wanted[0] - v[0], wanted[1] - v[1]]);
         state.qd = sum(&state.qd, &constraint.response(force));
     }
 
-    fn terms(&self, state: &State<T, N>) -> (Pose<T, N>, Terms<T, N>) {
-        let pose = Pose::new(&state.q);
-        let terms = Terms::new(&self.chain, self.base.as_ref(), &pose, &state.qd);
-        (pose, terms)
+    /// The equation of motion in joint coordinates.
+    pub fn terms(&self, pose: &Pose<T, N>, qd: &Joints<T, N>) -> Terms<T, N> {
+        Terms::new(
+            &self.chain,
+            self.base.as_ref(),
+            self.placement.as_ref(),
+            (pose, qd),
+        )
     }
 }
 
@@ -529,10 +567,7 @@ fn powers<T: Scalar, const N: usize>(
 }
 
 #[inline(always)]
-pub(crate) fn load<T: Scalar, const N: usize>(
-    torque: &Joints<T, N>,
-    force_on_arm: Plane<T>,
-) -> Load<T, N> {
+fn load<T: Scalar, const N: usize>(torque: &Joints<T, N>, force_on_arm: Plane<T>) -> Load<T, N> {
     Load {
         torque: *torque,
         force_on_arm,

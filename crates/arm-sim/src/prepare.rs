@@ -294,6 +294,8 @@ fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
         }
     }
     let finite = [
+        ("placement", setup.placement[0]),
+        ("placement", setup.placement[1]),
         ("base motion", setup.base_motion[0]),
         ("base motion", setup.base_motion[1]),
         ("rest angle of the base", setup.base_rest),

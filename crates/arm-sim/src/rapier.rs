@@ -193,7 +193,7 @@ fn check<const N: usize>(
     let Link::Compliant(contact) = &model.link else {
         return Ok(());
     };
-    let vibration = Vibration::at(contact, &model.chain, None, &prepared.start.0);
+    let vibration = Vibration::at(contact, model, &prepared.start.0);
     let Vibration { frequency, damping } = vibration;
     // ω²h² + 4ch < 4: the mode ẍ + c ẋ + ω² x = 0 with its damper at a speed extrapolated from two half steps.
     let largest = 2.0 / (damping + (damping * damping + frequency * frequency).sqrt());

@@ -3,7 +3,7 @@
 use arm_core::effect::Motion;
 use arm_core::{Joints, Plane, Pose, Scalar, contributions};
 
-use crate::model::{Input, Link, Model, Outcome, State, difference, load};
+use crate::model::{Input, Link, Model, Outcome, State, difference};
 use crate::prepare::Prepared;
 use crate::widest::{Computation, widest};
 use crate::{JointMotion, Recording};
@@ -71,7 +71,11 @@ impl<T: Scalar> Row<T> {
         let mut motion = Motion::new(input.time, *q, *qd);
         motion.joint_force = forces.joint_force;
         let resisting = model.resisting(&motion, memory);
-        let load = load(&difference(&input.torque, &resisting), forces.force_on_arm);
+        let load = model.load(
+            &pose,
+            &difference(&input.torque, &resisting),
+            forces.force_on_arm,
+        );
         let parts = contributions(&model.chain, &pose, (qd, &forces.qdd), &load);
         let frame = match &model.base {
             Some(base) => base.torque(&model.chain, &pose, (qd, &forces.qdd), forces.force_on_arm),

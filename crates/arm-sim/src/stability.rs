@@ -3,7 +3,6 @@
 use arm_core::{Contact, Joints, Pose};
 
 use crate::model::{Link, Model};
-use crate::terms::{MovingBase, Terms};
 use crate::{Integrator, SimulationError};
 
 /// The fastest vibration of an arm on the springs and dampers of its contact.
@@ -35,11 +34,10 @@ impl Vibration {
     /// The vibration at a pose.
     pub(crate) fn at<const N: usize>(
         contact: &Contact<f64>,
-        chain: &arm_core::Chain<f64, N>,
-        base: Option<&MovingBase<f64, N>>,
+        model: &Model<f64, N>,
         q: &Joints<f64, N>,
     ) -> Self {
-        let terms = Terms::new(chain, base, &Pose::new(q), &Joints::zeros());
+        let terms = model.terms(&Pose::new(q), &Joints::zeros());
         // B⁻¹ Jᵀ S J has the eigenvalues of the 2×2 matrix J B⁻¹ Jᵀ S.
         let columns = [[1.0, 0.0], [0.0, 1.0]]
             .map(|f| terms.tip_rate(&terms.accelerate(&terms.tip_torque(f))));
@@ -69,7 +67,7 @@ pub(crate) fn check<const N: usize>(
     let Link::Compliant(contact) = &model.link else {
         return Ok(());
     };
-    let vibration = Vibration::at(contact, &model.chain, model.base.as_ref(), q);
+    let vibration = Vibration::at(contact, model, q);
     let largest = vibration.largest_step(integrator);
     if dt <= largest {
         return Ok(());

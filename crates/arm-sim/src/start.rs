@@ -5,7 +5,6 @@ use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
 use crate::model::{Input, Link, Model, State};
-use crate::terms::Terms;
 
 /// Largest torque left in an equilibrium, and largest gap of a rigid coupling \[N m, m\].
 const BALANCED: f64 = 1e-9;
@@ -76,12 +75,7 @@ pub(crate) fn equilibrium<const N: usize>(
     let stretch = gap(model, input, &q);
     let back = [0, 1].map(|axis| -play[axis].copysign(stretch[axis]));
     // The smallest change of the angles that moves the tip so.
-    let terms = Terms::new(
-        &model.chain,
-        model.base.as_ref(),
-        &Pose::new(&q),
-        &Joints::zeros(),
-    );
+    let terms = model.terms(&Pose::new(&q), &Joints::zeros());
     let [along_y, along_z] = [[1.0, 0.0], [0.0, 1.0]].map(|unit| terms.tip_torque(unit));
     let (yy, yz, zz) = (
         along_y.dot(&along_y),
@@ -170,7 +164,7 @@ fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[
         (Link::Rigid, Some(&[y, z])) => [y, z],
         _ => [0.0; 2],
     };
-    let terms = Terms::new(&model.chain, model.base.as_ref(), &pose, &rest);
+    let terms = model.terms(&pose, &rest);
     let held = terms.tip_torque(force);
     let mut r: Vec<f64> = (0..N)
         .map(|i| terms.bias[i] + resisting[i] - input.torque[i] - held[i])

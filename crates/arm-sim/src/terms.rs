@@ -4,7 +4,7 @@
 use core::array::from_fn;
 
 use arm_core::{
-    Chain, Invalid, JointMatrix, Joints, Plane, Pose, Scalar, Setup, gravity, inertia,
+    Chain, Invalid, JointMatrix, Joints, Placement, Plane, Pose, Scalar, Setup, gravity, inertia,
     inverse_dynamics, jacobian, jacobian_rate, joint_force,
 };
 
@@ -119,7 +119,7 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
     }
 }
 
-/// `B`, `C q̇ + G` and the Jacobian of the tip at one state, with a moving base where there is one.
+/// `B`, `C q̇ + G` and the Jacobian of the tip at one state, with a moving base and a handle beside the tip where there are.
 pub(crate) struct Terms<T, const N: usize> {
     inertia: JointMatrix<T, N>,
     /// `C q̇ + G` \[N m\].
@@ -134,8 +134,8 @@ impl<T: Scalar, const N: usize> Terms<T, N> {
     pub fn new(
         chain: &Chain<T, N>,
         base: Option<&MovingBase<T, N>>,
-        pose: &Pose<T, N>,
-        qd: &Joints<T, N>,
+        placement: Option<&Placement<T>>,
+        (pose, qd): (&Pose<T, N>, &Joints<T, N>),
     ) -> Self {
         let still = Joints::<T, N>::repeat(T::ZERO);
         let (j, rate) = (jacobian(chain, pose), jacobian_rate(chain, pose, qd));
@@ -164,6 +164,16 @@ impl<T: Scalar, const N: usize> Terms<T, N> {
             terms.bias[0] += uy * fy + uz * fz;
             terms.jacobian[0][0] += uy;
             terms.jacobian[1][0] += uz;
+        }
+        if let Some(placement) = placement {
+            let ([y, z], turning) = (placement.arm(pose), placement.centripetal(pose, qd));
+            for k in 0..N {
+                terms.jacobian[0][k] += -z;
+                terms.jacobian[1][k] += y;
+            }
+            for axis in 0..2 {
+                terms.jacobian_rate[axis] += turning[axis];
+            }
         }
         terms
     }

@@ -75,7 +75,7 @@ def _gap(data: Mapping[str, Any], drawn: str) -> str:
     if not content.rows:
         return heading("The gap") + paragraph("There is no test trial, so that the gap cannot be measured on data that were kept apart.")
     led = any(name.endswith("_N") for name in data["gap"])
-    own = "Of these trials nothing was fitted but where the hand holds the handle in each, and the phase of a rhythm." if led else ""
+    own = "Of these trials nothing was fitted but where the handle is in each, and the phase of a rhythm." if led else ""
     return heading("The gap on trials that were kept apart") + table(content) + (paragraph(own, "soft") if own else "") + drawn
 
 

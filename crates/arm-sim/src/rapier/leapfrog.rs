@@ -7,7 +7,7 @@
 use core::array::from_fn;
 
 use arm_core::effect::Motion;
-use arm_core::{Contact, Joints, Plane, Pose, joint_force, tip_velocity};
+use arm_core::{Contact, Joints, Plane, Pose, joint_force};
 
 use super::RapierSettings;
 use super::world::{Bodies, Loads, Reaction, Start, World};
@@ -75,6 +75,7 @@ impl<'a, const N: usize> Arm<'a, N> {
             qd,
             earlier,
             handle: matches!(model.link, Link::Rigid).then_some(input.handle.position),
+            placement: prepared.setup.placement,
         };
         let mut world = World::new(&model.chain, &start, dt, settings)?;
         let bodies = world.read();
@@ -85,7 +86,7 @@ impl<'a, const N: usize> Arm<'a, N> {
             dt,
             speeds: Speeds {
                 joints: qd,
-                tip: tip_velocity(&model.chain, &pose, &qd),
+                tip: model.tip_velocity(&qd, &pose),
             },
             before: Speeds {
                 joints: bodies.qd,

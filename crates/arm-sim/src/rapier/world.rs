@@ -28,6 +28,8 @@ pub(super) struct World<const N: usize> {
     links: [RigidBodyHandle; N],
     joints: [ImpulseJointHandle; N],
     held: Option<Held>,
+    /// Where the handle holds the last segment, in its own frame \[m\].
+    tip: Plane<f64>,
     chain: Chain<f64, N>,
     /// Link angles, followed over full turns \[rad\].
     angles: [f64; N],
@@ -53,6 +55,8 @@ pub(super) struct Start<const N: usize> {
     pub earlier: Joints<f64, N>,
     /// The handle that holds the tip rigidly \[m\].
     pub handle: Option<Plane<f64>>,
+    /// Where the hand holds the handle beside its tip: along the last segment and to its left \[m\].
+    pub placement: Plane<f64>,
 }
 
 /// What is read of the bodies between two steps. Speeds are those of the step that led here, half a step ago.
@@ -111,6 +115,8 @@ impl<const N: usize> World<N> {
                 }));
             }
         }
+        let reach = chain.segments().last().map_or(0.0, |hand| hand.length);
+        let tip = [reach + start.placement[0], start.placement[1]];
         let mut world = PhysicsWorld {
             gravity: vector(chain.gravity()),
             integration_parameters: parameters(chain, start.handle.is_some(), dt, settings),
@@ -119,10 +125,7 @@ impl<const N: usize> World<N> {
         let links = links(&mut world, chain, start, dt);
         let joints = joints(&mut world, chain, &links);
         let held = match (start.handle, links.last()) {
-            (Some(at), Some(&hand)) => {
-                let tip = [chain.segments()[N - 1].length, 0.0];
-                Some(Held::new(&mut world, hand, tip, at))
-            }
+            (Some(at), Some(&hand)) => Some(Held::new(&mut world, hand, tip, at)),
             _ => None,
         };
         let mut angle = 0.0;
@@ -131,6 +134,7 @@ impl<const N: usize> World<N> {
             links,
             joints,
             held,
+            tip,
             chain: *chain,
             angles: from_fn(|i| {
                 angle += start.q[i];
@@ -159,8 +163,7 @@ impl<const N: usize> World<N> {
             bodies.qd[i] = body.angvel() - speed_before;
             bodies.velocity[i] = body.linvel().into();
             (angle_before, speed_before) = (angle, body.angvel());
-            let end = vector([self.chain.segments()[i].length, 0.0]);
-            bodies.tip = body.position().transform_point(end).into();
+            bodies.tip = body.position().transform_point(vector(self.tip)).into();
         }
         bodies
     }
