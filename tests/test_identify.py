@@ -80,6 +80,23 @@ def test_json_has_the_keys_that_are_promised(data: Path, tmp_path: Path) -> None
     assert set(written["residual_rms"]) == {"fit", "test"}
 
 
+def test_what_hangs_together_with_a_bound_is_known_no_better_than_that(dfki: armrs.Identified) -> None:
+    known = {e.name: e for e in dfki.parameters + dfki.combinations}
+    # m1*l1 is the sum less a1*m2, and m2 sits on a limit.
+    assert known["m2"].decided_by == "bound"
+    assert known["m1*l1"].std > 0.3 * known["m2"].std - known["m1*l1 + a1*m2"].std
+    low, high = known["l2"].interval
+    assert 0.0 <= low < high <= dfki.model.segments[1].length
+
+
+def test_what_the_prior_alone_knows_does_not_widen_with_few_trials(data: Path) -> None:
+    found = armrs.identify(data / "dfki_c1", with_effects=["coulomb", "viscous"])
+    mass = next(e for e in found.parameters if e.name == "m1")
+    low, high = mass.interval
+    assert mass.decided_by == "prior"
+    assert (high - low) / 2.0 == pytest.approx(1.96 * mass.std, rel=0.02)
+
+
 def test_cascade_is_another_method_and_finds_the_same_sums(data: Path, dfki: armrs.Identified) -> None:
     cascade = armrs.identify(data / "dfki_a0", method="cascade", with_effects=["coulomb"])
     assert (cascade.method, dfki.method) == ("cascade", "joint")

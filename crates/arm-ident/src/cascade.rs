@@ -30,10 +30,10 @@ use crate::joint::{cluster_ranges, explain, root_mean_square};
 use crate::motion::{candidates, low_pass, speed, speed_noise};
 use crate::program::{Program, Status};
 use crate::rank::{RankOptions, analyse};
-use crate::summary::{Certainty, RANK_TOLERANCE, base_name};
+use crate::summary::{Certainty, RANK_TOLERANCE, Spread, base_name};
 use crate::trial::{Model, Role, Trial};
 use crate::unknown::{LEAST_MASS, Moment, Source, Unknown};
-use crate::{Condenser, Factor, Matrix, student};
+use crate::{Condenser, Factor, Matrix};
 
 /// Direction is read from angles below this frequency \[Hz\]: a quasi-static movement has nothing above.
 const DIRECTION_CUTOFF: f64 = 1.0;
@@ -494,7 +494,7 @@ fn covariance(
     unknowns: &[Unknown],
     x: &[f64],
     bounds: bool,
-) -> Result<Matrix, IdentError> {
+) -> Result<Spread, IdentError> {
     let p = unknowns.len();
     let breads = steps
         .iter()
@@ -531,13 +531,17 @@ fn covariance(
         })?);
     }
     let correction = n as f64 / (n as f64 - 1.0);
-    Ok(Matrix::from_fn(p, p, |i, j| {
+    let scatter = Matrix::from_fn(p, p, |i, j| {
         let scatter: f64 = moves
             .iter()
             .map(|m| (m[i] - mean[i]) * (m[j] - mean[j]))
             .sum();
-        scatter * correction + priors.iter().map(|m| m[i] * m[j]).sum::<f64>()
-    }))
+        scatter * correction
+    });
+    let whole = Matrix::from_fn(p, p, |i, j| {
+        scatter[(i, j)] + priors.iter().map(|m| m[i] * m[j]).sum::<f64>()
+    });
+    Ok(Spread { whole, scatter })
 }
 
 fn summarise<const N: usize>(
@@ -578,7 +582,8 @@ fn summarise<const N: usize>(
         unbounded: covariance(steps, unknowns, x, false)?,
         report,
         physical: p,
-        quantile: student::quantile(0.5 + level / 2.0, (clusters - 1) as f64)?,
+        dof: (clusters - 1) as f64,
+        level,
     };
     let mut parameters = Vec::new();
     for (u, unknown) in unknowns.iter().enumerate() {

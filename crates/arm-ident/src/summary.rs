@@ -38,15 +38,35 @@ pub(crate) struct Certainty<'a> {
     pub limited: Vec<bool>,
     /// Relative standard deviation of the scale that the model gives to data without a load, else zero.
     pub scale_sd: f64,
-    pub covariance: Matrix,
-    /// Covariance as if no bound held, for the parameters that sit on one.
-    pub unbounded: Matrix,
+    pub covariance: Spread,
+    /// Covariance as if no bound held, for what a bound narrows.
+    pub unbounded: Spread,
     /// What the movements can tell apart.
     pub report: RankReport,
     /// Number of unknowns that are not calibration; they come first.
     pub physical: usize,
-    /// Half width of the intervals in standard deviations.
-    pub quantile: f64,
+    /// Degrees of freedom of the scatter: clusters less one.
+    pub dof: f64,
+    /// Probability with which an interval holds the true value.
+    pub level: f64,
+}
+
+/// Covariance of the unknowns.
+pub(crate) struct Spread {
+    /// Of data and prior.
+    pub whole: Matrix,
+    /// The part that was read off the scatter of the clusters.
+    pub scatter: Matrix,
+}
+
+impl Spread {
+    /// Standard deviations of a linear function of the unknowns: the whole, and the part read off the scatter.
+    fn of(&self, w: &[f64]) -> Result<[f64; 2], IdentError> {
+        Ok([
+            standard_error(&self.whole, w)?,
+            standard_error(&self.scatter, w)?,
+        ])
+    }
 }
 
 /// Puts a result together.
@@ -88,13 +108,15 @@ pub(crate) fn summarise<const N: usize>(
         unbounded: covariance(solved, unknowns, false)?,
         report,
         physical,
-        quantile: student::quantile(0.5 + fit.level / 2.0, (clusters - 1) as f64)?,
+        dof: (clusters - 1) as f64,
+        level: fit.level,
     };
     let mut parameters = Vec::new();
     for (u, unknown) in unknowns[..physical].iter().enumerate() {
         parameters.push(certainty.unknown(u)?);
         if let Source::Segment(k, Moment::Inertia) = unknown.source {
-            parameters.extend(derived(&certainty, k)?);
+            let length = fit.model.chain.segments()[k].length;
+            parameters.extend(derived(&certainty, k, length)?);
         }
     }
     for e in &mut parameters {
@@ -132,7 +154,7 @@ pub(crate) fn summarise<const N: usize>(
 }
 
 /// `H⁻¹ (Σ s sᵀ n/(n−1) + prior) H⁻¹`: scatter of the clusters for the data, the prior's own variance for the prior.
-fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Matrix, IdentError> {
+fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Spread, IdentError> {
     let p = unknowns.len();
     let mut binding = solved.equalities.clone();
     if bounds {
@@ -151,19 +173,23 @@ fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Mat
     let mean: Vec<f64> = (0..p)
         .map(|i| scores.iter().map(|s| s[i]).sum::<f64>() / n)
         .collect();
-    let meat = Matrix::from_fn(p, p, |i, j| {
+    let mut meat = Matrix::from_fn(p, p, |i, j| {
         let scatter: f64 = scores
             .iter()
             .map(|s| (s[i] - mean[i]) * (s[j] - mean[j]))
             .sum();
-        let prior = if i == j && unknowns[i].sd.is_finite() {
-            1.0 / (unknowns[i].sd * unknowns[i].sd)
-        } else {
-            0.0
-        };
-        scatter * n / (n - 1.0) + prior
+        scatter * n / (n - 1.0)
     });
-    bread.sandwich(&meat)
+    let scatter = bread.sandwich(&meat)?;
+    for (i, unknown) in unknowns.iter().enumerate() {
+        if unknown.sd.is_finite() {
+            meat[(i, i)] += 1.0 / (unknown.sd * unknown.sd);
+        }
+    }
+    Ok(Spread {
+        whole: bread.sandwich(&meat)?,
+        scatter,
+    })
 }
 
 impl Certainty<'_> {
@@ -190,17 +216,17 @@ impl Certainty<'_> {
         unit: &'static str,
     ) -> Result<Estimate, IdentError> {
         let value: f64 = w.iter().zip(self.x).map(|(w, x)| w * x).sum();
-        let (held, open) = (
-            standard_error(&self.covariance, w)?,
-            standard_error(&self.unbounded, w)?,
-        );
+        let (held, open) = (self.covariance.of(w)?, self.unbounded.of(w)?);
+        // A bound narrows also what hangs together with the unknown that sits on it. How far that is inside nobody knows, so
+        // that neither is known better than without the bound.
+        let narrowed = held[0] < FREE * open[0];
         // A combination whose parts sit on a bound may still be free to move: X_j is, where m_{j+1} is not.
         let limited = w.iter().zip(&self.limited).any(|(&w, &l)| w != 0.0 && l);
-        let bound = limited && held < FREE * open;
-        let std = if bound { open } else { held };
+        let bound = limited && narrowed;
+        let [std, scatter] = if narrowed { open } else { held };
         // Without a load every value is a ratio to the model's scale, and knows no more than that scale.
         let std = libm::hypot(std, self.scale_sd * value);
-        let reach = self.quantile * std;
+        let reach = self.quantile(std, scatter)? * std;
         let decided_by = if self.scale_sd > 0.0 && w[..self.physical].iter().any(|&v| v != 0.0) {
             Decision::Prior
         } else if bound {
@@ -218,6 +244,15 @@ impl Certainty<'_> {
             interval: [value - reach, value + reach],
             decided_by,
         })
+    }
+
+    /// Half width of an interval in standard deviations: of so many degrees of freedom as a sum of two variances has of which one
+    /// is known (Satterthwaite 1946), so that what the prior alone tells does not widen with the few clusters.
+    fn quantile(&self, std: f64, scatter: f64) -> Result<f64, IdentError> {
+        const NORMAL: f64 = 1e9;
+        let share = if scatter > 0.0 { std / scatter } else { NORMAL };
+        let dof = self.dof * share * share * share * share;
+        student::quantile(0.5 + self.level / 2.0, dof.min(NORMAL))
     }
 
     fn decision(&self, w: &[f64], std: f64) -> Result<Decision, IdentError> {
@@ -250,7 +285,8 @@ impl Certainty<'_> {
         unit: &'static str,
     ) -> Result<Estimate, IdentError> {
         let mut estimate = self.linear(gradient, name, unit)?;
-        let reach = self.quantile * estimate.std;
+        let [low, high] = estimate.interval;
+        let reach = 0.5 * (high - low);
         estimate.value = value;
         estimate.interval = [value - reach, value + reach];
         for (u, _) in gradient.iter().enumerate().filter(|(_, g)| **g != 0.0) {
@@ -264,7 +300,7 @@ impl Certainty<'_> {
 }
 
 /// Centre of mass and inertia about it, which follow from the unknowns of a segment.
-fn derived(certainty: &Certainty<'_>, k: usize) -> Result<[Estimate; 2], IdentError> {
+fn derived(certainty: &Certainty<'_>, k: usize, length: f64) -> Result<[Estimate; 2], IdentError> {
     let find = |moment| {
         certainty
             .unknowns
@@ -301,10 +337,10 @@ fn derived(certainty: &Certainty<'_>, k: usize) -> Result<[Estimate; 2], IdentEr
         certainty.nonlinear(com, &to_com, format!("l{}", k + 1), "m")?,
         certainty.nonlinear(inertia, &to_inertia, format!("I{}", k + 1), "kg m^2")?,
     ];
-    for estimate in &mut list {
+    // The centre of mass is within the segment, and no inertia is negative.
+    for (estimate, most) in list.iter_mut().zip([length, f64::INFINITY]) {
         estimate.joint = Some(k);
-        // Neither a distance within the segment nor an inertia is negative.
-        estimate.interval = estimate.interval.map(|end| end.max(0.0));
+        estimate.interval = estimate.interval.map(|end| end.clamp(0.0, most));
     }
     Ok(list)
 }
