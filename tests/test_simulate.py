@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -97,6 +98,17 @@ def test_reprs_say_units(slow_arm: Path) -> None:
     run = armrs.simulate(slow_arm / "truth.toml", armrs.load_movement(slow_arm / "movement.toml", 2), duration=0.2)
     assert "N; digest" in repr(run)
     assert "2 joints" in repr(run)
+
+
+def test_the_digest_stands_for_every_column(slow_arm: Path) -> None:
+    movement = armrs.load_movement(slow_arm / "movement.toml", 2)
+    run = armrs.simulate(slow_arm / "truth.toml", movement, duration=0.2)
+    recorded = {name: values for name, values in run.columns.items() if name not in ("effects", "energy_error") and values is not None}
+    assert {"time", "q", "tip", "force_on_arm", "torque_contact"} <= set(recorded)
+    for name, values in recorded.items():
+        other = dataclasses.replace(run, columns={**run.columns, name: np.nextafter(values, np.inf)})
+        assert other.digest != run.digest, name
+    assert dataclasses.replace(run).digest == run.digest
 
 
 def test_a_model_without_a_robot_can_follow_a_movement(tmp_path: Path, slow_arm: Path) -> None:

@@ -15,6 +15,7 @@ __all__ = [
     "control",
     "declare",
     "design",
+    "digest",
     "distances",
     "effects",
     "find_gap",
@@ -138,6 +139,7 @@ def forecast(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], 
 def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...
 def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[dict[str, Any]]: ...
 def play(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any], own: bool = False) -> list[dict[str, Any]]: ...
+def digest(effects: Sequence[tuple[str, int]], columns: Sequence[tuple[str, NDArray[np.float64] | None]]) -> str: ...
 def simulate(
     rig: Rig,
     drive: Mapping[str, Any],

@@ -6,6 +6,7 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -140,8 +141,6 @@ class Simulated:
         Contact force [N].
     columns : dict of str to ndarray
         Everything that was recorded: tip, handle, robot angles, every torque by itself, energies and works.
-    digest : str
-        Digest of the recorded bits; the same on every machine.
     readings : tuple of dict
         What the sensors read, one for each seed asked for.
     model : Model
@@ -155,7 +154,6 @@ class Simulated:
     qdd: np.ndarray
     force_on_arm: np.ndarray
     columns: dict[str, Any] = field(repr=False)
-    digest: str
     readings: tuple[dict[str, Any], ...] = field(repr=False)
     model: Model = field(repr=False)
     settings: dict[str, Any] = field(repr=False)
@@ -164,6 +162,12 @@ class Simulated:
         most = np.max(np.hypot(*self.force_on_arm.T))
         size = f"{len(self.t)} samples, {self.t[-1]:.6g} s, {self.q.shape[1]} joints"
         return f"Simulated({size}; force on the arm up to {most:.4g} N; digest {self.digest})"
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the recorded bits; the same on every machine. Computed when it is first asked for."""
+        recorded = [(name, values) for name, values in self.columns.items() if name not in ("effects", "energy_error")]
+        return _armrs.digest(self.columns["effects"], recorded)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -262,8 +266,7 @@ def simulate(
         qd=raw["qd"],
         qdd=raw["qdd"],
         force_on_arm=raw["force_on_arm"],
-        columns={k: v for k, v in raw.items() if k not in ("digest", "readings")},
-        digest=raw["digest"],
+        columns={k: v for k, v in raw.items() if k != "readings"},
         readings=tuple(raw.get("readings", ())),
         model=model,
         settings={

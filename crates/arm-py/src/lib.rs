@@ -34,6 +34,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(gap::play, m)?)?;
     m.add_function(wrap_pyfunction!(own::declare, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
+    m.add_function(wrap_pyfunction!(sim::digest, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;
     m.add_function(wrap_pyfunction!(plan::forecast_py, m)?)?;
     m.add_function(wrap_pyfunction!(plan::design_py, m)?)?;

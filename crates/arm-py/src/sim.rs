@@ -5,7 +5,7 @@ use arm_sim::{
     Channel, Coupling, Drive, Engine, Experiment, HandlePath, Integrator, Interpolation, Movement,
     Recording, Sensors, Series, Start,
 };
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -294,11 +294,27 @@ fn columns<'py, const N: usize>(
         .collect();
     out.set_item("effects", effects)?;
     out.set_item("energy_error", recording.energy_error().to_pyarray(py))?;
-    out.set_item(
-        "digest",
-        format!("{:016x}", arm_sim::digest(recording).map_err(simulation)?),
-    )?;
+    arm_sim::definite(recording).map_err(simulation)?;
     Ok(out)
+}
+
+/// What stands for every bit of a run, which takes a quarter as long as the run; see `armrs.Simulated`.
+///
+/// * `effects` - kind and joint of each
+/// * `columns` - name and values of each, as `simulate` gives them
+#[pyfunction]
+pub fn digest(
+    effects: Vec<(String, usize)>,
+    columns: Vec<(String, Option<PyReadonlyArrayDyn<'_, f64>>)>,
+) -> PyResult<String> {
+    let mut slices = Vec::with_capacity(columns.len());
+    for (name, values) in &columns {
+        let values = values.as_ref().map_or(Ok(&[][..]), |v| v.as_slice())?;
+        slices.push((name.as_str(), values));
+    }
+    let effects = effects.iter().map(|(kind, joint)| (kind.as_str(), *joint));
+    let digest = arm_sim::digest_of(effects, slices.into_iter());
+    Ok(format!("{digest:016x}"))
 }
 
 /// How a column is shaped in Python.

@@ -2,34 +2,61 @@
 
 use crate::{Recording, SimulationError};
 
-/// FNV-1a, 64 bits (Fowler, Noll, Vo) over names, sizes and the little-endian bits of every column.
+/// [`digest_of`] a recording.
 ///
 /// Two recordings with the same digest are, but for a chance of 2⁻⁶⁴, the same in every bit. The digest of a run is the
 /// same on every platform, in debug and release.
 ///
 /// # Errors
-/// [`SimulationError::Samples`] for a value that is not a number: its bits differ between processors.
+/// As [`definite`].
 pub fn digest<const N: usize>(recording: &Recording<N>) -> Result<u64, SimulationError> {
-    let mut hash = Fnv1a::new();
-    for (kind, joint) in &recording.effects {
-        hash.bytes(kind.info().kind.as_bytes());
-        hash.number(*joint as u64);
-    }
+    definite(recording)?;
+    let effects = recording.effects.iter();
+    let columns = recording.columns().into_iter();
+    Ok(digest_of(
+        effects.map(|(kind, joint)| (kind.info().kind, *joint)),
+        columns.map(|(name, _, values)| (name, values)),
+    ))
+}
+
+/// Refuses a recording that has no definite bits.
+///
+/// # Errors
+/// [`SimulationError::Samples`] for a value that is not a number: its bits differ between processors.
+pub fn definite<const N: usize>(recording: &Recording<N>) -> Result<(), SimulationError> {
     for (name, width, values) in recording.columns() {
+        if let Some(i) = values.iter().position(|value| value.is_nan()) {
+            return Err(SimulationError::Samples {
+                name,
+                sample: i / width.max(1) + 1,
+                problem: "not a number, which has no definite bits",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// FNV-1a, 64 bits (Fowler, Noll, Vo) over names, sizes and the little-endian bits of every column.
+///
+/// * `effects` - kind and joint of each
+/// * `columns` - name and values of each
+pub fn digest_of<'a>(
+    effects: impl Iterator<Item = (&'a str, usize)>,
+    columns: impl Iterator<Item = (&'a str, &'a [f64])>,
+) -> u64 {
+    let mut hash = Fnv1a::new();
+    for (kind, joint) in effects {
+        hash.bytes(kind.as_bytes());
+        hash.number(joint as u64);
+    }
+    for (name, values) in columns {
         hash.bytes(name.as_bytes());
         hash.number(values.len() as u64);
-        for (i, value) in values.iter().enumerate() {
-            if value.is_nan() {
-                return Err(SimulationError::Samples {
-                    name,
-                    sample: i / width.max(1) + 1,
-                    problem: "not a number, which has no definite bits",
-                });
-            }
+        for value in values {
             hash.number(value.to_bits());
         }
     }
-    Ok(hash.0)
+    hash.0
 }
 
 struct Fnv1a(u64);

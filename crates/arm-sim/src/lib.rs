@@ -49,7 +49,7 @@ pub mod widest;
 
 pub use batch::simulate_batch;
 pub use controlled::{Controlled, Controller, Fault, Safety, control};
-pub use digest::digest;
+pub use digest::{definite, digest, digest_of};
 pub use error::SimulationError;
 pub use experiment::{
     Coupling, Drive, Engine, Experiment, Integrator, Partial, Start, altered, simulate,
