@@ -104,7 +104,7 @@ def test_the_digest_stands_for_every_column(slow_arm: Path) -> None:
     movement = armrs.load_movement(slow_arm / "movement.toml", 2)
     run = armrs.simulate(slow_arm / "truth.toml", movement, duration=0.2)
     recorded = {name: values for name, values in run.columns.items() if name not in ("effects", "energy_error") and values is not None}
-    assert {"time", "q", "tip", "force_on_arm", "torque_contact"} <= set(recorded)
+    assert {"time", "q", "tip", "force_on_arm", "torque.contact"} <= set(recorded)
     for name, values in recorded.items():
         other = dataclasses.replace(run, columns={**run.columns, name: np.nextafter(values, np.inf)})
         assert other.digest != run.digest, name
