@@ -426,7 +426,12 @@ def test_long_gaps_stay_open_and_are_reported(session: Session) -> None:
     assert np.isnan(trial.force_on_arm[50:80, 0]).all()
     assert trial.pieces() == [slice(0, 50), slice(80, 200)]
     assert trial.gaps == (("Fy_N", 0.98, 1.6),)
-    assert data.warnings == ("trials/slow_1.csv: column Fy_N has no samples from 0.98 to 1.6 s: left out",)
+    assert data.warnings == ("trials/slow_1.csv: column Fy_N: no samples from 0.98 to 1.6 s: left out",)
+    values[50:80, 1:4] = np.nan
+    write_rows(session, values)
+    assert armrs.load_dataset(session.folder).warnings == (
+        "trials/slow_1.csv: columns q1_rad, q2_rad, Fy_N: no samples from 0.98 to 1.6 s: left out",
+    )
 
 
 def test_samples_missing_at_the_ends_are_not_invented(session: Session) -> None:

@@ -226,15 +226,18 @@ def passive_moments(
     curves, warnings = [], []
     for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
         repeats = [m for m in trials if m.trial.configuration == configuration]
+        lost = []
         for joint in range(dataset.model.n_joints):
             curve = _curve(dataset, repeats, joint, bins)
             if curve is not None:
                 curves.append(curve)
             elif any(_moves(m.q[:, joint]) for m in repeats):
-                warnings.append(
-                    f"{configuration}: joint {joint + 1} moved, but not long enough in both directions over the same angles for a low-pass "
-                    f"at {cutoff:g} Hz: left out"
-                )
+                lost.append(f"{joint + 1}")
+        if lost:
+            warnings.append(
+                f"{configuration}: joint{'s' * (len(lost) > 1)} {', '.join(lost)} moved, but not long enough in both directions over the "
+                f"same angles for a low-pass at {cutoff:g} Hz: left out"
+            )
         warnings += _doubtful(dataset, repeats)
     slow = [(c.configuration, c.joint, c.inertial_share) for c in curves]
     assumptions = (relaxed.muscles_silent(dataset.trials), relaxed.slow_enough(slow))
@@ -436,9 +439,11 @@ def _deviation(values: np.ndarray) -> np.ndarray:
 def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
     """Return what is odd in the trials of one configuration, a line each: none of it proves an error, and all of it spoils the means."""
     lines = []
+    telling = [m for m in repeats if m.direction.any()]
     for m in repeats:
         there = np.isfinite(m.q).all(axis=1)
-        if not m.direction.any():
+        # Where no repeat tells, it is the movement and not a sensor, and that its joints are left out says so.
+        if telling and not m.direction.any():
             lines.append(
                 f"{m.trial.file}: no joint moves long enough in it to tell its direction: it counts nowhere (unit, or a dead sensor?)"
             )

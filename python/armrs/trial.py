@@ -306,21 +306,31 @@ def _unwrapped(column: columns.Column, values: np.ndarray, warnings: list[str]) 
 
 
 def _gap_lines(gaps: tuple[tuple[str, float, float], ...]) -> list[str]:
-    """Return one line a column, however many gaps it has."""
-    lines = []
+    """Return one line for all columns with the same gaps, however many these are."""
+    said = {}
     for name in dict.fromkeys(gap[0] for gap in gaps):
         own = [(start, end) for column, start, end in gaps if column == name]
         first = f"{own[0][0]:g} to {own[0][1]:g} s"
         more = f" and {len(own) - 1} more" if len(own) > 1 else ""
-        lines.append(f"column {name} has no samples from {first}{more}: left out")
-    return lines
+        said[name] = f"no samples from {first}{more}: left out"
+    return _lines(said)
 
 
 def _bridged_lines(channels: Mapping[str, resample.Channel]) -> list[str]:
-    """Return one line a column of which a good part was bridged."""
+    """Return one line for all columns of which the same good part was bridged."""
     shares = {name: float(np.mean(c.bridged)) for name, c in channels.items() if not name.startswith("emg_")}
-    return [
-        f"column {name}: {share:.0%} of the samples were missing and are bridged; they count as measured: intervals promise too much"
-        for name, share in shares.items()
-        if share > BRIDGED
-    ]
+    return _lines(
+        {
+            name: f"{share:.0%} of the samples were missing and are bridged; they count as measured: intervals promise too much"
+            for name, share in shares.items()
+            if share > BRIDGED
+        }
+    )
+
+
+def _lines(said: Mapping[str, str]) -> list[str]:
+    """Return what is said of columns, those together of which the same is said: a sensor that drops out is one fact."""
+    names: dict[str, list[str]] = {}
+    for name, text in said.items():
+        names.setdefault(text, []).append(name)
+    return [f"column{'s' * (len(own) > 1)} {', '.join(own)}: {text}" for text, own in names.items()]
