@@ -206,6 +206,13 @@ def test_the_cascade_holds_what_it_does_not_find(slow_arm: Path) -> None:
     assert any("motor_inertia of joint 1" in line for line in with_rotor.left_out)
 
 
+def test_an_inertia_at_its_bound_is_written_as_zero(data: Path) -> None:
+    """It is the difference of a moment of inertia and mass · com², which are equal there."""
+    result = armrs.identify(data / "dfki_a0", with_effects="coulomb,viscous")
+    assert "bound" in {e.decided_by for e in result.parameters if e.name == "I2"}
+    assert result.model.segments[1].inertia == 0.0
+
+
 def test_a_calibration_beyond_twice_its_tolerance_is_called_out(slow_arm: Path) -> None:
     dataset = armrs.load_dataset(slow_arm)
     promised = dataset.tolerance.time_delay_s

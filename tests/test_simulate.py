@@ -117,6 +117,12 @@ def test_a_model_without_a_robot_can_follow_a_movement(tmp_path: Path, slow_arm:
     assert run("simulate", tmp_path / "model.toml", "--movement", slow_arm / "movement.toml", "--duration-s", 0.1) == 0
 
 
+def test_what_rounding_leaves_is_not_called_stored_energy(slow_arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The movement ends where it began, at rest, and a rigid coupling has no spring."""
+    assert run("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--coupling", "rigid") == 0
+    assert "changed by 0 J" in capsys.readouterr().out
+
+
 def test_both_engines_come_to_the_same(slow_arm: Path, tmp_path: Path) -> None:
     command = ("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--duration-s", 1)
     tables = {}

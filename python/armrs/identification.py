@@ -321,6 +321,8 @@ _POOR = 0.2
 """A residual above this share of the variation of a torque is a poor fit."""
 _NO_FIT = 0.5
 """And above this, none."""
+_ROUNDING = 1e-12
+"""An inertia below this part of mass · length² is a difference of equal numbers."""
 
 
 def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
@@ -450,7 +452,7 @@ def _residuals_by_configuration(explained: Sequence[Explained]) -> dict[str, dic
 def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) -> Model:
     """Return the model with estimates; effects that its joints state stay there, the others become effects."""
     segments = tuple(
-        Segment(old.name, length, mass, min(max(com, 0.0), length), inertia, com_normal=normal)
+        Segment(old.name, length, mass, min(max(com, 0.0), length), _not_rounding(inertia, mass * length**2), com_normal=normal)
         for old, (length, mass, com, normal, inertia) in zip(model.segments, raw["segments"], strict=True)
     )
     joints = [dataclasses.asdict(j) | {"stiffness": 0.0, "rest": 0.0, "viscosity": 0.0, "coulomb": 0.0} for j in model.joints]
@@ -471,6 +473,11 @@ def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) 
         else:
             listed.append(effect)
     return model.replace(segments=segments, joints=tuple(Joint(**j) for j in joints), effects=(*listed, *held))
+
+
+def _not_rounding(value: float, scale: float) -> float:
+    """Return a value, or zero where it is what rounding left of a bound at zero."""
+    return value if abs(value) > _ROUNDING * scale else 0.0
 
 
 def _changed(effect: Effect) -> set[str]:
