@@ -82,8 +82,9 @@ def test_convert(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture
         (["effects", "coulom"], "KIND: found unknown kind of effect 'coulom', allowed"),
         (
             ["convert", "nothing", "-o", "out"],
-            "nothing: file: found No such file or directory, allowed a folder with dataset.toml, or that file",
+            "nothing: file: found No such file or directory, allowed a data set's folder or dataset.toml, or a file of .csv, .parquet, .mot, ",
         ),
+        (["convert", "nope.xyz", "-o", "out"], "nope.xyz: file: found No such file or directory, allowed a data set's folder"),
         (["convert", "nothing.csv", "-o", "out"], "nothing.csv: file: found No such file or directory"),
         (["convert", "nul\0l.csv", "-o", "out"], "embedded null"),
     ],

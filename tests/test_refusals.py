@@ -77,6 +77,16 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "model that is no TOML": (MOVE, lambda f: f.edit("truth.toml", "[arm]", "[arm"), "truth.toml: "),
     "model that is not there": (("simulate", "no.toml", "--movement", "data/movement.toml"), nothing, "no.toml: file: found No such file"),
     "a folder as model": (("simulate", "data", "--movement", "data/movement.toml"), nothing, "data: file: found a folder"),
+    "a model in UTF-16": (
+        MOVE, lambda f: (f.path / "truth.toml").write_text((f.path / "truth.toml").read_text("utf-8"), "utf-16") and None,
+        "truth.toml: line 1: found byte 0xff, allowed UTF-8 text (UTF-16 text? Save it as UTF-8)"),
+    "a trial in UTF-16": (
+        FOLLOW, lambda f: (f.path / "trials/slow_1.csv").write_text("t_s,q1_rad", "utf-16") and None,
+        "slow_1.csv: line 1: found byte 0xff, allowed UTF-8 text (UTF-16 text? Save it as UTF-8)"),
+    "a trial in Latin-1": (
+        FOLLOW, lambda f: (f.path / "trials/slow_1.csv").write_text("t_s,q1_rad,Kraft_für_F", "latin-1") and None,
+        "line 1: found byte 0xfc, allowed UTF-8 text (Latin-1 or Windows-1252 text? Save it as UTF-8)"),
+    "a trial as a data set": (("identify", "data/trials/slow_1.csv"), nothing, "slow_1.csv: file: found a trial, allowed the folder of its data set, with dataset.toml (that is data)"),
     "a data set that is not there": (("identify", "nowhere", "-o", "out"), nothing, "nowhere: file: found No such file"),
     # movements
     "movement with another number of joints": (
@@ -84,6 +94,8 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "movement of three joints": (
         MOVE, lambda f: (f.path / "movement.toml").write_text("[movement]\nwaypoints_rad = [[0, 0, 0], [1, 1, 1]]\n", encoding="utf-8") and None,
         "movement.waypoints: found 'an array of shape (2, 3)', allowed rows of 2 angles"),
+    "movement whose rows differ in length": (
+        MOVE, lambda f: f.edit("movement.toml", "[[-60, 60]", "[[-60, 60, 1]"), "movement.toml: movement.waypoints_deg: found rows of 3 and of 2 values, allowed rows of one length"),
     "movement of one waypoint": (
         MOVE, lambda f: (f.path / "movement.toml").write_text("[movement]\nwaypoints_rad = [[0, 0]]\n", encoding="utf-8") and None, "two or more rows"),
     "movement with an unknown key": (MOVE, lambda f: f.edit("movement.toml", "speed_rad_s", "speed_rads"), "unknown key 'speed_rads'"),
@@ -103,6 +115,9 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "an effect of no joint": ((*IDENTIFY, "--with", "backlash"), nothing, "--with: found unknown joint effect 'backlash'"),
     "no effect at all": ((*IDENTIFY, "--with", ","), nothing, "--with: found ',', allowed kinds of effects with commas between them"),
     "an empty effect": ((*IDENTIFY, "--with", ""), nothing, "--with: found ''"),
+    "an effect twice": ((*IDENTIFY, "--with", "coulomb,coulomb"), nothing, "--with: found coulomb twice, allowed each kind once"),
+    "an effect of a plan twice": (("plan", "data/model.toml", "--angles-deg", "-60:60,0:90", "--with", "viscous, viscous"), nothing, "--with: found viscous twice"),
+    "a date without a history": ((*IDENTIFY, "--date", "2026-01-01"), nothing, "--date: found no --history, allowed --date beside --history FILE"),
     "nothing to find": (IDENTIFY, lambda f: f.edit("model.toml", "segment_uncertainty = 0.1", "segment_uncertainty = 0.0 #"), "model.toml: [arm], segment_uncertainty: found 0.0, allowed above 0, or an effect to fit"),
     "unknown method": ((*IDENTIFY, "--method", "best"), nothing, "'best' is not one of"),
     "level of one": ((*IDENTIFY, "--level", "1"), nothing, "--level: found 1.0"),
@@ -114,8 +129,12 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "one bin": ((*PASSIVE, "--bins", "1"), nothing, "--bins: found 1, allowed a whole number 2 to 1000"),
     "negative step": ((*MOVE, "--dt", "-0.001"), nothing, "--dt: found -0.001, allowed a finite number > 0 s"),
     "step that is no number": ((*MOVE, "--dt", "nan"), nothing, "--dt: found nan"),
-    "more samples than steps": ((*MOVE, "--rate-hz", "7000"), nothing, "--rate-hz: found 7000.0, allowed at most 4000 Hz"),
-    "step that does not divide the sample interval": ((*MOVE, "--dt", "0.0003"), nothing, "--dt: found 0.0003, allowed a whole part of the interval between samples, 0.02 s"),
+    "more samples than steps": ((*MOVE, "--rate-hz", "7000"), nothing, "--dt, --rate-hz: found a step of 0.00025 s and 7000 Hz, allowed at least one step from sample to sample"),
+    "steps longer than the sample interval": ((*MOVE, "--dt", "1"), nothing, "--dt, --rate-hz: found a step of 1 s and 50 Hz, allowed at least one step"),
+    "step that does not divide the sample interval": ((*MOVE, "--dt", "0.0003"), nothing, "--dt, --rate-hz: found a step of 0.0003 s and 50 Hz, allowed a whole number of steps from sample to sample, not 66.6667"),
+    "rate whose interval no step divides": ((*MOVE, "--rate-hz", "333"), nothing, "--dt, --rate-hz: found a step of 0.00025 s and 333 Hz, allowed a whole number of steps from sample to sample, not 12.012"),
+    "an integrator for the engine that has its own": ((*MOVE, "--engine", "rapier", "--integrator", "euler"), nothing, "--integrator: found 'euler', allowed none beside the engine rapier"),
+    "a format of samples that are not written": ((*MOVE[:-2], "--to", "parquet"), nothing, "--to: found no -o, allowed --to beside -o"),
     "sample rate of zero": ((*MOVE, "--rate-hz", "0"), nothing, "--rate-hz: found 0.0"),
     "negative duration": ((*MOVE, "--duration-s", "-1"), nothing, "--duration-s: found -1"),
     "duration of no sample": ((*MOVE, "--duration-s", "0.001"), nothing, "--duration-s: found 0.001, allowed 0.02 s (one interval between samples) to"),
@@ -132,6 +151,10 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "output folder that is a file": (("passive", "data", "-o", "data/model.toml"), nothing, "model.toml: -o: found a file, allowed a folder"),
     "output below a file": (("passive", "data", "-o", "data/model.toml/x"), nothing, "Not a directory"),
     "JSON below a file": ((*PASSIVE, "--json", "data/model.toml/x.json"), nothing, "Not a directory"),
+    "an empty name of a folder": (("convert", "data", "--to", "csv", "-o", ""), nothing, "'--out': found '', allowed the name of a file or folder"),
+    "an empty name of a folder for what need not write": ((*PASSIVE[:-1], ""), nothing, "'--out': found ''"),
+    "an empty name of a unit": (("fmu", "export", "data/model.toml", "-o", ""), nothing, "'--out': found ''"),
+    "an empty name of a JSON file": ((*PASSIVE, "--json", ""), nothing, "'--json': found ''"),
     "demo into a file": (("demo", "-o", "data/model.toml"), nothing, "-o: found a file"),
     "JSON over a model": (("passive", "data", "--json", "data/model.toml"), nothing, "an existing file with suffix '.toml'"),
     "results and JSON over a model": ((*PASSIVE, "--json", "data/model.toml"), nothing, "an existing file with suffix '.toml'"),
@@ -286,6 +309,11 @@ def four_segments() -> armrs.Model:
         (lambda: armrs.Movement(np.zeros(2)), "waypoints: found 'an array of shape"),
         (lambda: armrs.simulate(true_model(), coupling="loose"), 'coupling: found \'loose\', allowed "compliant" or "rigid"'),
         (lambda: armrs.simulate(true_model(), engine="bullet", duration=0.1), "engine: found 'bullet'"),
+        (
+            lambda: armrs.simulate(true_model(), engine="rapier", integrator="rk4", duration=0.1),
+            "integrator: found 'rk4', allowed none beside",
+        ),
+        (lambda: armrs.simulate(true_model(), rate=7000.0), "dt, rate: found a step of 0.00025 s and 7000 Hz"),
         (lambda: armrs.simulate(true_model(), dt="fast"), "dt: found 'fast', allowed a finite number > 0 s"),
         (lambda: armrs.simulate(3), "model: found 3, allowed a Model or a path"),
         (lambda: armrs.simulate(true_model(), "fast"), "drive: found 'fast', allowed a Movement or a Trial"),
@@ -293,6 +321,7 @@ def four_segments() -> armrs.Model:
         (lambda: armrs.simulate(true_model(), duration=0.1, sensors=armrs.Sensors(), seeds=3), "seeds: found 3, allowed a list"),
         (lambda: armrs.simulate(true_model(), duration=0.1, start=["a", 0]), "start: found .* allowed finite numbers rad"),
         (lambda: armrs.Movement([[0.0], [1.0]], speed=-1), "speed: found -1.0, allowed a finite number > 0 rad/s"),
+        (lambda: armrs.Movement([[0.0, 1.0], [0.0]]), "waypoints: found rows of 2 and of 1 values, allowed rows of one length"),
         (lambda: armrs.Movement([[0.0], [np.nan]]), "waypoints: found a value that is not finite"),
         (lambda: armrs.Channel("much"), "deviation: found 'much'"),
         (lambda: armrs.identify(3), "dataset: found 3, allowed a Dataset or a path"),

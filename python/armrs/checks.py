@@ -134,7 +134,7 @@ def samples(place: str, value: object, unit: str = "", *, shape: Sequence[int | 
         if raw.dtype == object:  # whole numbers of any length, fractions; each must be a number
             raw = np.array([number(place, item) for item in raw.ravel()]).reshape(raw.shape)
     except (OverflowError, TypeError, ValueError):
-        raise BadInput(place, value, allowed) from None
+        raise _uneven(place, value) or BadInput(place, value, allowed) from None
     if raw.dtype.kind not in "iuf":
         raise BadInput(place, Text(_KINDS.get(raw.dtype.kind, str(raw.dtype))) if raw.ndim else value, allowed)
     result = np.asarray(raw, dtype=float)
@@ -144,6 +144,14 @@ def samples(place: str, value: object, unit: str = "", *, shape: Sequence[int | 
             wanted = ", ".join("n" if want is None else str(want) for want in shape)
             raise BadInput(place, Text(f"an array of shape {result.shape}"), f"shape ({wanted}{',' if len(shape) == 1 else ''})")
     return result
+
+
+def _uneven(place: str, value: object) -> BadInput | None:
+    """Return the refusal of rows that differ in length, of which NumPy makes no array; None where that is not it."""
+    if not isinstance(value, (list, tuple)) or not all(isinstance(row, (list, tuple)) for row in value):
+        return None
+    lengths = list(dict.fromkeys(len(row) for row in value))
+    return BadInput(place, Text(f"rows of {lengths[0]} and of {lengths[1]} values"), "rows of one length") if len(lengths) > 1 else None
 
 
 _KINDS = {"U": "texts", "S": "bytes", "b": "booleans", "c": "complex numbers", "M": "dates", "m": "times"}

@@ -339,6 +339,10 @@ def describe(source: str | os.PathLike[str]) -> Description:
     path = checks.path("source", source)
     if not os.path.lexists(path):
         raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)
+    if path.suffix.lower() in SUFFIXES and path.is_file():
+        above = next((folder for folder in (path.parent, path.parent.parent) if (folder / FILE).is_file()), None)
+        hint = None if above is None else f"that is {above}"
+        raise BadInput("file", Text("a trial"), f"the folder of its data set, with {FILE}", file=source, hint=hint)
     path = path / FILE if path.is_dir() else path
     return tomlfile.load(path, _description)
 

@@ -122,6 +122,13 @@ class Text(str):
     """A description of what was found, printed as it is and not as a quoted value."""
 
 
+def not_utf8(place: str, raw: bytes, error: UnicodeDecodeError, *, file: str | os.PathLike[str] | None = None) -> BadInput:
+    """Build the refusal of bytes that are no UTF-8 text; it says what they probably are."""
+    utf16 = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
+    guess = "UTF-16" if utf16 else "Latin-1 or Windows-1252"
+    return BadInput(place, Text(f"byte 0x{raw[error.start]:02x}"), "UTF-8 text", file=file, hint=f"{guess} text? Save it as UTF-8")
+
+
 def show(value: object) -> str:
     """Write a value on one line of bounded length, as it would stand in a file."""
     text = str(value).lower() if isinstance(value, bool) else repr(value)

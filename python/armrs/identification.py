@@ -387,9 +387,11 @@ def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
     known = _joint_kinds()
     present = {(e.kind, e.joint) for e in all_effects(model)}
     added = []
-    for kind in dict.fromkeys(kinds):
+    for place, kind in enumerate(kinds):
         if kind not in known:
             raise unknown_name("with_effects", kind, known, what="joint effect")
+        if kind in kinds[:place]:
+            raise BadInput("with_effects", Text(f"{kind} twice"), "each kind once")
         first = known[kind].first_joint
         if first > model.n_joints:
             raise BadInput("with_effects", kind, f"an arm of {first} joints or more: it acts over two of them")

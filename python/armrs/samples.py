@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import BadInput, Text
+from .errors import BadInput, Text, not_utf8
 from .files import may_replace, replacing
 
 SUFFIXES = (".csv", ".parquet")
@@ -92,7 +92,7 @@ def header_of(path: Path) -> list[str]:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise BadInput("line 1", Text(f"byte 0x{raw[error.start]:02x}"), "UTF-8 text") from None
+        raise not_utf8("line 1", raw, error) from None
     if "\0" in text:
         raise BadInput("line 1", Text("binary data"), "CSV text")
     names = [name.strip() for name in next(csv.reader([text]))]
@@ -160,7 +160,7 @@ def explain_csv(path: Path, names: list[str], *, numbers: bool = True) -> None:
             try:
                 text = raw.decode("utf-8-sig" if line == 1 else "utf-8")
             except UnicodeDecodeError as error:
-                raise BadInput(f"line {line}", Text(f"byte 0x{raw[error.start]:02x}"), "UTF-8 text") from None
+                raise not_utf8(f"line {line}", raw, error) from None
             if "\0" in text:
                 raise BadInput(f"line {line}", Text("a null byte"), "CSV text")
             if line == 1 or not text.strip("\r\n"):

@@ -184,7 +184,7 @@ def simulate(
     drive: Movement | Trial | None = None,
     *,
     engine: str = "native",
-    integrator: str = "rk4",
+    integrator: str | None = None,
     dt: float = DEFAULT_DT,
     rate: float = DEFAULT_RATE,
     duration: float | None = None,
@@ -203,8 +203,8 @@ def simulate(
         The desired movement; a measured trial, whose robot angles (or else joint torques) drive the arm; or nothing, and it swings.
     engine : {"native", "rapier"}
         Minimal coordinates, or rigid bodies and joints in maximal coordinates.
-    integrator : {"rk4", "euler"}
-        Fourth order, or semi-implicit first order (native engine).
+    integrator : {"rk4", "euler"}, optional
+        Of the native engine: fourth order, taken when absent, or semi-implicit first order.
     dt : float
         Step [s].
     rate : float
@@ -228,15 +228,15 @@ def simulate(
     model = checks.loaded("model", model, Model, load_model)
     checks.choice("coupling", coupling, ("compliant", "rigid"))
     checks.choice("engine", engine, ("native", "rapier"))
-    checks.choice("integrator", integrator, ("rk4", "euler"))
+    integrator = _integrator(integrator, engine)
     checks.instance("drive", drive, Movement, Trial, type(None))
     checks.number("dt", dt, above=0.0, unit="s")
     checks.number("rate", rate, above=0.0, unit="Hz")
     steps = 1.0 / (rate * dt)
     if steps < 1.0 - 1e-6:
-        raise BadInput("rate", rate, f"at most {1.0 / dt:g} Hz, a sample for every step of {dt:g} s")
+        raise BadInput("dt, rate", _clock(dt, rate), "at least one step from sample to sample")
     if abs(steps - round(steps)) > 1e-6 * steps:
-        raise BadInput("dt", dt, f"a whole part of the interval between samples, {1.0 / rate:g} s")
+        raise BadInput("dt, rate", _clock(dt, rate), f"a whole number of steps from sample to sample, not {steps:.6g}")
     if duration is not None:
         _check_duration(duration, dt, rate)
     led = driven(drive, coupling)
@@ -271,12 +271,26 @@ def simulate(
         model=model,
         settings={
             "engine": engine,
-            "integrator": integrator if engine == "native" else None,
+            "integrator": None if engine == "rapier" else integrator,
             "dt_s": dt,
             "rate_Hz": rate,
             "coupling": coupling,
         },
     )
+
+
+def _integrator(given: str | None, engine: str) -> str:
+    """Return the integrator of a run; rapier has its own, and one that is asked for would be ignored."""
+    if given is None:
+        return "rk4"
+    if engine == "rapier":
+        raise BadInput("integrator", given, "none beside the engine rapier, which has its own")
+    return checks.choice("integrator", given, ("rk4", "euler"))
+
+
+def _clock(dt: float, rate: float) -> Text:
+    """Return step and rate together: which of them is meant to change, a refusal cannot know."""
+    return Text(f"a step of {dt:g} s and {rate:g} Hz")
 
 
 def about(drive: Movement | Trial | None, error: BadInput, more: str = "") -> BadInput:
@@ -363,10 +377,7 @@ def movement_of(table: dict[str, Any], n_joints: int) -> Movement:
                 raise BadInput("movement.shape", value, "trapezoid or smooth")
             fields[key] = value
             continue
-        try:
-            numbers = np.asarray(value, dtype=float)
-        except (OverflowError, TypeError, ValueError):
-            raise BadInput(f"movement.{name}", value, "numbers") from None
+        numbers = checks.samples(f"movement.{name}", value)
         if not np.isfinite(numbers).all() or (key != "waypoints" and numbers.ndim):
             raise BadInput(f"movement.{name}", value, "finite numbers" if key == "waypoints" else "one finite number")
         if key in fields:

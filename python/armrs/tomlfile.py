@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from . import checks
-from .errors import BadInput, Text
+from .errors import BadInput, Text, not_utf8
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -60,7 +60,7 @@ def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> st
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
-        raise BadInput(f"line {line}", Text(f"byte 0x{raw[error.start]:02x}"), "UTF-8 text", file=path) from None
+        raise not_utf8(f"line {line}", raw, error, file=path) from None
 
 
 def value(item: object) -> str:

@@ -111,6 +111,7 @@ _OPTIONS = {
     "speed": "--speed-rad-s", "acceleration": "--acceleration-rad-s2", "force": "--force-n",
     **{name: f"--{name}" for name in ("bins", "coupling", "dt", "engine", "evaluations", "integrator", "jobs", "level", "method")},
     **{name: f"--{name}" for name in ("motion", "repeats", "seed")},
+    "dt, rate": "--dt, --rate-hz",
 }  # fmt: skip
 """What the command line calls an argument of a function."""
 _NEVER_IN_FILES = {name: f"--{name}" for name in ("coordinates", "date", "forward", "history", "points", "up")}

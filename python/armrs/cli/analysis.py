@@ -36,11 +36,18 @@ def identify(
     method: Annotated[Method, typer.Option(help="All joints at once with physical constraints, or one after the other.")] = Method.joint,
     with_: Annotated[
         str | None,
-        typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects that are fitted at every joint besides the model's."),
+        typer.Option(
+            "--with",
+            metavar="KIND,…",
+            help="Kinds of joint effects (see armrs effects) that are fitted at every joint besides the model's.",
+        ),
     ] = None,
-    cutoff_hz: Annotated[float | None, typer.Option(help="Cutoff of the common low-pass [Hz]; chosen from the data when absent.")] = None,
+    cutoff_hz: Annotated[
+        float | None,
+        typer.Option(help="Cutoff of the common low-pass [Hz], above 0, below 0.4 of the sample rate; chosen from the data when absent."),
+    ] = None,
     motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
-    level: Annotated[float, typer.Option(help="Probability of the intervals, 0.5 to 1.")] = 0.95,
+    level: Annotated[float, typer.Option(help="Probability of the intervals, from 0.5 to below 1.")] = 0.95,
     history: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Add the result to the history of this subject, a file of SQLite, and show it.")
     ] = None,
@@ -51,8 +58,9 @@ def identify(
 ) -> int:
     """Identify body segment and joint parameters, each with an interval and what decided it.
 
-    Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, or when
-    speeds are noise to a good part. Such a result is not added to a history.
+    Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, when more than
+    half the variation of a joint's torque is left (above a fifth there is a warning), or when speeds are noise to a good part. Such a
+    result is not added to a history.
     """
     from .. import history as sessions
     from .. import results, words
@@ -62,7 +70,7 @@ def identify(
     folder = writable(out, json)
     data = load_dataset(dataset)
     if history is None and date is not None:
-        raise BadInput("--date", date, "--date together with --history")
+        raise BadInput("--date", Text("no --history"), "--date beside --history FILE: the date is kept only there")
     day = sessions.session_date(data.name, date)
     if history is not None:
         sessions.check(history, data.model.n_joints, sessions.subject_of(data))
@@ -131,8 +139,10 @@ def passive(
     context: typer.Context,
     dataset: Source,
     out: MaybeFolder = None,
-    cutoff_hz: Annotated[float, typer.Option(help="Cutoff of the low-pass of angles and forces [Hz].")] = 1.0,
-    bins: Annotated[int, typer.Option(help="Angle bins over the range of a joint.")] = 24,
+    cutoff_hz: Annotated[
+        float, typer.Option(help="Cutoff of the low-pass of angles and forces [Hz], from 0.001 to below half the sample rate.")
+    ] = 1.0,
+    bins: Annotated[int, typer.Option(help="Angle bins over the range of a joint, 2 to 1000.")] = 24,
     json: JsonFile = None,
 ) -> int:
     """Compute passive joint moments of slow movements: elastic mean and hysteresis against the angle.

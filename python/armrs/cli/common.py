@@ -13,12 +13,28 @@ from typing import Annotated, Any
 import typer
 
 from .. import files
-from ..errors import BadInput
+from ..errors import BadInput, Text
 
-JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is standard output.")]
-OutFolder = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write below; made when it does not exist.")]
+
+def _named(value: str | Path) -> Path:
+    """Return where to write; an empty text, as of a variable of the shell that is not set, is not the current folder."""
+    if value == "":
+        raise typer.BadParameter("found '', allowed the name of a file or folder; . is the current folder")
+    return Path(value)
+
+
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", parser=_named, help="Write the result as JSON; - is standard output.")
+]
+OutFolder = Annotated[
+    Path, typer.Option("-o", "--out", metavar="DIR", parser=_named, help="Folder to write below; made when it does not exist.")
+]
 MaybeFolder = Annotated[
-    Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder to write files and report below; made when it does not exist.")
+    Path | None,
+    typer.Option("-o", "--out", metavar="DIR", parser=_named, help="Folder to write files and report below; made when it does not exist."),
+]
+OutFile = Annotated[
+    Path | None, typer.Option("-o", "--out", metavar="FILE", parser=_named, help="The FMU to write; MODEL.fmu when absent.")
 ]
 Source = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with dataset.toml, or that file.")]
 
@@ -30,6 +46,16 @@ class Format(str, enum.Enum):
 
     csv = "csv"
     parquet = "parquet"
+
+
+SamplesFormat = Annotated[Format | None, typer.Option("--to", help="Format of the samples below -o; csv when absent.")]
+
+
+def samples_suffix(to: Format | None, out: Path | None) -> str:
+    """Return the suffix of the file of samples; a format without a folder to write them to is refused."""
+    if to is not None and out is None:
+        raise BadInput("--to", Text("no -o"), "--to beside -o: samples are written only there")
+    return f".{(to or Format.csv).value}"
 
 
 def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None]) -> None:

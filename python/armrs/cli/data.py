@@ -78,8 +78,9 @@ def convert(
     from ..conversion import convert as run_conversion
     from ..markers import MARKER_SUFFIXES
     from ..opensim import MOTION_SUFFIXES
+    from ..samples import SUFFIXES
 
-    suffix = "" if source.is_dir() else source.suffix.lower()
+    suffix = _suffix_of(source, (*SUFFIXES, *MOTION_SUFFIXES, *MARKER_SUFFIXES))
     chosen, named = listed(points), listed(coordinates)
     writable(out, json)
     if suffix in MARKER_SUFFIXES:
@@ -99,6 +100,15 @@ def convert(
     else:
         written = run_conversion(source, out, to=to.value)
     present(lambda: {"files": written}, json, lambda: print("\n".join(os.fspath(path) for path in written)))
+
+
+def _suffix_of(source: Path, readable: tuple[str, ...]) -> str:
+    """Return the suffix that says how a source is read, nothing for a folder; one that says nothing is refused with all that are read."""
+    suffix = source.suffix.lower()
+    if source.is_dir() or suffix in (*readable, ".toml"):
+        return "" if source.is_dir() else suffix
+    found = f"suffix {source.suffix!r}" if os.path.lexists(source) else "No such file or directory"
+    raise BadInput("file", Text(found), f"a data set's folder or dataset.toml, or a file of {', '.join(readable)}", file=source)
 
 
 def report(

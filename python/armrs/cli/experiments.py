@@ -11,7 +11,7 @@ import typer
 
 from .. import console
 from ..errors import BadInput, Text
-from .common import Format, JsonFile, MaybeFolder, OutFolder, command_line, listed, present, writable
+from .common import JsonFile, MaybeFolder, OutFolder, SamplesFormat, command_line, listed, present, samples_suffix, writable
 
 if TYPE_CHECKING:
     from ..trial import Reading
@@ -46,16 +46,23 @@ def simulate(
     ] = None,
     trial: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
+        typer.Option(metavar="FILE", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
     ] = None,
     out: MaybeFolder = None,
     engine: Annotated[Engine, typer.Option(help="Minimal coordinates, or rigid bodies and joints.")] = Engine.native,
-    dt: Annotated[float, typer.Option(help="Step [s].")] = 0.25e-3,
-    rate_hz: Annotated[float, typer.Option(help="Samples a second that are recorded [Hz].")] = 50.0,
-    integrator: Annotated[Integrator, typer.Option(help="Fourth order, or semi-implicit first order.")] = Integrator.rk4,
+    dt: Annotated[float, typer.Option(help="Step [s], above 0.")] = 0.25e-3,
+    rate_hz: Annotated[
+        float, typer.Option(help="Samples a second that are recorded [Hz], above 0; a whole number of steps from one to the next.")
+    ] = 50.0,
+    integrator: Annotated[
+        Integrator | None, typer.Option(help="Of the native engine: fourth order, taken when absent, or semi-implicit first order.")
+    ] = None,
     coupling: Annotated[Coupling, typer.Option(help="How the handle holds the tip.")] = Coupling.compliant,
-    duration_s: Annotated[float | None, typer.Option(help="Length of the run [s]; that of the movement when absent.")] = None,
-    to: Annotated[Format, typer.Option("--to", help="Format of the samples written.")] = Format.csv,
+    duration_s: Annotated[
+        float | None,
+        typer.Option(help="Length of the run [s], a whole number of steps, at least 1/rate; that of the movement or trial when absent."),
+    ] = None,
+    to: SamplesFormat = None,
     json: JsonFile = None,
 ) -> None:
     """Simulate the closed-chain experiment: a robot leads the arm."""
@@ -67,6 +74,7 @@ def simulate(
     if (movement is None) == (trial is None):
         found = Text("neither" if movement is None else "both")
         raise BadInput("--movement, --trial", found, "one of them")
+    suffix = samples_suffix(to, out)
     folder = writable(out, json)
     arm = load_model(model)
     reading = None if trial is None else _single_trial(trial, arm.n_joints)
@@ -77,14 +85,14 @@ def simulate(
             arm,
             drive,
             engine=engine.value,
-            integrator=integrator.value,
+            integrator=None if integrator is None else integrator.value,
             dt=dt,
             rate=rate_hz,
             duration=duration_s,
             coupling=coupling.value,
         )
     plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
-    written = results.write_simulated(result, plain, folder, suffix=f".{to.value}", trial=measured) if folder else []
+    written = results.write_simulated(result, plain, folder, suffix=suffix, trial=measured) if folder else []
     console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *result.warnings])
     present(lambda: plain, json, lambda: words.simulated(plain, written))
 
@@ -94,14 +102,17 @@ def plan(
     angles_deg: Annotated[str, typer.Option(metavar="LOW:HIGH,…", help="Range of each joint [deg], first joint first.")],
     out: MaybeFolder = None,
     with_: Annotated[
-        str, typer.Option("--with", metavar="KIND,…", help="Kinds of joint effects to be fitted besides those of the model.")
+        str,
+        typer.Option(
+            "--with", metavar="KIND,…", help="Kinds of joint effects (see armrs effects) to be fitted besides those of the model."
+        ),
     ] = "",
     speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint [rad/s].")] = 2.0,
     acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint [rad/s²].")] = 8.0,
     robot_speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint of the robot [rad/s].")] = 4.0,
     robot_acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint of the robot [rad/s²].")] = 60.0,
     force_n: Annotated[float, typer.Option(help="Largest force on the arm [N].")] = 60.0,
-    duration_s: Annotated[float, typer.Option(help="Longest trial [s].")] = 20.0,
+    duration_s: Annotated[float, typer.Option(help="Longest trial [s], above 0 to 600.")] = 20.0,
     repeats: Annotated[int, typer.Option(help="Trials of each movement.")] = 5,
     compare: Annotated[Path | None, typer.Option(metavar="FILE", help="Movement file to compare the plan with.")] = None,
     evaluations: Annotated[int, typer.Option(help="Movements to try.")] = 300,

@@ -11,7 +11,7 @@ import typer
 
 from .. import console
 from ..errors import BadInput
-from .common import Format, JsonFile, MaybeFolder, command_line, present, writable
+from .common import JsonFile, MaybeFolder, OutFile, SamplesFormat, command_line, present, samples_suffix, writable
 
 app = typer.Typer(
     name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.", no_args_is_help=True
@@ -35,12 +35,12 @@ class Fmi(str, enum.Enum):
 @app.command("export", short_help="Export an arm as a unit for co-simulation.")
 def fmu_export(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
-    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="The FMU to write; MODEL.fmu when absent.")] = None,
+    out: OutFile = None,
     version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard: FMI 2.0 or 3.0.")] = Fmi.three,
     port: Annotated[Port, typer.Option(help="Force on the arm in, or motion of the robot's handle in.")] = Port.force,
     start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; zero when absent.")] = "",
     rest: Annotated[bool, typer.Option("--rest", help="Start in equilibrium near these angles.")] = False,
-    dt: Annotated[float, typer.Option(help="Inner step [s].")] = 0.25e-3,
+    dt: Annotated[float, typer.Option(help="Inner step [s], above 0.")] = 0.25e-3,
     json: JsonFile = None,
 ) -> None:
     """Export an arm as a functional mock-up unit for co-simulation: no compiler is needed.
@@ -104,7 +104,7 @@ def fmu_run(
     context: typer.Context,
     system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],
     out: MaybeFolder = None,
-    to: Annotated[Format, typer.Option("--to", help="Format of the samples written.")] = Format.csv,
+    to: SamplesFormat = None,
     json: JsonFile = None,
 ) -> int:
     """Couple arms, FMUs of any tool and walls, and say whether the numbers may be believed.
@@ -118,6 +118,7 @@ def fmu_run(
     from ..cosim.system import load_system
     from ..errors import CoupledError
 
+    suffix = samples_suffix(to, out)
     folder = writable(out, json)
     loaded = load_system(system)
     try:
@@ -128,7 +129,7 @@ def fmu_run(
     finally:
         loaded.free()
     plain = coupled_data(run, system.name, command_line(context))
-    written = write_coupled(run, plain, folder, suffix=f".{to.value}") if folder else []
+    written = write_coupled(run, plain, folder, suffix=suffix) if folder else []
     console.warn(run.warnings)
     if run.verdict != "good":
         console.warn([f"{run.verdict}, no result: {run.why}"])
