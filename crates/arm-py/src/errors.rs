@@ -49,8 +49,8 @@ pub fn invalid(error: Invalid) -> PyErr {
         }
         Invalid::OutOfReach { distance, min, max } => bad_input(
             "handle",
-            format!("{distance} m from the robot's base"),
-            &format!("{min} m to {max} m"),
+            format!("{} from the robot's base", metres(distance)),
+            &format!("{} to {}", metres(min), metres(max)),
         ),
         other => bad_input("argument", other, "a known name"),
     }
@@ -155,11 +155,17 @@ pub fn simulation(error: SimulationError) -> PyErr {
             max,
         } => bad_input(
             &format!("handle at {time} s"),
-            format!("{distance} m from the robot's base"),
-            &format!("{min} m to {max} m"),
+            format!("{} from the robot's base", metres(distance)),
+            &format!("{} to {}", metres(min), metres(max)),
         ),
         other => in_python("SimulationError", &other.to_string()),
     }
+}
+
+/// A length to the micrometre, without trailing zeros.
+fn metres(value: f64) -> String {
+    let digits = format!("{value:.6}");
+    format!("{} m", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
 /// A refusal or failure of the gap workflow.
