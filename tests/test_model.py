@@ -132,7 +132,7 @@ def test_refuses_no_segments(path: Path) -> None:
 
 def test_refuses_text_that_is_not_utf8(path: Path) -> None:
     path.write_bytes(b"[arm]\ngravity = 9.81 # \xb5\n")
-    assert refusal(path) == "line 2: found byte 0xb5, allowed UTF-8 text"
+    assert refusal(path) == "line 2: found byte 0xb5, allowed UTF-8 text (Latin-1 or Windows-1252 text? Save it as UTF-8)"
 
 
 def test_refuses_a_file_that_is_not_there(tmp_path: Path) -> None:

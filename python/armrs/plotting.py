@@ -26,7 +26,7 @@ CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, INK)
 MARKERS = {"data": (BLUE, "full"), "prior": (GREY, "none"), "bound": (RED, "none")}
 """What decided a value -> colour and fill of its marker."""
 _SHAPES = {"data": "o", "prior": "o", "bound": "D"}
-_MEANING = {"data": "decided by the measurement", "prior": "taken from the model, not measured", "bound": "at a physical limit"}
+_MEANING = {"data": "decided by the measurement", "prior": "rests on the model, not on these data alone", "bound": "at a physical limit"}
 
 _STYLE: dict[str, Any] = {
     "font.size": 10.0,

@@ -215,8 +215,11 @@ def _identified(data: Mapping[str, Any]) -> str:
     joints, level = data["data"]["joints"], data["level"]
     out = heading("Data set") + bullets(words.data_lines(data["data"]))
     out += heading("What these movements determine")
-    out += paragraph("This is what the measurement shows, whatever the model says.", "soft")
-    out += table(tables.estimates(tables.measured(data), joints, level))
+    if measured := tables.measured(data):
+        out += paragraph("This is what the measurement shows, whatever the model says.", "soft")
+        out += table(tables.estimates(measured, joints, level))
+    else:
+        out += paragraph("No value by the measurement alone: every one below also rests on what the model was given.", "soft")
     out += heading("Parameters")
     out += _decided(data["parameters"])
     out += table(tables.estimates(data["parameters"], joints, level), [e["decided_by"] for e in data["parameters"]])
