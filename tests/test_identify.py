@@ -15,6 +15,7 @@ import armrs
 from armrs.catalogue import catalogue
 from armrs.cli import main
 from armrs.demo import BRAKES
+from armrs.quantities import value_in
 
 # DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
 DFKI_M2L2 = 0.6043459469186889 * 0.18377686083653508
@@ -192,6 +193,32 @@ def test_friction_is_read_from_measured_speeds(slow_arm: Path) -> None:
     assert {e.caveat for e in result.parameters} == {None}
     assert result.is_sound
     assert friction(result) == pytest.approx(BRAKES, rel=0.03)
+
+
+def test_intervals_of_the_cascade_know_the_tolerance(slow_arm: Path) -> None:
+    """It takes the sensors as they are; what their calibration leaves open is in its intervals nevertheless."""
+    data = armrs.load_dataset(slow_arm)
+    truth = armrs.load_model(slow_arm / "truth.toml")
+    bias = np.array([0.0, data.tolerance.force_bias_N])
+    biased = data.replace(trials=tuple(dataclasses.replace(t, force_on_arm=t.force_on_arm + bias) for t in data.trials))
+
+    def covered(data: armrs.Dataset) -> list[bool]:
+        sums = armrs.identify(data, method="cascade", with_effects="coulomb").combinations
+        known = [value_in(truth, e.name, kind=e.kind, joint=e.joint) for e in sums]
+        return [e.interval[0] <= value <= e.interval[1] for e, value in zip(sums, known, strict=True)]
+
+    assert covered(biased) == [True, True]
+    assert covered(biased.replace(tolerance=armrs.Tolerance(0.0, 0.0, 0.0, 0.0, 0.0))) == [False, False]
+
+
+def test_the_model_of_the_cascade_has_what_was_measured(data: Path) -> None:
+    """The forearm's centre of mass comes out beyond its end; the model has it there, and the same first moments."""
+    found = armrs.identify(data / "dfki_a0", method="cascade", with_effects="coulomb")
+    upper, fore = found.model.segments
+    assert fore.com == pytest.approx(fore.length, rel=1e-12)
+    moments = (upper.mass * upper.com + upper.length * fore.mass, fore.mass * fore.com)
+    assert moments == pytest.approx([e.value for e in found.combinations], rel=1e-9)
+    assert [line for line in found.misfits if line.startswith("l2 came out as 0.213 m, beyond the end of its segment of 0.2 m")]
 
 
 def test_the_cascade_holds_what_it_does_not_find(slow_arm: Path) -> None:

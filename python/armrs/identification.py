@@ -256,6 +256,7 @@ def identify(
         ),
         misfits=(
             *_misfits(shares, _POOR, _NO_FIT),
+            *_beyond_segment(model, parameters),
             *(
                 f"{line}: what the model lacks may be in it"
                 for line in _beyond_tolerance(calibration, settings["tolerance"], _FAR, _BEYOND)
@@ -322,7 +323,7 @@ _POOR = 0.2
 _NO_FIT = 0.5
 """And above this, none."""
 _ROUNDING = 1e-12
-"""An inertia below this part of mass · length² is a difference of equal numbers."""
+"""An inertia below this part of mass · length² is a difference of equal numbers; so is what of a length is beyond another."""
 
 
 def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
@@ -332,6 +333,19 @@ def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
         for e in parameters
         if e.kind == "segment" and e.decided_by == "bound" and e.name.startswith("m") and abs(e.value) <= 1e-2 * abs(e.interval[1])
     )
+
+
+def _beyond_segment(model: Model, parameters: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return the centres of mass that the cascade, which knows no such limit, puts beyond the end of their segment, a line each."""
+    lines = []
+    for e in parameters:
+        length = model.segments[(e.joint or 1) - 1].length
+        if e.kind == "segment" and e.unit == "m" and e.value > length * (1.0 + _ROUNDING):
+            lines.append(
+                f"{e.name} came out as {e.value:.3g} m, beyond the end of its segment of {length:g} m: "
+                "the model written has more mass there instead, of the same moment"
+            )
+    return tuple(lines)
 
 
 def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: dict[str, float], above: float, to: float) -> tuple[str, ...]:

@@ -20,19 +20,20 @@
 use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
 use arm_core::{Chain, Joints, Pose, gravity, joint_force, regressor, static_torque};
 
+use crate::calibration::{influence as of_calibration, predicted_force};
 use crate::coloured::effective_samples;
 use crate::condition::{Pieces, filtered};
 use crate::covariance::Bread;
-use crate::equation::{Memory, Rows, value_of};
+use crate::equation::{Kinematics, Memory, Rows, value_of};
 use crate::error::{IdentError, check_range};
 use crate::estimate::{Estimate, Identified};
-use crate::joint::{cluster_ranges, explain, root_mean_square};
+use crate::joint::{cluster_ranges, explain, physical_columns, root_mean_square};
 use crate::motion::{candidates, low_pass, speed, speed_noise};
 use crate::program::{Program, Status};
 use crate::rank::{RankOptions, analyse};
 use crate::summary::{Certainty, RANK_TOLERANCE, Spread, base_name};
-use crate::trial::{Model, Role, Trial};
-use crate::unknown::{LEAST_MASS, Moment, Source, Unknown};
+use crate::trial::{Model, Role, Tolerance, Trial};
+use crate::unknown::{LEAST_MASS, Moment, Source, Unknown, calibration};
 use crate::{Condenser, Factor, Matrix};
 
 /// Direction is read from angles below this frequency \[Hz\]: a quasi-static movement has nothing above.
@@ -51,6 +52,8 @@ pub struct Options {
     pub cutoff: Option<f64>,
     /// Half width of the box `l_b … u_b` around the model, in its standard deviations.
     pub bound_width: f64,
+    /// What the calibration promises: it widens the intervals, and is not refitted.
+    pub tolerance: Tolerance,
     /// Probability of the intervals.
     pub level: f64,
 }
@@ -60,6 +63,7 @@ impl Default for Options {
         Self {
             cutoff: None,
             bound_width: 3.0,
+            tolerance: Tolerance::default(),
             level: 0.95,
         }
     }
@@ -88,7 +92,7 @@ pub fn identify<const N: usize>(
             expected: 1,
         });
     }
-    let unknowns = unknowns(model, options.bound_width);
+    let mut unknowns = unknowns(model, options.bound_width);
     if unknowns.is_empty() {
         return Err(IdentError::TooFew {
             name: "unknowns",
@@ -96,6 +100,7 @@ pub fn identify<const N: usize>(
             expected: 1,
         });
     }
+    unknowns.extend(calibration::<N>(&options.tolerance, &fit));
     let cutoff = options.cutoff.unwrap_or(candidates(&fit)[0]);
     let prepared = trials
         .iter()
@@ -251,11 +256,17 @@ fn rows<const N: usize>(
     };
     let mut memory = Memory::new(&kept);
     let rest = Joints::<f64, N>::zeros();
+    let still = Kinematics {
+        q,
+        qd: vec![rest; samples],
+        qdd: vec![rest; samples],
+    };
+    let predicted = predicted_force(&kept, trial, &still);
     for i in 0..samples {
-        let pose = Pose::new(&q[i]);
+        let pose = Pose::new(&still.q[i]);
         let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
         let joint = joint_force(&model.chain, &pose, (&rest, &rest), force);
-        let at = Motion::new(i as f64 / trial.rate, q[i], speed[i]).with_joint_force(&joint);
+        let at = Motion::new(i as f64 / trial.rate, still.q[i], speed[i]).with_joint_force(&joint);
         memory.advance(&at, 1.0 / trial.rate);
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let mut measured = static_torque(&model.chain, &pose, force, moment)
@@ -282,7 +293,9 @@ fn rows<const N: usize>(
                     };
                     value
                 }
-                Source::Calibration(_) => rest,
+                Source::Calibration(what) => {
+                    of_calibration(&kept, trial, &still, (&predicted, &memory, i), what)
+                }
             };
             column[i * N..(i + 1) * N].copy_from_slice(value.as_slice());
         }
@@ -467,13 +480,13 @@ fn residual_variance<const N: usize>(
     Ok(sum / f64::max(effective, 1.0))
 }
 
-/// By how much every unknown moves with the scores of all steps: an error of one step is carried into the next.
+/// By how much every unknown moves with the scores of all steps and with those `moved` that no step finds: an error of one
+/// step is carried into the next.
 fn influence(
     steps: &[(&Step, Bread)],
-    p: usize,
+    mut moved: Vec<f64>,
     score: impl Fn(usize) -> Vec<f64>,
 ) -> Result<Vec<f64>, IdentError> {
-    let mut moved = vec![0.0; p];
     for (i, (step, bread)) in steps.iter().enumerate() {
         if step.own.is_empty() {
             continue;
@@ -488,7 +501,7 @@ fn influence(
     Ok(moved)
 }
 
-/// Covariance of all unknowns: scatter of the clusters and the prior's own variance, each through all steps.
+/// Covariance of all unknowns: scatter of the clusters, the prior's own variance and the calibration's, each through all steps.
 fn covariance(
     steps: &[Step],
     unknowns: &[Unknown],
@@ -510,7 +523,7 @@ fn covariance(
             .iter()
             .map(|s| s.clusters[g].score(x))
             .collect::<Result<Vec<_>, _>>()?;
-        moves.push(influence(&breads, p, |i| scores[i].clone())?);
+        moves.push(influence(&breads, vec![0.0; p], |i| scores[i].clone())?);
     }
     let mean: Vec<f64> = (0..p)
         .map(|i| moves.iter().map(|m| m[i]).sum::<f64>() / n as f64)
@@ -522,7 +535,11 @@ fn covariance(
         .filter(|(_, u)| u.sd.is_finite())
     {
         let owner = steps.iter().position(|s| s.own.contains(&u));
-        priors.push(influence(&breads, p, |i| {
+        let mut moved = vec![0.0; p];
+        if owner.is_none() {
+            moved[u] = unknown.sd;
+        }
+        priors.push(influence(&breads, moved, |i| {
             let mut score = vec![0.0; p];
             if Some(i) == owner {
                 score[u] = 1.0 / unknown.sd;
@@ -557,13 +574,18 @@ fn summarise<const N: usize>(
         all.merge_factor(&step.data)?;
     }
     let data = all.finish();
+    let r = physical_columns(&data, unknowns);
+    let physical = r.cols();
     let options = RankOptions {
         scale: None,
         rows: data.rows,
         tolerance: Some(RANK_TOLERANCE),
     };
-    let report = analyse(&data.r, &options)?;
-    let names: Vec<&str> = unknowns.iter().map(|u| u.name.as_str()).collect();
+    let report = analyse(&r, &options)?;
+    let names: Vec<&str> = unknowns[..physical]
+        .iter()
+        .map(|u| u.name.as_str())
+        .collect();
     let trades = report.describe_trades(&names)?;
     let rank = report.rank;
     let clusters = steps.first().map_or(0, |s| s.clusters.len());
@@ -581,12 +603,12 @@ fn summarise<const N: usize>(
         covariance: covariance(steps, unknowns, x, true)?,
         unbounded: covariance(steps, unknowns, x, false)?,
         report,
-        physical: p,
+        physical,
         dof: (clusters - 1) as f64,
         level,
     };
     let mut parameters = Vec::new();
-    for (u, unknown) in unknowns.iter().enumerate() {
+    for (u, unknown) in unknowns[..physical].iter().enumerate() {
         let mut estimate = certainty.unknown(u)?;
         if let Source::Effect(e, _) = unknown.source {
             estimate.joint = Some(model.fitted[e].index);
@@ -611,7 +633,7 @@ fn summarise<const N: usize>(
             .find(|&s| s != Status::Solved)
             .unwrap_or(Status::Solved),
         rank,
-        unknowns: p,
+        unknowns: physical,
         parameters,
         combinations,
         calibration: Vec::new(),
@@ -672,6 +694,9 @@ fn first_moment<const N: usize>(
 }
 
 /// The arm and the effects with the estimates; moments of inertia about the centres of mass stay the model's.
+///
+/// A centre of mass beyond the end of its segment is moved there by more mass, which the segments before it balance: every `X_j`, all that the
+/// data determine, stays.
 fn updated<const N: usize>(
     model: &Model<N>,
     unknowns: &[Unknown],
@@ -686,6 +711,13 @@ fn updated<const N: usize>(
             Source::Segment(k, _) => along[k] = value,
             Source::Effect(e, p) => fitted[e].parameters[p] = value,
             Source::Calibration(_) => {}
+        }
+    }
+    for k in (1..N).rev() {
+        let more = f64::max(along[k] / segments[k].length - segments[k].mass, 0.0);
+        segments[k].mass += more;
+        for (i, along) in along[..k].iter_mut().enumerate() {
+            *along -= segments[i].length * more;
         }
     }
     for (k, segment) in segments.iter_mut().enumerate() {

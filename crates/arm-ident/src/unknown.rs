@@ -162,7 +162,11 @@ fn segment<const N: usize>(model: &Model<N>, k: usize) -> Vec<Unknown> {
     list
 }
 
-fn calibration<const N: usize>(tolerance: &Tolerance, trials: &[&Trial<N>]) -> Vec<Unknown> {
+/// What the calibration of the sensors leaves open, within a tolerance.
+pub(crate) fn calibration<const N: usize>(
+    tolerance: &Tolerance,
+    trials: &[&Trial<N>],
+) -> Vec<Unknown> {
     let mut list = Vec::new();
     let mut push = |imperfection, name: String, unit, sd: f64| {
         if sd > 0.0 {

@@ -206,6 +206,7 @@ pub fn identify<'py>(
         };
         let cascade = arm_ident::cascade::Options {
             cutoff: settings.cutoff,
+            tolerance: settings.tolerance(),
             level: settings.level,
             ..Default::default()
         };
