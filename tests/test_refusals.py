@@ -137,6 +137,8 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "a format of samples that are not written": ((*MOVE[:-2], "--to", "parquet"), nothing, "--to: found no -o, allowed --to beside -o"),
     "sample rate of zero": ((*MOVE, "--rate-hz", "0"), nothing, "--rate-hz: found 0.0"),
     "negative duration": ((*MOVE, "--duration-s", "-1"), nothing, "--duration-s: found -1"),
+    "a step too long for the contact": ((*MOVE, "--dt", "0.02"), nothing, "--dt: found 0.02 s, allowed at most 1.55e-2 s: the contact vibrates at 167.3003 rad/s"),
+    "a duration beyond the trial": ((*FOLLOW, "--duration-s", "1000"), nothing, "--duration-s: found 1000.0, allowed at most 11.68 s, the length of the trial"),
     "duration of no sample": ((*MOVE, "--duration-s", "0.001"), nothing, "--duration-s: found 0.001, allowed 0.02 s (one interval between samples) to"),
     "duration between steps": ((*MOVE, "--duration-s", "1.0001"), nothing, "allowed a whole number of steps of 0.00025 s (nearest: 1 s)"),
     "duration that is no number": ((*MOVE, "--duration-s", "nan"), nothing, "--duration-s: found nan"),

@@ -158,6 +158,20 @@ pub fn simulation(error: SimulationError) -> PyErr {
             format!("{} from the robot's base", metres(distance)),
             &format!("{} to {}", metres(min), metres(max)),
         ),
+        // A little less than the largest, so that its rounded digits can be taken.
+        SimulationError::TooStiff {
+            frequency,
+            largest,
+            dt,
+            ..
+        } => bad_input(
+            "dt",
+            format!("{dt} s"),
+            &format!(
+                "at most {:.2e} s: the contact vibrates at {frequency:.4} rad/s",
+                0.995 * largest
+            ),
+        ),
         other => in_python("SimulationError", &other.to_string()),
     }
 }
