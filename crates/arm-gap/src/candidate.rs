@@ -62,6 +62,11 @@ impl Candidate {
         self.effect.kind == effect.kind && self.effect.index == effect.index
     }
 
+    /// Whether it asks the same, in whatever shape.
+    pub fn is_same_question(&self, other: &Self) -> bool {
+        self.is_same_effect(&other.effect) && self.question == other.question
+    }
+
     /// Smallest and largest value that each column's coefficient may have.
     pub fn bounds(&self, column: usize) -> (f64, f64) {
         if self.rest.is_some() {

@@ -16,12 +16,17 @@ const STEPS: usize = 6;
 /// Damping of the steps that are tried, as a share of the diagonal of the normal equations (Levenberg and Marquardt): what the data
 /// decide well moves on where a whole step leads astray.
 const DAMPING: [f64; 5] = [0.0, 0.01, 0.1, 1.0, 10.0];
-/// A step that gains less than this, in units of the noise, is the last.
+/// A step that gains less than this, in units of the noise, is the last,
 const ENOUGH: f64 = 0.2;
-/// Share of the cost that a last step gains at most, where the model is far from the data.
+/// and where the model is far from the data, less than this share of the cost.
 const SHARE: f64 = 1e-4;
 /// Times that a fit is simulated anew from where it ended.
 const AGAIN: usize = 4;
+
+/// A gain below this is none.
+pub(crate) fn enough(cost: f64) -> f64 {
+    ENOUGH + SHARE * cost
+}
 
 /// A hypothesis fitted to the fit trials.
 #[derive(Clone, Debug)]
@@ -146,7 +151,7 @@ impl<'a, const N: usize> Study<'a, N> {
             };
             let gained = fitted.cost - next.cost;
             fitted = next;
-            if gained < ENOUGH + SHARE * fitted.cost {
+            if gained < enough(fitted.cost) {
                 break;
             }
         }
@@ -194,7 +199,7 @@ impl<'a, const N: usize> Study<'a, N> {
         for _ in 0..AGAIN {
             let after = self.fit(&anchor, before.hypothesis.clone(), before.asked.clone())?;
             let gained = before.cost - after.cost;
-            if gained < 2.0 * ENOUGH + 2.0 * SHARE * after.cost {
+            if gained < 2.0 * enough(after.cost) {
                 return Ok((after, anchor));
             }
             let there = match self.anchor(&after.hypothesis) {

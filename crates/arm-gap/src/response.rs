@@ -7,7 +7,7 @@
 //! The same scheme, with Newton's method in every step, follows a change that is not small ([`Linear::play`]): what it
 //! gives is the run itself and, on top, what two coarse solutions differ by, so that their common error drops out.
 
-use arm_core::effect::{Effect, Motion, resisting_torque};
+use arm_core::effect::{Effect, Motion, Place, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Placement, Plane, Pose, Reading, Scalar, Setup, inverse_dynamics,
     jacobian, joint_force, static_torque, tip,
@@ -38,17 +38,30 @@ struct Plant<const N: usize> {
     setup: Setup<f64, N>,
     chain: Chain<f64, N>,
     contact: Contact<f64>,
-    effects: Vec<Effect<f64>>,
+    /// Effects that resist in joints: they alone count in every step.
+    resisting: Vec<Effect<f64>>,
+    /// Effects that the sensors show.
+    sensing: Vec<Effect<f64>>,
+    /// Whether the forces through the joints count.
+    feels_force: bool,
 }
 
 impl<const N: usize> Plant<N> {
     fn new(session: &Session<N>, hypothesis: &Hypothesis<N>) -> Result<Self, SimulationError> {
         let setup = session.rig(hypothesis)?;
+        let (resisting, sensing): (Vec<_>, Vec<_>) = hypothesis
+            .effects()
+            .into_iter()
+            .filter(|e| e.on)
+            .partition(|e| e.kind.info().place == Place::Joint);
         Ok(Self {
             chain: setup.chain()?,
             contact: setup.contact,
+            feels_force: setup.base_motion != [0.0; 2]
+                || resisting.iter().any(|e| e.kind.feels_force()),
             setup,
-            effects: hypothesis.effects(),
+            resisting,
+            sensing,
         })
     }
 
@@ -145,15 +158,17 @@ fn balance<const N: usize>(
         [0, 1].map(|a| rate[a] - moving[a] - turning[a] - drift[a]),
     );
     let moment = placement.map_or(0.0, |p| p.moment(&pose, force));
-    let through = joint_force(&chain, &pose, (&state.qd, &state.qdd), force);
-    let mut motion = Motion::new(state.time, state.q, state.qd).with_joint_force(&through);
-    motion.qdd = state.qdd;
+    let mut motion = state.motion();
     let mut torque = inverse_dynamics(&chain, &pose, &state.qd, &state.qdd)
-        + resisting_torque(&plant.effects, &motion, memory)
         - static_torque(&chain, &pose, force, moment);
-    // The guide of a moving base carries the force through the first joint.
-    let u = plant.setup.base_motion;
-    torque[0] += u[0] * through[0][0] + u[1] * through[0][1];
+    if plant.feels_force {
+        let through = joint_force(&chain, &pose, (&state.qd, &state.qdd), force);
+        motion = motion.with_joint_force(&through);
+        // The guide of a moving base carries the force through the first joint.
+        let u = plant.setup.base_motion;
+        torque[0] += u[0] * through[0][0] + u[1] * through[0][1];
+    }
+    torque += resisting_torque(&plant.resisting, &motion, memory);
     Balance {
         torque,
         force,
@@ -194,7 +209,9 @@ impl<'a, const N: usize> Linear<'a, N> {
         hypothesis: &Hypothesis<N>,
         course: &Arc<Course<N>>,
     ) -> Result<Self, SimulationError> {
-        let plant = Plant::new(session, hypothesis)?;
+        let mut plant = Plant::new(session, hypothesis)?;
+        // Effects that are asked later may feel them.
+        plant.feels_force = true;
         let run = session.run_finely(hypothesis, course, PARTS)?;
         let recording = run.recording();
         let step = 1.0 / course.rate / PARTS as f64;
@@ -230,7 +247,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
             linear.differentiate(&plant, i, memory);
             let motion = &linear.balances[i].motion;
-            let torque = resisting_torque(&plant.effects, motion, memory);
+            let torque = resisting_torque(&plant.resisting, motion, memory);
             linear.resisted.push(torque);
         }
         let first = linear
@@ -252,17 +269,17 @@ impl<'a, const N: usize> Linear<'a, N> {
 
     /// The states of effects that have one, along the run; nothing where none has.
     fn memories(&self, plant: &Plant<N>) -> Vec<Vec<f64>> {
-        if !memory::is_needed(&plant.effects) {
+        if !memory::is_needed(&plant.resisting) {
             return Vec::new();
         }
-        let mut now = vec![0.0; plant.effects.len()];
+        let mut now = vec![0.0; plant.resisting.len()];
         let motion = |state: &State<N>| state.motion();
         let mut out = Vec::with_capacity(self.states.len());
         for (i, state) in self.states.iter().enumerate() {
             if i > 0 {
                 let before = motion(&self.states[i - 1]);
                 memory::advance(
-                    &plant.effects,
+                    &plant.resisting,
                     (&before, &motion(state)),
                     &mut now,
                     self.step,
@@ -382,7 +399,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             let own = &self.balances[i];
             let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
             let (push, force) = if same_rig {
-                let changed = resisting_torque(&plant.effects, &own.motion, memory);
+                let changed = resisting_torque(&plant.resisting, &own.motion, memory);
                 (self.resisted[i] - changed, own.force)
             } else {
                 let changed = balance(plant, &self.states[i], hands[i], memory);
@@ -437,14 +454,16 @@ impl<'a, const N: usize> Linear<'a, N> {
         /// Distance from the run at which an arm is lost \[rad\].
         const ASTRAY: f64 = 1.0;
         let h = self.step;
-        let remembers = memory::is_needed(&plant.effects);
-        let mut memory = vec![0.0; if remembers { plant.effects.len() } else { 0 }];
+        let remembers = memory::is_needed(&plant.resisting);
+        let mut memory = vec![0.0; if remembers { plant.resisting.len() } else { 0 }];
         let zero = Joints::<f64, N>::zeros();
         let (mut q, mut qd, mut qdd) = (zero, zero, zero);
         let mut out = Vec::with_capacity(self.states.len());
         let mut before = self.states[0].moved(&q, &qd, &qdd);
-        // The inverse slope of the last step, where that of the run itself was no good.
-        let mut steep = None;
+        // What the inverse slope differed by from that of the run itself in the last step.
+        let mut other = SMatrix::<f64, N, N>::zeros();
+        // What accelerations differed by from those that nothing pushes, in the last two steps.
+        let mut pushed = [zero; 2];
         let mut unsolved = 0;
         for i in 0..self.states.len() {
             let (own, state) = (&self.balances[i], &self.states[i]);
@@ -455,7 +474,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                     let there = balance(plant, &moved, hands[i], &memory);
                     (own.torque - there.torque, there)
                 };
-                let solved = newton(zero, &self.rest, missing, NUDGE.0)?;
+                let solved = newton(zero, [&self.rest; 2], missing, NUDGE.0)?;
                 q = solved.at;
                 solved.there
             } else {
@@ -471,10 +490,11 @@ impl<'a, const N: usize> Linear<'a, N> {
                 };
                 let carry = |to: &State<N>, memory: &mut Vec<f64>| {
                     let motions = (&before.motion(), &to.motion());
-                    memory::advance(&plant.effects, motions, memory, h);
+                    memory::advance(&plant.resisting, motions, memory, h);
                 };
-                let start =
+                let free =
                     -(self.inverse[i] * (self.damping[i] * speed + self.stiffness[i] * angle));
+                let start = free + pushed[0] * 2.0 - pushed[1];
                 // States of effects follow slowly: where the step is expected to end is near enough.
                 let mut expected = memory.clone();
                 if remembers {
@@ -484,10 +504,11 @@ impl<'a, const N: usize> Linear<'a, N> {
                     let there = balance(plant, &place(next), hands[i], &expected);
                     (own.torque - there.torque, there)
                 };
-                let inverse = *steep.as_ref().unwrap_or(&self.inverse[i]);
-                let solved = newton(start, &inverse, missing, NUDGE.1 / reach)?;
+                let own = &self.inverse[i];
+                let solved = newton(start, [&(own + other), own], missing, NUDGE.1 / reach)?;
                 let (next, there) = (solved.at, solved.there);
-                steep = solved.steep;
+                other = solved.inverse - own;
+                pushed = [next - free, pushed[0]];
                 unsolved += usize::from(!solved.exact);
                 q = angle + next * (reach * reach);
                 qd = speed + next * reach;
@@ -537,7 +558,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                 force_on_arm: force_at(i as f64 - delay),
                 moment_on_arm: 0.0,
             };
-            for effect in &plant.effects {
+            for effect in &plant.sensing {
                 effect.distort(&mut reading);
             }
             for j in 0..N {
@@ -555,39 +576,51 @@ impl<'a, const N: usize> Linear<'a, N> {
 struct Solved<const N: usize> {
     at: Joints<f64, N>,
     there: Balance<N>,
-    /// An inverse slope that was needed beyond the given one.
-    steep: Option<SMatrix<f64, N, N>>,
+    /// The inverse slope that led there.
+    inverse: SMatrix<f64, N, N>,
     exact: bool,
 }
 
 /// Solves for the unknown at which nothing is missing; `None` where that leads beyond all numbers.
 ///
-/// First with a given inverse slope, which is enough for what is smooth or small; then with slopes of its own and shorter
-/// steps, for friction that reverses and a contact that opens.
+/// First with given inverse slopes, one after the other and corrected on the way (Broyden 1965), which is enough for what is
+/// smooth or small; then with slopes of its own and shorter steps, for friction that reverses and a contact that opens.
 ///
 /// * `missing` - the torque missing at an unknown
 /// * `nudge` - a change of the unknown that tells a slope
 fn newton<const N: usize>(
     start: Joints<f64, N>,
-    inverse: &SMatrix<f64, N, N>,
+    [first, second]: [&SMatrix<f64, N, N>; 2],
     missing: impl Fn(&Joints<f64, N>) -> (Joints<f64, N>, Balance<N>),
     nudge: f64,
 ) -> Option<Solved<N>> {
     /// Torque that may be missing, and that is missing at most where a step finds no better \[N m\].
     const ENOUGH: (f64, f64) = (1e-7, 1e-3);
+    /// Share of what is missing that a step of a good slope leaves at most.
+    const GOOD: f64 = 0.3;
     const ROUNDS: usize = 30;
     const HALVINGS: usize = 6;
     let size = |r: &Joints<f64, N>| r.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let (mut at, (mut left, mut there)) = (start, missing(&start));
-    let (mut inverse, mut steep) = (*inverse, None);
+    let (mut inverse, mut fallback) = (*first, (first != second).then_some(second));
     for _ in 0..ROUNDS {
         if size(&left) < ENOUGH.0 {
             break;
         }
-        let next = at + inverse * left;
+        let step = inverse * left;
+        let next = at + step;
         let (rest, balance) = missing(&next);
-        if size(&rest) < 0.3 * size(&left) {
+        if size(&rest) < GOOD * size(&left) {
+            let answered = inverse * (left - rest);
+            let along = step.dot(&answered);
+            if along > 0.0 {
+                inverse += (step - answered) * (step.transpose() * inverse) / along;
+            }
             (at, left, there) = (next, rest, balance);
+            continue;
+        }
+        if let Some(given) = fallback.take() {
+            inverse = *given;
             continue;
         }
         let mut slope = SMatrix::<f64, N, N>::zeros();
@@ -597,7 +630,6 @@ fn newton<const N: usize>(
             slope.set_column(j, &((left - missing(&beside).0) / nudge));
         }
         inverse = slope.try_inverse()?;
-        steep = Some(inverse);
         let whole = inverse * left;
         let mut share = 1.0;
         let better = (0..HALVINGS).find_map(|_| {
@@ -614,7 +646,7 @@ fn newton<const N: usize>(
     size(&left).is_finite().then(|| Solved {
         at,
         there,
-        steep,
+        inverse,
         exact: size(&left) < ENOUGH.1,
     })
 }

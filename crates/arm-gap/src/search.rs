@@ -6,7 +6,7 @@ use crate::GapError;
 use crate::anchor::Anchor;
 use crate::apart::Apart;
 use crate::candidate::{Candidate, Library};
-use crate::fit::{Fitted, Precision};
+use crate::fit::{Fitted, Precision, enough};
 use crate::hypothesis::Hypothesis;
 use crate::judge::{FLOOR, Named, mimicked_by_any};
 use crate::misfit::{Lack, lack_of_fit};
@@ -98,9 +98,27 @@ struct Hunt<'a, const N: usize> {
     /// Number of candidates.
     asked: f64,
     scale: f64,
+    /// Where it has been: what was named, the joints that are dry then, and the cost.
+    been: Vec<(Vec<Candidate>, [bool; N], f64)>,
 }
 
 impl<const N: usize> Hunt<'_, N> {
+    /// Whether it has been here before and was no worse off: from here it would go round in a circle.
+    fn is_back(&mut self, dry: [bool; N]) -> bool {
+        let Fitted { asked, cost, .. } = &self.current;
+        let same = |other: &[Candidate]| {
+            other.len() == asked.len()
+                && other
+                    .iter()
+                    .all(|o| asked.iter().any(|a| a.is_same_question(o)))
+        };
+        let back = self.been.iter().any(|(named, then, before)| {
+            *then == dry && same(named) && before - cost < enough(*cost)
+        });
+        self.been.push((asked.clone(), dry, *cost));
+        back
+    }
+
     /// What a further effect must gain so as not to be the imperfect shape of a named one.
     fn least(&self, effect: &Effect<f64>) -> f64 {
         let explained = self.calibrated.cost - self.current.cost;
@@ -184,6 +202,7 @@ impl<'a, const N: usize> Study<'a, N> {
         }
         let mut named;
         let mut turns = 0;
+        let mut outcomes = Vec::new();
         loop {
             let kinds = |f: &Fitted<N>| f.asked.iter().map(Candidate::kind).collect::<Vec<_>>();
             let before = kinds(&hunt.current);
@@ -194,9 +213,11 @@ impl<'a, const N: usize> Study<'a, N> {
                 progress,
             )?;
             turns += 1;
-            if turns == TURNS || kinds(&hunt.current) == before {
+            let after = kinds(&hunt.current);
+            if turns == TURNS || after == before || outcomes.contains(&after) {
                 break;
             }
+            outcomes.push(after);
             // What a coarser law could have missed may be seen beside the one that took its place.
             let rounds = hunt.ladder.len();
             hunt = self.hunt_on(hunt, periodic, progress)?;
@@ -276,6 +297,7 @@ impl<'a, const N: usize> Study<'a, N> {
             ruled: Vec::new(),
             asked: 1.0,
             scale: 1.0,
+            been: Vec::new(),
         };
         self.hunt_on(start, periodic, progress)
     }
@@ -287,6 +309,7 @@ impl<'a, const N: usize> Study<'a, N> {
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
     ) -> Result<Hunt<'a, N>, GapError> {
+        hunt.is_back(self.dry);
         for round in 0..MOST {
             progress("asking the catalogue", 0.1 + 0.1 * round as f64);
             let library = Library::build(self, &hunt.anchor, periodic)?;
@@ -318,6 +341,10 @@ impl<'a, const N: usize> Study<'a, N> {
                 hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
                 let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
                 (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
+            }
+            if hunt.is_back(self.dry) {
+                hunt.ladder.pop();
+                break;
             }
             // Without repeats a second look has only its own residual to tell noise from what the model lacks.
             if hunt.current.asked.len() >= MOST || !self.repeated {
@@ -395,11 +422,10 @@ impl<'a, const N: usize> Study<'a, N> {
     ) -> Option<(Settled<'a, N>, Rung)> {
         let fresh = |members: &[usize], c: usize| {
             let candidate = &library.candidates[c];
-            let same = |other: &Candidate| {
-                other.is_same_effect(&candidate.effect) && other.question == candidate.question
-            };
-            !current.asked.iter().any(same)
-                && !members.iter().any(|&m| same(&library.candidates[m]))
+            !current.asked.iter().any(|a| a.is_same_question(candidate))
+                && !members
+                    .iter()
+                    .any(|&m| library.candidates[m].is_same_question(candidate))
         };
         let choices = scan.search(&[], AHEAD.min(room), WIDTH, &fresh);
         // Less than every effect must explain need not be converged.
