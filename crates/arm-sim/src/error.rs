@@ -65,7 +65,7 @@ pub enum SimulationError {
     },
     /// No static equilibrium was found from the angles given.
     #[error(
-        "no static equilibrium near the given angles: {residual} N m are left after {iterations} iterations"
+        "start: found no static equilibrium near the given angles ({residual:.3} N m are left after {iterations} iterations), allowed angles near which the arm can rest; a joint that neither a stiffness nor the handle holds falls away"
     )]
     NoEquilibrium {
         /// Largest torque left \[N m\], or gap left \[m\].
