@@ -1,6 +1,6 @@
 """Check a plan by repetition: predicted standard deviations beside the scatter of what is identified.
 
-    python scripts/check_plan.py [repetitions] [evaluations] [segments]
+    python scripts/check_plan.py [repetitions] [evaluations] [segments] [first seed]
 
 Each repetition draws the believed masses, centres of mass and inertias and the calibration from what is promised of them, simulates the
 planned trials with noise, and identifies. Shared by tests/test_plan.py.
@@ -23,6 +23,8 @@ from armrs.planning import Instruments, Limits, Plan, forecast, plan
 TOLERANCE = Tolerance(handle_placement_m=0.0)
 """Where the handle is held is not drawn, and so not promised either."""
 UNCERTAINTY = 0.1
+RECORDED = 1000.0
+"""Samples a second of which the sensors read 50 [Hz]: what a delayed channel reads lies between samples."""
 THESIS = Movement(np.radians([[-60.0, 50.0], [-48.6, 61.5], [-60.0, 50.0]]), speed=0.2, acceleration=0.6)
 """The composite movement of thesis figure 3.12: 11.4° and 11.5°."""
 LIMITS = Limits(((-1.4, -0.17), (0.35, 1.92)), speed=2.5, acceleration=10.0)
@@ -67,7 +69,8 @@ def repetition(arm: Model, planned: Plan, seed: int) -> dict[tuple[str, int | No
     trials = []
     for number, movement in enumerate(planned.movements):
         seeds = range(1000 * seed + 100 * number, 1000 * seed + 100 * number + planned.repeats)
-        for k, read in enumerate(armrs.simulate(measured, movement, sensors=Sensors.realistic(), seeds=seeds).readings, 1):
+        run = armrs.simulate(measured, movement, rate=RECORDED, sensors=Sensors.realistic(), seeds=seeds)
+        for k, read in enumerate(run.readings, 1):
             name = f"planned {number}"
             trials.append(Trial(f"{name} {k}.csv", name, k, "fit", read["time"], read["q"], read["force_on_arm"], None, read["robot_q"]))
     # Believed values as far from the truth as the model says that they may be, moment by moment as identification has them.
@@ -85,14 +88,16 @@ def repetition(arm: Model, planned: Plan, seed: int) -> dict[tuple[str, int | No
     return {(e.name, e.joint if e.kind not in ("segment", "combination") else None): e.value for e in listed}
 
 
-def compare(repetitions: int, evaluations: int, segments: int = 2) -> tuple[Plan, Plan, list[tuple[str, float, float, float, float]]]:
+def compare(
+    repetitions: int, evaluations: int, segments: int = 2, first: int = 1
+) -> tuple[Plan, Plan, list[tuple[str, float, float, float, float]]]:
     """Return plan, thesis' movement, and for each parameter name, value, predicted and found standard deviation, and bias."""
     arm = truth(segments)
     limits, movement = (THREE_LIMITS, THREE_THESIS) if segments == 3 else (LIMITS, THESIS)
     instruments = Instruments(tolerance=TOLERANCE)
     planned = plan(arm, limits, evaluations=evaluations, instruments=instruments)
     thesis = forecast(arm, [movement], repeats=10, instruments=instruments)
-    found = [repetition(arm, planned, seed) for seed in range(1, repetitions + 1)]
+    found = [repetition(arm, planned, seed) for seed in range(first, first + repetitions)]
     rows = []
     for p in planned.predictions:
         values = np.array([f[(p.name, p.joint)] for f in found])
@@ -104,8 +109,8 @@ def compare(repetitions: int, evaluations: int, segments: int = 2) -> tuple[Plan
 def main() -> None:
     """Print the comparison."""
     given = [int(a) for a in sys.argv[1:]]
-    repetitions, evaluations, segments = (*given, *(200, 300, 2)[len(given) :])
-    planned, thesis, rows = compare(repetitions, evaluations, segments)
+    repetitions, evaluations, segments, first = (*given, *(200, 300, 2, 1)[len(given) :])
+    planned, thesis, rows = compare(repetitions, evaluations, segments, first)
     for name, p in (("thesis", thesis), ("plan", planned)):
         print(f"{name}: worst relative deviation {p.worst:.4f} in {p.duration:.0f} s")
     for name, value, predicted, scatter, bias in rows:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs import BadInput, IdentificationError, Joint, Limits, Movement
+from armrs import BadInput, Dataset, Effect, IdentificationError, Joint, Limits, Movement, Sensors, Trial
 from armrs.cli import main
 from armrs.discrepancy import detectable
 
@@ -44,6 +44,22 @@ def test_a_plan_respects_the_acceleration_of_the_robot() -> None:
     assert 0.0 < gentle.robot_acceleration <= most < free.robot_acceleration
     asked = [np.abs(armrs.simulate(arm, m).columns["robot_qdd"]).max() for m in gentle.movements]
     assert max(asked) == pytest.approx(gentle.robot_acceleration, rel=0.02)
+
+
+def test_a_delay_of_the_force_is_identified_beyond_its_first_order() -> None:
+    """Without noise 8 ms in a fast movement made a first moment 0.4 % too small, and 8 ms the other way did not make it as much too large."""
+    arm = check_plan.truth()
+    movements = armrs.plan(arm, LIMITS, evaluations=1).movements
+    truth = {p.name: p.value for p in armrs.forecast(arm, movements).predictions if p.kind == "combination"}
+    for delay in (-0.008, 0.008):
+        late = arm.replace(effects=(Effect("time_delay", parameters={"delay": delay}),))
+        trials = []
+        for movement, name in zip(movements, "ab", strict=True):
+            read = armrs.simulate(late, movement, rate=check_plan.RECORDED, sensors=Sensors(), seeds=[1]).readings[0]
+            trials.append(Trial(f"{name}.csv", name, 1, "fit", read["time"], read["q"], read["force_on_arm"], None, read["robot_q"]))
+        found = armrs.identify(Dataset("late", arm, tuple(trials), "robot", tolerance=check_plan.TOLERANCE, synthetic=True))
+        for e in found.combinations[:2]:
+            assert e.value == pytest.approx(truth[e.name], rel=1.5e-3), (delay, e.name)
 
 
 def test_more_trials_narrow_what_noise_alone_widens() -> None:
@@ -83,7 +99,7 @@ def test_a_wrist_that_hangs_between_forearm_and_handle_is_identified() -> None:
     instruments = armrs.Instruments(tolerance=check_plan.TOLERANCE)
     planned = armrs.forecast(arm, movements, repeats=5, instruments=instruments)
     # The sixth draw starts so far off that a first step leads to an arm that cannot be simulated.
-    for seed in (2, 6):
+    for seed in (2, 6, 9):
         found = check_plan.repetition(arm, planned, seed)
         for p in planned.predictions:
             assert abs(found[(p.name, p.joint)] - p.value) < 4.0 * p.std, (seed, p)

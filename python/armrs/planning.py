@@ -235,9 +235,10 @@ def forecast(
     -----
     The closed chain is simulated, noise of the sensors is carried through the rows of the regression and the prior of the
     model, as `identify` would have them. Nothing is measured: what the model lacks is not in it. Over 120 repetitions with two
-    segments the deviations agree with the scatter within 14 %. With three segments, where the robot does not hold every joint, 2 of
-    25 repetitions ended with the wrist's viscosity at zero; of the others the scatter is up to 40 % larger than predicted, in the
-    middle 16 %, and two second moments come out low by about one deviation (`scripts/check_plan.py`).
+    segments the deviations agreed with the scatter within 14 %. With three segments, where the robot does not hold every joint, 1 of
+    20 repetitions ended with the wrist's viscosity at zero; of the others the scatter is up to 48 % larger than predicted, in the
+    middle 16 %, and first and second moments of the arm's first two segments come out low by half a deviation to two thirds
+    (`scripts/check_plan.py`, seeds 501 to 520).
     """
     asked = _Question(model, with_effects, instruments, repeats)
     movements = checks.instances("movements", movements, Movement)

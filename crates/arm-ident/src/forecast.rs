@@ -149,7 +149,7 @@ pub fn forecast<const N: usize>(
         .iter()
         .map(|(trial, course, _)| {
             let mut found = rows(model, &unknowns, trial, &course.at_samples());
-            instrument(&mut found, (model, &unknowns), trial, course);
+            instrument(&mut found, (model, &unknowns), trial, (course, 0.0));
             filtered(&found, trial, question.accuracy.cutoff)
         })
         .collect::<Result<Vec<Pieces>, _>>()?;

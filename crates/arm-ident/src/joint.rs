@@ -13,10 +13,11 @@ use crate::motion::{
     candidates, candidates_of_measured, measured, motion_cutoff, relative_speed_noise, speed_noise,
 };
 use crate::outcome::Outcome;
+use crate::response::damped;
 use crate::simulated::simulated;
 use crate::summary::{Fit, summarise};
 use crate::trial::{Model, Role, Tolerance, Trial};
-use crate::unknown::{Moment, Source, Unknown, unknowns};
+use crate::unknown::{Imperfection, Moment, Source, Unknown, unknowns};
 use crate::{Condenser, Factor, Matrix};
 
 /// Most rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
@@ -111,11 +112,18 @@ pub fn identify<const N: usize>(
         None if simulate => candidates(&fit)[0],
         None => best_cutoff(model, &unknowns, &fit)?,
     };
-    let mut current = model.clone();
+    let mut current = if simulate {
+        damped(model, cutoff)
+    } else {
+        model.clone()
+    };
     let mut last: Option<(Solved, Vec<Pieces>)> = None;
-    let (mut shown, mut refused) = (model.clone(), None);
+    let (mut shown, mut refused) = (current.clone(), None);
     for _ in 0..MOST_ROUNDS {
-        let prepared = match prepare(&current, &unknowns, trials, (cutoff, simulate)) {
+        let delay = last
+            .as_ref()
+            .map_or(0.0, |(solved, _)| delay(&unknowns, &solved.outcome.x));
+        let prepared = match prepare(&current, &unknowns, trials, (cutoff, simulate, delay)) {
             Ok(prepared) => prepared,
             // A step too far makes an arm that cannot be simulated: half of it is a step too.
             Err(error) if last.is_some() => {
@@ -179,6 +187,15 @@ fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
     trial.handle.is_some() && !moment && !torque
 }
 
+/// The estimated delay of the force channels \[s\], zero where it is taken as known.
+fn delay(unknowns: &[Unknown], x: &[f64]) -> f64 {
+    let is_delay = |u: &Unknown| u.source == Source::Calibration(Imperfection::TimeDelay);
+    unknowns
+        .iter()
+        .position(is_delay)
+        .map_or(0.0, |place| x[place])
+}
+
 /// How far a round moved the estimate, in units of its noise.
 fn moved(solved: &Solved, before: &Solved) -> f64 {
     let step: Vec<f64> = solved
@@ -203,7 +220,7 @@ fn best_cutoff<const N: usize>(
     let scale_free = fit.iter().all(|t| t.is_unloaded());
     let mut scored = Vec::new();
     for cutoff in candidates_of_measured(fit)? {
-        let prepared = prepare(model, unknowns, &trials, (cutoff, false))?;
+        let prepared = prepare(model, unknowns, &trials, (cutoff, false, 0.0))?;
         let pieces: Vec<&Pieces> = prepared.iter().collect();
         let solved = first_solution(model, unknowns, &pieces, scale_free)?.0;
         let rows = || prepared.iter().flatten();
@@ -231,7 +248,7 @@ fn prepare<const N: usize>(
     model: &Model<N>,
     unknowns: &[Unknown],
     trials: &[Trial<N>],
-    (cutoff, simulate): (f64, bool),
+    (cutoff, simulate, delay): (f64, bool, f64),
 ) -> Result<Vec<Pieces>, IdentError> {
     let mut model = model.clone();
     if !simulate {
@@ -253,7 +270,7 @@ fn prepare<const N: usize>(
         }
         let course = simulated(&model, trial, cutoff).map_err(|error| error.in_trial(k))?;
         let mut found = rows(&model, unknowns, trial, &course.at_samples());
-        instrument(&mut found, (&model, unknowns), trial, &course);
+        instrument(&mut found, (&model, unknowns), trial, (&course, delay));
         filtered(&found, trial, cutoff)
     };
     trials.iter().enumerate().map(of_trial).collect()
