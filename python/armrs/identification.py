@@ -100,7 +100,7 @@ class Identified:
         Joints whose torque the fitted model does not describe well, and speeds that are noise. Intervals hold only where the model's
         structure is right.
     left_out : tuple of str
-        What of the model the method does not take into account.
+        What of the model the method does not take into account, or finds nothing about in these movements.
     trades : tuple of str
         Which unknowns the movements cannot tell apart, in words.
     scale_free : bool
@@ -263,7 +263,7 @@ def identify(
             ),
             *noisy,
         ),
-        left_out=_left_out(method, effects),
+        left_out=(*_left_out(method, effects), *_unmoved(method, parameters)),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
         level=level,
@@ -293,6 +293,15 @@ def _left_out(method: str, effects: Sequence[Effect]) -> tuple[str, ...]:
     """Return what the method leaves out of the model, a line each."""
     rotors = [e.joint for e in effects if e.kind == "motor_inertia"] if method == "cascade" else []
     return tuple(f"the cascade takes no inertia into account, and so not the motor_inertia of joint {joint}" for joint in rotors)
+
+
+def _unmoved(method: str, parameters: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return the joints of whose dry friction the cascade finds nothing, a line each."""
+    joints = [e.joint for e in parameters if method == "cascade" and e.kind == "coulomb" and e.decided_by == "prior"]
+    return tuple(
+        f"joint {joint} never moves steadily in one direction: the cascade cannot identify its dry friction, nor use its torque"
+        for joint in joints
+    )
 
 
 def effects_of(model: Model, with_effects: Sequence[str]) -> tuple[list[Effect], list[bool]]:

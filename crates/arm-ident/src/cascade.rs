@@ -4,7 +4,7 @@
 //!
 //! `g [cosθ_j, a_j cosθ_j] [m_j l_j, m_{j+1}]ᵀ + τ_pj + d_j s_j = (JᵀF)_j − g Σ_{k>j} cosθ_k X_k − g a_j cosθ_j Σ_{k>j+1} m_k`
 //!
-//! with θ_j = q_1 + … + q_j, F the force **on the arm**, s_j the direction of motion (−1 … 1), `X_k = m_k l_k + a_k Σ_{i>k} m_i`
+//! with θ_j = q_1 + … + q_j, F the force **on the arm**, s_j the direction of motion (−1 … 1, by the law of the effect), `X_k = m_k l_k + a_k Σ_{i>k} m_i`
 //! from the steps before, and bounds `l_b ≤ π ≤ u_b` (equation 3.30).
 //!
 //! Where this departs from the text:
@@ -13,6 +13,8 @@
 //!   as is the point of the line `X_j = const` that lies nearest to the model, or a bound, and is labelled so;
 //! - d_j is a regression on the direction of motion in the same problem. The mean of |residual| (equation 3.32) is 0.8 σ
 //!   where there is no friction at all;
+//! - where a joint with dry friction rests or turns, friction is anything between −d_j and d_j: these rows of that joint are left
+//!   out. They would pull d_j towards zero, and X_j with it. The other joints' rows of the same samples know nothing of d_j, and stay;
 //! - the same zero-phase low-pass acts on torque and regressors.
 //!
 //! The joint method (`joint`) is better in every respect; the cascade is for comparison with the thesis.
@@ -24,7 +26,7 @@ use crate::calibration::{influence as of_calibration, predicted_force};
 use crate::coloured::effective_samples;
 use crate::condition::{Pieces, filtered};
 use crate::covariance::Bread;
-use crate::equation::{Kinematics, Memory, Rows, value_of};
+use crate::equation::{Kinematics, Memory, Rows, gradient, value_of};
 use crate::error::{IdentError, check_range};
 use crate::estimate::{Estimate, Identified};
 use crate::joint::{cluster_ranges, explain, physical_columns, root_mean_square};
@@ -38,10 +40,15 @@ use crate::{Condenser, Factor, Matrix};
 
 /// Direction is read from angles below this frequency \[Hz\]: a quasi-static movement has nothing above.
 const DIRECTION_CUTOFF: f64 = 1.0;
-/// Motion counts in full from this many standard deviations of the speed's noise on.
+/// A joint moves where its speed is this many standard deviations of the speed's noise.
 const DEAD_BAND: f64 = 3.0;
-/// Slowest speed that counts as motion in full \[rad/s\], however little noise there is.
+/// Slowest speed that counts as motion \[rad/s\], however little noise there is.
 const SLOWEST: f64 = 1e-4;
+/// Periods of the direction's cutoff next to rest or a turn that do not count as motion: the filter moves a start forward by no more,
+/// and its ringing beside a movement has one sign for less than twice as long.
+const TURN: f64 = 0.5;
+/// Fewest stretches of data in which a joint has rows; with fewer nothing tells how sure its values are.
+const FEWEST: usize = 2;
 /// Residual, relative to the torques, assumed before the first fit.
 const FIRST_GUESS: f64 = 0.05;
 
@@ -117,10 +124,13 @@ pub fn identify<const N: usize>(
     let mut x: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
     let mut steps = Vec::with_capacity(N);
     for joint in (0..N).rev() {
-        let clusters = ranges
+        let mut clusters = ranges
             .iter()
             .map(|cluster| condensed::<N>(cluster, joint, unknowns.len()))
             .collect::<Result<Vec<_>, _>>()?;
+        if informed(&clusters) < FEWEST {
+            clusters.fill(Condenser::new(unknowns.len()).finish());
+        }
         let series: Vec<&Rows> = fitted.iter().flat_map(|p| p.iter()).collect();
         steps.push(step::<N>(
             &unknowns,
@@ -152,6 +162,18 @@ struct Step {
     posterior: Factor,
     /// How the solver ended.
     status: Status,
+}
+
+impl Step {
+    /// Whether there is anything to find the joint's unknowns from.
+    fn has_data(&self) -> bool {
+        self.data.rows > 0
+    }
+}
+
+/// Number of clusters in which a joint has rows.
+fn informed(clusters: &[Factor]) -> usize {
+    clusters.iter().filter(|c| c.rows > 0).count()
 }
 
 /// The unknowns: `m_2, m_1 l_1, …` of the segments, then passive moments and dissipative torques.
@@ -240,7 +262,7 @@ fn rows<const N: usize>(
     cutoff: f64,
 ) -> Result<Rows, IdentError> {
     let samples = trial.len();
-    let (q, speed, direction) = motion(trial, cutoff)?;
+    let (q, speed, moves) = motion(trial, cutoff)?;
     let mut columns = vec![vec![0.0; samples * N]; unknowns.len()];
     let mut rhs = vec![0.0; samples * N];
     let kept = Model {
@@ -284,15 +306,7 @@ fn rows<const N: usize>(
                     held -= value * unknown.mean;
                     value
                 }
-                Source::Effect(e, _) => {
-                    let effect = &model.fitted[e];
-                    let mut value = rest;
-                    value[effect.index] = match effect.kind {
-                        Kind::Coulomb => direction[i][effect.index],
-                        _ => 1.0,
-                    };
-                    value
-                }
+                Source::Effect(e, p) => gradient(&model.fitted[e], p, &at, 0.0),
                 Source::Calibration(what) => {
                     of_calibration(&kept, trial, &still, (&predicted, &memory, i), what)
                 }
@@ -305,22 +319,32 @@ fn rows<const N: usize>(
         columns,
         rhs,
         samples: (0..samples).collect(),
+        fits: has_friction(model).map(|has| {
+            let fits = |i: usize| (0..N).map(move |j| (i, j));
+            (0..samples)
+                .flat_map(fits)
+                .map(|(i, j)| !has[j] || moves[j][i])
+                .collect()
+        }),
     })
 }
 
-/// Angles at the common cutoff, speeds, and the direction of motion of every joint, from −1 to 1.
-#[expect(clippy::type_complexity, reason = "three series of one type")]
+/// The joints whose dry friction is found; none if there is no such joint.
+fn has_friction<const N: usize>(model: &Model<N>) -> Option<[bool; N]> {
+    let found = |j| {
+        let mut effects = model.fitted.iter();
+        effects.any(|e| e.kind == Kind::Coulomb && e.index == j)
+    };
+    let has = core::array::from_fn(found);
+    has.contains(&true).then_some(has)
+}
+
+/// Angles at the common cutoff, speeds, and for every joint where it moves.
+#[expect(clippy::type_complexity, reason = "three series")]
 fn motion<const N: usize>(
     trial: &Trial<N>,
     cutoff: f64,
-) -> Result<
-    (
-        Vec<Joints<f64, N>>,
-        Vec<Joints<f64, N>>,
-        Vec<Joints<f64, N>>,
-    ),
-    IdentError,
-> {
+) -> Result<(Vec<Joints<f64, N>>, Vec<Joints<f64, N>>, [Vec<bool>; N]), IdentError> {
     let slow_cutoff = DIRECTION_CUTOFF.min(cutoff);
     let (filter, slow) = (
         low_pass(cutoff, trial.rate)?,
@@ -328,19 +352,43 @@ fn motion<const N: usize>(
     );
     let noise = speed_noise(trial, slow_cutoff);
     let mut q = vec![Joints::zeros(); trial.len()];
-    let (mut speeds, mut direction) = (q.clone(), q.clone());
+    let mut speeds = q.clone();
+    let mut moves = core::array::from_fn(|_| Vec::new());
+    let turn = libm::ceil(TURN * trial.rate / slow_cutoff) as usize;
     for j in 0..N {
         let raw: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();
         let smooth = filter.both_ways(&raw)?;
         let qd = speed(trial, j, &slow)?;
-        let full = f64::max(DEAD_BAND * noise[j], SLOWEST);
         for i in 0..trial.len() {
             q[i][j] = smooth[i];
             speeds[i][j] = qd[i];
-            direction[i][j] = (qd[i] / full).clamp(-1.0, 1.0);
         }
+        moves[j] = moving(&qd, f64::max(DEAD_BAND * noise[j], SLOWEST), turn);
     }
-    Ok((q, speeds, direction))
+    Ok((q, speeds, moves))
+}
+
+/// Where a joint moves one way: at least so fast, and for that many samples before and after.
+///
+/// The ends of the series are no turns.
+fn moving(speed: &[f64], least: f64, turn: usize) -> Vec<bool> {
+    let way = |v: &f64| i8::from(*v >= least) - i8::from(*v <= -least);
+    let mut moves = vec![false; speed.len()];
+    let mut start = 0;
+    for stretch in speed.chunk_by(|a, b| way(a) == way(b)) {
+        let end = start + stretch.len();
+        let from = if start == 0 { 0 } else { start + turn };
+        let to = if end == speed.len() {
+            end
+        } else {
+            end.saturating_sub(turn)
+        };
+        if way(&stretch[0]) != 0 && from < to {
+            moves[from..to].fill(true);
+        }
+        start = end;
+    }
+    moves
 }
 
 /// Rows of one joint over the stretches of a cluster.
@@ -354,6 +402,9 @@ fn condensed<const N: usize>(
     for (rows, range) in cluster {
         for i in range.clone() {
             let at = i * N + joint;
+            if !rows.fits(at) {
+                continue;
+            }
             for (value, column) in row.iter_mut().zip(&rows.columns) {
                 *value = column[at];
             }
@@ -366,11 +417,15 @@ fn condensed<const N: usize>(
 /// Solves one joint with the unknowns of the joints beyond it held at `x`, and writes its own into `x`.
 fn step<const N: usize>(
     unknowns: &[Unknown],
-    own: Vec<usize>,
+    mut own: Vec<usize>,
     (joint, mut clusters, series): (usize, Vec<Factor>, &[&Rows]),
     x: &mut [f64],
 ) -> Result<Step, IdentError> {
     let mut data = merged(&clusters, unknowns.len())?;
+    if data.rows == 0 {
+        // What neither data nor a prior know anything of stays as it is.
+        own.retain(|&u| unknowns[u].sd.is_finite());
+    }
     let level = libm::sqrt(data.residual2(&vec![0.0; x.len()])? / data.rows.max(1) as f64);
     let mut variance = f64::max(FIRST_GUESS * level, f64::MIN_POSITIVE.sqrt());
     variance *= variance;
@@ -470,9 +525,14 @@ fn residual_variance<const N: usize>(
     for rows in series {
         let rest: Vec<f64> = crate::condition::residual(rows, x)
             .into_iter()
+            .enumerate()
             .skip(joint)
             .step_by(N)
+            .filter_map(|(at, value)| rows.fits(at).then_some(value))
             .collect();
+        if rest.len() < 2 {
+            continue;
+        }
         let square = root_mean_square(rest.iter());
         sum += square * square * rest.len() as f64;
         effective += effective_samples(&rest)?;
@@ -516,9 +576,10 @@ fn covariance(
             Ok((s, Bread::with_fixed(&s.posterior.r, &fixed)?))
         })
         .collect::<Result<Vec<_>, IdentError>>()?;
-    let n = steps.first().map_or(0, |s| s.clusters.len());
-    let mut moves = Vec::with_capacity(n);
-    for g in 0..n {
+    let all = steps.first().map_or(0, |s| s.clusters.len());
+    let n = stretches(steps);
+    let mut moves = Vec::with_capacity(all);
+    for g in 0..all {
         let scores = steps
             .iter()
             .map(|s| s.clusters[g].score(x))
@@ -526,7 +587,7 @@ fn covariance(
         moves.push(influence(&breads, vec![0.0; p], |i| scores[i].clone())?);
     }
     let mean: Vec<f64> = (0..p)
-        .map(|i| moves.iter().map(|m| m[i]).sum::<f64>() / n as f64)
+        .map(|i| moves.iter().map(|m| m[i]).sum::<f64>() / all as f64)
         .collect();
     let mut priors = Vec::new();
     for (u, unknown) in unknowns
@@ -561,6 +622,15 @@ fn covariance(
     Ok(Spread { whole, scatter })
 }
 
+/// Number of stretches of data that every joint with rows has rows in.
+fn stretches(steps: &[Step]) -> usize {
+    let of_joints = steps.iter().filter(|s| s.has_data());
+    of_joints
+        .map(|s| informed(&s.clusters))
+        .min()
+        .unwrap_or(FEWEST)
+}
+
 fn summarise<const N: usize>(
     model: &Model<N>,
     unknowns: &[Unknown],
@@ -588,7 +658,7 @@ fn summarise<const N: usize>(
         .collect();
     let trades = report.describe_trades(&names)?;
     let rank = report.rank;
-    let clusters = steps.first().map_or(0, |s| s.clusters.len());
+    let clusters = stretches(steps);
     let mut limited = vec![false; p];
     for step in steps {
         for (&u, &a) in step.own.iter().zip(&step.active) {
@@ -612,6 +682,11 @@ fn summarise<const N: usize>(
         let mut estimate = certainty.unknown(u)?;
         if let Source::Effect(e, _) = unknown.source {
             estimate.joint = Some(model.fitted[e].index);
+        }
+        if steps.iter().all(|s| !s.own.contains(&u)) {
+            // Nothing is known but the bounds: as spread out as an even distribution between them.
+            estimate.std = (unknown.max - unknown.min) / libm::sqrt(12.0);
+            estimate.interval = [unknown.min, unknown.max];
         }
         parameters.push(estimate);
         if let Source::Segment(k, Moment::Along) = unknown.source {

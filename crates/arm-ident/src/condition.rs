@@ -38,6 +38,10 @@ pub fn filtered<const N: usize>(
         .map(|samples| Rows {
             columns: Vec::with_capacity(rows.columns.len()),
             rhs: Vec::new(),
+            fits: rows.fits.as_ref().map(|fits| {
+                let of_sample = |&i: &usize| &fits[i * N..(i + 1) * N];
+                samples.iter().flat_map(of_sample).copied().collect()
+            }),
             samples,
         })
         .collect();

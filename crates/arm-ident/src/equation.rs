@@ -33,6 +33,15 @@ pub struct Rows {
     pub rhs: Vec<f64>,
     /// Index in the trial of each sample.
     pub samples: Vec<usize>,
+    /// Which rows the cascade fits, laid out like `rhs`; all where there is none.
+    pub fits: Option<Vec<bool>>,
+}
+
+impl Rows {
+    /// Whether the row at a place in `rhs` is fitted.
+    pub fn fits(&self, at: usize) -> bool {
+        self.fits.as_ref().is_none_or(|fits| fits[at])
+    }
 }
 
 /// Builds the rows of a trial for given unknowns.
@@ -81,6 +90,7 @@ pub fn rows<const N: usize>(
         columns,
         rhs,
         samples: (0..samples).collect(),
+        fits: None,
     }
 }
 
@@ -154,7 +164,7 @@ pub fn value_of<const N: usize>(chain: &Chain<f64, N>, segment: usize, moment: M
 }
 
 /// Derivative of the resisting torques to one parameter of one effect.
-fn gradient<const N: usize>(
+pub(crate) fn gradient<const N: usize>(
     effect: &Effect<f64>,
     p: usize,
     motion: &Motion<f64, N>,

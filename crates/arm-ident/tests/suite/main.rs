@@ -2,6 +2,7 @@
 
 mod bits;
 mod by_simulation;
+mod cascade;
 mod coloured;
 mod condense;
 mod covariance;
