@@ -171,7 +171,9 @@ def test_refuses_no_trials(session: Session) -> None:
 
 
 def test_refuses_a_folder_without_description(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"dataset.toml: file: found No such file"):
+    with pytest.raises(
+        BadInput, match=r"file: found a folder that holds no data set, allowed the folder of a data set, with dataset.toml$"
+    ):
         armrs.load_dataset(tmp_path)
 
 

@@ -271,6 +271,14 @@ def test_a_full_disk_is_said_of_the_file_that_was_asked_for(
         (["identify", "data", "--metod", "joint"], "(see armrs identify --help)"),
         (["fmu", "export", "data/model.toml", "--fmi", "1"], "'1' is not one of '2', '3' (see armrs fmu export --help)"),
         (["nonsense"], "(see armrs --help)"),
+        (
+            ["convert", "data/trials", "-o", "out"],
+            "found a folder that holds no data set, allowed the folder of a data set, with dataset.toml (that is data)",
+        ),
+        (
+            ["simulate", "data/truth.toml", "--trial", "data/trials/slow_1.csv", "--rate-hz", "1e-3"],
+            "--rate-hz: found 0.001, allowed at least one sample interval in the 11.68 s of the trial",
+        ),
     ],
 )
 def test_the_line_points_to_what_helps(

@@ -339,10 +339,12 @@ def describe(source: str | os.PathLike[str]) -> Description:
     path = checks.path("source", source)
     if not os.path.lexists(path):
         raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)
-    if path.suffix.lower() in SUFFIXES and path.is_file():
+    trial = path.suffix.lower() in SUFFIXES and path.is_file()
+    if trial or (path.is_dir() and not os.path.lexists(path / FILE)):
         above = next((folder for folder in (path.parent, path.parent.parent) if (folder / FILE).is_file()), None)
         hint = None if above is None else f"that is {above}"
-        raise BadInput("file", Text("a trial"), f"the folder of its data set, with {FILE}", file=source, hint=hint)
+        found = "a trial" if trial else "a folder that holds no data set"
+        raise BadInput("file", Text(found), f"the folder of {'its' if trial else 'a'} data set, with {FILE}", file=source, hint=hint)
     path = path / FILE if path.is_dir() else path
     return tomlfile.load(path, _description)
 

@@ -212,7 +212,7 @@ def identify(
     checks.choice("method", method, ("joint", "cascade"))
     checks.choice("motion", motion, ("auto", "measured", "simulated"))
     kinds = checks.texts("with_effects", with_effects, "kinds of effects")
-    checks.number("level", level, least=0.5, below=1.0)
+    checks.number("level", level, **LEVELS)
     slowest = min(trial.rate for trial in dataset.trials)
     if cutoff is not None and checks.number("cutoff", cutoff, above=0.0, unit="Hz") >= 0.4 * slowest:
         raise BadInput("cutoff", Text(f"{cutoff:g} Hz"), f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
@@ -276,6 +276,8 @@ def identify(
     )
 
 
+LEVELS: dict[str, Any] = {"least": 0.5, "most": 0.999999}
+"""Probabilities that intervals may have."""
 _IN_CASCADE = ("coulomb", "constant_moment")
 """Effects that the cascade finds; others it holds at what the model says."""
 

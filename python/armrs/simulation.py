@@ -242,6 +242,8 @@ def simulate(
     led = driven(drive, coupling)
     if duration is not None and led["times"] is not None and duration > led["times"][-1] + 1e-6 * dt:
         raise BadInput("duration", duration, f"at most {led['times'][-1]:.10g} s, the length of the trial")
+    if duration is None and led["times"] is not None and rate * led["times"][-1] < 1.0:
+        raise BadInput("rate", rate, f"at least one sample interval in the {led['times'][-1]:.10g} s of the trial")
     if isinstance(drive, Trial) and start is None:
         first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
         start = drive.q[first]

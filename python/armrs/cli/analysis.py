@@ -47,7 +47,7 @@ def identify(
         typer.Option(help="Cutoff of the common low-pass [Hz], above 0, below 0.4 of the sample rate; chosen from the data when absent."),
     ] = None,
     motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
-    level: Annotated[float, typer.Option(help="Probability of the intervals, from 0.5 to below 1.")] = 0.95,
+    level: Annotated[float, typer.Option(help="Probability of the intervals, from 0.5 to 0.999999.")] = 0.95,
     history: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Add the result to the history of this subject, a file of SQLite, and show it.")
     ] = None,

@@ -17,7 +17,7 @@ from .. import _armrs, checks, tomlfile
 from ..dataset import Dataset, load_dataset
 from ..errors import BadInput, Text
 from ..experiment import Experiment, experiment_of, model_at
-from ..identification import cascade_can, effects_of
+from ..identification import LEVELS, cascade_can, effects_of
 from ..model import Model
 from .change import Vary, vary_of
 
@@ -200,7 +200,7 @@ def _question(table: object) -> Question:
     kinds = given.get("with", [])
     if not isinstance(kinds, list) or not all(isinstance(kind, str) for kind in kinds):
         raise BadInput(f"{place}, with", kinds, 'a list of kinds of effects, as in ["coulomb"]')
-    level = checks.number(f"{place}, level", given.get("level", 0.95), least=0.5, most=0.999999)
+    level = checks.number(f"{place}, level", given.get("level", 0.95), **LEVELS)
     cutoff = given.get("cutoff_Hz")
     return Question(
         method=checks.choice(f"{place}, method", given.get("method", "joint"), ("joint", "cascade")),
