@@ -12,8 +12,10 @@ import pytest
 
 import armrs
 from armrs import cli
+from armrs.catalogue import catalogue
 from armrs.dataset import Dataset, write_dataset
 from armrs.discrepancy import Alternative, calibrate, compare, confirm, detectable, separate
+from armrs.discrepancy.found import Value
 from armrs.discrepancy.results import gap_data, write_gap
 from armrs.errors import BadInput
 from gap_sessions import model, session
@@ -139,6 +141,17 @@ def test_a_rhythm_has_its_own_phase_in_every_trial(frequency: float) -> None:
         assert gap.calibrated > 3.0 * gap.floor
         assert (gap.calibrated - gap.after) / (gap.calibrated - gap.floor) > 0.9, (name, gap)
     assert confirm(result)["Fy_N"].after == pytest.approx(result.gap["Fy_N"].after, rel=1e-9)
+
+
+def test_an_interval_stays_within_what_the_kind_allows(found: armrs.GapFound) -> None:
+    for effect in found.effects:
+        limits = {p.name: (p.min, p.max) for p in catalogue()[effect.kind].parameters}
+        for name, value in effect.parameters.items():
+            low, high = limits[name]
+            assert value.interval is None or low <= value.interval[0] <= value.value <= value.interval[1] <= high
+    wide = Value.of(0.01, 0.08, "rad/s", (1e-4, 1.0))
+    assert wide.interval == (1e-4, 0.01 + 1.96 * 0.08)
+    assert Value.of(0.01, None, "rad/s", (1e-4, 1.0)).interval is None
 
 
 def test_a_result_is_confirmed_on_another_day(found: armrs.GapFound) -> None:

@@ -14,16 +14,29 @@ from ..model import Model
 
 @dataclass(frozen=True)
 class Value:
-    """One parameter of a named effect: estimate, standard deviation, unit; without a standard deviation it was held."""
+    """One parameter of a named effect.
+
+    Attributes
+    ----------
+    value : float
+    std : float or None
+        Standard deviation; None for a value that was held.
+    unit : str
+    interval : (float, float) or None
+        The 95 % interval, within what its kind allows.
+    """
 
     value: float
     std: float | None
     unit: str
+    interval: tuple[float, float] | None = None
 
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval, or None for a value that was held."""
-        return None if self.std is None else (self.value - 1.96 * self.std, self.value + 1.96 * self.std)
+    @classmethod
+    def of(cls, value: float, std: float | None, unit: str, limits: tuple[float, float]) -> Value:
+        """Return a value with its interval; `limits` are what its kind allows."""
+        if std is None:
+            return cls(value, None, unit)
+        return cls(value, std, unit, (max(value - 1.96 * std, limits[0]), min(value + 1.96 * std, limits[1])))
 
 
 @dataclass(frozen=True)

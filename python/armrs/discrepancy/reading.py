@@ -59,7 +59,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
 
 
 def _without_intervals(effect: Missing) -> Missing:
-    values = {name: dataclasses.replace(value, std=None) for name, value in effect.parameters.items()}
+    values = {name: dataclasses.replace(value, std=None, interval=None) for name, value in effect.parameters.items()}
     return dataclasses.replace(effect, parameters=values)
 
 
@@ -85,10 +85,12 @@ def _missing(item: Mapping[str, Any], dataset: Dataset) -> Missing:
     kind = catalogue()[name]
     known = dict(item["sd"])
     own = in_file(name, dataset)
-    parameters = {
-        p.name: Value((own if p.linear else 1.0) * v, known[k] if k in known and math.isfinite(known[k]) else None, p.unit)
-        for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
-    }
+    parameters = {}
+    for k, (p, value) in enumerate(zip(kind.parameters, values, strict=True)):
+        sign = own if p.linear else 1.0
+        low, high = sorted((sign * p.min, sign * p.max))
+        std = known[k] if k in known and math.isfinite(known[k]) else None
+        parameters[p.name] = Value.of(sign * value, std, p.unit, (low, high))
     alternatives = []
     for (entry, _), worse, likeness in item["alternatives"]:
         why = "explains these movements as well" if worse < 2.0 else "explains these movements nearly as well"
@@ -102,7 +104,8 @@ def _apart(item: Sequence[Any], dataset: Dataset, raw: Mapping[str, Any]) -> Mis
     kind = catalogue()[name]
     first = next((k for k, p in enumerate(kind.parameters) if values[k] and p.name not in ("frequency", "phase", "start", "duration")), 0)
     parameters = {
-        p.name: Value(v, sd if k == first else None, p.unit) for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
+        p.name: Value.of(v, sd if k == first else None, p.unit, (p.min, p.max))
+        for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
     }
     if trial is not None and "start" not in parameters:
         parameters["start"] = Value(start, None, "s")

@@ -38,7 +38,7 @@ def size(effect: Mapping[str, Any]) -> str:
     text = f"{name} {number(value['value'], value['std'])} {unit(value['unit'])}".rstrip()
     if value["std"] is None:
         return text
-    low, high = (number(value["value"] + k * 1.96 * value["std"], value["std"]) for k in (-1, 1))
+    low, high = (number(end, value["std"]) for end in value["interval"])
     return f"{text} (95 %: {low} to {high})"
 
 
@@ -214,7 +214,7 @@ def missing(data: Mapping[str, Any]) -> Table:
             head = [effect["kind"], place, f"{effect['share']:.0%}"] if k == 0 else ["", "", ""]
             ends = None
             if value["std"] is not None:
-                ends = " … ".join(number(value["value"] + s * 1.96 * value["std"], value["std"]) for s in (-1, 1))
+                ends = " … ".join(number(end, value["std"]) for end in value["interval"])
             rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), ends, unit(value["unit"])])
     return Table(["effect", "at", "share", "parameter", "value", "± std", "95 % interval", "unit"], rows, 4)
 
