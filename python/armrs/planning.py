@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +136,38 @@ class Prediction:
         return f"{self.name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
 
 
+@dataclass(frozen=True)
+class Slowed:
+    """A planned movement that had to be slowed: the same path, all of it slower by one factor in time.
+
+    Attributes
+    ----------
+    movement : int
+        From 1.
+    pace : float
+        Its share of the speed that was asked for; of the acceleration that squared.
+    limit : str
+        What it would exceed if it were faster, by its name in `Limits`.
+    found, allowed : float
+        What that would be at the speed that was asked for, and the limit [unit].
+    what, unit : str
+    """
+
+    movement: int
+    pace: float
+    limit: str
+    found: float
+    allowed: float
+    what: str
+    unit: str
+
+    def __str__(self) -> str:
+        return (
+            f"movement {self.movement} is slowed to {100 * self.pace:.3g} % of the pace asked for: at all of it the {self.what} would be "
+            f"{self.found:.4g} {self.unit}, allowed {self.allowed:.4g} {self.unit}"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Movements, and what they will show.
@@ -155,6 +187,8 @@ class Plan:
     duration : float
         Of all trials together [s].
     model : Model
+    slowed : tuple of Slowed
+        The movements that had to be slowed for a limit.
     """
 
     movements: tuple[Movement, ...]
@@ -167,6 +201,7 @@ class Plan:
     robot_acceleration: float
     duration: float
     model: Model = field(repr=False)
+    slowed: tuple[Slowed, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         return f"Plan({len(self.movements)} movements, {self.duration:.4g} s; {'; '.join(map(str, self.predictions))})"
@@ -192,6 +227,7 @@ class Plan:
             "largest_robot_speed_rad_s": self.robot_speed,
             "largest_robot_acceleration_rad_s2": self.robot_acceleration,
             "duration_s": self.duration,
+            "slowed": [dict(vars(s)) for s in self.slowed],
         }
 
     def to_toml(self) -> str:
@@ -273,7 +309,8 @@ def plan(
     limits : Limits
         Of joints, speed, acceleration, the robot, force and duration.
     speeds : sequence of float
-        One movement for each, at this share of the largest speed and acceleration.
+        One movement for each, at this share of the largest speed and acceleration; slower along the same path where it would exceed
+        another limit.
     waypoints : int
         Of each movement, besides the return to the first.
     repeats, with_effects, instruments
@@ -286,9 +323,10 @@ def plan(
     Raises
     ------
     BadInput
-        For settings out of range.
+        For settings out of range, and for limits that no movement that was tried respects, even slowed: to the longest trial allowed, or
+        a tenth of the speed asked for. It names the limit, what the nearest movement takes, and what is allowed.
     IdentificationError
-        When no movement that was tried respects the limits.
+        When the movements that respect the limits cannot tell the parameters apart.
     """
     asked = _Question(model, with_effects, instruments, repeats)
     checks.instance("limits", limits, Limits)
@@ -309,7 +347,8 @@ def plan(
     }
     raw = _armrs.design(asked.rig, asked.settings, asked.sensing, bounds)
     found = tuple(Movement(t["waypoints"], speed=t["speed"], acceleration=t["acceleration"], shape="smooth") for t in raw["tasks"])
-    return asked.plan(found, raw)
+    slowed = tuple(Slowed(k, t["pace"], **t["slowed_for"]) for k, t in enumerate(raw["tasks"], start=1) if t["slowed_for"] is not None)
+    return replace(asked.plan(found, raw), slowed=slowed)
 
 
 def angles_of(text: str) -> tuple[tuple[float, float], ...]:

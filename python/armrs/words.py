@@ -261,6 +261,8 @@ def recorded(result: Mapping[str, Any]) -> None:
 
 def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print a plan and what it will show."""
+    from .planning import Slowed
+
     other = result.get("compared")
     rows = []
     for k, p in enumerate(result["predictions"]):
@@ -276,6 +278,8 @@ def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         f"worst relative deviation {100 * result['worst_relative_std']:.2g} %"
         + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
     )
+    for slow in result["slowed"]:
+        print(Slowed(**slow))
     if result.get("would_show"):
         from .discrepancy.words import limits
 

@@ -74,11 +74,13 @@ pub enum IdentError {
     },
     /// No movement that was tried respects what is allowed.
     #[error(
-        "none of {evaluations} movements respects the limits of force, speed and duration: widen them, or use fewer waypoints"
+        "none of {evaluations} movements respects the limits, slowed or not; of the nearest, {nearest}"
     )]
     NoPlan {
         /// Movements tried.
         evaluations: usize,
+        /// What the movement that comes nearest still exceeds when it is slowed as far as may be.
+        nearest: crate::design::Excess,
     },
     /// The simulated arm moves elsewhere than the measured one.
     #[error(

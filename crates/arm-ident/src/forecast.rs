@@ -138,16 +138,25 @@ pub fn forecast<const N: usize>(
     question: &Question<N>,
     tasks: &[Task<N>],
 ) -> Result<Forecast, IdentError> {
+    let seen = tasks
+        .iter()
+        .map(|task| Seen::of(question, task))
+        .collect::<Result<Vec<_>, _>>()?;
+    said(question, tasks, &seen)
+}
+
+/// What simulated movements say of the parameters.
+pub(crate) fn said<const N: usize>(
+    question: &Question<N>,
+    tasks: &[Task<N>],
+    seen: &[Seen<N>],
+) -> Result<Forecast, IdentError> {
     let model = &question.model;
-    let mut seen = Vec::new();
-    for task in tasks {
-        seen.push(simulated(question, task)?);
-    }
-    let first: Vec<&Trial<N>> = seen.iter().map(|(trial, _, _)| trial).collect();
+    let first: Vec<&Trial<N>> = seen.iter().map(|s| &s.trial).collect();
     let unknowns = unknowns(model, &question.tolerance, &first);
     let pieces = seen
         .iter()
-        .map(|(trial, course, _)| {
+        .map(|Seen { trial, course, .. }| {
             let mut found = rows(model, &unknowns, trial, &course.at_samples());
             instrument(&mut found, (model, &unknowns), trial, (course, 0.0));
             filtered(&found, trial, question.accuracy.cutoff)
@@ -155,7 +164,7 @@ pub fn forecast<const N: usize>(
         .collect::<Result<Vec<Pieces>, _>>()?;
     let torque_noise: Vec<Vec<Covariance<N>>> = seen
         .iter()
-        .map(|(trial, course, _)| noise_of(question, trial, &course.at_samples()))
+        .map(|s| noise_of(question, &s.trial, &s.course.at_samples()))
         .collect();
     let (bread, meat) = condensed(question, tasks, (&pieces, &torque_noise), unknowns.len())?;
     let covariance = covariance(&bread, &meat, &unknowns, |u| u.sd)?;
@@ -197,22 +206,14 @@ pub fn forecast<const N: usize>(
             expected: 1,
         });
     }
-    let recordings = || seen.iter().map(|(_, _, r)| r);
-    let durations: Vec<f64> = recordings().map(|r| r.time[r.len() - 1]).collect();
-    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let most = |of: fn(&Demand) -> f64| seen.iter().map(|s| of(&s.demand)).fold(0.0, f64::max);
+    let durations: Vec<f64> = seen.iter().map(|s| s.demand.duration).collect();
     Ok(Forecast {
         predicted,
-        force: recordings()
-            .flat_map(|r| r.force_on_arm.chunks_exact(2))
-            .map(|f| libm::hypot(f[0], f[1]))
-            .fold(0.0, f64::max),
-        speed: recordings().map(|r| largest(&r.qd)).fold(0.0, f64::max),
-        robot_speed: recordings()
-            .map(|r| largest(&r.robot_qd))
-            .fold(0.0, f64::max),
-        robot_acceleration: recordings()
-            .map(|r| largest(&r.robot_qdd))
-            .fold(0.0, f64::max),
+        force: most(|d| d.force),
+        speed: most(|d| d.speed),
+        robot_speed: most(|d| d.robot_speed),
+        robot_acceleration: most(|d| d.robot_acceleration),
         duration: durations
             .iter()
             .zip(tasks)
@@ -222,49 +223,89 @@ pub fn forecast<const N: usize>(
     })
 }
 
-/// The movement in the closed chain, as a trial without noise.
-fn simulated<const N: usize>(
-    question: &Question<N>,
-    task: &Task<N>,
-) -> Result<(Trial<N>, Course<N>, Recording<N>), IdentError> {
-    let model = &question.model;
-    let limits = Limits {
-        speed: task.speed,
-        acceleration: task.acceleration,
-    };
-    let movement = Movement::within(task.shape, &task.waypoints, &[limits; N], task.pause)?;
-    let interval = 1.0 / question.accuracy.rate;
-    let duration = libm::ceil(movement.duration() / interval - 1e-9).max(4.0) * interval;
-    let drive = Drive::Handle {
-        path: HandlePath::of_arm(model.chain, movement),
-        coupling: Coupling::Compliant,
-    };
-    let mut experiment = Experiment::new(Setup::new(&model.chain, model.contact), drive, duration);
-    experiment.effects = model.fitted.iter().chain(&model.held).copied().collect();
-    experiment.robot = question.robot;
-    experiment.start = Start::Equilibrium {
-        near: task.waypoints[0],
-    };
-    let parts = parts(question.accuracy.rate);
-    let finer = interval / parts as f64;
-    experiment.dt = finer / libm::ceil(finer / STEP);
-    experiment.output_interval = Some(finer);
-    let recording = simulate(&experiment)?;
-    let course = Course::new(&recording, question.accuracy.rate, parts);
-    let q = course.at_samples().q;
-    let trial = Trial {
-        role: Role::Fit,
-        configuration: 0,
-        rate: question.accuracy.rate,
-        force_on_arm: Some(course.force_at_samples()),
-        moment_on_arm: None,
-        torque: None,
-        handle: None,
-        speed: None,
-        valid: vec![true; q.len()],
-        q,
-    };
-    Ok((trial, course, recording))
+/// What one movement asks of arm and robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Demand {
+    /// Largest force on the arm \[N\].
+    pub force: f64,
+    /// Largest speed of a joint \[rad/s\].
+    pub speed: f64,
+    /// Largest speed of a joint of the robot, zero without one \[rad/s\].
+    pub robot_speed: f64,
+    /// Largest acceleration of a joint of the robot, zero without one \[rad/s²\].
+    pub robot_acceleration: f64,
+    /// Duration of one trial \[s\].
+    pub duration: f64,
+}
+
+impl Demand {
+    fn of<const N: usize>(recording: &Recording<N>) -> Self {
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let force = recording.force_on_arm.chunks_exact(2);
+        Self {
+            force: force.map(|f| libm::hypot(f[0], f[1])).fold(0.0, f64::max),
+            speed: largest(&recording.qd),
+            robot_speed: largest(&recording.robot_qd),
+            robot_acceleration: largest(&recording.robot_qdd),
+            duration: recording.time[recording.len() - 1],
+        }
+    }
+}
+
+/// A movement in the closed chain, as a trial without noise.
+pub(crate) struct Seen<const N: usize> {
+    trial: Trial<N>,
+    course: Course<N>,
+    /// What it asks of arm and robot.
+    pub demand: Demand,
+}
+
+impl<const N: usize> Seen<N> {
+    pub fn of(question: &Question<N>, task: &Task<N>) -> Result<Self, IdentError> {
+        let model = &question.model;
+        let limits = Limits {
+            speed: task.speed,
+            acceleration: task.acceleration,
+        };
+        let movement = Movement::within(task.shape, &task.waypoints, &[limits; N], task.pause)?;
+        let interval = 1.0 / question.accuracy.rate;
+        let duration = libm::ceil(movement.duration() / interval - 1e-9).max(4.0) * interval;
+        let drive = Drive::Handle {
+            path: HandlePath::of_arm(model.chain, movement),
+            coupling: Coupling::Compliant,
+        };
+        let mut experiment =
+            Experiment::new(Setup::new(&model.chain, model.contact), drive, duration);
+        experiment.effects = model.fitted.iter().chain(&model.held).copied().collect();
+        experiment.robot = question.robot;
+        experiment.start = Start::Equilibrium {
+            near: task.waypoints[0],
+        };
+        let parts = parts(question.accuracy.rate);
+        let finer = interval / parts as f64;
+        experiment.dt = finer / libm::ceil(finer / STEP);
+        experiment.output_interval = Some(finer);
+        let recording = simulate(&experiment)?;
+        let course = Course::new(&recording, question.accuracy.rate, parts);
+        let q = course.at_samples().q;
+        let trial = Trial {
+            role: Role::Fit,
+            configuration: 0,
+            rate: question.accuracy.rate,
+            force_on_arm: Some(course.force_at_samples()),
+            moment_on_arm: None,
+            torque: None,
+            handle: None,
+            speed: None,
+            valid: vec![true; q.len()],
+            q,
+        };
+        Ok(Self {
+            trial,
+            course,
+            demand: Demand::of(&recording),
+        })
+    }
 }
 
 /// Covariance of the torque residual of a single sample, at every sample \[N² m²\].

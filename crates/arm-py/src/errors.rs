@@ -56,7 +56,7 @@ pub fn invalid(error: Invalid) -> PyErr {
     }
 }
 
-/// A refusal or failure of an identification: bad data are `BadInput`, the rest is `IdentificationError`.
+/// A refusal or failure of an identification: bad data and limits that nothing respects are `BadInput`, the rest is `IdentificationError`.
 pub fn identification(error: IdentError) -> PyErr {
     let (number, error) = match error {
         IdentError::InTrial { number, error } => (Some(number), *error),
@@ -77,6 +77,17 @@ pub fn identification(error: IdentError) -> PyErr {
             name,
             Shown(found),
             &format!("{} to {}", Shown(min), Shown(max)),
+        ),
+        IdentError::NoPlan {
+            evaluations,
+            nearest,
+        } => bad_input(
+            nearest.limit.name(),
+            format!(
+                "{} in the nearest of {evaluations} movements",
+                nearest.found_text()
+            ),
+            &format!("{} {}", nearest.allowed, nearest.limit.words()[1]),
         ),
         IdentError::Rank {
             found, expected, ..

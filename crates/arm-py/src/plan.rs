@@ -2,7 +2,7 @@
 
 use arm_core::{Chain, Joints, Shape};
 use arm_ident::IdentError;
-use arm_ident::design::{Allowed, design};
+use arm_ident::design::{Allowed, Excess, design};
 use arm_ident::forecast::{Accuracy, Forecast, Question, Task, forecast};
 use numpy::{PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
@@ -157,12 +157,12 @@ pub fn design_py<'py>(
             evaluations: bounds.evaluations,
             seed: bounds.seed,
         };
-        let (tasks, found) = py
+        let found = py
             .detach(|| design(&question, &allowed, || {}))
             .map_err(identification)?;
-        let out = plain(py, &found)?;
+        let out = plain(py, &found.forecast)?;
         let list = PyList::empty(py);
-        for task in &tasks {
+        for ((task, pace), excess) in found.tasks.iter().zip(&found.paces).zip(&found.slowed_for) {
             let item = PyDict::new(py);
             let flat: Vec<f64> = task
                 .waypoints
@@ -174,12 +174,26 @@ pub fn design_py<'py>(
             item.set_item("waypoints", table)?;
             item.set_item("speed", task.speed)?;
             item.set_item("acceleration", task.acceleration)?;
+            item.set_item("pace", pace)?;
+            item.set_item("slowed_for", excess.map(|e| told(py, &e)).transpose()?)?;
             list.append(item)?;
         }
         out.set_item("tasks", list)?;
         Ok(out)
     }
     each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &bounds)))
+}
+
+/// A limit by its name in `armrs.Limits`, and what would be found at the pace asked for.
+fn told<'py>(py: Python<'py>, excess: &Excess) -> PyResult<Bound<'py, PyDict>> {
+    let item = PyDict::new(py);
+    let [what, unit] = excess.limit.words();
+    item.set_item("limit", excess.limit.name())?;
+    item.set_item("what", what)?;
+    item.set_item("found", excess.found)?;
+    item.set_item("allowed", excess.allowed)?;
+    item.set_item("unit", unit)?;
+    Ok(item)
 }
 
 fn plain<'py>(py: Python<'py>, found: &Forecast) -> PyResult<Bound<'py, PyDict>> {

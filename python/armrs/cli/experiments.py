@@ -121,6 +121,9 @@ def plan(
 ) -> int:
     """Propose movements that make the parameters identifiable, and say before the experiment how well each will be known.
 
+    A movement that would exceed the speed or the acceleration of the robot, or the force on the arm, is slowed along its own path, to the
+    longest trial allowed or a tenth of its pace at the most.
+
     Exit status 1 when a parameter will stay uncertain by more than half its value.
     """
     from .. import planning, words

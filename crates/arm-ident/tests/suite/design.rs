@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Contact, Elbow, Joints, Robot, Shape, models};
 use arm_ident::IdentError;
-use arm_ident::design::{Allowed, design};
+use arm_ident::design::{Allowed, Excess, Limit, design};
 use arm_ident::forecast::{Accuracy, Question, Task, forecast};
 use arm_ident::trial::{Model, Tolerance};
 
@@ -112,11 +112,14 @@ fn deviations_grow_with_the_noise_and_stay_above_the_calibration() {
 fn a_longer_search_is_no_worse_and_the_same_seed_gives_the_same_plan() {
     let question = question(Tolerance::default());
     let mut calls = 0;
-    let (tasks, first) = design(&question, &allowed(12), || calls += 1).expect("a plan");
+    let plan = design(&question, &allowed(12), || calls += 1).expect("a plan");
     assert_eq!(calls, 12);
-    let (again, _) = design(&question, &allowed(12), || {}).expect("a plan");
-    assert_eq!(tasks, again);
-    let (_, longer) = design(&question, &allowed(40), || {}).expect("a plan");
+    let again = design(&question, &allowed(12), || {}).expect("a plan");
+    assert_eq!(plan, again);
+    let (tasks, first) = (plan.tasks, plan.forecast);
+    let longer = design(&question, &allowed(40), || {})
+        .expect("a plan")
+        .forecast;
     assert!(longer.worst() <= 1.05 * first.worst());
     for (task, speed) in tasks.iter().zip([2.0, 0.6]) {
         assert_eq!(task.waypoints.len(), 5);
@@ -133,29 +136,78 @@ fn a_longer_search_is_no_worse_and_the_same_seed_gives_the_same_plan() {
 fn a_plan_respects_the_speed_and_the_acceleration_of_the_robot() {
     let mut question = question(Tolerance::default());
     question.robot = Some(Robot::new([0.45, 0.45], [1.0, -0.1], Elbow::Up).expect("valid"));
-    let free = design(&question, &allowed(15), || {}).expect("a plan").1;
+    let free = design(&question, &allowed(15), || {})
+        .expect("a plan")
+        .forecast;
     let limit = 0.7 * free.robot_speed;
     assert!(limit > 0.0);
     let slow = Allowed {
         robot_speed: limit,
         ..allowed(15)
     };
-    let held = design(&question, &slow, || {}).expect("a plan").1;
+    let held = design(&question, &slow, || {}).expect("a plan").forecast;
     assert!(held.robot_speed <= limit);
-    let free = design(&question, &allowed(60), || {}).expect("a plan").1;
+    let free = design(&question, &allowed(60), || {})
+        .expect("a plan")
+        .forecast;
     let limit = 0.8 * free.robot_acceleration;
     assert!(limit > 0.0);
     let gentle = Allowed {
         robot_acceleration: limit,
         ..allowed(60)
     };
-    let held = design(&question, &gentle, || {}).expect("a plan").1;
+    let held = design(&question, &gentle, || {}).expect("a plan").forecast;
     assert!(held.robot_acceleration <= limit);
     // Without a robot there is neither.
     question.robot = None;
     let none = forecast(&question, &[task(1)]).expect("a forecast");
     assert_eq!(none.robot_speed.to_bits(), 0.0_f64.to_bits());
     assert_eq!(none.robot_acceleration.to_bits(), 0.0_f64.to_bits());
+}
+
+/// One movement whose forces are those of inertia.
+fn quick() -> Allowed<2> {
+    Allowed {
+        speed: 5.0,
+        acceleration: 60.0,
+        force: f64::INFINITY,
+        speeds: vec![1.0],
+        ..allowed(1)
+    }
+}
+
+#[test]
+fn a_movement_that_asks_too_much_is_slowed_along_its_own_path() {
+    let mut question = question(Tolerance::default());
+    question.robot = Some(Robot::new([0.45, 0.45], [1.0, -0.1], Elbow::Up).expect("valid"));
+    // One movement is tried: without slowing there would be no plan.
+    let of = |bounds: &Allowed<2>| design(&question, bounds, || {}).expect("a slower plan");
+    let fast = quick();
+    let free = of(&fast);
+    let force = 0.8 * free.forecast.force;
+    let held = of(&Allowed { force, ..fast });
+    let excess = held.slowed_for[0].expect("slowed");
+    assert_eq!((excess.limit, excess.pace), (Limit::Force, 1.0));
+    assert_eq!((excess.found, excess.allowed), (free.forecast.force, force));
+    assert!(held.forecast.force <= force && held.forecast.force > 0.9 * force);
+    let free = of(&allowed(1));
+    assert_eq!(free.slowed_for, [None, None]);
+    let acceleration = 0.5 * free.forecast.robot_acceleration;
+    let held = of(&Allowed {
+        robot_acceleration: acceleration,
+        ..allowed(1)
+    });
+    let limits = [0, 1].map(|k| held.slowed_for[k].map(|e: Excess| e.limit));
+    assert_eq!(limits, [Some(Limit::RobotAcceleration), None]);
+    assert!(held.forecast.robot_acceleration <= acceleration);
+    let (fast, slow) = (&free.tasks[0], &held.tasks[0]);
+    assert_eq!(fast.waypoints, slow.waypoints);
+    // Slower by a factor in time: half the acceleration at 1/√2 of the speed.
+    let pace = slow.speed / fast.speed;
+    assert_eq!(held.paces, [pace, 1.0]);
+    assert!((pace - 0.5_f64.sqrt()).abs() < 0.05, "{pace}");
+    assert!((slow.acceleration / fast.acceleration - pace * pace).abs() < 1e-12);
+    assert_eq!(free.tasks[1], held.tasks[1]);
 }
 
 #[test]
@@ -165,6 +217,38 @@ fn limits_that_nothing_respects_are_an_error() {
         ..allowed(5)
     };
     let error = design(&question(Tolerance::default()), &tight, || {}).expect_err("no plan");
-    assert_eq!(error, IdentError::NoPlan { evaluations: 5 });
+    let IdentError::NoPlan { nearest, .. } = error else {
+        panic!("{error}");
+    };
+    // Dry friction alone takes more.
+    assert_eq!((nearest.limit, nearest.allowed), (Limit::Force, 0.5));
+    assert!(nearest.found > 0.5 && nearest.pace < 1.0);
     assert!(error.to_string().contains("none of 5 movements"));
+    // What is left at the slowest pace is measured there: with a newton more there is a plan, and shorter trials leave none.
+    let one = |force, duration| {
+        let allowed = Allowed {
+            force,
+            duration,
+            ..quick()
+        };
+        design(&question(Tolerance::default()), &allowed, || {})
+    };
+    let free = one(f64::INFINITY, 15.0).expect("a plan").forecast;
+    let Err(IdentError::NoPlan { nearest, .. }) = one(0.5, 15.0) else {
+        panic!("a plan")
+    };
+    assert!(nearest.found + 1.0 < free.force);
+    let plan = one(nearest.found + 1.0, 15.0).expect("a plan");
+    assert!(plan.paces[0] < 1.0 && plan.forecast.force <= nearest.found + 1.0);
+    assert!(plan.forecast.durations[0] > free.durations[0] && plan.forecast.durations[0] <= 15.0);
+    let longest = free.durations[0];
+    let error = one(f64::INFINITY, 0.9 * longest).expect_err("too long");
+    let text = format!("duration of a trial: found {longest:.3} s, allowed");
+    assert!(error.to_string().contains(&text), "{error}");
+    // Trials that may be hardly longer leave no room to slow.
+    let error = one(nearest.found + 1.0, 1.05 * longest).expect_err("too much");
+    assert!(
+        matches!(&error, IdentError::NoPlan { nearest, .. } if nearest.limit == Limit::Force && nearest.pace > 0.9),
+        "{error}"
+    );
 }
