@@ -86,8 +86,12 @@ def led(
     return Dataset("led", model(), tuple(trials), force_on="arm", synthetic=True)
 
 
-def test_the_contact_is_read_off_the_ringing_of_the_arm() -> None:
-    first = calibrate(led(armrs.Contact((1e4, 1e4), (32.0, 32.0)), shape="trapezoid"), threads=2)
+@pytest.mark.parametrize("amplitude", [0.0, 0.15])
+def test_the_contact_is_read_off_the_ringing_of_the_arm(amplitude: float) -> None:
+    # Also of one that trembles, which is no ringing.
+    tremor = armrs.Effect("tremor", 2, parameters={"amplitude": amplitude, "frequency": 6.3})
+    data = led(armrs.Contact((1e4, 1e4), (32.0, 32.0)), [tremor], phases=(0.3, 2.2, 4.4, 5.5), shape="trapezoid")
+    first = calibrate(data, threads=2)
     absorbed = {a.name: a.value for a in first.absorbed}
     for axis in "yz":
         # 25 N s/m were believed.
@@ -125,6 +129,16 @@ def test_a_handle_beside_the_hand_turns_the_wrist() -> None:
     assert wrist.calibrated is not None
     # The force on a lever of 0.4 mm turns the wrist by milliradians; what is left is noise.
     assert wrist.before > 1e-3 and wrist.calibrated < 2e-4
+
+
+def test_a_slow_ripple_below_the_noise_is_seen_in_all_trials_together() -> None:
+    ripple = armrs.Effect("robot_ripple", parameters={"y": 8e-5, "z": -4e-5, "frequency": 1.7, "phase": 0.7})
+    result = armrs.find_gap(session(ripple), threads=2, separate=False)
+    assert [e.kind for e in result.effects] == ["robot_ripple"]
+    values = result.effects[0].parameters
+    assert values["frequency"].value == pytest.approx(1.7, abs=0.02)
+    # A tenth of the noise of the angles.
+    assert values["y"].value == pytest.approx(8e-5, abs=2.5e-5)
 
 
 @pytest.mark.parametrize("frequency", [2.5, 6.3])

@@ -32,11 +32,17 @@ impl Apart {
 
     /// Whether another is the same rhythm.
     pub fn is_like(&self, other: &Self) -> bool {
-        /// Difference of two frequencies that are one \[Hz\].
-        const NEAR: f64 = 0.3;
         let (a, b) = (&self.effect, &other.effect);
         let same = a.kind == b.kind && a.index == b.index && self.trial == other.trial;
-        same && (self.wave()[0] - other.wave()[0]).abs() < NEAR
+        same && self.swings_with(other)
+    }
+
+    /// Whether another rhythm has the same frequency, whatever makes it.
+    pub fn swings_with(&self, other: &Self) -> bool {
+        /// Difference of two frequencies that are one \[Hz\].
+        const NEAR: f64 = 0.3;
+        let rhythms = self.trial.is_none() && other.trial.is_none();
+        rhythms && (self.wave()[0] - other.wave()[0]).abs() < NEAR
     }
 
     /// From when to when it lasts \[s\].

@@ -214,13 +214,36 @@ impl Library {
         anchor: &Anchor<N>,
         periodic: Option<[f64; 2]>,
     ) -> Result<Self, GapError> {
+        Self::of(study, anchor, study.session.kinds(), periodic.as_slice())
+    }
+
+    /// Asks what is periodic alone, in waves of the given frequencies \[Hz\] and phases \[rad\].
+    ///
+    /// # Errors
+    /// As [`Study::responses`].
+    pub fn of_waves<const N: usize>(
+        study: &Study<N>,
+        anchor: &Anchor<N>,
+        waves: &[[f64; 2]],
+    ) -> Result<Self, GapError> {
+        let kinds = study.session.kinds();
+        let kinds = kinds.filter(|k| k.probe().nature == Nature::Periodic);
+        Self::of(study, anchor, kinds, waves)
+    }
+
+    fn of<const N: usize>(
+        study: &Study<N>,
+        anchor: &Anchor<N>,
+        kinds: impl Iterator<Item = Kind>,
+        waves: &[[f64; 2]],
+    ) -> Result<Self, GapError> {
         let hypothesis = &anchor.hypothesis;
         let motions = motions(study, anchor);
         let mut candidates = Vec::new();
-        for kind in study.session.kinds() {
+        for kind in kinds {
             for index in places(study.session, kind) {
                 for asked in kind.probe().questions.iter().enumerate() {
-                    let mut own = ask(&motions, kind, index, asked, periodic);
+                    let mut own = ask(&motions, kind, index, asked, waves);
                     // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
                     if !study.repeated && kind.probe().nature != Nature::Periodic {
                         own.iter_mut().for_each(|c| c.refined = &[]);
@@ -395,7 +418,7 @@ fn ask<const N: usize>(
     kind: Kind,
     index: usize,
     (number, question): (usize, &'static Question),
-    periodic: Option<[f64; 2]>,
+    waves: &[[f64; 2]],
 ) -> Vec<Candidate> {
     let nature = kind.probe().nature;
     if matches!(nature, Nature::Rhythm | Nature::Burst) {
@@ -407,13 +430,15 @@ fn ask<const N: usize>(
     }
     let mut shapes = vec![plain];
     if nature == Nature::Periodic {
-        let Some(wave) = periodic else {
-            return Vec::new();
-        };
         // A kind that is periodic refines its frequency and its phase.
-        for (&p, value) in question.refined.iter().zip(wave) {
-            shapes[0].parameters[p] = value;
-        }
+        let shape = |wave: &[f64; 2]| {
+            let mut shape = plain;
+            for (&p, value) in question.refined.iter().zip(wave) {
+                shape.parameters[p] = *value;
+            }
+            shape
+        };
+        shapes = waves.iter().map(shape).collect();
     }
     let joint = index.min(N - 1);
     let angles = || {

@@ -26,6 +26,7 @@ pub mod scan;
 pub mod search;
 pub mod separate;
 pub mod session;
+pub mod slow_ripple;
 pub mod spectrum;
 pub mod spread;
 pub mod stretches;

@@ -85,12 +85,13 @@ impl<const N: usize> Study<'_, N> {
                 None => best.push(suspect),
             }
         }
-        // What is left of a rhythm would pass for ringing.
-        if self.session.sight == Sight::Led
-            && self.rhythm(&anchor, Line::BetweenRepeats)?.is_none()
-            && let Some(hypothesis) = self.tuned(&calibrated.hypothesis)
-        {
-            calibrated.hypothesis = hypothesis;
+        if self.session.sight == Sight::Led {
+            let rhythm = self
+                .rhythm(&anchor, Line::BetweenRepeats)?
+                .map(|r| r.effect);
+            if let Some(hypothesis) = self.tuned(&calibrated.hypothesis, rhythm.as_slice()) {
+                calibrated.hypothesis = hypothesis;
+            }
         }
         progress("done", 1.0);
         Ok(Look {

@@ -5,12 +5,14 @@
 
 use std::sync::Arc;
 
+use arm_core::effect::Effect;
 use nalgebra::{DMatrix, DVector};
 
+use crate::apart::shapes_of;
 use crate::fit::{departure, stepped};
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::noise::dot;
-use crate::normal::Cluster;
+use crate::normal::{Cluster, Scaled, factor};
 use crate::predict::{Channels, away_from_gaps, difference, margin, smooth};
 use crate::session::Sight;
 use crate::study::Study;
@@ -21,9 +23,20 @@ const TURNS: usize = 4;
 const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
 /// A step that lowers the cost by less than this share is the last.
 const ENOUGH: f64 = 1e-3;
+/// Powers of time with which the size of a rhythm may change over a trial.
+const SLOWLY: i32 = 3;
 
 /// What a hypothesis leaves above the band, in sizes of each channel: one row of numbers for one trial of each movement.
 type Left = Vec<f64>;
+
+/// What of the ringing is compared.
+struct Heard {
+    trials: Vec<usize>,
+    /// Frequencies of what swings besides, which would pass for ringing \[Hz\].
+    swings: Vec<f64>,
+    /// In which each channel counts.
+    sizes: Vec<f64>,
+}
 
 /// Where a contact is refitted to, and what it then leaves.
 struct Tuned<const N: usize> {
@@ -37,16 +50,21 @@ impl<const N: usize> Study<'_, N> {
     /// What the band of the comparison told is where they start from and are drawn to, with the uncertainty from before; where
     /// the ringing plainly speaks for the contact as given, that takes its place. `None` where no contact is compared, or the
     /// ringing tells nothing better.
-    pub fn tuned(&self, start: &Hypothesis<N>) -> Option<Hypothesis<N>> {
+    /// * `rhythms` - what swings besides and would pass for ringing: it is taken out, with a size and phase that change slowly
+    pub fn tuned(&self, start: &Hypothesis<N>, rhythms: &[Effect<f64>]) -> Option<Hypothesis<N>> {
         /// What the other start must gain, in squares of what is left: as an effect of as many parameters must.
         const PLAIN: f64 = 12.0;
         if self.session.sight != Sight::Led {
             return None;
         }
-        let trials = self.one_of_each();
-        let first = self.above(&trials, start)?;
-        let sizes = sizes(&first);
-        let before = joined(&first, &sizes);
+        let swing = |r: &Effect<f64>| r.parameters[shapes_of(r.kind)[0]];
+        let mut heard = Heard {
+            trials: self.one_of_each(),
+            swings: rhythms.iter().map(swing).collect(),
+            sizes: vec![1.0; self.session.channels()],
+        };
+        heard.sizes = sizes(&self.above(&heard, start)?);
+        let before = self.left_ringing(&heard, start)?;
         let given = Hypothesis {
             contact: self.session.given().contact,
             ..start.clone()
@@ -56,7 +74,7 @@ impl<const N: usize> Study<'_, N> {
                 hypothesis: hypothesis.clone(),
                 left,
             };
-            self.tuned_from(start, &trials, &sizes)
+            self.tuned_from(start, &heard)
         };
         let mut best = from(start, before.clone());
         let is_far = |c: &Coordinate| {
@@ -65,8 +83,8 @@ impl<const N: usize> Study<'_, N> {
         };
         let far = self.session.nuisances().iter().any(is_far);
         if far
-            && let Some(left) = self.above(&trials, &given)
-            && let Some(other) = from(&given, joined(&left, &sizes))
+            && let Some(left) = self.left_ringing(&heard, &given)
+            && let Some(other) = from(&given, left)
         {
             let least = best.as_ref().map_or(&before, |b| &b.left);
             if dot(&other.left, &other.left) + PLAIN < dot(least, least) {
@@ -77,7 +95,7 @@ impl<const N: usize> Study<'_, N> {
     }
 
     /// Gauss and Newton's method from a start, whose contact is what is believed; `None` where a step cannot be simulated.
-    fn tuned_from(&self, mut best: Tuned<N>, trials: &[usize], sizes: &[f64]) -> Option<Tuned<N>> {
+    fn tuned_from(&self, mut best: Tuned<N>, heard: &Heard) -> Option<Tuned<N>> {
         let coordinates: Vec<Coordinate> = self
             .session
             .nuisances()
@@ -88,7 +106,7 @@ impl<const N: usize> Study<'_, N> {
                 ..c
             })
             .collect();
-        let left = |h: &Hypothesis<N>| Some(joined(&self.above(trials, h)?, sizes));
+        let left = |h: &Hypothesis<N>| self.left_ringing(heard, h);
         let cost = |h: &Hypothesis<N>, left: &Left| dot(left, left) + departure(h, &coordinates);
         for _ in 0..TURNS {
             let before = cost(&best.hypothesis, &best.left);
@@ -166,22 +184,86 @@ impl<const N: usize> Study<'_, N> {
         out
     }
 
-    /// What a hypothesis leaves of every channel above the band, away from gaps, trial by trial.
-    fn above(&self, trials: &[usize], hypothesis: &Hypothesis<N>) -> Option<Vec<Channels>> {
+    /// What a hypothesis leaves of every channel above the band, away from gaps and without what swings, trial by trial.
+    fn above(&self, heard: &Heard, hypothesis: &Hypothesis<N>) -> Option<Vec<Channels>> {
         let one = |i: usize| {
-            let (trial, course) = (&self.session.trials[trials[i]], &self.courses[trials[i]]);
+            let trial = heard.trials[i];
+            let (valid, course) = (&self.session.trials[trial].valid, &self.courses[trial]);
             let run = self.session.run(hypothesis, course).ok()?;
             let shown = self.session.read_raw(hypothesis, course, &run).ok()?;
             let left = difference(&course.raw, &shown);
-            let above = difference(&left, &smooth(&left, course.band, course.rate).ok()?);
-            let kept = away_from_gaps(&trial.valid, margin(course.rate, course.band));
-            let pick = |channel: &Vec<f64>| {
-                let each = std::iter::zip(channel, &kept);
-                each.filter(|(_, kept)| **kept).map(|(v, _)| *v).collect()
-            };
-            Some(above.iter().map(pick).collect::<Channels>())
+            let mut above = difference(&left, &smooth(&left, course.band, course.rate).ok()?);
+            let kept = away_from_gaps(valid, margin(course.rate, course.band));
+            let kept: Vec<usize> = (0..kept.len()).filter(|&i| kept[i]).collect();
+            for channel in &mut above {
+                *channel = kept.iter().map(|&i| channel[i]).collect();
+            }
+            let swings = Swings::of(&heard.swings, &kept, course.rate);
+            swings.take_out(&mut above);
+            Some(above)
         };
-        self.parallel(trials.len(), one).into_iter().collect()
+        let trials = heard.trials.len();
+        self.parallel(trials, one).into_iter().collect()
+    }
+
+    /// The same in one row, each channel in its size.
+    fn left_ringing(&self, heard: &Heard, hypothesis: &Hypothesis<N>) -> Option<Left> {
+        let trials = self.above(heard, hypothesis)?;
+        let each = trials
+            .iter()
+            .flat_map(|t| std::iter::zip(t, &heard.sizes))
+            .flat_map(|(channel, size)| channel.iter().map(move |v| v / size));
+        Some(each.collect())
+    }
+}
+
+/// Swings of fixed frequencies whose sizes and phases change slowly, as those of a trembling arm do that is led elsewhere.
+struct Swings {
+    columns: Vec<Vec<f64>>,
+    solver: Option<Scaled>,
+}
+
+impl Swings {
+    /// * `kept` - which samples are compared
+    fn of(frequencies: &[f64], kept: &[usize], rate: f64) -> Self {
+        let last = kept.last().map_or(1.0, |&i| i.max(1) as f64);
+        let columns: Vec<Vec<f64>> = frequencies
+            .iter()
+            .flat_map(|frequency| {
+                let turns = core::f64::consts::TAU * frequency / rate;
+                let swing = move |i: f64, quarter: bool| {
+                    let (sin, cos) = libm::sincos(turns * i);
+                    if quarter { cos } else { sin }
+                };
+                (0..SLOWLY).flat_map(move |power| {
+                    [false, true].map(|quarter| {
+                        let one = |&i: &usize| {
+                            let i = i as f64;
+                            libm::pow(2.0 * i / last - 1.0, f64::from(power)) * swing(i, quarter)
+                        };
+                        kept.iter().map(one).collect()
+                    })
+                })
+            })
+            .collect();
+        let count = columns.len();
+        let gram = DMatrix::from_fn(count, count, |a, b| dot(&columns[a], &columns[b]));
+        Self {
+            solver: factor(gram).filter(|_| count > 0),
+            columns,
+        }
+    }
+
+    fn take_out(&self, channels: &mut Channels) {
+        let Some(solver) = &self.solver else { return };
+        for channel in channels {
+            let score = DVector::from_fn(self.columns.len(), |a, _| dot(&self.columns[a], channel));
+            for (column, size) in std::iter::zip(&self.columns, &solver.solve(&score)) {
+                for (value, swing) in std::iter::zip(channel.iter_mut(), column) {
+                    *value -= size * swing;
+                }
+            }
+        }
     }
 }
 
@@ -194,12 +276,5 @@ fn sizes(trials: &[Channels]) -> Vec<f64> {
             let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
             libm::sqrt(sum / f64::max(count, 1.0)).max(f64::MIN_POSITIVE)
         })
-        .collect()
-}
-
-/// All trials and channels in one row, each channel in its size.
-fn joined(trials: &[Channels], sizes: &[f64]) -> Left {
-    let each = trials.iter().flat_map(|t| std::iter::zip(t, sizes));
-    each.flat_map(|(channel, size)| channel.iter().map(move |v| v / size))
         .collect()
 }

@@ -7,7 +7,7 @@ use crate::anchor::{Anchor, Response};
 use crate::candidate::{Library, Twin};
 use crate::fit::{Fitted, priors, regularise};
 use crate::normal::{Normal, factor, solve};
-use crate::spread::spread;
+use crate::spread::{spread, unlike};
 use crate::study::Study;
 
 /// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
@@ -24,6 +24,8 @@ pub struct Scan {
     columns: Vec<std::ops::Range<usize>>,
     /// How much more the score of each candidate scatters between repeats than the noise allows; at least one.
     pub spread: Vec<f64>,
+    /// By how much movements differ in what each candidate gains, beyond chance; see [`unlike`].
+    pub unlike: Vec<f64>,
     /// What each candidate must earn to be named.
     pub price: Vec<f64>,
     /// Misfit for each degree of freedom that no choice of candidates would take away; at least one, and one until it is measured
@@ -106,6 +108,7 @@ impl Scan {
             score,
             columns: ranges,
             spread: vec![1.0; library.candidates.len()],
+            unlike: vec![0.0; library.candidates.len()],
             price: library
                 .candidates
                 .iter()
@@ -133,6 +136,7 @@ impl Scan {
             });
             let weights: Vec<(usize, f64)> = own.chain(others).collect();
             scan.spread[index] = spread(&clusters, &weights);
+            scan.unlike[index] = unlike(&clusters, &weights);
         }
         Ok(scan)
     }

@@ -161,32 +161,39 @@ impl<'a, const N: usize> Study<'a, N> {
         if let Some(before) = apart.iter().position(|a| a.trial.is_none())
             && !hunt.current.asked.is_empty()
         {
-            // What rang may have been what was named since.
-            let without = std::mem::replace(&mut self.courses, measured.clone());
+            // What rang may have been what was named since; and how an arm answers a rhythm depends on what was named.
+            self.courses.clone_from(&measured);
             let again = self.rhythm(&hunt.anchor, Line::BetweenRepeats)?;
-            if again.is_some_and(|a| a.is_like(&apart[before])) {
-                self.courses = without;
+            if let Some(again) = again.filter(|a| a.is_like(&apart[before])) {
+                self.take_out(&hunt.anchor, &again)?;
+                apart[before] = again;
+                hunt = self.renewed(hunt)?;
             } else {
                 apart.remove(before);
                 let settled = self.calibrate_anew()?;
                 hunt = self.hunt(settled, periodic, progress)?;
             }
         }
-        if led
-            && let Some(found) = self.rhythm(&hunt.anchor, Line::OfTheRobot)?
-            && (found.locked || found.wave()[0] > SLOW)
-            && found.gain > hunt.least(&found.effect)
-            && !apart.iter().any(|a| a.is_like(&found))
-        {
-            let [frequency, phase] = found.wave();
-            if frequency < SLOW {
-                periodic = Some([frequency, phase]);
-            } else {
-                self.take_out(&hunt.anchor, &found)?;
-                apart.push(found);
+        if led {
+            let found = self.rhythm(&hunt.anchor, Line::OfTheRobot)?;
+            let found = found.filter(|f| {
+                (f.locked || f.wave()[0] > SLOW)
+                    && f.gain > hunt.least(&f.effect)
+                    // What is left of a rhythm that was taken out has its frequency.
+                    && !apart.iter().any(|a| a.swings_with(f))
+            });
+            periodic = match &found {
+                Some(found) => Some(found.wave()).filter(|[frequency, _]| *frequency < SLOW),
+                None => self.slow_ripple((&hunt.current, &hunt.anchor), hunt.scale)?,
+            };
+            if let (Some(found), None) = (&found, periodic) {
+                self.take_out(&hunt.anchor, found)?;
+                apart.push(found.clone());
             }
-            let again = self.calibrate_anew()?;
-            hunt = self.hunt(again, periodic, progress)?;
+            if found.is_some() || periodic.is_some() {
+                let again = self.calibrate_anew()?;
+                hunt = self.hunt(again, periodic, progress)?;
+            }
         }
         if apart.iter().any(|a| a.trial.is_some()) && !hunt.current.asked.is_empty() {
             // What looked like a disturbance may have been what was named since.
@@ -253,12 +260,9 @@ impl<'a, const N: usize> Study<'a, N> {
             .filter(|a| a.trial.is_none())
             .map(|a| a.effect)
             .collect();
-        // What is left of a rhythm would pass for ringing.
-        if rhythms.is_empty() {
-            for fitted in [&mut calibrated, &mut amended] {
-                if let Some(hypothesis) = self.tuned(&fitted.hypothesis) {
-                    fitted.hypothesis = hypothesis;
-                }
+        for fitted in [&mut calibrated, &mut amended] {
+            if let Some(hypothesis) = self.tuned(&fitted.hypothesis, &rhythms) {
+                fitted.hypothesis = hypothesis;
             }
         }
         self.courses = measured;
@@ -335,12 +339,7 @@ impl<'a, const N: usize> Study<'a, N> {
             let settled = self.afresh(settled);
             (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
             if self.leave_out_rest(&hunt.anchor) {
-                self.measure_noise(&self.anchor(&hunt.current.hypothesis)?)?;
-                let from;
-                (hunt.calibrated, from) = self.settle(hunt.calibrated.hypothesis, Vec::new())?;
-                hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
-                let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
-                (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
+                hunt = self.renewed(hunt)?;
             }
             if hunt.is_back(self.dry) {
                 hunt.ladder.pop();
@@ -351,6 +350,17 @@ impl<'a, const N: usize> Study<'a, N> {
                 break;
             }
         }
+        Ok(hunt)
+    }
+
+    /// What was found, after the data that are compared have changed.
+    fn renewed(&mut self, mut hunt: Hunt<'a, N>) -> Result<Hunt<'a, N>, GapError> {
+        self.measure_noise(&self.anchor(&hunt.current.hypothesis)?)?;
+        let from;
+        (hunt.calibrated, from) = self.settle(hunt.calibrated.hypothesis, Vec::new())?;
+        hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
+        let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
+        (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
         Ok(hunt)
     }
 
