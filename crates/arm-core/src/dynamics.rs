@@ -98,49 +98,89 @@ pub fn accelerations<T: Scalar, const N: usize>(
     qd: &Joints<T, N>,
     load: &Load<T, N>,
 ) -> Joints<T, N> {
-    let (m, mut rows) = link_motion(products, pose, &to_links(qd));
-    let [fy, fz] = load.force_on_arm;
-    each!(i in 0, N => {
-        // Weight and force at the tip turn the link with the same two lever arms.
-        let [level, upright] = products.weight[i];
-        let a = products.length[i];
-        let pushed = (a * fz + level) * pose.cos[i] - (a * fy + upright) * pose.sin[i];
-        let beyond = if i + 1 < N { load.torque[i + 1] } else { -load.moment_on_arm };
-        rows[i] = load.torque[i] - beyond + pushed - rows[i];
-    });
-    solve(m, products.first, &mut rows);
-    joints(from_fn(|i| {
-        if i == 0 {
-            rows[0]
-        } else {
-            rows[i] - rows[i - 1]
-        }
-    }))
+    Resistance::at(products, pose, qd).accelerations(products, pose, load)
 }
 
-/// Solves `M x = b` in place for symmetric positive definite M, given by its rows up to the diagonal, by `L D Lᵀ`;
-/// `first` is one over its first entry.
-#[inline(always)]
-fn solve<T: Scalar, const N: usize>(mut m: [[T; N]; N], first: T, b: &mut [T; N]) {
-    let mut reciprocal = [first; N];
-    each!(k in 0, N => {
-        if k > 0 {
-            reciprocal[k] = T::ONE / m[k][k];
-        }
-        each!(i in k + 1, N => {
-            let factor = m[i][k] * reciprocal[k];
-            each!(c in i, N => {
-                m[c][i] -= factor * m[c][k];
+/// What an arm in one state opposes to any load: its inertia matrix in link angles, factorised as `L D Lᵀ`, and what its speeds
+/// demand. Of several loads in one state each then costs a third.
+#[derive(Clone, Copy, Debug)]
+pub struct Resistance<T, const N: usize> {
+    /// `L D` up to the diagonal, by rows.
+    matrix: [[T; N]; N],
+    /// One over `D`.
+    reciprocal: [T; N],
+    /// `C q̇` of each link \[N m\].
+    demand: [T; N],
+}
+
+impl<T: Scalar, const N: usize> Resistance<T, N> {
+    /// The resistance in a state.
+    #[inline(always)]
+    pub fn at(products: &Products<T, N>, pose: &Pose<T, N>, qd: &Joints<T, N>) -> Self {
+        let (mut m, demand) = link_motion(products, pose, &to_links(qd));
+        let mut reciprocal = [products.first; N];
+        each!(k in 0, N => {
+            if k > 0 {
+                reciprocal[k] = T::ONE / m[k][k];
+            }
+            each!(i in k + 1, N => {
+                let factor = m[i][k] * reciprocal[k];
+                each!(c in i, N => {
+                    m[c][i] -= factor * m[c][k];
+                });
             });
-            b[i] -= factor * b[k];
         });
-    });
-    each!(i in rev 0, N => {
-        each!(k in i + 1, N => {
-            b[i] -= m[k][i] * b[k];
+        Self {
+            matrix: m,
+            reciprocal,
+            demand,
+        }
+    }
+
+    /// Joint accelerations under a load \[rad/s²\].
+    #[inline(always)]
+    pub fn accelerations(
+        &self,
+        products: &Products<T, N>,
+        pose: &Pose<T, N>,
+        load: &Load<T, N>,
+    ) -> Joints<T, N> {
+        let mut rows = self.demand;
+        let [fy, fz] = load.force_on_arm;
+        each!(i in 0, N => {
+            // Weight and force at the tip turn the link with the same two lever arms.
+            let [level, upright] = products.weight[i];
+            let a = products.length[i];
+            let pushed = (a * fz + level) * pose.cos[i] - (a * fy + upright) * pose.sin[i];
+            let beyond = if i + 1 < N { load.torque[i + 1] } else { -load.moment_on_arm };
+            rows[i] = load.torque[i] - beyond + pushed - rows[i];
         });
-        b[i] = b[i] * reciprocal[i];
-    });
+        self.solve(&mut rows);
+        joints(from_fn(|i| {
+            if i == 0 {
+                rows[0]
+            } else {
+                rows[i] - rows[i - 1]
+            }
+        }))
+    }
+
+    #[inline(always)]
+    fn solve(&self, b: &mut [T; N]) {
+        let (m, reciprocal) = (&self.matrix, &self.reciprocal);
+        each!(k in 0, N => {
+            each!(i in k + 1, N => {
+                let factor = m[i][k] * reciprocal[k];
+                b[i] -= factor * b[k];
+            });
+        });
+        each!(i in rev 0, N => {
+            each!(k in i + 1, N => {
+                b[i] -= m[k][i] * b[k];
+            });
+            b[i] = b[i] * reciprocal[i];
+        });
+    }
 }
 
 /// Force of the proximal side on each joint, from the motion and the force at the tip \[N\].

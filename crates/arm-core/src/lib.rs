@@ -53,7 +53,7 @@ pub use contact::Contact;
 pub use contribution::{Contributions, contributions};
 pub use coriolis::{centrifugal, coriolis, coriolis_matrix};
 pub use dynamics::{
-    Load, accelerations, forward_dynamics, inverse_dynamics, joint_force, static_torque,
+    Load, Resistance, accelerations, forward_dynamics, inverse_dynamics, joint_force, static_torque,
 };
 pub use energy::{kinetic_energy, potential_energy};
 pub use equation::{Equation, Measured, Needed, Prior};

@@ -2,9 +2,9 @@
 
 use arm_core::effect::{Effect, Local, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Invalid, Joints, Lanes, Load, Placement, Plane, Pose, Products, Scalar, Setup,
-    accelerations, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip,
-    tip_velocity,
+    Chain, Contact, Invalid, Joints, Lanes, Load, Placement, Plane, Pose, Products, Resistance,
+    Scalar, Setup, accelerations, forward_dynamics, joint_force, kinetic_energy, potential_energy,
+    tip, tip_velocity,
 };
 
 use crate::Handle;
@@ -312,6 +312,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     ) -> Joints<T, N> {
         let qd = motion.qd;
         let terms = (!self.in_link_form()).then(|| self.terms(pose, &qd));
+        let products = Products::of(&self.chain);
+        let mut resistance = None;
         let mut qdd = Joints::<T, N>::repeat(T::ZERO);
         for pass in 0..self.passes() {
             if pass > 0 {
@@ -321,7 +323,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             let torque = difference(&input.torque, resisting);
             match &terms {
                 Some(terms) => (qdd, *force) = self.accelerations(input, &torque, *force, terms),
-                None => qdd = self.forward(pose, &qd, &torque, *force),
+                None => {
+                    let load = self.load(pose, &torque, *force);
+                    qdd = resistance
+                        .get_or_insert_with(|| Resistance::at(&products, pose, &qd))
+                        .accelerations(&products, pose, &load);
+                }
             }
         }
         qdd
