@@ -62,6 +62,15 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
     assert verdict.startswith("The model lacks viscous in joint 2 (elbow): resistance in proportion to joint speed, viscosity 0.")
 
 
+def test_a_joint_may_have_any_name(viscous: armrs.GapFound, tmp_path: Path) -> None:
+    data, name = viscous.dataset, r"elbow $\frac{1}$"
+    renamed = data.model.replace(joints=(data.model.joints[0], dataclasses.replace(data.model.joints[1], name=name)))
+    result = dataclasses.replace(viscous, dataset=data.replace(model=renamed))
+    written = write_gap(result, gap_data(result), tmp_path)
+    assert sum(path.suffix == ".png" for path in written) == 5
+    assert name in written[-1].read_text(encoding="utf-8")
+
+
 def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> None:
     seen = portrait(viscous, viscous.effects[0])
     value = viscous.effects[0].parameters["viscosity"]

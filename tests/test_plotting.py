@@ -6,6 +6,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from armrs import plotting
 
@@ -75,7 +76,7 @@ def test_the_legend_of_intervals_explains_what_occurs() -> None:
 
 
 def test_symbols_tell_i_from_l() -> None:
-    assert plotting.symbol("I1 + m1*l1^2") == r"$I_{1} + m_{1}\,l_{1}^2$"
+    assert plotting.symbol("I1 + m1*l1^2") == "I₁ + m₁·ℓ₁²"
 
 
 def test_angles_are_in_degrees(ax: matplotlib.axes.Axes) -> None:
@@ -124,6 +125,20 @@ def test_the_style_leaves_no_trace() -> None:
     with plotting.style():
         assert not matplotlib.rcParams["axes.spines.top"]
     assert dict(matplotlib.rcParams) == before
+
+
+@pytest.mark.parametrize("name", ["elbow $x^2$", r"elbow $\frac{1}$", "$", r"5 \$"])
+def test_names_are_shown_as_they_stand(name: str) -> None:
+    with plotting.style():
+        figure = plotting.figure(5, 4)
+        ax = plotting.angles(T, np.column_stack([T, T]), [name, "other"], figure.subplots())
+        ax.set(title=name, xlabel=name)
+        ax.set_yticks([0.0, 1.0], [name, "other"])
+        figure.draw_without_rendering()
+    shown = figure.findobj(lambda artist: isinstance(artist, Text) and artist.get_text() == name)
+    # Title, axis, tick on both sides, and legend.
+    assert len(shown) == 5
+    assert not any(text.get_parse_math() for text in shown)
 
 
 def test_the_palette_tells_neighbours_apart_in_grey() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -84,6 +85,19 @@ def test_identify_writes_model_json_and_figures(results: Path) -> None:
         picture = (folder / entry["file"]).read_bytes()
         assert picture.startswith(b"\x89PNG")
         assert len(picture) > 20_000
+
+
+def test_a_joint_may_have_any_name(slow_arm: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    shutil.copytree(slow_arm, folder)
+    for name in ("truth.toml", "model.toml"):
+        text = (folder / name).read_text(encoding="utf-8")
+        assert 'name = "elbow"' in text
+        (folder / name).write_text(text.replace('name = "elbow"', r"name = 'elbow $\frac{1}$ <b> $x^2$'"), encoding="utf-8")
+    movement = str(folder / "movement.toml")
+    for verb, *source in (["simulate", str(folder / "truth.toml"), "--movement", movement], ["passive", str(folder)]):
+        assert cli.main([verb, *source, "-o", str(tmp_path / verb)]) == 0
+        assert Page((tmp_path / verb / "report.html").read_text(encoding="utf-8")).loads
 
 
 def test_identify_without_a_folder_writes_nothing(

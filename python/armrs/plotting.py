@@ -54,7 +54,9 @@ _STYLE: dict[str, Any] = {
     "figure.facecolor": "white",
     "axes.facecolor": "white",
     "savefig.facecolor": "white",
+    "text.parse_math": False,
 }
+"""Names of joints, movements and files are shown as they stand, whatever `$` they have in them."""
 
 
 def style() -> AbstractContextManager[None]:
@@ -151,10 +153,13 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
     return ax
 
 
+_BELOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
 def symbol(name: str) -> str:
-    """Set a quantity such as `I1 + m1*l1^2` as mathematics, so that I and l look different."""
-    text = re.sub(r"([mlaIn])([0-9]+)", r"\1_{\2}", name).replace("*", r"\,")
-    return f"${text}$"
+    """Set a quantity such as `I1 + m1*l1^2` as print does, I₁ + m₁·ℓ₁²: I and l look different."""
+    text = re.sub(r"([mlaIn])([0-9]+)", lambda found: found[1].replace("l", "ℓ") + found[2].translate(_BELOW), name)
+    return tables.symbol(text)
 
 
 def interval_legend(figure: Figure, items: Sequence[Mapping[str, Any]]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _armrs, figures, files, report
+from . import _armrs, figures, files, plotting, report
 from .dataset import Dataset
 from .identification import Estimate, Identified
 from .moments import LEVEL, PassiveMoments
@@ -92,7 +92,7 @@ def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figu
     for item in drawn:
         path = folder / "figures" / f"{item.name}.png"
         files.may_replace(path, ".png")
-        with files.replacing(path) as temporary:
+        with plotting.style(), files.replacing(path) as temporary:
             item.figure.savefig(temporary, format="png", dpi=130)
         pictures.append(path)
     data["figures"] = [

@@ -26,7 +26,7 @@ def stick(ax: Axes, model: Model, q: np.ndarray, *, poses: int = 6, title: str =
     ax.set(title=title, xlabel="y [m]", ylabel="z [m]")
 
 
-FORCES = {"$F_y$": plotting.RED, "$F_z$": plotting.INK}
+FORCES = {"Fy": plotting.RED, "Fz": plotting.INK}
 JOINTS = {"shoulder": plotting.BLUE, "elbow": plotting.ORANGE, "wrist": plotting.GREEN}
 """Names and colours, which are others for forces, since these stand beside joints."""
 
@@ -55,7 +55,7 @@ def forces_and_torques(t: np.ndarray, force: np.ndarray, torque: np.ndarray) -> 
     over_trials(left, t, force, FORCES)
     over_trials(right, t, torque, JOINTS)
     left.set(title="contact force", xlabel="time [s]", ylabel="force on the robot [N]")
-    right.set(title="joint torques $\\tau_j$", xlabel="time [s]", ylabel="torque of the force on the arm [N m]")
+    right.set(title="joint torques τⱼ", xlabel="time [s]", ylabel="torque of the force on the arm [N m]")
     legend(figure, left, right)
     return figure
 

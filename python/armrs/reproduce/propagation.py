@@ -61,6 +61,9 @@ def torque_errors() -> Found:
         (("Monte Carlo", plotting.SILVER, "-"), ("Jacobian", plotting.BLUE, "--"), ("equation 5.3", plotting.RED, "-"))
     ):
         ax.semilogy(np.degrees(angles), curves[:, k], look, color=colour, lw=3.0 if k == 0 else 1.5, label=label)
+    # Without mathematics, in which a logarithmic axis would write powers of ten.
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter("")
     ax.set(xlabel="shoulder [°]", ylabel="standard deviation [N m]")
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, 0.92))
     rows = [[f"{q1:g}", *(f"{v:.4f}" for v in _at(np.radians(q1), np.radians(60.0)))] for q1 in (-60.0, -30.0, -10.0, -1.0, -0.01)]

@@ -145,7 +145,7 @@ def _figures(comparison: Comparison, names: tuple[str, str], free: Simulated | N
         ax.plot(trial.t, -trial.force_on_arm[:, k], color=plotting.SILVER, lw=1.0, label="virtual measurement")
         ax.plot(run.t, -run.force_on_arm[:, k], color=plotting.RED, lw=1.5, label="simulation")
         if free is not None:
-            ax.plot(free.t, -free.force_on_arm[:, k], "--", color=plotting.BLUE, lw=1.2, label="simulation without the spring $K_e$")
+            ax.plot(free.t, -free.force_on_arm[:, k], "--", color=plotting.BLUE, lw=1.2, label="simulation without the spring Kₑ")
         ax.set(title=axis, xlabel="time [s]", ylabel="force on the robot [N]")
     drawing.legend(forces, ax)
     angles = plotting.figure(9.4, 3.4)
