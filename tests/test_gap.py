@@ -12,8 +12,8 @@ import pytest
 
 import armrs
 from armrs import cli
-from armrs.dataset import Dataset
-from armrs.discrepancy import compare
+from armrs.dataset import Dataset, write_dataset
+from armrs.discrepancy import calibrate, compare
 from armrs.discrepancy.results import gap_data, write_gap
 from armrs.discrepancy.shapes import portrait
 from armrs.discrepancy.suspicion import examine
@@ -102,8 +102,6 @@ def test_a_hidden_viscosity_is_named_with_its_value_and_closes_the_gap(viscous: 
 
 
 def test_nothing_is_missing_where_nothing_is_hidden(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from armrs.dataset import write_dataset
-
     write_dataset(session(), tmp_path / "data")
     assert cli.main(["gap", str(tmp_path / "data"), "-o", str(tmp_path / "out")]) == 0
     assert "Nothing is missing" in capsys.readouterr().out
@@ -164,6 +162,88 @@ def test_one_trial_with_another_label_is_refused(change: Callable[[np.ndarray], 
     for function in (armrs.find_gap, compare):
         with pytest.raises(BadInput, match=word):
             function(other)
+
+
+def copied(data: Dataset, into: str, source: str, *, length: int | None = None, **columns: Callable[[np.ndarray], np.ndarray]) -> Dataset:
+    """Return a data set in which a trial has the samples of another, the first of them, with columns changed by functions."""
+    by_name = {t.file: t for t in data.trials}
+    taken = {name: getattr(by_name[source], name)[:length].copy() for name in ("t", "q", "force_on_arm", "robot_q")}
+    taken |= {name: change(taken[name]) for name, change in columns.items()}
+    copy = dataclasses.replace(by_name[into], valid=np.empty(0, dtype=bool), **taken)
+    return data.replace(trials=tuple(copy if t.file == into else t for t in data.trials))
+
+
+NO_REPEAT, NO_TEST = "a copy is no repeat", "a test on a copy of what was fitted proves nothing"
+
+
+@pytest.mark.parametrize(
+    ("into", "source", "length", "why"),
+    [
+        ("fast_3.csv", "fast_1.csv", None, NO_REPEAT),
+        ("fast_3.csv", "fast_1.csv", 100, NO_REPEAT),
+        ("fast_4.csv", "slow_4.csv", None, NO_REPEAT),
+        ("fast_4.csv", "fast_2.csv", None, NO_TEST),
+        ("slow_4.csv", "fast_2.csv", None, NO_TEST),
+    ],
+)
+def test_a_copied_trial_is_refused(into: str, source: str, length: int | None, why: str) -> None:
+    data = copied(session(), into, source, length=length)
+    # A test trial is blamed wherever it stands; of equals, the later one.
+    for trials in [data.trials, data.trials[::-1]] if why == NO_TEST else [data.trials]:
+        for function in (armrs.find_gap, calibrate, compare):
+            with pytest.raises(BadInput) as refused:
+                function(data.replace(trials=trials))
+            start = f"{into}: samples: found those of {source}, one by one, allowed a measurement of its own"
+            assert str(refused.value) == f"{start} ({why}; simulated repeats need noise)"
+
+
+def test_a_copied_file_ends_with_status_2_and_nothing_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_dataset(copied(session(), "fast_2.csv", "fast_1.csv"), tmp_path / "data")
+    assert cli.main(["gap", str(tmp_path / "data"), "-o", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "fast_2.csv: samples: found those of fast_1.csv" in told
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("column", ["q", "force_on_arm"])
+def test_angles_or_forces_alone_that_are_the_same_are_no_copy(column: str) -> None:
+    def last(values: np.ndarray) -> np.ndarray:
+        values[-1] += 1e-4
+        return values
+
+    assert examine(copied(session(), "fast_2.csv", "fast_1.csv", **{column: last}), led=True) == []
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_swing_without_torque_is_a_copy_where_it_moves_alike(moves: bool) -> None:
+    t = np.arange(200) / 100.0
+    swings = [np.sin(3.0 * t), moves * np.cos(3.0 * t), moves * np.cos(3.0 * t)]
+    pivot = armrs.Model((armrs.Segment("link", 0.3, 0.15, 0.15, 1e-4),), (armrs.Joint("pivot"),))
+    trials = [
+        armrs.Trial(f"swing_{k}.csv", "swing", k, "fit" if k < 3 else "test", t, q[:, None], tau=np.zeros((200, 1)))
+        for k, q in enumerate(swings, start=1)
+    ]
+    data = Dataset("swings", pivot, tuple(trials))
+    if not moves:
+        assert examine(data, led=False) == []
+        return
+    with pytest.raises(BadInput, match=r"^swing_3\.csv: samples: found those of swing_2\.csv"):
+        examine(data, led=False)
+
+
+def test_what_a_trial_without_robot_angles_costs_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = session()
+    first, second, *rest = data.trials
+    bare = data.replace(trials=(first, dataclasses.replace(second, robot_q=None), *rest))
+    write_dataset(bare, tmp_path / "data")
+    assert cli.main(["gap", str(tmp_path / "data"), "--quick", "--json", str(tmp_path / "gap.json")]) == 0
+    [line] = json.loads((tmp_path / "gap.json").read_text(encoding="utf-8"))["warnings"]
+    assert line.startswith("no robot angles in slow_2.csv: so all trials are compared by joint torques, and errors of the contact, ")
+    assert line in capsys.readouterr().err
+    # Nothing is said where no trial has them, or where all do.
+    none = data.replace(trials=tuple(dataclasses.replace(t, robot_q=None) for t in data.trials))
+    assert examine(none, led=False) == examine(data, led=True) == []
 
 
 def test_without_repeats_a_movement_that_separates_rivals_is_found() -> None:

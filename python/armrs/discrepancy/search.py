@@ -46,7 +46,7 @@ def find_gap(
     Raises
     ------
     BadInput
-        For data that cannot be judged: wrong units, swapped channels, a reversed force.
+        For data that cannot be judged: wrong units, swapped channels, a reversed force, trials that are copies.
     SimulationError
         When the model as given cannot be simulated on a trial.
     """

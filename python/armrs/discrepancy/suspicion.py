@@ -20,6 +20,8 @@ _OFTEN = 3.0
 """A saturated channel is that much oftener at its extreme than next to it."""
 _ALIKE = 0.9
 """Correlation above which two signals are the same movement."""
+_FIRST = 16
+"""Samples at the start by which trials that may be copies are looked up: no trial has fewer."""
 
 
 def examine(dataset: Dataset, led: bool) -> list[str]:
@@ -28,9 +30,9 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
     Raises
     ------
     BadInput
-        For channels that never change.
+        For channels that never change, and trials that are copies.
     """
-    lines = []
+    lines = _without_the_robot(dataset, led)
     fit = dataset.fit_trials
     if len(fit) == 1:
         lines.append("one fit trial only: what is noise and what is missing cannot be told apart by repeats")
@@ -45,7 +47,50 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
             if level:  # zero is an arm that swings freely
                 found = Text(f"{level:g} N m in every sample")
                 raise BadInput(f"column {name}", found, "a torque that changes with the movement", file=trial.file, hint="a dead sensor?")
+    _refuse_copies(dataset.trials)
     return lines + _uneven_repeats(fit) + _saturated(dataset, led)
+
+
+def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
+    """Return which trials keep the others from being compared in the closed chain, and what is not asked for it."""
+    whole = [t for t in dataset.trials if t.robot_q is not None and t.force_on_arm is not None]
+    if led or dataset.model.robot is None or not whole:
+        return []
+    angles = ", ".join(t.file for t in dataset.trials if t.robot_q is None)
+    forces = ", ".join(t.file for t in dataset.trials if t.force_on_arm is None)
+    missing = [f"no {what} in {files}" for what, files in (("robot angles", angles), ("contact forces", forces)) if files]
+    return [
+        f"{'; '.join(missing)}: so all trials are compared by joint torques, and errors of the contact, the robot and the force sensor, "
+        "misalignment, delay, tremor and bursts are not asked; leave such trials out, or add what they lack"
+    ]
+
+
+def _refuse_copies(trials: Sequence[Trial]) -> None:
+    """Refuse a trial whose samples are those of another, or of its start: such repeats tell no noise, and such a test proves nothing."""
+    known: dict[bytes, list[Trial]] = {}
+    for trial in trials:
+        # Comparing those alone that start alike is cheap for many trials and long ones.
+        alike = known.setdefault(trial.q[:_FIRST].tobytes(), [])
+        for other in alike:
+            if _same_samples(trial, other):
+                copy, first = (other, trial) if (other.role, trial.role) == ("test", "fit") else (trial, other)
+                why = "a copy is no repeat" if copy.role == first.role else "a test on a copy of what was fitted proves nothing"
+                found, allowed = Text(f"those of {first.file}, one by one"), "a measurement of its own"
+                raise BadInput("samples", found, allowed, file=copy.file, hint=f"{why}; simulated repeats need noise")
+        alike.append(trial)
+
+
+def _same_samples(a: Trial, b: Trial) -> bool:
+    """Whether measured angles and forces, or torques, of two trials are equal as far as both go, and one of them changes."""
+    efforts = [(a.force_on_arm, b.force_on_arm), (a.tau, b.tau)]
+    both = [(x, y) for x, y in efforts if x is not None and y is not None]
+    if not both and any(values is not None for pair in efforts for values in pair):
+        return False
+    n = min(len(a), len(b))
+    pairs = [(x[:n], y[:n]) for x, y in ((a.q, b.q), *both)]
+    if not all(np.array_equal(x, y, equal_nan=True) for x, y in pairs):
+        return False
+    return any(np.isfinite(column).any() and constant(column) is None for x, _ in pairs for column in x.T)
 
 
 def _uneven_repeats(trials: Sequence[Trial]) -> list[str]:
