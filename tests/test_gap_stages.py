@@ -141,12 +141,36 @@ def test_a_slow_ripple_below_the_noise_is_seen_in_all_trials_together() -> None:
     assert values["y"].value == pytest.approx(8e-5, abs=2.5e-5)
 
 
+def test_a_rhythm_that_a_strong_effect_hides_is_seen_once_that_is_named() -> None:
+    spring = armrs.Effect("elastic", 1, parameters={"stiffness": 4.0, "rest": -0.3})
+    tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.1, "frequency": 4.4})
+    result = armrs.find_gap(led(model().contact, [spring, tremor], phases=(0.3, 2.2, 4.4, 5.5)), threads=2, separate=False)
+    assert {(e.kind, e.joint) for e in result.effects} == {("elastic", 1), ("tremor", 2)}
+
+
+def test_an_interrupt_ends_a_search_and_a_failing_display_does_not() -> None:
+    data = session()
+
+    def interrupted(what: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    def broken(what: str, share: float) -> None:
+        raise ValueError(what)
+
+    with pytest.raises(KeyboardInterrupt):
+        armrs.find_gap(data, threads=2, progress=interrupted)
+    assert armrs.find_gap(data, threads=2, separate=False, progress=broken).verdict == "nothing_missing"
+
+
 @pytest.mark.parametrize("frequency", [2.5, 6.3])
 def test_a_rhythm_has_its_own_phase_in_every_trial(frequency: float) -> None:
     tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.15, "frequency": frequency})
     data = led(model().contact, [tremor], phases=(0.3, 2.2, 4.4, 5.5))
     result = armrs.find_gap(data, threads=2)
     assert [(e.kind, e.joint) for e in result.effects] == [("tremor", 2)]
+    amplitude = result.effects[0].parameters["amplitude"]
+    assert amplitude.std is not None and amplitude.std < 0.005
+    assert amplitude.value == pytest.approx(0.15, abs=3.0 * amplitude.std)
     # No other trial could be foretold with the phase of one.
     assert result.model.effects == ()
     for name in ("Fy_N", "Fz_N"):

@@ -33,4 +33,7 @@ pub enum GapError {
         /// How many were asked.
         unknowns: usize,
     },
+    /// Who is told of the work wants no more of it.
+    #[error("stopped")]
+    Stopped,
 }

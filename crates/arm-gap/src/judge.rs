@@ -214,7 +214,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 progress(
                     "comparing alternatives",
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
-                );
+                )?;
                 let less = self.without(&fitted, slot, &anchor)?;
                 let gain = (less.cost - fitted.cost).min(f64::MAX);
                 let rivals = match &library {

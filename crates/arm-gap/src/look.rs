@@ -47,13 +47,13 @@ impl<const N: usize> Study<'_, N> {
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
     pub fn look(&mut self, progress: Progress<'_>) -> Result<Look<N>, GapError> {
-        progress("calibrating", 0.1);
+        progress("calibrating", 0.1)?;
         let (mut calibrated, mut anchor) = self.calibrate()?;
         if !self.repeated {
             self.measure_noise(&anchor)?;
             (calibrated, anchor) = self.calibrate()?;
         }
-        progress("asking the catalogue", 0.6);
+        progress("asking the catalogue", 0.6)?;
         let library = Library::build(self, &anchor, None)?;
         let scan = Scan::new(self, &calibrated, &anchor, &library)?.scaled();
         let lack = lack_of_fit(self, &anchor, &calibrated);
@@ -93,7 +93,7 @@ impl<const N: usize> Study<'_, N> {
                 calibrated.hypothesis = hypothesis;
             }
         }
-        progress("done", 1.0);
+        progress("done", 1.0)?;
         Ok(Look {
             in_trials: self.in_trials((&calibrated.hypothesis, &[])),
             calibrated,

@@ -7,7 +7,7 @@ use arm_core::{Contact, Joints, Pose, jacobian};
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
-use crate::anchor::Anchor;
+use crate::anchor::{Anchor, slope};
 use crate::apart::{Apart, shapes_of};
 use crate::groups::same_rate;
 use crate::normal::factor;
@@ -91,7 +91,8 @@ impl<const N: usize> Study<'_, N> {
             if place == Line::OfTheRobot && columns[0].kind.probe().nature != Nature::Periodic {
                 continue;
             }
-            if let Some(explained) = self.explain(anchor, residuals, frequency, &columns) {
+            let answers = self.answers(anchor, frequency, &columns);
+            if let Some(explained) = self.explain(residuals, frequency, (&columns, &answers)) {
                 let worth = explained.gain - 8.0 * columns.len() as f64;
                 best.push((worth, explained));
             }
@@ -225,13 +226,72 @@ impl<const N: usize> Study<'_, N> {
         list
     }
 
+    /// A rhythm with the size that simulated runs give it: what it shows to first order on a coarse grid is off by as much as
+    /// a tenth where an arm nearly rings with it. `None` where it cannot be simulated.
+    ///
+    /// Its standard deviation counts how sizes scatter from trial to trial.
+    pub fn sized(&self, anchor: &Anchor<N>, apart: &Apart) -> Option<Apart> {
+        let residuals = self.raw_residuals(anchor).ok()?;
+        let frequency = apart.wave()[0];
+        let size = apart.effect.parameters[free_of(apart.effect.kind)[0]].abs();
+        let shown = |group: usize, named: Option<Effect<f64>>| {
+            let mut hypothesis = anchor.hypothesis.clone();
+            hypothesis.named.extend(named);
+            let course = &self.courses[self.references[group]];
+            let run = self.session.run(&hypothesis, course).ok()?;
+            self.session.read_raw(&hypothesis, course, &run).ok()
+        };
+        let answer = |group: usize| {
+            let base = shown(group, None)?;
+            let each = apart.columns.iter().map(|column| {
+                let swinging = shown(group, Some(sized_at(column, frequency, size)))?;
+                Some(slope(&swinging, &base, size))
+            });
+            each.collect()
+        };
+        let answers = self.parallel(self.references.len(), answer);
+        let explained = self.explain(&residuals, frequency, (&apart.columns, &answers))?;
+        let sizes = explained.sizes.iter();
+        let sizes: Vec<f64> = sizes
+            .map(|s| libm::sqrt(s.iter().map(|v| v * v).sum::<f64>()))
+            .collect();
+        let n = sizes.len() as f64;
+        let mean = sizes.iter().sum::<f64>() / n;
+        let square = sizes.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>();
+        let scatter = libm::sqrt(square / (n * (n - 1.0).max(1.0)));
+        let mut effect = apart.effect;
+        for &p in free_of(effect.kind) {
+            let info = &effect.kind.info().parameters[p];
+            effect.parameters[p] = explained.effect.parameters[p].clamp(info.min, info.max);
+        }
+        Some(Apart {
+            effect,
+            sd: f64::max(explained.sd, scatter),
+            ..apart.clone()
+        })
+    }
+
+    /// What small swings show on each movement, to first order.
+    fn answers(&self, anchor: &Anchor<N>, frequency: f64, columns: &[Effect<f64>]) -> Vec<Answer> {
+        self.parallel(self.references.len(), |group| {
+            let line = anchor.lines.get(group)?;
+            let each = columns.iter().map(|effect| {
+                let mut changed = anchor.hypothesis.clone();
+                changed.named.push(small(effect, frequency, false));
+                line.response_raw(&changed, UNIT, (false, false)).ok()
+            });
+            each.collect()
+        })
+    }
+
     /// How much of the line some swings explain, with a size and phase of their own in every trial.
+    ///
+    /// * `answers` - what one unit of each column shows on each movement
     fn explain(
         &self,
-        anchor: &Anchor<N>,
         residuals: &[Channels],
         frequency: f64,
-        columns: &[Effect<f64>],
+        (columns, answers): (&[Effect<f64>], &[Answer]),
     ) -> Option<Explained> {
         let rate = self.courses[self.fitted[0]].rate;
         let channels = self.session.channels();
@@ -249,25 +309,12 @@ impl<const N: usize> Study<'_, N> {
                 f64::max(sum / f64::max(count, 1.0), 1e-30)
             })
             .collect();
-        let swing = |group: usize| -> Option<Vec<Vec<[f64; 2]>>> {
-            let line = anchor.lines.get(group)?;
-            columns
-                .iter()
-                .map(|effect| {
-                    let mut changed = anchor.hypothesis.clone();
-                    changed.named.push(small(effect, frequency, false));
-                    let response = line.response_raw(&changed, UNIT, (false, false)).ok()?;
-                    let swings = response.iter().map(|c| coefficient(c, frequency, rate));
-                    Some(swings.collect())
-                })
-                .collect()
-        };
-        let swings = self.parallel(self.references.len(), swing);
         let k = columns.len();
         let (mut gain, mut sizes) = (0.0, Vec::new());
         let mut information = 0.0;
         for (residual, &trial) in residuals.iter().zip(&self.fitted) {
-            let swings = swings[self.group_of[trial]].as_ref()?;
+            let swings = answers[self.group_of[trial]].as_ref()?;
+            let swing = |column: &Channels, c: usize| coefficient(&column[c], frequency, rate);
             // Complex least squares as real ones: each column turned by 0 and by 90°.
             let mut gram = DMatrix::zeros(2 * k, 2 * k);
             let mut score = DVector::zeros(2 * k);
@@ -275,7 +322,8 @@ impl<const N: usize> Study<'_, N> {
                 let seen = coefficient(&residual[c], frequency, rate);
                 let turned: Vec<[f64; 2]> = swings
                     .iter()
-                    .flat_map(|s| [s[c], [-s[c][1], s[c][0]]])
+                    .map(|column| swing(column, c))
+                    .flat_map(|[a, b]| [[a, b], [-b, a]])
                     .collect();
                 for (a, x) in turned.iter().enumerate() {
                     score[a] += (x[0] * seen[0] + x[1] * seen[1]) / noise[c];
@@ -367,6 +415,9 @@ fn stretch(force: &[f64], (stiffness, damping): (f64, f64), rate: f64) -> Vec<f6
     out
 }
 
+/// What one unit of each of some swings shows on a movement; `None` where one cannot be followed.
+type Answer = Option<Vec<Channels>>;
+
 struct Explained {
     effect: Effect<f64>,
     sd: f64,
@@ -404,13 +455,18 @@ fn size_of(swing: &Effect<f64>) -> usize {
 
 /// A swing of a small size, a quarter of a period earlier on demand.
 fn small(swing: &Effect<f64>, frequency: f64, earlier: bool) -> Effect<f64> {
-    let mut effect = *swing;
-    effect.parameters[size_of(swing)] = UNIT;
-    let [f, phase] = shapes_of(swing.kind);
-    effect.parameters[f] = frequency;
+    let mut effect = sized_at(swing, frequency, UNIT);
     if earlier {
-        effect.parameters[phase] += 0.5 * core::f64::consts::PI;
+        effect.parameters[shapes_of(swing.kind)[1]] += 0.5 * core::f64::consts::PI;
     }
+    effect
+}
+
+/// A swing of a size at a frequency.
+fn sized_at(swing: &Effect<f64>, frequency: f64, size: f64) -> Effect<f64> {
+    let mut effect = *swing;
+    effect.parameters[size_of(swing)] = size;
+    effect.parameters[shapes_of(swing.kind)[0]] = frequency;
     effect
 }
 

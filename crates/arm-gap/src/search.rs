@@ -80,8 +80,8 @@ pub struct Finding<const N: usize> {
     pub scale: f64,
 }
 
-/// What a search tells while it works: what it does, and how far it is (0 to 1).
-pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
+/// What a search tells while it works: what it does, and how far it is (0 to 1). [`GapError::Stopped`] in answer ends the search.
+pub type Progress<'a> = &'a (dyn Fn(&str, f64) -> Result<(), GapError> + Sync);
 
 /// A fitted hypothesis with the simulation that it was followed from.
 pub(crate) type Settled<'a, const N: usize> = (Fitted<N>, Anchor<'a, N>);
@@ -138,7 +138,7 @@ impl<'a, const N: usize> Study<'a, N> {
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
     pub fn search(&mut self, progress: Progress<'_>) -> Result<Finding<N>, GapError> {
-        progress("calibrating", 0.0);
+        progress("calibrating", 0.0)?;
         let mut settled = self.calibrate()?;
         if !self.repeated {
             self.measure_noise(&settled.1)?;
@@ -149,7 +149,7 @@ impl<'a, const N: usize> Study<'a, N> {
         let mut periodic = None;
         let measured = self.courses.clone();
         if led {
-            progress("looking at single trials", 0.05);
+            progress("looking at single trials", 0.05)?;
             if let Some(found) = self.rhythm(&settled.1, Line::BetweenRepeats)? {
                 self.take_out(&settled.1, &found)?;
                 apart.push(found);
@@ -158,20 +158,28 @@ impl<'a, const N: usize> Study<'a, N> {
             settled = self.disturbances(settled, &mut apart)?;
         }
         let mut hunt = self.hunt(settled, periodic, progress)?;
-        if let Some(before) = apart.iter().position(|a| a.trial.is_none())
-            && !hunt.current.asked.is_empty()
-        {
-            // What rang may have been what was named since; and how an arm answers a rhythm depends on what was named.
-            self.courses.clone_from(&measured);
+        if led && !hunt.current.asked.is_empty() {
+            // What rang may have been what was named since; what was named may have hidden a rhythm; and how an arm answers one
+            // depends on what was named.
+            let before = apart.iter().position(|a| a.trial.is_none());
+            let without = std::mem::replace(&mut self.courses, measured.clone());
             let again = self.rhythm(&hunt.anchor, Line::BetweenRepeats)?;
-            if let Some(again) = again.filter(|a| a.is_like(&apart[before])) {
-                self.take_out(&hunt.anchor, &again)?;
-                apart[before] = again;
-                hunt = self.renewed(hunt)?;
-            } else {
-                apart.remove(before);
-                let settled = self.calibrate_anew()?;
-                hunt = self.hunt(settled, periodic, progress)?;
+            match (before, again) {
+                (Some(before), Some(again)) if again.is_like(&apart[before]) => {
+                    self.take_out(&hunt.anchor, &again)?;
+                    apart[before] = again;
+                    hunt = self.renewed(hunt)?;
+                }
+                (None, None) => self.courses = without,
+                (before, again) => {
+                    before.map(|before| apart.remove(before));
+                    if let Some(again) = again {
+                        self.take_out(&hunt.anchor, &again)?;
+                        apart.push(again);
+                    }
+                    let settled = self.calibrate_anew()?;
+                    hunt = self.hunt(settled, periodic, progress)?;
+                }
             }
         }
         if led {
@@ -184,7 +192,7 @@ impl<'a, const N: usize> Study<'a, N> {
             });
             periodic = match &found {
                 Some(found) => Some(found.wave()).filter(|[frequency, _]| *frequency < SLOW),
-                None => self.slow_ripple((&hunt.current, &hunt.anchor), hunt.scale)?,
+                None => self.slow_ripple((&hunt.current, &hunt.anchor), hunt.scale),
             };
             if let (Some(found), None) = (&found, periodic) {
                 self.take_out(&hunt.anchor, found)?;
@@ -242,7 +250,7 @@ impl<'a, const N: usize> Study<'a, N> {
             scale,
             ..
         } = hunt;
-        progress("measuring what is left", 0.9);
+        progress("measuring what is left", 0.9)?;
         let mut precision = self.precision(&anchor, &amended, scale)?;
         for one in &named {
             let missed = amended.asked[one.slot].kind().probe().missed;
@@ -255,22 +263,28 @@ impl<'a, const N: usize> Study<'a, N> {
         if let Some((hypothesis, known)) = self.refined(&amended) {
             (amended.hypothesis, precision) = (hypothesis, known);
         }
-        let rhythms: Vec<Effect<f64>> = apart
-            .iter()
-            .filter(|a| a.trial.is_none())
-            .map(|a| a.effect)
-            .collect();
+        self.courses = measured;
+        let rhythms = rhythms_of(&apart);
         for fitted in [&mut calibrated, &mut amended] {
             if let Some(hypothesis) = self.tuned(&fitted.hypothesis, &rhythms) {
                 fitted.hypothesis = hypothesis;
             }
         }
-        self.courses = measured;
+        if !rhythms.is_empty() {
+            // The contact is part of what decides how large a rhythm is.
+            let tuned = self.anchor(&amended.hypothesis)?;
+            for one in apart.iter_mut().filter(|a| a.trial.is_none()) {
+                if let Some(sized) = self.sized(&tuned, one) {
+                    *one = sized;
+                }
+            }
+        }
+        let rhythms = rhythms_of(&apart);
         let in_trials = [
             self.in_trials((&calibrated.hypothesis, &[])),
             self.in_trials((&amended.hypothesis, &rhythms)),
         ];
-        progress("done", 1.0);
+        progress("done", 1.0)?;
         Ok(Finding {
             calibrated,
             amended,
@@ -315,7 +329,7 @@ impl<'a, const N: usize> Study<'a, N> {
     ) -> Result<Hunt<'a, N>, GapError> {
         hunt.is_back(self.dry);
         for round in 0..MOST {
-            progress("asking the catalogue", 0.1 + 0.1 * round as f64);
+            progress("asking the catalogue", 0.1 + 0.1 * round as f64)?;
             let library = Library::build(self, &hunt.anchor, periodic)?;
             let scan = match Scan::new(self, &hunt.current, &hunt.anchor, &library) {
                 // What was found so far stands.
@@ -551,4 +565,10 @@ impl<'a, const N: usize> Study<'a, N> {
             })
             .collect()
     }
+}
+
+/// Those that swing in every trial.
+fn rhythms_of(apart: &[Apart]) -> Vec<Effect<f64>> {
+    let rhythms = apart.iter().filter(|a| a.trial.is_none());
+    rhythms.map(|a| a.effect).collect()
 }

@@ -3,7 +3,6 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use crate::GapError;
 use crate::anchor::Anchor;
 use crate::candidate::Library;
 use crate::fit::Fitted;
@@ -25,46 +24,47 @@ const UNSTEADY: f64 = 0.05;
 
 impl<const N: usize> Study<'_, N> {
     /// Frequency \[Hz\] and phase \[rad\] of a slow ripple of the robot that is plain in all movements together, and alike in each;
-    /// `None` where there is none, or trials are too long for it.
+    /// `None` where there is none, trials are too long for it, or what was fitted cannot be followed a little further.
     ///
     /// * `scale` - misfit for each degree of freedom
-    ///
-    /// # Errors
-    /// As [`Scan::new`].
     pub fn slow_ripple(
         &self,
         (fitted, anchor): (&Fitted<N>, &Anchor<N>),
         scale: f64,
-    ) -> Result<Option<[f64; 2]>, GapError> {
+    ) -> Option<[f64; 2]> {
         let longest = |&t: &usize| self.courses[t].seen[0].len() as f64 / self.courses[t].rate;
         let longest = self.references.iter().map(longest).fold(1.0, f64::max);
         let step = TURNS / longest;
         let count = libm::ceil((BAND[1] - BAND[0]) / step) as usize + 1;
         if !self.repeated || count > MOST {
-            return Ok(None);
+            return None;
         }
         let coarse: Vec<f64> = (0..count).map(|k| BAND[0] + step * k as f64).collect();
-        let mut best: Option<(f64, [f64; 2])> = None;
+        let mut best: Option<Wave> = None;
         for frequencies in coarse.chunks(AT_ONCE) {
-            best = better(best, self.waves_at(frequencies, (fitted, anchor))?);
+            best = better(best, self.waves_at(frequencies, (fitted, anchor)));
         }
-        let Some((_, [near, _])) = best else {
-            return Ok(None);
-        };
+        let (_, [near, _]) = best?;
         let closer = |k: i32| near + step * f64::from(k) / f64::from(CLOSER + 1);
         let closer: Vec<f64> = (-CLOSER..=CLOSER).map(closer).collect();
-        let Some((_, wave)) = better(best, self.waves_at(&closer, (fitted, anchor))?) else {
-            return Ok(None);
-        };
-        let library = Library::of_waves(self, anchor, &[wave])?;
-        let scan = Scan::new(self, fitted, anchor, &library)?;
-        let Some(choice) = scan.evaluate(&[0]) else {
-            return Ok(None);
-        };
+        let (_, wave) = better(best, self.waves_at(&closer, (fitted, anchor)))?;
+        let (library, scan) = self.scanned(&[wave], (fitted, anchor))?;
+        let choice = scan.evaluate(&[0])?;
         let tried = 2.0 * libm::log(count as f64) + self.price_of_shapes(&library.candidates);
         let worth = choice.gain / scale.max(1.0) - scan.spread[0] * scan.price[0] - tried;
         let steady = scan.unlike[0] < UNSTEADY * choice.gain;
-        Ok((worth > 0.0 && steady).then_some(wave))
+        (worth > 0.0 && steady).then_some(wave)
+    }
+
+    fn scanned(
+        &self,
+        waves: &[[f64; 2]],
+        (fitted, anchor): (&Fitted<N>, &Anchor<N>),
+    ) -> Option<(Library, Scan)> {
+        let library = Library::of_waves(self, anchor, waves).ok()?;
+        let scan = Scan::new(self, fitted, anchor, &library).ok()?;
+        // One that cannot be asked is missing, and the others no longer stand in their places.
+        (library.candidates.len() == waves.len()).then_some((library, scan))
     }
 
     /// The frequency that explains most, with any phase and in both axes: its gain, and frequency and phase.
@@ -72,28 +72,23 @@ impl<const N: usize> Study<'_, N> {
         &self,
         frequencies: &[f64],
         (fitted, anchor): (&Fitted<N>, &Anchor<N>),
-    ) -> Result<Option<(f64, [f64; 2])>, GapError> {
+    ) -> Option<Wave> {
         let waves: Vec<[f64; 2]> = frequencies
             .iter()
             .flat_map(|&f| [[f, 0.0], [f, FRAC_PI_2]])
             .collect();
-        let library = Library::of_waves(self, anchor, &waves)?;
-        let scan = Scan::new(self, fitted, anchor, &library)?;
-        let mut best = None;
-        for (k, &frequency) in frequencies.iter().enumerate() {
-            let pair = [2 * k, 2 * k + 1];
-            // One that cannot be asked is missing, and the others no longer stand in pairs.
-            if library.candidates.len() == waves.len()
-                && let Some(choice) = scan.evaluate(&pair)
-            {
-                let phase = common_phase(&choice.coefficients[0], &choice.coefficients[1]);
-                best = better(best, Some((choice.gain, [frequency, phase])));
-            }
-        }
-        Ok(best)
+        let (_, scan) = self.scanned(&waves, (fitted, anchor))?;
+        let wave = |(k, &frequency): (usize, &f64)| {
+            let choice = scan.evaluate(&[2 * k, 2 * k + 1])?;
+            let phase = common_phase(&choice.coefficients[0], &choice.coefficients[1]);
+            Some((choice.gain, [frequency, phase]))
+        };
+        let all = frequencies.iter().enumerate().map(wave);
+        all.fold(None, better)
     }
 }
 
+/// What a wave gains, and its frequency and phase.
 type Wave = (f64, [f64; 2]);
 
 /// The one that gains more.

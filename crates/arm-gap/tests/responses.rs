@@ -255,7 +255,7 @@ fn a_hidden_spring_is_named_and_nothing_else() {
     let hidden = Effect::new(elastic, 1).with(&[1.5, 1.0]);
     let session = session(&[hidden], (1e-3, 0.1));
     let mut study = Study::new(&session, 2).expect("a sound session");
-    let finding = study.search(&|_, _| ()).expect("a finding");
+    let finding = study.search(&|_, _| Ok(())).expect("a finding");
     let named = &finding.amended.hypothesis.named;
     assert_eq!(named.len(), 1, "{named:?}");
     assert_eq!((named[0].kind, named[0].index), (elastic, 1));
@@ -267,7 +267,7 @@ fn a_hidden_spring_is_named_and_nothing_else() {
 fn nothing_is_named_where_nothing_is_hidden() {
     let session = session(&[], (1e-3, 0.1));
     let mut study = Study::new(&session, 2).expect("a sound session");
-    let finding = study.search(&|_, _| ()).expect("a finding");
+    let finding = study.search(&|_, _| Ok(())).expect("a finding");
     assert!(finding.amended.hypothesis.named.is_empty());
     assert!(finding.apart.is_empty());
     assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);

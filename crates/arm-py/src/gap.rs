@@ -1,5 +1,7 @@
 //! The gap workflow: trials in, what the model lacks out.
 
+use std::sync::Mutex;
+
 use arm_core::Chain;
 use arm_core::effect::Effect;
 use arm_gap::GapError;
@@ -16,6 +18,7 @@ use arm_gap::separate::Contest;
 use arm_gap::session::{Session, Sight};
 use arm_gap::study::Study;
 use numpy::ToPyArray;
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -151,7 +154,9 @@ pub fn find_gap<'py>(
         progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let session = asked.session(chain)?;
-        let (study, finding) = asked.studied(py, &session, |s| s.search(&tell(progress)))?;
+        let told = Told::of(progress);
+        let done = asked.studied(py, &session, |s| s.search(&|w, s| told.tell(w, s)));
+        let (study, finding) = told.or_raised(done)?;
         result(py, &study, &finding)
     }
     let asked = Asked::of(rig, &trials, &settings);
@@ -175,7 +180,9 @@ pub fn look<'py>(
         progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let session = asked.session(chain)?;
-        let (study, look) = asked.studied(py, &session, |s| s.look(&tell(progress)))?;
+        let told = Told::of(progress);
+        let done = asked.studied(py, &session, |s| s.look(&|w, s| told.tell(w, s)));
+        let (study, look) = told.or_raised(done)?;
         first_look(py, &study, &look)
     }
     let asked = Asked::of(rig, &trials, &settings);
@@ -211,12 +218,44 @@ fn first_look<'py, const N: usize>(
     Ok(out)
 }
 
-/// What is told of the work to a callable, where there is one.
-fn tell(progress: Option<&Py<PyAny>>) -> impl Fn(&str, f64) + Sync + '_ {
-    move |what, share| {
-        if let Some(callable) = progress {
-            // What a display does with it is no reason to stop.
-            let _ = Python::attach(|py| callable.call1(py, (what, share)).map(|_| ()));
+/// Who is told of the work, and what was raised to stop it.
+struct Told<'a> {
+    callable: Option<&'a Py<PyAny>>,
+    raised: Mutex<Option<PyErr>>,
+}
+
+impl<'a> Told<'a> {
+    fn of(callable: Option<&'a Py<PyAny>>) -> Self {
+        Self {
+            callable,
+            raised: Mutex::new(None),
+        }
+    }
+
+    fn tell(&self, what: &str, share: f64) -> Result<(), GapError> {
+        Python::attach(|py| {
+            let call = |callable: &Py<PyAny>| callable.call1(py, (what, share)).map(|_| ());
+            let told = py
+                .check_signals()
+                .and_then(|()| self.callable.map_or(Ok(()), call));
+            match told {
+                // What a display does wrong is no reason to stop, but an interrupt is.
+                Err(error) if !error.is_instance_of::<PyException>(py) => {
+                    if let Ok(mut raised) = self.raised.lock() {
+                        *raised = Some(error);
+                    }
+                    Err(GapError::Stopped)
+                }
+                _ => Ok(()),
+            }
+        })
+    }
+
+    /// What the work came to, unless it was stopped.
+    fn or_raised<T>(self, outcome: PyResult<T>) -> PyResult<T> {
+        match self.raised.into_inner() {
+            Ok(Some(error)) => Err(error),
+            _ => outcome,
         }
     }
 }
