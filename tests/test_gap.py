@@ -254,6 +254,19 @@ def test_without_repeats_a_movement_that_separates_rivals_is_found() -> None:
     assert any(a.separating_movement for e in found.effects for a in e.alternatives)
 
 
+def test_a_trial_that_begins_while_the_robot_moves_is_warned_of() -> None:
+    data = session()
+    assert not [line for line in examine(data, led=True) if "when these begin" in line]
+    late = data.trials[4]
+    speed = np.abs(np.gradient(late.robot_q, late.t, axis=0)).max(axis=1)
+    first = int(np.argmax(speed > 0.3))
+    columns = {name: getattr(late, name)[first:] for name in ("t", "q", "force_on_arm", "robot_q")}
+    cut = dataclasses.replace(late, valid=np.empty(0, dtype=bool), **columns)
+    changed_data = data.replace(trials=tuple(cut if t is late else t for t in data.trials))
+    (line,) = [line for line in examine(changed_data, led=True) if "when these begin" in line]
+    assert late.file in line and line.count(" rad/s") == 1
+
+
 def test_a_gap_that_keeps_repeats_from_being_compared_is_warned_of() -> None:
     data = session()
     first, *rest = data.trials

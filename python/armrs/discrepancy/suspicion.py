@@ -20,6 +20,10 @@ _OFTEN = 3.0
 """A saturated channel is that much oftener at its extreme than next to it."""
 _ALIKE = 0.9
 """Correlation above which two signals are the same movement."""
+_STARTING = 0.02
+"""Time between the samples that tell how fast the robot is when a trial begins [s]."""
+_AT_REST = 0.05
+"""Speed of a robot's joint up to which it counts as resting [rad/s]: four samples of an encoder of 0.1 mrad tell it to 0.02."""
 _FIRST = 16
 """Samples at the start by which trials that may be copies are looked up: no trial has fewer."""
 
@@ -48,7 +52,7 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
                 found = Text(f"{level:g} N m in every sample")
                 raise BadInput(f"column {name}", found, "a torque that changes with the movement", file=trial.file, hint="a dead sensor?")
     _refuse_copies(dataset.trials)
-    return lines + _uneven_repeats(fit) + _saturated(dataset, led)
+    return lines + _moving_starts(dataset.trials, led) + _uneven_repeats(fit) + _saturated(dataset, led)
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
@@ -91,6 +95,25 @@ def _same_samples(a: Trial, b: Trial) -> bool:
     if not all(np.array_equal(x, y, equal_nan=True) for x, y in pairs):
         return False
     return any(np.isfinite(column).any() and constant(column) is None for x, _ in pairs for column in x.T)
+
+
+def _moving_starts(trials: Sequence[Trial], led: bool) -> list[str]:
+    """Return the trials that begin while the robot moves: a simulated run starts at rest."""
+    fastest: dict[str, float] = {}
+    for trial in trials if led else ():
+        step = max(1, int(np.ceil(_STARTING / np.median(np.diff(trial.t)) - 1e-6)))
+        start = trial.robot_q[: 3 * step + 1 : step] if trial.robot_q is not None else np.empty((0, 2))
+        if len(start) < 4 or not np.isfinite(start).all():
+            continue
+        # The speed at the first sample: a robot that sets off there has none yet, however sharply it does.
+        slope = np.polynomial.polynomial.polyfit(trial.t[: 3 * step + 1 : step] - trial.t[0], start, 2)[1]
+        speed = slope * np.sign(start[-1] - start[0])
+        if speed.max() > _AT_REST:
+            fastest[trial.file] = float(speed.max())
+    if not fastest:
+        return []
+    each = ", ".join(f"{file} ({speed:.2g} rad/s)" for file, speed in fastest.items())
+    return [f"the robot moves when these begin: {each}; runs are simulated from rest, so begin them at one, or what is left says little"]
 
 
 def _uneven_repeats(trials: Sequence[Trial]) -> list[str]:
