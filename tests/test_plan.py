@@ -129,6 +129,21 @@ def test_a_wrist_that_hangs_between_forearm_and_handle_is_identified() -> None:
             assert abs(found[(p.name, p.joint)] - p.value) < 4.0 * p.std, (seed, p)
 
 
+def test_a_fit_that_ends_at_a_bound_starts_again() -> None:
+    """From its first start the wrist's viscosity ended at zero, two dozen deviations off."""
+    arm = check_plan.truth(3)
+    waypoints = ([-697, 367, -50], [-1169, 1086, -198], [-1221, 1070, -168], [-803, 1248, 171], [-693, 463, -69], [-311, 869, 39])
+    wide = ([-183, 1201, -25], [-170, 1920, -95], [-215, 659, 115], [-404, 1865, -97], [-1014, 1520, -144], [-205, 955, -60])
+    movements = [
+        Movement(1e-3 * np.array((*path, path[0]), float), speed=speed, acceleration=4 * speed, shape="smooth")
+        for path, speed in ((waypoints, 2.5), (wide, 0.75))
+    ]
+    planned = armrs.forecast(arm, movements, repeats=5, instruments=armrs.Instruments(tolerance=check_plan.TOLERANCE))
+    found = check_plan.repetition(arm, planned, 511)
+    for p in planned.predictions:
+        assert abs(found[(p.name, p.joint)] - p.value) < 3.0 * p.std, p
+
+
 def test_a_movement_in_which_dry_joints_rest_tells_nothing_and_breaks_nothing() -> None:
     """Nothing is compared where dry friction holds a joint: a movement may have no sample left, and a longer one follows it."""
     joints = (Joint("shoulder", coulomb=0.2), Joint("elbow", coulomb=0.2), Joint("wrist", viscosity=0.1, stiffness=12.0))

@@ -63,7 +63,8 @@ def fit_by_simulation(
 ) -> SimulationFit:
     """Fit parameters of effects so that a simulated run comes closest to a recorded one.
 
-    The fit starts from the model's values. Every round simulates the estimate and a run beside it for each parameter in one batch.
+    The fit starts from the model's values, and again from elsewhere where a parameter ends at its bound or the rounds run out; the run that
+    comes closest counts. Every round simulates the estimate and a run beside it for each parameter in one batch.
 
     Parameters
     ----------

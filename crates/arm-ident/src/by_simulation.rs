@@ -10,6 +10,7 @@ use crate::covariance::Bread;
 use crate::error::{IdentError, check_finite, check_least, check_len, check_range};
 use crate::factor::Factor;
 use crate::program::Program;
+use crate::restart::{Ended, best};
 
 /// A parameter beside the estimate is this share of its size away: between rounding (1e-14 of an angle) and curvature.
 const BESIDE: f64 = 1e-6;
@@ -63,13 +64,14 @@ pub struct Fit {
     pub squares: f64,
     /// Number of residuals.
     pub residuals: usize,
-    /// Rounds of simulations.
+    /// Rounds of simulations from the start that led here.
     pub rounds: usize,
     /// Whether the estimate stands; false when the rounds ran out.
     pub settled: bool,
 }
 
-/// Fits parameters of an experiment's effects; the fit starts from the experiment's own values.
+/// Fits parameters of an experiment's effects; the fit starts from the experiment's own values, and again from elsewhere where it ends at a bound or does
+/// not settle: the run that comes closest counts.
 ///
 /// * `threads` - over which the runs of a round are spread; the result has the same bits for any number
 ///
@@ -106,45 +108,26 @@ pub fn fit<const N: usize>(
         free,
         threads,
     };
-    let still = vec![0.0; x.len()];
-    let mut here = search.around(&x)?;
-    let mut squares = here.residual2(&still)?;
-    let (mut damping, mut rounds, mut settled) = (FIRST_DAMPING, 1, false);
-    while rounds < MOST_ROUNDS && damping < MOST_DAMPING {
-        let step = search.step(&here, &x, damping)?;
-        let promised = squares - here.residual2(&step)?;
-        if promised <= SETTLED * (1.0 + squares) {
-            settled = true;
-            break;
-        }
-        rounds += 1;
-        let candidate: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x + s).collect();
-        // A candidate whose run stops is no better than one that fits worse.
-        let there = search.around(&candidate).ok();
-        match there.map(|there| (there.residual2(&still), there)) {
-            Some((Ok(fewer), there)) if fewer < squares => {
-                (squares, here, x) = (fewer, there, candidate);
-                damping *= 0.1;
-            }
-            _ => damping *= 10.0,
-        }
+    let limits: Vec<[f64; 2]> = free.iter().map(|f| [f.min, f.max]).collect();
+    let first = search.settle(x.clone())?;
+    Ok(best(first, &x, &limits, |_, from| {
+        search.settle(from.to_vec()).ok()
+    }))
+}
+
+impl Ended for Fit {
+    fn parameters(&self) -> Vec<(f64, i8)> {
+        let values = self.values.iter().copied();
+        values.zip(self.active.iter().copied()).collect()
     }
-    // Where damping has taken every step away, what is left is rounding.
-    settled |= damping >= MOST_DAMPING;
-    let active = x
-        .iter()
-        .zip(free)
-        .map(|(&x, f)| i8::from(x >= f.max) - i8::from(x <= f.min))
-        .collect();
-    Ok(Fit {
-        sd: deviations(&here),
-        squares,
-        residuals: here.rows,
-        active,
-        values: x,
-        rounds,
-        settled,
-    })
+
+    fn settled(&self) -> bool {
+        self.settled
+    }
+
+    fn objective(&self) -> f64 {
+        self.squares
+    }
 }
 
 struct Search<'a, const N: usize> {
@@ -155,6 +138,49 @@ struct Search<'a, const N: usize> {
 }
 
 impl<const N: usize> Search<'_, N> {
+    /// Rounds from a start until the estimate stands.
+    fn settle(&self, mut x: Vec<f64>) -> Result<Fit, IdentError> {
+        let still = vec![0.0; x.len()];
+        let mut here = self.around(&x)?;
+        let mut squares = here.residual2(&still)?;
+        let (mut damping, mut rounds, mut settled) = (FIRST_DAMPING, 1, false);
+        while rounds < MOST_ROUNDS && damping < MOST_DAMPING {
+            let step = self.step(&here, &x, damping)?;
+            let promised = squares - here.residual2(&step)?;
+            if promised <= SETTLED * (1.0 + squares) {
+                settled = true;
+                break;
+            }
+            rounds += 1;
+            let candidate: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x + s).collect();
+            // A candidate whose run stops is no better than one that fits worse.
+            let there = self.around(&candidate).ok();
+            match there.map(|there| (there.residual2(&still), there)) {
+                Some((Ok(fewer), there)) if fewer < squares => {
+                    (squares, here, x) = (fewer, there, candidate);
+                    damping *= 0.1;
+                }
+                _ => damping *= 10.0,
+            }
+        }
+        // Where damping has taken every step away, what is left is rounding.
+        settled |= damping >= MOST_DAMPING;
+        let active = x
+            .iter()
+            .zip(self.free)
+            .map(|(&x, f)| i8::from(x >= f.max) - i8::from(x <= f.min))
+            .collect();
+        Ok(Fit {
+            sd: deviations(&here),
+            squares,
+            residuals: here.rows,
+            active,
+            values: x,
+            rounds,
+            settled,
+        })
+    }
+
     /// The problem of least squares around an estimate: derivatives by differences, in the unit of the noise.
     fn around(&self, x: &[f64]) -> Result<Factor, IdentError> {
         let at = |values: &[f64]| {

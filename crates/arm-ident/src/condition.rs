@@ -145,6 +145,11 @@ impl<const N: usize> Noise<N> {
         Ok(Self::from_covariance(&covariance))
     }
 
+    /// Of all that residuals have in common between joints, as if they were independent in time.
+    pub fn of_all(residuals: &[Vec<f64>]) -> Self {
+        Self::from_covariance(&second_moments::<N>(residuals))
+    }
+
     fn from_covariance(covariance: &[[f64; N]; N]) -> Self {
         let largest = (0..N)
             .map(|j| covariance[j][j])
@@ -192,6 +197,11 @@ impl<const N: usize> Noise<N> {
             self.inverse.iter_mut().flatten().for_each(|v| *v /= excess);
         }
         self
+    }
+
+    /// Logarithm of the covariance's determinant.
+    pub fn log_determinant(&self) -> f64 {
+        (0..N).map(|j| -2.0 * libm::log(self.inverse[j][j])).sum()
     }
 
     /// Weighs rows in place.

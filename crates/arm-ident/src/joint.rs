@@ -13,7 +13,8 @@ use crate::motion::{
     candidates, candidates_of_measured, measured, motion_cutoff, relative_speed_noise, speed_noise,
 };
 use crate::outcome::Outcome;
-use crate::response::damped;
+use crate::response::{HELD, damped};
+use crate::restart::{Ended, best};
 use crate::simulated::simulated;
 use crate::summary::{Fit, summarise};
 use crate::trial::{Model, Role, Tolerance, Trial};
@@ -112,51 +113,39 @@ pub fn identify<const N: usize>(
         None if simulate => candidates(&fit)[0],
         None => best_cutoff(model, &unknowns, &fit)?,
     };
-    let mut current = if simulate {
+    let task = Task {
+        unknowns: &unknowns,
+        trials,
+        fit: &fit,
+        cutoff,
+        simulate,
+        scale_free,
+    };
+    let first = if simulate {
         damped(model, cutoff)
     } else {
         model.clone()
     };
-    let mut last: Option<(Solved, Vec<Pieces>)> = None;
-    let (mut shown, mut refused) = (current.clone(), None);
-    for _ in 0..MOST_ROUNDS {
-        let delay = last
-            .as_ref()
-            .map_or(0.0, |(solved, _)| delay(&unknowns, &solved.outcome.x));
-        let prepared = match prepare(&current, &unknowns, trials, (cutoff, simulate, delay)) {
-            Ok(prepared) => prepared,
-            // A step too far makes an arm that cannot be simulated: half of it is a step too.
-            Err(error) if last.is_some() => {
-                current = half_way(&shown, &current, &unknowns)?;
-                refused = Some(error);
-                continue;
+    let mut found = task.settle(first.clone())?;
+    // Where the robot holds every joint the motion is known, and the problem has one minimum.
+    if simulate && N > HELD {
+        let from = values(&first, &unknowns);
+        let start: Vec<f64> = of_effects(&unknowns).map(|(k, _)| from[k]).collect();
+        let limits: Vec<[f64; 2]> = of_effects(&unknowns).map(|(_, u)| [u.min, u.max]).collect();
+        found = best(found, &start, &limits, |other, effects| {
+            let mut x = values(&other.model, &unknowns);
+            for ((k, _), value) in of_effects(&unknowns).zip(effects) {
+                x[k] = *value;
             }
-            Err(error) => return Err(error),
-        };
-        (shown, refused) = (current, None);
-        let fitted: Vec<&Pieces> = prepared
-            .iter()
-            .zip(trials)
-            .filter(|(_, t)| t.role == Role::Fit)
-            .map(|(p, _)| p)
-            .collect();
-        let deviations = deviations(&fit, &fitted);
-        let solved = weighted(&shown, &unknowns, &fitted, (&deviations, scale_free))?;
-        current = updated(&shown, &unknowns, &solved.outcome.x)?;
-        let moved = last
-            .as_ref()
-            .map_or(f64::INFINITY, |(before, _)| moved(&solved, before));
-        last = Some((solved, prepared));
-        if moved < SETTLED {
-            break;
-        }
+            task.settle(updated(&other.model, &unknowns, &x).ok()?).ok()
+        });
     }
-    if let Some(error) = refused {
-        return Err(error);
-    }
-    let Some((solved, prepared)) = last else {
-        unreachable!("there is at least one round")
-    };
+    let Settled {
+        model: current,
+        solved,
+        prepared,
+        ..
+    } = found;
     let explained = prepared
         .iter()
         .map(|pieces| explain(pieces, &solved.outcome.x))
@@ -174,6 +163,139 @@ pub fn identify<const N: usize>(
         result.speed_noise = relative_speed_noise(&fit_trials, cutoff)?.to_vec();
     }
     Ok(result)
+}
+
+/// What rounds of a fit have in common.
+struct Task<'a, const N: usize> {
+    unknowns: &'a [Unknown],
+    trials: &'a [Trial<N>],
+    /// Those that are fitted.
+    fit: &'a [&'a Trial<N>],
+    cutoff: f64,
+    simulate: bool,
+    scale_free: bool,
+}
+
+/// Where rounds of a fit ended.
+struct Settled<const N: usize> {
+    model: Model<N>,
+    solved: Solved,
+    prepared: Vec<Pieces>,
+    /// Values of the fitted effects, and whether they are at a bound.
+    effects: Vec<(f64, i8)>,
+    settled: bool,
+    objective: f64,
+}
+
+impl<const N: usize> Ended for Settled<N> {
+    fn parameters(&self) -> Vec<(f64, i8)> {
+        self.effects.clone()
+    }
+
+    fn settled(&self) -> bool {
+        self.settled
+    }
+
+    fn objective(&self) -> f64 {
+        self.objective
+    }
+}
+
+/// The unknowns that belong to effects, with their places.
+fn of_effects(unknowns: &[Unknown]) -> impl Iterator<Item = (usize, &Unknown)> {
+    let numbered = unknowns.iter().enumerate();
+    numbered.filter(|(_, u)| matches!(u.source, Source::Effect(..)))
+}
+
+impl<const N: usize> Task<'_, N> {
+    /// Fits, linearises again and, where the motion is simulated, simulates again until the estimate stands.
+    fn settle(&self, start: Model<N>) -> Result<Settled<N>, IdentError> {
+        let Self {
+            unknowns,
+            trials,
+            fit,
+            cutoff,
+            simulate,
+            scale_free,
+        } = *self;
+        let mut current = start;
+        let mut last: Option<(Solved, Vec<Pieces>)> = None;
+        let (mut shown, mut refused, mut settled) = (current.clone(), None, false);
+        for _ in 0..MOST_ROUNDS {
+            let delay = last
+                .as_ref()
+                .map_or(0.0, |(solved, _)| delay(unknowns, &solved.outcome.x));
+            let prepared = match prepare(&current, unknowns, trials, (cutoff, simulate, delay)) {
+                Ok(prepared) => prepared,
+                // A step too far makes an arm that cannot be simulated: half of it is a step too.
+                Err(error) if last.is_some() => {
+                    current = half_way(&shown, &current, unknowns)?;
+                    refused = Some(error);
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            (shown, refused) = (current, None);
+            let fitted = self.fitted(&prepared);
+            let deviations = deviations(fit, &fitted);
+            let solved = weighted(&shown, unknowns, &fitted, (&deviations, scale_free))?;
+            current = updated(&shown, unknowns, &solved.outcome.x)?;
+            let moved = last
+                .as_ref()
+                .map_or(f64::INFINITY, |(before, _)| moved(&solved, before));
+            last = Some((solved, prepared));
+            if moved < SETTLED {
+                settled = true;
+                break;
+            }
+        }
+        if let Some(error) = refused {
+            return Err(error);
+        }
+        let Some((solved, prepared)) = last else {
+            unreachable!("there is at least one round")
+        };
+        let effects = of_effects(unknowns)
+            .map(|(k, _)| (solved.outcome.x[k], solved.outcome.active[k]))
+            .collect();
+        let objective = self.objective(&prepared, &solved.outcome.x);
+        Ok(Settled {
+            model: current,
+            solved,
+            prepared,
+            effects,
+            settled,
+            objective,
+        })
+    }
+
+    /// The pieces of the trials that are fitted.
+    fn fitted<'p>(&self, prepared: &'p [Pieces]) -> Vec<&'p Pieces> {
+        let all = prepared.iter().zip(self.trials);
+        all.filter(|(_, t)| t.role == Role::Fit)
+            .map(|(p, _)| p)
+            .collect()
+    }
+
+    /// Twice the negative logarithm of what data and prior say of an estimate, whatever the weights: `n ln det S + Σ ((x − mean) / sd)²`, with
+    /// S the covariance of n residuals.
+    fn objective(&self, prepared: &[Pieces], x: &[f64]) -> f64 {
+        let residuals: Vec<Vec<f64>> = self
+            .fitted(prepared)
+            .into_iter()
+            .flatten()
+            .map(|rows| residual(rows, x))
+            .collect();
+        let samples = residuals.iter().map(Vec::len).sum::<usize>() / N;
+        let prior: f64 = self
+            .unknowns
+            .iter()
+            .zip(x)
+            .map(|(u, x)| (x - u.mean) / u.sd)
+            .map(|v| v * v)
+            .sum();
+        samples as f64 * Noise::<N>::of_all(&residuals).log_determinant() + prior
+    }
 }
 
 /// Whether the robot's angles alone tell how a trial moved: its path is known, and nothing else drives the arm.

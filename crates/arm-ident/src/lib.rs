@@ -51,6 +51,7 @@ mod orthogonal;
 mod outcome;
 mod polish;
 mod response;
+mod restart;
 mod scaled;
 
 pub use condense::Condenser;

@@ -1,5 +1,6 @@
 //! Fits by simulation.
 
+use arm_core::effect::{Effect, Kind};
 use arm_ident::IdentError;
 use arm_ident::by_simulation::{Fit, Free, Recorded, fit};
 use arm_sim::{Experiment, Integrator, Recording, models, simulate};
@@ -94,6 +95,35 @@ fn bounds_hold_and_are_said() {
     assert_eq!(found.values[3], 0.45);
     assert_eq!(found.active[3], 1);
     assert!(found.values.iter().all(|&v| (0.0..=0.45).contains(&v)));
+}
+
+#[test]
+fn a_rhythm_that_loses_its_amplitude_to_a_wrong_phase_is_found_again() {
+    // Out of phase by more than a right angle, no amplitude fits better than any; at amplitude zero no phase is better than another.
+    let rhythm = |amplitude, phase| {
+        let mut run = experiment(TRUE);
+        let effect = Effect::new(Kind::Tremor, 1).with(&[amplitude, 1.5, phase]);
+        run.effects.push(effect);
+        run
+    };
+    let recording = simulate(&rhythm(0.4, 0.0)).expect("runs");
+    let recorded = Recorded {
+        q: &recording.q,
+        force_on_arm: &recording.force_on_arm,
+        angle_noise: [ANGLE_NOISE; 3],
+        force_noise: [FORCE_NOISE; 2],
+    };
+    let free = |parameter, [min, max]: [f64; 2]| Free {
+        effect: 6,
+        parameter,
+        min,
+        max,
+    };
+    let free = [free(0, [0.0, 20.0]), free(2, [-7.0, 7.0])];
+    let found = fit(&rhythm(0.4, 2.5), &recorded, &free, 1).expect("a fit");
+    assert_eq!(found.active, [0, 0]);
+    assert!(found.squares < 1e-6, "{}", found.squares);
+    assert!((found.values[0] - 0.4).abs() < 1e-5 && found.values[1].abs() < 1e-4);
 }
 
 #[test]
