@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
+import io
 import json
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow
 import pyarrow.csv
 import pytest
 from pyarrow import parquet
 
 import armrs
-from armrs import cli
+from armrs import cli, figures
+from armrs.files import json_text
+from armrs.results import simulated_columns, simulated_data
+from armrs.samples import write_samples
+from armrs.simulation import PIECE
+from armrs.streamed import stream
 from conftest import MODEL
 
 
@@ -59,6 +71,118 @@ def test_a_trial_drives_the_arm_along_its_robot_angles(slow_arm: Path, tmp_path:
     simulated = np.column_stack([table.column(f"q{j}_rad").to_numpy() for j in (1, 2)])
     assert np.degrees(np.abs(simulated - measured.q[: len(simulated)]).max()) < 1.0
     assert json.loads((tmp_path / "simulated.json").read_text(encoding="utf-8"))["file"] == "simulated.parquet"
+
+
+LONG = ("--duration-s", 12, "--rate-hz", 4000)
+"""48 001 samples: two whole pieces, and a part of a third."""
+
+
+def long_run(folder: Path) -> armrs.Simulated:
+    return armrs.simulate(folder / "truth.toml", armrs.load_movement(folder / "movement.toml", 2), duration=12.0, rate=4000.0)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_long_run_is_written_as_if_at_once(slow_arm: Path, tmp_path: Path, suffix: str) -> None:
+    out = tmp_path / "out"
+    command = ("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", *LONG, "--to", suffix[1:], "-o", out)
+    assert run(*command) == 0
+    whole = long_run(slow_arm)
+    assert 2 * PIECE < len(whole.t) < 3 * PIECE
+    expected = tmp_path / f"whole{suffix}"
+    columns = simulated_columns(whole)
+    if suffix == ".csv":
+        write_samples(expected, list(columns), list(columns.values()))
+    else:
+        table = pyarrow.table(columns)
+        with parquet.ParquetWriter(expected, table.schema) as writer:
+            writer.write_table(table, row_group_size=PIECE)
+    assert (out / f"simulated{suffix}").read_bytes() == expected.read_bytes()
+    found = json.loads((out / "simulated.json").read_text(encoding="utf-8"))
+    at_once = json.loads(json_text(simulated_data(whole, found["data"]["name"], found["made_by"]["command"])))
+    assert {key: found[key] for key in at_once} == at_once and found["file"] == f"simulated{suffix}"
+    assert found["samples"] == 48_001 and found["digest"] == whole.digest
+    # Nothing is left of what was kept on the way.
+    assert {p.name for p in out.iterdir()} == {"figures", "report.html", f"simulated{suffix}", "simulated.json"}
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+
+
+def test_pieces_of_a_whole_run_are_its_samples(slow_arm: Path) -> None:
+    whole = long_run(slow_arm)
+    pieces = list(whole.pieces(20_000))
+    assert [p.samples for p in pieces] == [20_000, 20_000, 8001]
+    for name, values in whole.columns.items():
+        if isinstance(values, np.ndarray):
+            assert np.array_equal(np.concatenate([p.columns[name] for p in pieces]), values), name
+
+
+def test_what_is_drawn_of_a_long_run_has_its_extremes(slow_arm: Path) -> None:
+    whole = long_run(slow_arm)
+    drawn = figures.outline(whole)
+    assert 5000 < drawn.samples <= 20_000
+    for a, b in (
+        (drawn.q, whole.q),
+        (drawn.force_on_arm, whole.force_on_arm),
+        (drawn.columns["torque.gravity"], whole.columns["torque.gravity"]),
+    ):
+        assert np.array_equal(a.max(axis=0), b.max(axis=0)) and np.array_equal(a.min(axis=0), b.min(axis=0))
+    assert (np.diff(drawn.t) > 0).all() and drawn.t[0] == 0.0
+    # Each drawn point is one of the samples near its time.
+    near = np.abs(np.interp(drawn.t, whole.t, whole.q[:, 0]) - drawn.q[:, 0])
+    assert near.max() < 8 / 4000 * np.abs(whole.qd).max()
+    short = armrs.simulate(slow_arm / "truth.toml", armrs.load_movement(slow_arm / "movement.toml", 2))
+    assert np.array_equal(figures.outline(short).q, short.q)
+
+
+MEMORY = """
+import resource, sys
+from armrs.cli import main
+assert main(sys.argv[1:]) == 0
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is told in other units")
+def test_memory_does_not_grow_with_the_run(slow_arm: Path, tmp_path: Path) -> None:
+    """Beyond a few pieces; 200 000 samples more would be 90 MB, and were twice that."""
+    largest = []
+    for seconds in (20, 70):
+        command = ["simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--integrator", "euler"]
+        command += ["--duration-s", seconds, "--rate-hz", 4000, "--to", "parquet", "-o", tmp_path / str(seconds)]
+        done = subprocess.run([sys.executable, "-c", MEMORY, *map(str, command)], capture_output=True, text=True, check=True)
+        largest.append(int(done.stderr.split()[-1]) * 1024 / 1e6)
+    assert largest[1] - largest[0] < 25.0, largest
+
+
+def test_what_is_kept_on_disk_has_no_name(slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that nothing is left of a run that is killed."""
+    usual, used = tempfile.TemporaryFile, []
+    monkeypatch.setattr("armrs.files.tempfile.TemporaryFile", lambda dir: used.append((dir, usual(dir=dir))) or used[-1][1])
+    movement = armrs.load_movement(slow_arm / "movement.toml", 2)
+    with stream(armrs.load_model(slow_arm / "truth.toml"), movement, tmp_path / "a" / "b", duration=12.0, rate=4000.0) as run:
+        assert run.samples == 48_001 and used[0][0] == tmp_path
+        assert list(tmp_path.iterdir()) == [] and used[0][1].tell() > 48_001 * 8 * 40
+    assert [file.closed for _, file in used] == [True]
+
+
+@pytest.mark.parametrize("start", ["new", "there"])
+def test_a_full_disk_is_said_and_nothing_is_left(
+    slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, start: str
+) -> None:
+    out = tmp_path / "out"
+    if start == "there":
+        out.mkdir()
+
+    class Full(io.BytesIO):
+        def write(self, data: Any) -> int:
+            if self.tell() > PIECE * 8:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            return super().write(data)
+
+    monkeypatch.setattr("armrs.files.tempfile.TemporaryFile", lambda dir: Full())
+    assert run("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", *LONG, "-o", out) == 2
+    error = capsys.readouterr().err
+    assert "No space left on device" in error and error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == ([out] if start == "there" else []) and not list(tmp_path.glob("out/*"))
 
 
 def test_an_arm_that_runs_away_is_called_out(slow_arm: Path, data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,13 +9,13 @@ __all__ = [
     "Arm",
     "ArmSlave",
     "ArmState",
+    "Digest",
     "Rig",
     "__version__",
     "build_profile",
     "control",
     "declare",
     "design",
-    "digest",
     "distances",
     "effects",
     "find_gap",
@@ -27,6 +27,7 @@ __all__ = [
     "low_pass_both_ways",
     "play",
     "simulate",
+    "simulate_in_pieces",
     "smooth",
 ]
 
@@ -70,6 +71,13 @@ class Rig:
 
 @final
 class ArmState: ...
+
+@final
+class Digest:
+    def __new__(cls, effects: Sequence[tuple[str, int]]) -> Digest: ...
+    def column(self, name: str, length: int) -> None: ...
+    def values(self, values: NDArray[np.float64]) -> None: ...
+    def value(self) -> str: ...
 
 @final
 class ArmSlave:
@@ -139,13 +147,15 @@ def forecast(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], 
 def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...
 def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[dict[str, Any]]: ...
 def play(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any], own: bool = False) -> list[dict[str, Any]]: ...
-def digest(effects: Sequence[tuple[str, int]], columns: Sequence[tuple[str, NDArray[np.float64] | None]]) -> str: ...
 def simulate(
     rig: Rig,
     drive: Mapping[str, Any],
     settings: Mapping[str, Any],
     sensing: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]: ...
+def simulate_in_pieces(
+    rig: Rig, drive: Mapping[str, Any], settings: Mapping[str, Any], samples: int, take: Callable[[dict[str, Any]], None]
+) -> None: ...
 def smooth(
     values: NDArray[np.float64], rate: float, cutoff: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...

@@ -19,6 +19,8 @@ from .trial import Trial
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .streamed import Run
+
 MOST_CONFIGURATIONS = 8
 """So many movements are drawn; with more, a report would be too long to read."""
 
@@ -146,8 +148,36 @@ _TORQUES = {
     "contact": "contact",
 }
 """Torque columns of a recording, and how a legend names them."""
+_MOST_DRAWN = 20_000
+"""Samples of a curve; more fall on the same pixels."""
 _VISIBLE = 5e-3
 """A torque below this part of the largest would be a line on the axis."""
+
+
+def outline(run: Run) -> Simulated:
+    """Return a run that looks the same when it is drawn: of a long one, the lowest and highest values of every few samples."""
+    together = 1 if run.samples <= _MOST_DRAWN else -(-2 * run.samples // _MOST_DRAWN)
+    parts = [_extremes(piece, together) for piece in run.pieces()]
+    return parts[0].with_columns({name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns})
+
+
+def _extremes(piece: Simulated, together: int) -> Simulated:
+    """Return what is drawn of a piece: two samples for every so many, of each column the lowest value and the highest."""
+    starts = np.arange(0, len(piece.t), together)
+    middles = np.minimum(starts + together // 2, len(piece.t) - 1)
+
+    def of(name: str, values: np.ndarray) -> np.ndarray:
+        if together == 1:
+            return values
+        both = (
+            (values[starts], values[middles])
+            if name == "time"
+            else (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
+        )
+        return np.stack(both, axis=1).reshape(-1, *values.shape[1:])
+
+    kept = ["time", "q", "qd", "qdd", "force_on_arm", *(name for name in piece.columns if name.startswith("torque."))]
+    return piece.with_columns({name: of(name, piece.columns[name]) for name in kept})
 
 
 def simulated(result: Simulated, trial: Trial | None = None) -> list[Drawn]:

@@ -7,9 +7,9 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from . import checks
 from .errors import BadInput, Text
@@ -42,6 +42,34 @@ def replacing(path: PathLike) -> Iterator[Path]:
         raise _unwritable(path, error) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def unnamed(near: PathLike | None) -> Iterator[IO[bytes]]:
+    """Give a file for a while: on the disk where `near` is or will be, or that of temporary files.
+
+    It has no name, so that nothing is left of it however the process ends.
+    """
+    if near is not None:
+        target = Path(near).absolute()
+        near = next(p for p in (target, *target.parents) if p.is_dir())
+    with as_bad_input(near):
+        file = tempfile.TemporaryFile(dir=near)  # noqa: SIM115 (closed below, whatever happens)
+    try:
+        yield file
+    finally:
+        # What could not be written was said before.
+        with suppress(OSError):
+            file.close()
+
+
+@contextmanager
+def as_bad_input(path: PathLike | None) -> Iterator[None]:
+    """Turn a disk that is full or out of reach into a refusal that names `path`, or the folder of temporary files."""
+    try:
+        yield
+    except OSError as error:
+        raise _unwritable(path or tempfile.gettempdir(), error) from None
 
 
 def write_whole(folder: PathLike, write: Callable[[Path], list[Path]]) -> list[Path]:

@@ -16,8 +16,9 @@ from .identification import Estimate, Identified
 from .moments import LEVEL, PassiveMoments
 from .quantities import value_in
 from .rig import NO_CONTACT
-from .samples import write_samples
+from .samples import write_pieces
 from .simulation import Simulated
+from .streamed import Run
 from .trial import Trial
 
 
@@ -104,27 +105,37 @@ def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figu
     return [*pictures, document, page]
 
 
-def simulated_data(result: Simulated, name: str, command: str | None = None) -> dict[str, Any]:
+def simulated_data(result: Run, name: str, command: str | None = None) -> dict[str, Any]:
     """Return what a run came to, as it is written to JSON; its samples stand in a file of their own."""
-    force = np.hypot(*result.force_on_arm.T)
-    at = int(np.argmax(force))
-    columns = result.columns
-    stored = sum(columns[f"energy.{part}"][-1] - columns[f"energy.{part}"][0] for part in ("kinetic", "potential", "contact"))
+    fastest = error = 0.0
+    largest = (-1.0, 0.0)
+    first: Simulated | None = None
+    last: Simulated | None = None
+    for piece in result.pieces():
+        force = np.hypot(*piece.force_on_arm.T)
+        at = int(np.argmax(force))
+        if force[at] > largest[0]:
+            largest = (force[at], piece.t[at])
+        fastest = max(fastest, np.abs(piece.qd).max())
+        error = max(error, np.abs(piece.columns["energy_error"]).max())
+        first, last = piece if first is None else first, piece
+    assert first is not None and last is not None
+    stored = sum(last.columns[f"energy.{part}"][-1] - first.columns[f"energy.{part}"][0] for part in ("kinetic", "potential", "contact"))
     return {
         "verb": "simulate",
         "data": {"name": name, "synthetic": True, "joints": [joint.name for joint in result.model.joints]},
         **result.settings,
-        "duration_s": result.t[-1],
-        "samples": len(result.t),
+        "duration_s": last.t[-1],
+        "samples": result.samples,
         "digest": result.digest,
-        "assumed": _assumed(result),
-        "largest_force_N": force[at],
-        "largest_force_at_s": result.t[at],
-        "largest_speed_rad_s": np.abs(result.qd).max(),
+        "assumed": _assumed(first),
+        "largest_force_N": largest[0],
+        "largest_force_at_s": largest[1],
+        "largest_speed_rad_s": fastest,
         "energy": {
             "stored_J": stored,
-            **{f"{part}_J": columns[f"work.{part}"][-1] for part in ("handle", "drive", "resisted", "damped")},
-            "error_J": np.abs(columns["energy_error"]).max(),
+            **{f"{part}_J": last.columns[f"work.{part}"][-1] for part in ("handle", "drive", "resisted", "damped")},
+            "error_J": error,
         },
         "made_by": origin(command),
     }
@@ -177,17 +188,14 @@ def simulated_columns(result: Simulated) -> dict[str, np.ndarray]:
     return table
 
 
-def write_simulated(
-    result: Simulated, data: dict[str, Any], folder: Path, *, suffix: str = ".csv", trial: Trial | None = None
-) -> list[Path]:
+def write_simulated(result: Run, data: dict[str, Any], folder: Path, *, suffix: str = ".csv", trial: Trial | None = None) -> list[Path]:
     """Write all samples, `simulated.json`, a figure and `report.html` below a folder; return the files, the report last."""
     name = f"simulated{suffix}"
-    table = simulated_columns(result)
-    drawn = figures.simulated(result, trial)
+    drawn = figures.simulated(figures.outline(result), trial)
     data["file"] = name
 
     def write(out: Path) -> list[Path]:
-        write_samples(out / name, list(table), list(table.values()))
+        write_pieces(out / name, (simulated_columns(piece) for piece in result.pieces()))
         return [out / name, *write_result(out, "simulated", data, drawn)]
 
     return files.write_whole(folder, write)

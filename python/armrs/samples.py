@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -232,26 +233,43 @@ def parquet_table(path: Path) -> Any:
 
 def write_samples(path: Path, names: list[str], values: list[np.ndarray]) -> None:
     """Write columns of numbers as CSV or Parquet, by the suffix; NaN becomes an empty cell. Every finite value is kept to the bit."""
+    write_table(path, _table(names, values))
+
+
+def write_pieces(path: Path, pieces: Iterable[Mapping[str, np.ndarray]]) -> None:
+    """Write columns that come some rows at a time, as `write_samples` does; in Parquet, each piece is a row group."""
+    _write_tables(path, (_table(list(piece), piece.values()) for piece in pieces))
+
+
+def _table(names: list[str], values: Iterable[np.ndarray]) -> Any:
     import pyarrow as pa
 
-    arrays = [pa.array(np.ascontiguousarray(column), from_pandas=True) for column in values]
-    write_table(path, pa.table(arrays, names=names))
+    return pa.table([pa.array(np.ascontiguousarray(column), from_pandas=True) for column in values], names=names)
 
 
 def write_table(path: Path, table: Any, verify: Callable[[Path], None] | None = None) -> None:
     """Write an Arrow table as CSV or Parquet, by the suffix. `verify` may refuse what was written before it takes its place."""
+    _write_tables(path, [table], verify)
+
+
+def _write_tables(path: Path, tables: Iterable[Any], verify: Callable[[Path], None] | None = None) -> None:
     from pyarrow import csv as arrow_csv
     from pyarrow import parquet
 
     may_replace(path, path.suffix.lower())
+    rest = iter(tables)
+    first = next(rest)
     with replacing(path) as temporary:
         if path.suffix.lower() == ".parquet":
-            parquet.write_table(table, temporary)
+            with parquet.ParquetWriter(temporary, first.schema) as writer:
+                for table in itertools.chain([first], rest):
+                    writer.write_table(table)
         else:
             header = io.StringIO()
-            csv.writer(header, lineterminator="\n").writerow(table.column_names)
+            csv.writer(header, lineterminator="\n").writerow(first.column_names)
             with temporary.open("wb") as stream:
                 stream.write(header.getvalue().encode("utf-8"))
-                arrow_csv.write_csv(table, stream, arrow_csv.WriteOptions(include_header=False))
+                for table in itertools.chain([first], rest):
+                    arrow_csv.write_csv(table, stream, arrow_csv.WriteOptions(include_header=False))
         if verify is not None:
             verify(temporary)

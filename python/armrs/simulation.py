@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -23,6 +24,8 @@ DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
 RUNAWAY = 30.0
 """Speed of a joint beyond which a run is none of a led arm [rad/s]."""
+PIECE = 16384
+"""Samples of a run that are held, drawn and written at once."""
 _MOST_STEPS = 10**9
 _CHANNELS = ("angle", "force", "moment", "robot", "torque")
 
@@ -166,17 +169,61 @@ class Simulated:
     @cached_property
     def digest(self) -> str:
         """Digest of the recorded bits; the same on every machine. Computed when it is first asked for."""
-        recorded = [(name, values) for name, values in self.columns.items() if name not in ("effects", "energy_error")]
-        return _armrs.digest(self.columns["effects"], recorded)
+        digest = _armrs.Digest(self.columns["effects"])
+        for name in digested(self.columns):
+            values = self.columns[name]
+            digest.column(name, 0 if values is None else values.size)
+            if values is not None:
+                digest.values(values)
+        return digest.value()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is hardly a movement of an arm, a line each."""
-        fastest = float(np.abs(self.qd).max())
-        if fastest <= RUNAWAY:
-            return ()
-        first = self.t[np.argmax(np.abs(self.qd).max(axis=1) > RUNAWAY)]
-        return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)
+        return runaway(self.pieces())
+
+    @property
+    def samples(self) -> int:
+        """How many were recorded."""
+        return len(self.t)
+
+    def pieces(self, samples: int = PIECE) -> Iterator[Simulated]:
+        """Give the samples in order, so many at a time."""
+        for first in range(0, len(self.t), samples):
+            part = slice(first, first + samples)
+            yield self.with_columns(
+                {name: values[part] if isinstance(values, np.ndarray) else values for name, values in self.columns.items()}
+            )
+
+    def with_columns(self, columns: dict[str, Any]) -> Simulated:
+        """Return the run with other samples."""
+        return dataclasses.replace(
+            self,
+            t=columns["time"],
+            q=columns["q"],
+            qd=columns["qd"],
+            qdd=columns["qdd"],
+            force_on_arm=columns["force_on_arm"],
+            columns=columns,
+        )
+
+
+def digested(columns: Mapping[str, Any]) -> list[str]:
+    """Return the names of the columns that a digest stands for, in its order."""
+    return [name for name in columns if name not in ("effects", "energy_error")]
+
+
+def runaway(pieces: Iterable[Simulated]) -> tuple[str, ...]:
+    """Return a line where a joint turns faster than a led arm does."""
+    fastest, first = 0.0, None
+    for piece in pieces:
+        speed = np.abs(piece.qd).max(axis=1)
+        fastest = max(fastest, float(speed.max()))
+        if first is None and fastest > RUNAWAY:
+            first = piece.t[np.argmax(speed > RUNAWAY)]
+    if first is None:
+        return ()
+    return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)
 
 
 def simulate(
@@ -225,6 +272,96 @@ def simulate(
     SimulationError
         When the run stops early.
     """
+    asked = _asked(
+        model,
+        drive,
+        engine=engine,
+        integrator=integrator,
+        dt=dt,
+        rate=rate,
+        duration=duration,
+        coupling=coupling,
+        start=(start, start_speed),
+    )
+    checks.instance("sensors", sensors, Sensors, type(None))
+    sensing = None if sensors is None else _sensing(sensors, seeds)
+    with asked.about_drive():
+        raw = _armrs.simulate(rig(asked.model), asked.led, asked.core, sensing)
+    return asked.recorded(raw)
+
+
+def simulate_in_pieces(
+    model: Model,
+    drive: Movement | Trial | None,
+    take: Callable[[Simulated], None],
+    *,
+    samples: int,
+    engine: str = "native",
+    integrator: str | None = None,
+    dt: float = DEFAULT_DT,
+    rate: float = DEFAULT_RATE,
+    duration: float | None = None,
+    coupling: str = "compliant",
+) -> None:
+    """Simulate as `simulate` does, and hand over every so many samples instead of keeping them; `take` gets each piece.
+
+    Raises
+    ------
+    BadInput, SimulationError
+        As `simulate`, and what `take` raises.
+    """
+    asked = _asked(
+        model, drive, engine=engine, integrator=integrator, dt=dt, rate=rate, duration=duration, coupling=coupling, start=(None, None)
+    )
+    with asked.about_drive():
+        _armrs.simulate_in_pieces(rig(model), asked.led, asked.core, samples, lambda raw: take(asked.recorded(raw)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """A run as the core takes it."""
+
+    model: Model
+    drive: Movement | Trial | None
+    led: dict[str, Any]
+    core: dict[str, Any]
+    settings: dict[str, Any]
+
+    @contextlib.contextmanager
+    def about_drive(self) -> Iterator[None]:
+        """Say of a refusal of the core which file it is about."""
+        try:
+            yield
+        except BadInput as error:
+            raise about(self.drive, error, f"; a step is {self.core['dt']:g} s") from None
+
+    def recorded(self, raw: dict[str, Any]) -> Simulated:
+        """Return what the core has recorded."""
+        return Simulated(
+            t=raw["time"],
+            q=raw["q"],
+            qd=raw["qd"],
+            qdd=raw["qdd"],
+            force_on_arm=raw["force_on_arm"],
+            columns={k: v for k, v in raw.items() if k != "readings"},
+            readings=tuple(raw.get("readings", ())),
+            model=self.model,
+            settings=self.settings,
+        )
+
+
+def _asked(
+    model: Model | str | os.PathLike[str],
+    drive: Movement | Trial | None,
+    *,
+    engine: str,
+    integrator: str | None,
+    dt: float,
+    rate: float,
+    duration: float | None,
+    coupling: str,
+    start: tuple[np.ndarray | None, np.ndarray | None],
+) -> _Asked:
     model = checks.loaded("model", model, Model, load_model)
     checks.choice("coupling", coupling, ("compliant", "rigid"))
     checks.choice("engine", engine, ("native", "rapier"))
@@ -244,43 +381,29 @@ def simulate(
         raise BadInput("duration", duration, f"at most {led['times'][-1]:.10g} s, the length of the trial")
     if duration is None and led["times"] is not None and rate * led["times"][-1] < 1.0:
         raise BadInput("rate", rate, f"at least one sample interval in the {led['times'][-1]:.10g} s of the trial")
-    if isinstance(drive, Trial) and start is None:
+    angles, speeds = start
+    if isinstance(drive, Trial) and angles is None:
         first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
-        start = drive.q[first]
-        if led["kind"] != "robot" and start_speed is None and drive.dq is not None:
-            start_speed = drive.dq[first]
-    settings = {
+        angles = drive.q[first]
+        if led["kind"] != "robot" and speeds is None and drive.dq is not None:
+            speeds = drive.dq[first]
+    core = {
         "engine": engine,
         "integrator": integrator,
         "dt": dt,
         "duration": duration,
         "output_interval": 1.0 / rate,
-        "q": None if start is None else checks.numbers("start", start, "rad").reshape(-1).tolist(),
-        "qd": None if start_speed is None else checks.numbers("start_speed", start_speed, "rad/s").reshape(-1).tolist(),
+        "q": None if angles is None else checks.numbers("start", angles, "rad").reshape(-1).tolist(),
+        "qd": None if speeds is None else checks.numbers("start_speed", speeds, "rad/s").reshape(-1).tolist(),
     }
-    checks.instance("sensors", sensors, Sensors, type(None))
-    sensing = None if sensors is None else _sensing(sensors, seeds)
-    try:
-        raw = _armrs.simulate(rig(model), led, settings, sensing)
-    except BadInput as error:
-        raise about(drive, error, f"; a step is {dt:g} s") from None
-    return Simulated(
-        t=raw["time"],
-        q=raw["q"],
-        qd=raw["qd"],
-        qdd=raw["qdd"],
-        force_on_arm=raw["force_on_arm"],
-        columns={k: v for k, v in raw.items() if k != "readings"},
-        readings=tuple(raw.get("readings", ())),
-        model=model,
-        settings={
-            "engine": engine,
-            "integrator": None if engine == "rapier" else integrator,
-            "dt_s": dt,
-            "rate_Hz": rate,
-            "coupling": coupling,
-        },
-    )
+    settings = {
+        "engine": engine,
+        "integrator": None if engine == "rapier" else integrator,
+        "dt_s": dt,
+        "rate_Hz": rate,
+        "coupling": coupling,
+    }
+    return _Asked(model, drive, led, core, settings)
 
 
 def _integrator(given: str | None, engine: str) -> str:

@@ -26,6 +26,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<rig::Rig>()?;
     m.add_class::<cosim::ArmSlave>()?;
     m.add_class::<cosim::ArmState>()?;
+    m.add_class::<sim::Digest>()?;
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(fit::fit_by_simulation, m)?)?;
     m.add_function(wrap_pyfunction!(gap::find_gap, m)?)?;
@@ -34,7 +35,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(gap::play, m)?)?;
     m.add_function(wrap_pyfunction!(own::declare, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
-    m.add_function(wrap_pyfunction!(sim::digest, m)?)?;
+    m.add_function(wrap_pyfunction!(sim::simulate_in_pieces, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;
     m.add_function(wrap_pyfunction!(plan::forecast_py, m)?)?;
     m.add_function(wrap_pyfunction!(plan::design_py, m)?)?;

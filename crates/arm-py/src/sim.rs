@@ -1,9 +1,11 @@
 //! Simulation: a rig and how it is driven in, every column of the recording out, and what sensors read of it.
 
+use std::ops::ControlFlow;
+
 use arm_core::{Chain, Joints, Limits, Shape};
 use arm_sim::{
     Channel, Coupling, Drive, Engine, Experiment, HandlePath, Integrator, Interpolation, Movement,
-    Recording, Sensors, Series, Start,
+    Piece, Recording, Sensors, Series, Start,
 };
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
@@ -43,6 +45,16 @@ pub struct Settings {
     /// Where it starts; the static equilibrium near it when a handle leads and no speed is given.
     q: Option<Vec<f64>>,
     qd: Option<Vec<f64>>,
+}
+
+impl Settings {
+    fn engine(&self) -> PyResult<Engine> {
+        match self.engine.as_str() {
+            "native" => Ok(Engine::Native),
+            "rapier" => Ok(Engine::Rapier),
+            other => Err(bad_input("engine", other, "native or rapier")),
+        }
+    }
 }
 
 /// Noise and limits of the sensors: (deviation, correlation time, range, bits) for each kind of channel.
@@ -95,15 +107,11 @@ pub fn simulate<'py>(
         (drive, settings, sensing): (&Driven<'py>, &Settings, Option<&Sensing>),
     ) -> PyResult<Bound<'py, PyDict>> {
         let experiment = experiment(chain, rig, drive, settings)?;
-        let engine = match settings.engine.as_str() {
-            "native" => Engine::Native,
-            "rapier" => Engine::Rapier,
-            other => return Err(bad_input("engine", other, "native or rapier")),
-        };
+        let engine = settings.engine()?;
         let outcome = py.detach(|| arm_sim::simulate_with(engine, &experiment));
         crate::own::failed()?;
         let recording = outcome.map_err(simulation)?;
-        let out = columns(py, &recording)?;
+        let out = columns(py, &Piece::from(&recording))?;
         if let Some(sensing) = sensing {
             let readings = sensing
                 .seeds
@@ -115,6 +123,45 @@ pub fn simulate<'py>(
         Ok(out)
     }
     each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
+}
+
+/// Simulates an experiment and calls `take` with the columns of every so many samples; what it raises ends the run.
+#[pyfunction]
+pub fn simulate_in_pieces<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    drive: Driven<'py>,
+    settings: Settings,
+    samples: usize,
+    take: Py<PyAny>,
+) -> PyResult<()> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (drive, settings): (&Driven<'py>, &Settings),
+        (samples, take): (usize, &Py<PyAny>),
+    ) -> PyResult<()> {
+        let experiment = experiment(chain, rig, drive, settings)?;
+        let engine = settings.engine()?;
+        let mut raised = None;
+        let mut give = |piece: &Piece<'_, N>| {
+            let given = Python::attach(|py| take.call1(py, (columns(py, piece)?,)).map(|_| ()));
+            given.map_or_else(
+                |error| {
+                    raised = Some(error);
+                    ControlFlow::Break(())
+                },
+                ControlFlow::Continue,
+            )
+        };
+        let outcome =
+            py.detach(|| arm_sim::simulate_in_pieces(engine, &experiment, samples, &mut give));
+        crate::own::failed()?;
+        raised.map_or(Ok(()), Err)?;
+        outcome.map_err(simulation)
+    }
+    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings), (samples, &take)))
 }
 
 /// The experiment that Python describes.
@@ -271,8 +318,9 @@ fn driven<const N: usize>(
 
 fn columns<'py, const N: usize>(
     py: Python<'py>,
-    recording: &Recording<N>,
+    piece: &Piece<'_, N>,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let recording = piece.recording;
     let out = PyDict::new(py);
     for (name, width, values) in recording.columns() {
         // Energies, works, time and the moment are numbers; everything else belongs to joints, axes or effects.
@@ -293,28 +341,39 @@ fn columns<'py, const N: usize>(
         .map(|(kind, index)| (kind.info().kind, *index))
         .collect();
     out.set_item("effects", effects)?;
-    out.set_item("energy_error", recording.energy_error().to_pyarray(py))?;
-    arm_sim::definite(recording).map_err(simulation)?;
+    out.set_item("energy_error", piece.energy_error().to_pyarray(py))?;
+    arm_sim::definite(piece).map_err(simulation)?;
     Ok(out)
 }
 
 /// What stands for every bit of a run, which takes a quarter as long as the run; see `armrs.Simulated`.
-///
-/// * `effects` - kind and joint of each
-/// * `columns` - name and values of each, as `simulate` gives them
-#[pyfunction]
-pub fn digest(
-    effects: Vec<(String, usize)>,
-    columns: Vec<(String, Option<PyReadonlyArrayDyn<'_, f64>>)>,
-) -> PyResult<String> {
-    let mut slices = Vec::with_capacity(columns.len());
-    for (name, values) in &columns {
-        let values = values.as_ref().map_or(Ok(&[][..]), |v| v.as_slice())?;
-        slices.push((name.as_str(), values));
+#[pyclass(module = "armrs._armrs")]
+pub struct Digest(arm_sim::Digest);
+
+#[pymethods]
+impl Digest {
+    /// Begins with kind and joint of each effect.
+    #[new]
+    fn new(effects: Vec<(String, usize)>) -> Self {
+        let effects = effects.iter().map(|(kind, joint)| (kind.as_str(), *joint));
+        Self(arm_sim::Digest::of_effects(effects))
     }
-    let effects = effects.iter().map(|(kind, joint)| (kind.as_str(), *joint));
-    let digest = arm_sim::digest_of(effects, slices.into_iter());
-    Ok(format!("{digest:016x}"))
+
+    /// Begins a column with so many values.
+    fn column(&mut self, name: &str, length: usize) {
+        self.0.column(name, length);
+    }
+
+    /// Adds values of the column that was begun last.
+    fn values(&mut self, values: PyReadonlyArrayDyn<'_, f64>) -> PyResult<()> {
+        self.0.values(values.as_slice()?);
+        Ok(())
+    }
+
+    /// The digest of all that was added.
+    fn value(&self) -> String {
+        format!("{:016x}", self.0.value())
+    }
 }
 
 /// How a column is shaped in Python.

@@ -141,7 +141,8 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
             });
             for (i, recorder) in recorders.iter_mut().enumerate() {
                 if stopped[i].is_none() {
-                    recorder.push(&row, |all| all.0[i]);
+                    // Whole recordings never break off.
+                    let _ = recorder.push(&row, |all| all.0[i]);
                 }
             }
         };

@@ -1,6 +1,6 @@
 //! A number that stands for every bit of a recording.
 
-use crate::{Recording, SimulationError};
+use crate::{Piece, Recording, SimulationError};
 
 /// [`digest_of`] a recording.
 ///
@@ -10,7 +10,7 @@ use crate::{Recording, SimulationError};
 /// # Errors
 /// As [`definite`].
 pub fn digest<const N: usize>(recording: &Recording<N>) -> Result<u64, SimulationError> {
-    definite(recording)?;
+    definite(&recording.into())?;
     let effects = recording.effects.iter();
     let columns = recording.columns().into_iter();
     Ok(digest_of(
@@ -19,16 +19,16 @@ pub fn digest<const N: usize>(recording: &Recording<N>) -> Result<u64, Simulatio
     ))
 }
 
-/// Refuses a recording that has no definite bits.
+/// Refuses samples that have no definite bits.
 ///
 /// # Errors
 /// [`SimulationError::Samples`] for a value that is not a number: its bits differ between processors.
-pub fn definite<const N: usize>(recording: &Recording<N>) -> Result<(), SimulationError> {
-    for (name, width, values) in recording.columns() {
+pub fn definite<const N: usize>(piece: &Piece<'_, N>) -> Result<(), SimulationError> {
+    for (name, width, values) in piece.recording.columns() {
         if let Some(i) = values.iter().position(|value| value.is_nan()) {
             return Err(SimulationError::Samples {
                 name,
-                sample: i / width.max(1) + 1,
+                sample: piece.from + i / width.max(1) + 1,
                 problem: "not a number, which has no definite bits",
             });
         }
@@ -44,21 +44,49 @@ pub fn digest_of<'a>(
     effects: impl Iterator<Item = (&'a str, usize)>,
     columns: impl Iterator<Item = (&'a str, &'a [f64])>,
 ) -> u64 {
-    let mut hash = Fnv1a::new();
-    for (kind, joint) in effects {
-        hash.bytes(kind.as_bytes());
-        hash.number(joint as u64);
-    }
+    let mut digest = Digest::of_effects(effects);
     for (name, values) in columns {
-        hash.bytes(name.as_bytes());
-        hash.number(values.len() as u64);
-        for value in values {
-            hash.number(value.to_bits());
-        }
+        digest.column(name, values.len());
+        digest.values(values);
     }
-    hash.0
+    digest.value()
 }
 
+/// [`digest_of`] of columns that come a piece after another.
+#[derive(Clone, Debug)]
+pub struct Digest(Fnv1a);
+
+impl Digest {
+    /// Begins with kind and joint of each effect.
+    pub fn of_effects<'a>(effects: impl Iterator<Item = (&'a str, usize)>) -> Self {
+        let mut hash = Fnv1a::new();
+        for (kind, joint) in effects {
+            hash.bytes(kind.as_bytes());
+            hash.number(joint as u64);
+        }
+        Self(hash)
+    }
+
+    /// Begins a column with so many values.
+    pub fn column(&mut self, name: &str, length: usize) {
+        self.0.bytes(name.as_bytes());
+        self.0.number(length as u64);
+    }
+
+    /// Adds values of the column that was begun last.
+    pub fn values(&mut self, values: &[f64]) {
+        for value in values {
+            self.0.number(value.to_bits());
+        }
+    }
+
+    /// The number for all that was added.
+    pub fn value(&self) -> u64 {
+        self.0.0
+    }
+}
+
+#[derive(Clone, Debug)]
 struct Fnv1a(u64);
 
 impl Fnv1a {

@@ -1,9 +1,12 @@
 //! What is simulated: the rig, what acts in it, how it is driven, and the numerical settings.
 
+use core::ops::ControlFlow;
+
 use arm_core::effect::Effect;
 use arm_core::{Joints, Robot, Setup};
 
-use crate::{HandlePath, Recording, Series, SimulationError, native};
+use crate::recorder::Pieces;
+use crate::{HandlePath, Piece, Recording, Series, SimulationError, native};
 
 /// The closed-chain experiment of thesis section 3.6 (figure 3.13), or an arm that is driven by torques or swings freely.
 ///
@@ -171,8 +174,34 @@ pub fn simulate_with<const N: usize>(
     match engine {
         Engine::Native => simulate(experiment),
         #[cfg(feature = "rapier")]
-        Engine::Rapier => crate::rapier::run(experiment)?.complete(),
+        Engine::Rapier => crate::rapier::run(experiment, None)?.complete(),
     }
+}
+
+/// Simulates an experiment with a chosen engine and gives the samples away a piece after another, so that a long run takes no
+/// more memory than a short one.
+///
+/// The samples have the bits of [`simulate_with`]. A run that stops early has given what was recorded before.
+///
+/// * `samples` - in each piece but the last
+/// * `take` - gets every piece, and breaks the run off where it wants no more
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_in_pieces<const N: usize>(
+    engine: Engine,
+    experiment: &Experiment<N>,
+    samples: usize,
+    take: &mut dyn FnMut(&Piece<'_, N>) -> ControlFlow<()>,
+) -> Result<(), SimulationError> {
+    let samples = samples.max(1);
+    let pieces = Some(Pieces { samples, take });
+    let partial = match engine {
+        Engine::Native => native::run(experiment, pieces)?,
+        #[cfg(feature = "rapier")]
+        Engine::Rapier => crate::rapier::run(experiment, pieces)?,
+    };
+    partial.complete().map(|_| ())
 }
 
 /// Simulates with the native engine and keeps what was recorded before a state ceased to be finite.
@@ -182,7 +211,7 @@ pub fn simulate_with<const N: usize>(
 pub fn simulate_partial<const N: usize>(
     experiment: &Experiment<N>,
 ) -> Result<Partial<N>, SimulationError> {
-    native::run(experiment)
+    native::run(experiment, None)
 }
 
 /// A recording and, where the run did not reach its end, why.

@@ -49,18 +49,18 @@ pub mod widest;
 
 pub use batch::simulate_batch;
 pub use controlled::{Controlled, Controller, Fault, Safety, control};
-pub use digest::{definite, digest, digest_of};
+pub use digest::{Digest, definite, digest, digest_of};
 pub use error::SimulationError;
 pub use experiment::{
     Coupling, Drive, Engine, Experiment, Integrator, Partial, Start, altered, simulate,
-    simulate_partial, simulate_with,
+    simulate_in_pieces, simulate_partial, simulate_with,
 };
 pub use movement::{JointMotion, Movement};
 pub use noise::Normal;
 pub use path::{Handle, HandlePath};
 #[cfg(feature = "rapier")]
 pub use rapier::{RapierSettings, simulate_rapier};
-pub use record::{EnergyColumns, Recording, TorqueColumns, WorkColumns};
+pub use record::{EnergyColumns, Piece, Recording, TorqueColumns, WorkColumns};
 pub use sensor::{Channel, Readings, Sensors};
 pub use series::{Interpolation, Jet, Series};
 pub use stability::Vibration;

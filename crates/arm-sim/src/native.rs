@@ -4,19 +4,20 @@ use crate::breaks::step_in_pieces;
 use crate::feed::{Ahead, Feed};
 use crate::model::{Plain, State};
 use crate::prepare::Prepared;
-use crate::recorder::{Instant, Recorder, Row};
+use crate::recorder::{Instant, Pieces, Recorder, Row};
 use crate::step::{Memory, step};
 use crate::widest::{Computation, widest};
 use crate::{Experiment, Partial, SimulationError};
 use arm_core::{Pose, Scalar};
 
-/// Runs an experiment; the loop does not allocate.
+/// Runs an experiment, recorded as a whole or in pieces; the loop does not allocate.
 pub(crate) fn run<const N: usize>(
     experiment: &Experiment<N>,
+    pieces: Option<Pieces<'_, N>>,
 ) -> Result<Partial<N>, SimulationError> {
-    let prepared = Prepared::new(experiment)?;
+    let prepared = Prepared::recorded(experiment, pieces.is_some())?;
     let schedule = prepared.schedule;
-    let mut recorder = Recorder::new(&prepared);
+    let mut recorder = Recorder::with(&prepared, pieces);
     let mut memory = Memory::new(prepared.model.effects.len());
     let mut state = State {
         q: prepared.start.0,
@@ -31,15 +32,15 @@ pub(crate) fn run<const N: usize>(
             state,
             memory,
         });
-        recorder.push(&row, |value| *value);
+        recorder.push(&row, |value| *value)
     };
-    sample(0, &state, &memory.state);
+    let mut wanted = sample(0, &state, &memory.state).is_continue();
     let mut feed = Feed::new(prepared.integrator());
     let plain = prepared.plain();
     let mut stopped = None;
     let mut broken = prepared.breaks.steps().peekable();
     let (mut done, mut sampled) = (0, 0);
-    while done < schedule.steps {
+    while wanted && done < schedule.steps {
         let next = done + 1;
         let at = (&mut state, &mut memory);
         if broken.next_if_eq(&next).is_some() {
@@ -68,7 +69,7 @@ pub(crate) fn run<const N: usize>(
         }
         if done == sampled + schedule.every {
             sampled = done;
-            sample(done, &state, &memory.state);
+            wanted = sample(done, &state, &memory.state).is_continue();
         }
     }
     Ok(Partial {

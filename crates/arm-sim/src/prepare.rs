@@ -1,6 +1,7 @@
 //! From an experiment to what a run needs: checks, effects applied, schedule, robot angles.
 
 use std::array::from_fn;
+use std::ops::Range;
 
 use arm_core::effect::{Effect, Place};
 use arm_core::{Joints, Scalar, Setup};
@@ -104,17 +105,33 @@ pub(crate) struct Prepared<'a, const N: usize> {
     pub breaks: Breaks,
     /// Angles and speeds at the start.
     pub start: (Joints<f64, N>, Joints<f64, N>),
-    /// Commanded robot motion at each sample; empty without a robot.
-    pub robot: Vec<JointMotion<2>>,
+    /// Commanded robot motion at each sample, where it is kept; empty without a robot.
+    robot: Vec<JointMotion<2>>,
 }
 
 impl<'a, const N: usize> Prepared<'a, N> {
     pub fn new(experiment: &'a Experiment<N>) -> Result<Self, SimulationError> {
+        Self::recorded(experiment, false)
+    }
+
+    /// Where no more than a piece of the run is held, what grows with its length is looked at once and not kept.
+    pub fn recorded(
+        experiment: &'a Experiment<N>,
+        in_pieces: bool,
+    ) -> Result<Self, SimulationError> {
         let schedule = Schedule::of(experiment)?;
         let setup = experiment.altered()?;
         let model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
         known(experiment, &schedule)?;
-        let robot = robot_motion(experiment, &schedule)?;
+        let motion = reached(experiment, &schedule, 0..schedule.samples());
+        let robot = if in_pieces {
+            for robot in motion {
+                robot?;
+            }
+            Vec::new()
+        } else {
+            motion.collect::<Result<_, _>>()?
+        };
         let mut prepared = Self {
             experiment,
             setup,
@@ -136,6 +153,20 @@ impl<'a, const N: usize> Prepared<'a, N> {
         };
         stability::check(model, solver, &prepared.start.0)?;
         Ok(prepared)
+    }
+
+    /// Whether the commanded motion of a robot is known.
+    pub fn has_robot(&self) -> bool {
+        self.experiment.robot.is_some() && matches!(self.experiment.drive, Drive::Handle { .. })
+    }
+
+    /// Commanded robot motion at some samples; none without a robot.
+    pub fn robot_motion(&self, samples: Range<usize>) -> impl Iterator<Item = JointMotion<2>> {
+        let known = self.robot.get(samples.clone()).unwrap_or_default();
+        let rest = samples.start + known.len()..samples.end;
+        // That the robot gets there was seen before the run.
+        let computed = reached(self.experiment, &self.schedule, rest).filter_map(Result::ok);
+        known.iter().copied().chain(computed)
     }
 
     /// Handle, ripple included, and torques at a time \[s\].
@@ -364,14 +395,20 @@ pub(crate) fn known<const N: usize>(
     }
 }
 
-fn robot_motion<const N: usize>(
+/// Commanded robot motion at some samples, or why it does not get there; nothing without a robot.
+fn reached<const N: usize>(
     experiment: &Experiment<N>,
     schedule: &Schedule,
-) -> Result<Vec<JointMotion<2>>, SimulationError> {
-    let (Some(robot), Drive::Handle { path, .. }) = (&experiment.robot, &experiment.drive) else {
-        return Ok(Vec::new());
+    samples: Range<usize>,
+) -> impl Iterator<Item = Result<JointMotion<2>, SimulationError>> {
+    let led = match (&experiment.robot, &experiment.drive) {
+        (Some(robot), Drive::Handle { path, .. }) => Some((robot, path)),
+        _ => None,
     };
-    (0..schedule.samples())
-        .map(|sample| path.robot_motion(robot, schedule.time(sample * schedule.every)))
-        .collect()
+    led.into_iter().flat_map(move |(robot, path)| {
+        let time = move |sample: usize| schedule.time(sample * schedule.every);
+        samples
+            .clone()
+            .map(move |sample| path.robot_motion(robot, time(sample)))
+    })
 }

@@ -83,7 +83,7 @@ mod world;
 
 use crate::model::{Link, State};
 use crate::prepare::Prepared;
-use crate::recorder::{Instant, Recorder, Row};
+use crate::recorder::{Instant, Pieces, Recorder, Row};
 use crate::{Experiment, Partial, SimulationError, Vibration};
 use leapfrog::Arm;
 
@@ -100,11 +100,12 @@ impl Default for RapierSettings {
     }
 }
 
-/// Runs an experiment with the default settings.
+/// Runs an experiment with the default settings, recorded as a whole or in pieces.
 pub(crate) fn run<const N: usize>(
     experiment: &Experiment<N>,
+    pieces: Option<Pieces<'_, N>>,
 ) -> Result<Partial<N>, SimulationError> {
-    simulate_rapier(experiment, &RapierSettings::default())
+    recorded(experiment, &RapierSettings::default(), pieces)
 }
 
 /// Simulates with rapier and keeps what was recorded before a state ceased to be finite.
@@ -118,11 +119,19 @@ pub fn simulate_rapier<const N: usize>(
     experiment: &Experiment<N>,
     settings: &RapierSettings,
 ) -> Result<Partial<N>, SimulationError> {
-    let prepared = Prepared::new(experiment)?;
+    recorded(experiment, settings, None)
+}
+
+fn recorded<const N: usize>(
+    experiment: &Experiment<N>,
+    settings: &RapierSettings,
+    pieces: Option<Pieces<'_, N>>,
+) -> Result<Partial<N>, SimulationError> {
+    let prepared = Prepared::recorded(experiment, pieces.is_some())?;
     check(&prepared, settings)?;
     let schedule = prepared.schedule;
     let mut arm = Arm::new(&prepared, settings)?;
-    let (mut recorder, mut row) = (Recorder::new(&prepared), Row::new());
+    let (mut recorder, mut row) = (Recorder::with(&prepared, pieces), Row::new());
     let (mut work, mut power) = ([0.0; 4], [0.0; 4]);
     let mut stopped = None;
     let mut input = prepared.input(0.0);
@@ -160,7 +169,9 @@ pub fn simulate_rapier<const N: usize>(
                 memory: &arm.memory,
             };
             row.fill_with(&instant, &sample.forces);
-            recorder.push(&row, |value| *value);
+            if recorder.push(&row, |value| *value).is_break() {
+                break;
+            }
         }
         arm.remember(&sample);
         input = next;

@@ -103,13 +103,15 @@ impl<const N: usize> Recording<N> {
 
     /// Change of stored energy less the work that explains it, for each sample \[J\]; zero but for the integration error.
     pub fn energy_error(&self) -> Vec<f64> {
+        Piece::from(self).energy_error()
+    }
+
+    /// Stored energy less the work since the start \[J\].
+    pub(crate) fn balance(&self, i: usize) -> f64 {
         let (e, w) = (&self.energy, &self.work);
-        let balance = |i: usize| {
-            e.kinetic[i] + e.potential[i] + e.contact[i] - w.handle[i] - w.drive[i]
-                + w.resisted[i]
-                + w.damped[i]
-        };
-        (0..self.len()).map(|i| balance(i) - balance(0)).collect()
+        e.kinetic[i] + e.potential[i] + e.contact[i] - w.handle[i] - w.drive[i]
+            + w.resisted[i]
+            + w.damped[i]
     }
 
     /// Every column with its name and number of entries a sample, in a fixed order.
@@ -145,5 +147,42 @@ impl<const N: usize> Recording<N> {
             ("work.resisted", 1, &w.resisted),
             ("work.damped", 1, &w.damped),
         ]
+    }
+}
+
+/// Some samples of a run in a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<'a, const N: usize> {
+    /// These samples.
+    pub recording: &'a Recording<N>,
+    /// Samples of the run before them.
+    pub from: usize,
+    /// [`Recording::balance`] at the start of the run.
+    pub(crate) balance: f64,
+}
+
+impl<'a, const N: usize> From<&'a Recording<N>> for Piece<'a, N> {
+    /// A whole run.
+    fn from(recording: &'a Recording<N>) -> Self {
+        let balance = if recording.is_empty() {
+            0.0
+        } else {
+            recording.balance(0)
+        };
+        Self {
+            recording,
+            from: 0,
+            balance,
+        }
+    }
+}
+
+impl<const N: usize> Piece<'_, N> {
+    /// Change of stored energy since the start of the run less the work that explains it, for each sample \[J\].
+    pub fn energy_error(&self) -> Vec<f64> {
+        let samples = 0..self.recording.len();
+        samples
+            .map(|i| self.recording.balance(i) - self.balance)
+            .collect()
     }
 }

@@ -1,12 +1,15 @@
 //! Fills a recording from states, for every engine in the same way.
 
+use core::ops::ControlFlow;
+
 use arm_core::effect::Motion;
 use arm_core::{Joints, Plane, Pose, Scalar, contributions};
 
+use crate::Recording;
 use crate::model::{Input, Link, Model, Outcome, State, difference};
 use crate::prepare::Prepared;
+use crate::record::Piece;
 use crate::widest::{Computation, widest};
-use crate::{JointMotion, Recording};
 
 /// Forces of a state, by whatever engine.
 #[derive(Clone, Copy, Debug)]
@@ -171,49 +174,119 @@ fn columns<const N: usize>(
     ]
 }
 
-/// Writes instants into columns whose room was taken before the run.
-pub(crate) struct Recorder<const N: usize> {
-    recording: Recording<N>,
-    handle: bool,
+/// Takes a run apart, see [`simulate_in_pieces`](crate::simulate_in_pieces).
+pub(crate) struct Pieces<'a, const N: usize> {
+    /// Samples in each but the last.
+    pub samples: usize,
+    pub take: &'a mut dyn FnMut(&Piece<'_, N>) -> ControlFlow<()>,
 }
 
-impl<const N: usize> Recorder<N> {
-    pub fn new(prepared: &Prepared<N>) -> Self {
+/// Writes instants into columns whose room was taken before the run.
+pub(crate) struct Recorder<'a, 't, const N: usize> {
+    prepared: &'a Prepared<'a, N>,
+    recording: Recording<N>,
+    handle: bool,
+    pieces: Option<Pieces<'t, N>>,
+    /// Samples that were taken away.
+    from: usize,
+    /// [`Recording::balance`] of the first sample.
+    balance: f64,
+}
+
+impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
+    /// For the whole run.
+    pub fn new(prepared: &'a Prepared<'a, N>) -> Self {
+        Self::with(prepared, None)
+    }
+
+    /// For the whole run, or for a piece after another.
+    pub fn with(prepared: &'a Prepared<'a, N>, pieces: Option<Pieces<'t, N>>) -> Self {
         let model = &prepared.model;
-        let flat = |part: fn(&JointMotion<2>) -> Joints<f64, 2>| {
-            let parts = prepared.robot.iter().map(part);
-            parts.flat_map(|v| [v[0], v[1]]).collect()
-        };
+        let most = pieces.as_ref().map_or(usize::MAX, |p| p.samples);
+        let room = prepared.schedule.samples().min(most);
+        let robot = if prepared.has_robot() { 2 * room } else { 0 };
+        let column = || Vec::with_capacity(robot);
         let mut recording = Recording {
-            robot_q: flat(|m| m.q),
-            robot_qd: flat(|m| m.qd),
-            robot_qdd: flat(|m| m.qdd),
+            robot_q: column(),
+            robot_qd: column(),
+            robot_qdd: column(),
             effects: model.effects.iter().map(|e| (e.kind, e.index)).collect(),
             ..Recording::default()
         };
         let handle = has_handle(model);
         for (column, width) in columns(&mut recording, handle) {
-            column.reserve_exact(prepared.schedule.samples() * width);
+            column.reserve_exact(room * width);
         }
-        Self { recording, handle }
+        Self {
+            prepared,
+            recording,
+            handle,
+            pieces,
+            from: 0,
+            balance: 0.0,
+        }
     }
 
-    /// Appends an instant, of which `of` reads the numbers of this run.
-    pub fn push<T>(&mut self, row: &Row<T>, of: impl Fn(&T) -> f64) {
+    /// Appends an instant, of which `of` reads the numbers of this run. Breaks where nobody wants more of it.
+    pub fn push<T>(&mut self, row: &Row<T>, of: impl Fn(&T) -> f64) -> ControlFlow<()> {
         let mut rest = row.0.as_slice();
         for (column, width) in columns(&mut self.recording, self.handle) {
             let (mine, others) = rest.split_at(width);
             column.extend(mine.iter().map(&of));
             rest = others;
         }
+        match &self.pieces {
+            Some(pieces) if self.recording.len() == pieces.samples => self.hand_over(),
+            _ => ControlFlow::Continue(()),
+        }
     }
 
-    /// The recording, with the robot's columns as long as the others.
-    pub fn finish(mut self) -> Recording<N> {
+    /// Gives what was recorded away, and keeps the room.
+    fn hand_over(&mut self) -> ControlFlow<()> {
+        self.add_robot();
+        let Some(Pieces { take, .. }) = &mut self.pieces else {
+            return ControlFlow::Continue(());
+        };
+        if self.from == 0 {
+            self.balance = self.recording.balance(0);
+        }
+        let piece = Piece {
+            recording: &self.recording,
+            from: self.from,
+            balance: self.balance,
+        };
+        let wanted = take(&piece);
+        self.from += self.recording.len();
+        for (column, _) in columns(&mut self.recording, self.handle) {
+            column.clear();
+        }
         let r = &mut self.recording;
-        let kept = 2 * r.time.len();
         for column in [&mut r.robot_q, &mut r.robot_qd, &mut r.robot_qdd] {
-            column.truncate(kept);
+            column.clear();
+        }
+        wanted
+    }
+
+    /// Makes the robot's columns as long as the others.
+    fn add_robot(&mut self) {
+        let r = &mut self.recording;
+        for motion in self
+            .prepared
+            .robot_motion(self.from..self.from + r.time.len())
+        {
+            r.robot_q.extend(motion.q.iter());
+            r.robot_qd.extend(motion.qd.iter());
+            r.robot_qdd.extend(motion.qdd.iter());
+        }
+    }
+
+    /// The recording; in pieces, what is left of it is given away.
+    pub fn finish(mut self) -> Recording<N> {
+        if self.pieces.is_none() {
+            self.add_robot();
+        } else if !self.recording.is_empty() {
+            // The run is over: there is nothing to break off.
+            let _ = self.hand_over();
         }
         self.recording
     }

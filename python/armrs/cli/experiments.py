@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import os
 from pathlib import Path
@@ -69,7 +70,7 @@ def simulate(
     from .. import results, words
     from ..model import load_model
     from ..simulation import load_movement
-    from ..simulation import simulate as run_simulation
+    from ..streamed import stream
 
     if (movement is None) == (trial is None):
         found = Text("neither" if movement is None else "both")
@@ -80,20 +81,24 @@ def simulate(
     reading = None if trial is None else _single_trial(trial, arm.n_joints)
     measured = None if reading is None else reading.trial
     drive = measured if movement is None else load_movement(movement, arm.n_joints)
-    with console.progress("simulating"):
-        result = run_simulation(
-            arm,
-            drive,
-            engine=engine.value,
-            integrator=None if integrator is None else integrator.value,
-            dt=dt,
-            rate=rate_hz,
-            duration=duration_s,
-            coupling=coupling.value,
-        )
-    plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
-    written = results.write_simulated(result, plain, folder, suffix=suffix, trial=measured) if folder else []
-    console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *result.warnings])
+    with contextlib.ExitStack() as stack:
+        with console.progress("simulating"):
+            run = stream(
+                arm,
+                drive,
+                folder,
+                engine=engine.value,
+                integrator=None if integrator is None else integrator.value,
+                dt=dt,
+                rate=rate_hz,
+                duration=duration_s,
+                coupling=coupling.value,
+            )
+            result = stack.enter_context(run)
+        plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
+        written = results.write_simulated(result, plain, folder, suffix=suffix, trial=measured) if folder else []
+        warnings = result.warnings
+    console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *warnings])
     present(lambda: plain, json, lambda: words.simulated(plain, written))
 
 

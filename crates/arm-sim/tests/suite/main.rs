@@ -8,6 +8,7 @@ mod energy;
 mod golden;
 mod long;
 mod pendulum;
+mod pieces;
 mod placement;
 #[cfg(feature = "rapier")]
 mod rapier;
