@@ -1,1 +1,3 @@
-//! Only benchmarks: see `benches/`.
+//! Problems that benchmarks share; the benchmarks themselves are in `benches/`.
+
+pub mod identification;

@@ -9,49 +9,89 @@ use arm_core::{Joints, Plane, Pose, Scalar, inverse_dynamics, jacobian, static_t
 
 use crate::equation::{Kinematics, Memory};
 use crate::trial::{Model, Trial};
-use crate::unknown::Imperfection;
+use crate::unknown::{Imperfection, Source, Unknown};
 
-/// The force on the arm \[N\] at every sample that the model predicts for a motion.
+/// The force on the arm \[N\] that the model predicts for a motion, sample after sample.
 ///
 /// Least squares of `Jᵀ F = B q̈ + C q̇ + G + R − τ − M` over the two components of the force; in a pose in which a component
 /// does no work (a stretched arm) that component is zero. Zero where the arm is not led by a force.
-pub fn predicted_force<const N: usize>(
-    model: &Model<N>,
-    trial: &Trial<N>,
-    motion: &Kinematics<N>,
-) -> Vec<Plane<f64>> {
-    if trial.force_on_arm.is_none() {
-        return vec![[0.0; 2]; trial.len()];
-    }
-    let mut memory = Memory::new(model);
-    (0..trial.len())
-        .map(|i| {
-            let (q, qd, qdd) = (&motion.q[i], &motion.qd[i], &motion.qdd[i]);
-            let pose = Pose::new(q);
-            let seen = Motion::new(i as f64 / trial.rate, *q, *qd);
-            memory.advance(&seen, 1.0 / trial.rate);
-            let torque = inverse_dynamics(&model.chain, &pose, qd, qdd)
-                + resisting_torque(&model.fitted, &seen, &memory.fitted)
-                + resisting_torque(&model.held, &seen, &memory.held)
-                - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i])
-                - Joints::repeat(trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]));
-            let j = jacobian(&model.chain, &pose);
-            let (a, b, c) = (
-                j.row(0).dot(&j.row(0)),
-                j.row(0).dot(&j.row(1)),
-                j.row(1).dot(&j.row(1)),
-            );
-            let rhs = j * torque;
-            // The smaller eigenvalue of J Jᵀ is set off from zero by this share of the larger.
-            let damping = 1e-3 * (a + c);
-            let (a, c) = (a + damping, c + damping);
-            let determinant = a * c - b * b;
-            [
-                (c * rhs[0] - b * rhs[1]) / determinant,
-                (a * rhs[1] - b * rhs[0]) / determinant,
-            ]
+pub(crate) struct Prediction<const N: usize> {
+    memory: Memory,
+    near: Nearby,
+    /// Samples of which the force is known.
+    known: usize,
+}
+
+/// The predicted force \[N\] at a sample and at those beside it; at an end the sample itself stands for what is beyond.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Nearby {
+    before: Plane<f64>,
+    here: Plane<f64>,
+    after: Plane<f64>,
+    /// Intervals from `before` to `after`.
+    span: usize,
+}
+
+impl<const N: usize> Prediction<N> {
+    /// Before the first sample; none where no imperfection of the measurement is among the unknowns.
+    pub fn of_unknowns(unknowns: &[Unknown], model: &Model<N>) -> Option<Self> {
+        let is_calibration = |u: &Unknown| matches!(u.source, Source::Calibration(_));
+        unknowns.iter().any(is_calibration).then(|| Self {
+            memory: Memory::new(model),
+            near: Nearby::default(),
+            known: 0,
         })
-        .collect()
+    }
+
+    /// The force about the next sample.
+    pub fn next(&mut self, model: &Model<N>, trial: &Trial<N>, motion: &Kinematics<N>) -> Nearby {
+        let first = self.known == 0;
+        if first {
+            self.near.after = self.force(model, trial, motion);
+            self.near.here = self.near.after;
+        }
+        self.near.before = self.near.here;
+        self.near.here = self.near.after;
+        let last = self.known == trial.len();
+        if !last {
+            self.near.after = self.force(model, trial, motion);
+        }
+        self.near.span = (2 - usize::from(first) - usize::from(last)).max(1);
+        self.near
+    }
+
+    /// The force at the first sample of which it is not known yet.
+    fn force(&mut self, model: &Model<N>, trial: &Trial<N>, motion: &Kinematics<N>) -> Plane<f64> {
+        let i = self.known;
+        self.known += 1;
+        if trial.force_on_arm.is_none() {
+            return [0.0; 2];
+        }
+        let (q, qd, qdd) = (&motion.q[i], &motion.qd[i], &motion.qdd[i]);
+        let pose = Pose::new(q);
+        let seen = Motion::new(i as f64 / trial.rate, *q, *qd);
+        self.memory.advance(&seen, 1.0 / trial.rate);
+        let torque = inverse_dynamics(&model.chain, &pose, qd, qdd)
+            + resisting_torque(&model.fitted, &seen, &self.memory.fitted)
+            + resisting_torque(&model.held, &seen, &self.memory.held)
+            - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i])
+            - Joints::repeat(trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]));
+        let j = jacobian(&model.chain, &pose);
+        let (a, b, c) = (
+            j.row(0).dot(&j.row(0)),
+            j.row(0).dot(&j.row(1)),
+            j.row(1).dot(&j.row(1)),
+        );
+        let rhs = j * torque;
+        // The smaller eigenvalue of J Jᵀ is set off from zero by this share of the larger.
+        let damping = 1e-3 * (a + c);
+        let (a, c) = (a + damping, c + damping);
+        let determinant = a * c - b * b;
+        [
+            (c * rhs[0] - b * rhs[1]) / determinant,
+            (a * rhs[1] - b * rhs[0]) / determinant,
+        ]
+    }
 }
 
 /// What one unit of an imperfection adds to the left-hand side of a sample's rows \[N m\].
@@ -59,14 +99,14 @@ pub(crate) fn influence<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
     motion: &Kinematics<N>,
-    (force, memory, i): (&[Plane<f64>], &Memory, usize),
+    (force, memory, i): (&Nearby, &Memory, usize),
     what: Imperfection,
 ) -> Joints<f64, N> {
     let pose = Pose::new(&motion.q[i]);
     match what {
         Imperfection::AngleOffset(joint) => {
             let time = i as f64 / trial.rate;
-            angle_offset(model, motion, (force[i], memory, i, time), joint)
+            angle_offset(model, motion, (force.here, memory, i, time), joint)
         }
         Imperfection::ForceBias(channel) => {
             let mut unit = [0.0; 2];
@@ -75,13 +115,12 @@ pub(crate) fn influence<const N: usize>(
         }
         Imperfection::ForceGain(channel) => {
             let mut share = [0.0; 2];
-            share[channel] = force[i][channel];
+            share[channel] = force.here[channel];
             static_torque(&model.chain, &pose, share, 0.0)
         }
         Imperfection::TimeDelay => {
-            let (before, after) = (i.saturating_sub(1), (i + 1).min(force.len() - 1));
-            let span = (after - before).max(1) as f64 / trial.rate;
-            let rate = [0, 1].map(|c| (force[after][c] - force[before][c]) / span);
+            let span = force.span as f64 / trial.rate;
+            let rate = [0, 1].map(|c| (force.after[c] - force.before[c]) / span);
             -static_torque(&model.chain, &pose, rate, 0.0)
         }
         Imperfection::HandlePlacement(axis) => {
@@ -89,7 +128,7 @@ pub(crate) fn influence<const N: usize>(
             let angle = motion.q[i].iter().fold(0.0, |sum, q| sum + q);
             let (s, c) = Scalar::sin_cos(angle);
             let direction = if axis == 0 { [c, s] } else { [-s, c] };
-            let moment = direction[0] * force[i][1] - direction[1] * force[i][0];
+            let moment = direction[0] * force.here[1] - direction[1] * force.here[0];
             Joints::repeat(-moment)
         }
     }

@@ -22,14 +22,15 @@
 use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
 use arm_core::{Chain, Joints, Pose, gravity, joint_force, regressor, static_torque};
 
-use crate::calibration::{influence as of_calibration, predicted_force};
+use crate::calibration::{Nearby, Prediction, influence as of_calibration};
+use crate::clusters::cluster_ranges;
 use crate::coloured::effective_samples;
 use crate::condition::{Pieces, filtered};
 use crate::covariance::Bread;
 use crate::equation::{Kinematics, Memory, Rows, gradient, value_of};
 use crate::error::{IdentError, check_range};
 use crate::estimate::{Estimate, Identified};
-use crate::joint::{cluster_ranges, explain, physical_columns, root_mean_square};
+use crate::joint::{explain, physical_columns, root_mean_square};
 use crate::motion::{candidates, low_pass, speed, speed_noise};
 use crate::program::{Program, Status};
 use crate::rank::{RankOptions, analyse};
@@ -111,7 +112,7 @@ pub fn identify<const N: usize>(
     let cutoff = options.cutoff.unwrap_or(candidates(&fit)[0]);
     let prepared = trials
         .iter()
-        .map(|t| filtered(&rows(model, &unknowns, t, cutoff)?, t, cutoff))
+        .map(|t| Building::new((model, &unknowns), t, cutoff)?.filtered(cutoff))
         .collect::<Result<Vec<Pieces>, _>>()?;
     let fitted: Vec<&Pieces> = prepared
         .iter()
@@ -254,42 +255,102 @@ pub(crate) fn own<const N: usize>(
         .collect()
 }
 
-/// Quasi-static rows of a whole trial: gravity and the static contact torque, inertia left out.
-fn rows<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
-    trial: &Trial<N>,
-    cutoff: f64,
-) -> Result<Rows, IdentError> {
-    let samples = trial.len();
-    let (q, speed, moves) = motion(trial, cutoff)?;
-    let mut columns = vec![vec![0.0; samples * N]; unknowns.len()];
-    let mut rhs = vec![0.0; samples * N];
-    let kept = Model {
-        fitted: Vec::new(),
-        held: model
-            .fitted
-            .iter()
-            .filter(|e| !is_found(e))
-            .chain(&model.held)
-            .copied()
-            .collect(),
-        ..model.clone()
-    };
-    let mut memory = Memory::new(&kept);
-    let rest = Joints::<f64, N>::zeros();
-    let still = Kinematics {
-        q,
-        qd: vec![rest; samples],
-        qdd: vec![rest; samples],
-    };
-    let predicted = predicted_force(&kept, trial, &still);
-    for i in 0..samples {
-        let pose = Pose::new(&still.q[i]);
+/// Quasi-static rows of a trial, a stretch after another: gravity and the static contact torque, inertia left out.
+struct Building<'a, const N: usize> {
+    model: &'a Model<N>,
+    unknowns: &'a [Unknown],
+    trial: &'a Trial<N>,
+    /// Angles, without speeds and accelerations.
+    still: Kinematics<N>,
+    speed: Vec<Joints<f64, N>>,
+    /// Where each joint moves.
+    moves: [Vec<bool>; N],
+    /// What is not found, held at its values.
+    kept: Model<N>,
+    memory: Memory,
+    /// Where imperfections of the measurement are among the unknowns.
+    prediction: Option<Prediction<N>>,
+    /// Samples that are built.
+    built: usize,
+}
+
+impl<'a, const N: usize> Building<'a, N> {
+    fn new(
+        (model, unknowns): (&'a Model<N>, &'a [Unknown]),
+        trial: &'a Trial<N>,
+        cutoff: f64,
+    ) -> Result<Self, IdentError> {
+        let (q, speed, moves) = motion(trial, cutoff)?;
+        let rest = vec![Joints::zeros(); trial.len()];
+        let kept = Model {
+            fitted: Vec::new(),
+            held: model
+                .fitted
+                .iter()
+                .filter(|e| !is_found(e))
+                .chain(&model.held)
+                .copied()
+                .collect(),
+            ..model.clone()
+        };
+        Ok(Self {
+            model,
+            unknowns,
+            trial,
+            still: Kinematics {
+                q,
+                qd: rest.clone(),
+                qdd: rest,
+            },
+            speed,
+            moves,
+            memory: Memory::new(&kept),
+            prediction: Prediction::of_unknowns(unknowns, &kept),
+            kept,
+            built: 0,
+        })
+    }
+
+    /// The rows of the trial, filtered and thinned, and which of them are fitted.
+    fn filtered(mut self, cutoff: f64) -> Result<Pieces, IdentError> {
+        let count = self.unknowns.len();
+        let mut pieces = filtered(self.trial, cutoff, count, |count| self.next(count))?;
+        if let Some(has) = has_friction(self.model) {
+            let moves = &self.moves;
+            for rows in &mut pieces {
+                let fits = |&i: &usize| (0..N).map(move |j| !has[j] || moves[j][i]);
+                rows.fits = Some(rows.samples.iter().flat_map(fits).collect());
+            }
+        }
+        Ok(pieces)
+    }
+
+    /// The rows of the next samples.
+    fn next(&mut self, count: usize) -> Rows {
+        let samples = self.built..self.built + count;
+        self.built += count;
+        let mut rows = Rows::zeros::<N>(self.unknowns.len(), samples.collect());
+        for k in 0..count {
+            self.sample(&mut rows, k);
+        }
+        rows
+    }
+
+    fn sample(&mut self, rows: &mut Rows, k: usize) {
+        let Self { model, trial, .. } = *self;
+        let (kept, still) = (&self.kept, &self.still);
+        let rest = Joints::<f64, N>::zeros();
+        let i = rows.samples[k];
+        let here = k * N..(k + 1) * N;
+        let q = still.q[i];
+        let pose = Pose::new(&q);
         let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
         let joint = joint_force(&model.chain, &pose, (&rest, &rest), force);
-        let at = Motion::new(i as f64 / trial.rate, still.q[i], speed[i]).with_joint_force(&joint);
-        memory.advance(&at, 1.0 / trial.rate);
+        let at = Motion::new(i as f64 / trial.rate, q, self.speed[i]).with_joint_force(&joint);
+        self.memory.advance(&at, 1.0 / trial.rate);
+        let memory = &self.memory;
+        let predicted = self.prediction.as_mut();
+        let predicted = predicted.map_or_else(Nearby::default, |p| p.next(kept, trial, still));
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let mut measured = static_torque(&model.chain, &pose, force, moment)
             - resisting_torque(&kept.held, &at, &memory.held);
@@ -298,7 +359,7 @@ fn rows<const N: usize>(
         }
         let y = regressor(&model.chain, &pose, &rest, &rest);
         let mut held = gravity(&model.chain, &pose);
-        for (column, unknown) in columns.iter_mut().zip(unknowns) {
+        for (column, unknown) in rows.columns.iter_mut().zip(self.unknowns) {
             let value = match unknown.source {
                 Source::Segment(k, moment) => {
                     let [mass, along, ..] = y.segment_columns(&model.chain, k);
@@ -308,25 +369,13 @@ fn rows<const N: usize>(
                 }
                 Source::Effect(e, p) => gradient(&model.fitted[e], p, &at, 0.0),
                 Source::Calibration(what) => {
-                    of_calibration(&kept, trial, &still, (&predicted, &memory, i), what)
+                    of_calibration(kept, trial, still, (&predicted, memory, i), what)
                 }
             };
-            column[i * N..(i + 1) * N].copy_from_slice(value.as_slice());
+            column[here.clone()].copy_from_slice(value.as_slice());
         }
-        rhs[i * N..(i + 1) * N].copy_from_slice((measured - held).as_slice());
+        rows.rhs[here].copy_from_slice((measured - held).as_slice());
     }
-    Ok(Rows {
-        columns,
-        rhs,
-        samples: (0..samples).collect(),
-        fits: has_friction(model).map(|has| {
-            let fits = |i: usize| (0..N).map(move |j| (i, j));
-            (0..samples)
-                .flat_map(fits)
-                .map(|(i, j)| !has[j] || moves[j][i])
-                .collect()
-        }),
-    })
 }
 
 /// The joints whose dry friction is found; none if there is no such joint.

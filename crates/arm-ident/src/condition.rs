@@ -1,8 +1,10 @@
 //! From raw rows to those that are fitted: the common low-pass, decimation, and weights.
 
+use crate::Condenser;
 use crate::coloured::effective_samples;
 use crate::equation::Rows;
-use crate::error::IdentError;
+use crate::error::{IdentError, check_least};
+use crate::filter::{BothWays, Butterworth};
 use crate::motion::low_pass;
 use crate::trial::Trial;
 
@@ -15,56 +17,152 @@ const MARGIN: f64 = 1.5;
 /// Fewest decimated samples in a stretch that is used.
 const SHORTEST: usize = 8;
 
-/// Columns that are filtered together.
-const TOGETHER: usize = 4;
+/// Fewest samples that are built and filtered at once: what is shorter goes through in one.
+const STRETCH: usize = 4096;
+/// The same in lengths of what a filter rings on, which is filtered twice.
+const REACHES: usize = 4;
 
 /// Rows after filtering and decimation, in pieces without a gap.
 pub type Pieces = Vec<Rows>;
 
-/// Low-passes all columns and the right-hand side alike, keeps one sample in some, and drops what a gap or an end has touched.
+/// The common low-pass of a trial and the samples that are kept.
+pub(crate) struct Thinning {
+    filter: Butterworth,
+    /// A list for each piece.
+    kept: Vec<Vec<usize>>,
+    samples: usize,
+}
+
+impl Thinning {
+    /// For rows that are low-passed at `cutoff` \[Hz\].
+    ///
+    /// # Errors
+    /// [`IdentError`] for a trial too short for the filter.
+    pub fn new<const N: usize>(trial: &Trial<N>, cutoff: f64) -> Result<Self, IdentError> {
+        let filter = low_pass(cutoff, trial.rate)?;
+        check_least("samples of column", trial.len(), filter.padding() + 1)?;
+        let step = ((trial.rate / (SAMPLES_PER_PERIOD * cutoff)) as usize).max(1);
+        let margin = ((MARGIN * trial.rate / cutoff) as usize).max(1);
+        Ok(Self {
+            filter,
+            kept: kept_samples(&trial.valid, margin, step),
+            samples: trial.len(),
+        })
+    }
+
+    /// Samples in each piece.
+    pub fn lengths(&self) -> Vec<usize> {
+        self.kept.iter().map(Vec::len).collect()
+    }
+
+    /// Room for the samples before `end` that were not given yet, with the number of their piece.
+    fn upto(
+        &self,
+        end: usize,
+        (piece, before): &mut (usize, usize),
+        room: impl Fn(&[usize]) -> Rows,
+    ) -> Vec<(usize, Rows)> {
+        let mut list = Vec::new();
+        while let Some(samples) = self.kept.get(*piece) {
+            let rest = &samples[*before..];
+            let count = rest.partition_point(|&sample| sample < end);
+            if count > 0 {
+                list.push((*piece, room(&rest[..count])));
+            }
+            if count < rest.len() {
+                *before += count;
+                break;
+            }
+            (*piece, *before) = (*piece + 1, 0);
+        }
+        list
+    }
+
+    /// [`filtered`], none of it kept.
+    ///
+    /// * `take` - gets rows that are kept, in the order of time, and the number of their piece
+    ///
+    /// # Errors
+    /// [`IdentError::NotFinite`], and what `take` refuses.
+    pub fn stream<const N: usize>(
+        &self,
+        unknowns: usize,
+        mut build: impl FnMut(usize) -> Rows,
+        mut take: impl FnMut(usize, Rows) -> Result<(), IdentError>,
+    ) -> Result<(), IdentError> {
+        let stretch = STRETCH.max(REACHES * self.filter.reach());
+        let mut smooth = BothWays::new(&self.filter, (unknowns + 1) * N);
+        let (mut left, mut next) = (self.samples, (0, 0));
+        while left > 0 {
+            // A last one that is short would not hold what is mirrored at the end.
+            let count = if left < 2 * stretch { left } else { stretch };
+            left -= count;
+            let last = left == 0;
+            let from = smooth.given();
+            let mut ready = self.upto(smooth.given_with(count, last), &mut next, |samples| {
+                Rows::zeros::<N>(unknowns, samples.to_vec())
+            });
+            let raw = build(count);
+            let columns = raw.columns.iter().chain([&raw.rhs]);
+            let columns: Vec<&[f64]> = columns.map(Vec::as_slice).collect();
+            smooth.push::<N>(&columns, last, |channel, values| {
+                let (u, j) = (channel / N, channel % N);
+                for (_, rows) in &mut ready {
+                    let Rows {
+                        columns,
+                        rhs,
+                        samples,
+                        ..
+                    } = rows;
+                    let column = columns.get_mut(u).unwrap_or(rhs);
+                    for (place, sample) in column[j..].iter_mut().step_by(N).zip(samples) {
+                        *place = values.at(*sample - from);
+                    }
+                }
+            })?;
+            ready
+                .into_iter()
+                .try_for_each(|(piece, rows)| take(piece, rows))?;
+        }
+        Ok(())
+    }
+}
+
+/// Low-passes all columns and the right-hand side of a trial alike, keeps one sample in some, and drops what a gap or an end has touched.
+///
+/// Rows are asked for a stretch at a time, so that those of the whole trial are never held.
+///
+/// * `cutoff` - of the low-pass \[Hz\]
+/// * `unknowns` - number of columns
+/// * `build` - gives the rows of the next samples, as many as it is asked for
 ///
 /// # Errors
 /// [`IdentError`] for a trial too short for the filter.
 pub fn filtered<const N: usize>(
-    rows: &Rows,
     trial: &Trial<N>,
     cutoff: f64,
+    unknowns: usize,
+    build: impl FnMut(usize) -> Rows,
 ) -> Result<Pieces, IdentError> {
-    let filter = low_pass(cutoff, trial.rate)?;
-    let step = ((trial.rate / (SAMPLES_PER_PERIOD * cutoff)) as usize).max(1);
-    let margin = ((MARGIN * trial.rate / cutoff) as usize).max(1);
-    let mut pieces: Pieces = kept_samples(&trial.valid, margin, step)
-        .into_iter()
-        .map(|samples| Rows {
-            columns: Vec::with_capacity(rows.columns.len()),
-            rhs: Vec::new(),
-            fits: rows.fits.as_ref().map(|fits| {
-                let of_sample = |&i: &usize| &fits[i * N..(i + 1) * N];
-                samples.iter().flat_map(of_sample).copied().collect()
-            }),
-            samples,
-        })
-        .collect();
-    // Some columns at a time: side by side they are filtered faster, and few of full length are held at once.
-    let all: Vec<&Vec<f64>> = rows.columns.iter().chain([&rows.rhs]).collect();
-    for group in all.chunks(TOGETHER) {
-        let channels: Vec<Vec<f64>> = group
-            .iter()
-            .flat_map(|values| (0..N).map(|j| values.iter().skip(j).step_by(N).copied().collect()))
-            .collect();
-        let smooth = filter.both_ways_all(&channels)?;
-        for column in smooth.chunks_exact(N) {
-            for piece in &mut pieces {
-                let sample = |&i: &usize| column.iter().map(move |channel| channel[i]);
-                piece
-                    .columns
-                    .push(piece.samples.iter().flat_map(sample).collect());
-            }
+    let thinning = Thinning::new(trial, cutoff)?;
+    let room = |n: &Vec<usize>| Rows {
+        columns: (0..unknowns)
+            .map(|_| Vec::with_capacity(n.len() * N))
+            .collect(),
+        rhs: Vec::with_capacity(n.len() * N),
+        samples: Vec::with_capacity(n.len()),
+        fits: None,
+    };
+    let mut pieces: Pieces = thinning.kept.iter().map(room).collect();
+    thinning.stream::<N>(unknowns, build, |piece, rows| {
+        let whole = &mut pieces[piece];
+        for (all, some) in whole.columns.iter_mut().zip(&rows.columns) {
+            all.extend(some);
         }
-    }
-    for piece in &mut pieces {
-        piece.rhs = piece.columns.pop().unwrap_or_default();
-    }
+        whole.rhs.extend(&rows.rhs);
+        whole.samples.extend(&rows.samples);
+        Ok(())
+    })?;
     Ok(pieces)
 }
 
@@ -105,7 +203,7 @@ pub struct Noise<const N: usize> {
 }
 
 /// Share of the largest variance that is added to every joint, so that no combination of torques is trusted beyond the model.
-const LEAST_SHARE: f64 = 1e-3;
+pub(crate) const LEAST_SHARE: f64 = 1e-3;
 
 impl<const N: usize> Noise<N> {
     /// The same in every joint \[N m\].
@@ -113,6 +211,14 @@ impl<const N: usize> Noise<N> {
         Self::from_covariance(&core::array::from_fn(|j| {
             core::array::from_fn(|k| if j == k { sd * sd } else { 0.0 })
         }))
+    }
+
+    /// Rows as they are.
+    pub(crate) fn none() -> Self {
+        let one = |j, k| if j == k { 1.0 } else { 0.0 };
+        Self {
+            inverse: core::array::from_fn(|j| core::array::from_fn(|k| one(j, k))),
+        }
     }
 
     /// From residuals, given as pieces of joint-interleaved values \[N m\].
@@ -204,16 +310,33 @@ impl<const N: usize> Noise<N> {
         (0..N).map(|j| -2.0 * libm::log(self.inverse[j][j])).sum()
     }
 
-    /// Weighs rows in place.
-    pub fn weigh(&self, rows: &mut Rows) {
-        for values in rows.columns.iter_mut().chain([&mut rows.rhs]) {
-            for sample in values.chunks_exact_mut(N) {
-                // From the last joint up: each row needs those before it unchanged.
-                for j in (0..N).rev() {
-                    sample[j] = (0..=j).fold(0.0, |sum, k| sum + self.inverse[j][k] * sample[k]);
+    /// Folds rows into a factor, weighed.
+    ///
+    /// * `range` - samples of them
+    ///
+    /// # Errors
+    /// [`IdentError::NotFinite`] for rows that are not finite.
+    pub(crate) fn condense(
+        &self,
+        condenser: &mut Condenser,
+        rows: &Rows,
+        range: core::ops::Range<usize>,
+    ) -> Result<(), IdentError> {
+        let width = rows.columns.len() + 1;
+        let mut sample = vec![0.0; N * width];
+        for i in range {
+            for (u, values) in rows.columns.iter().chain([&rows.rhs]).enumerate() {
+                let values = &values[i * N..(i + 1) * N];
+                for j in 0..N {
+                    sample[j * width + u] =
+                        (0..=j).fold(0.0, |sum, k| sum + self.inverse[j][k] * values[k]);
                 }
             }
+            for row in sample.chunks_exact(width) {
+                condenser.push(&row[..width - 1], row[width - 1])?;
+            }
         }
+        Ok(())
     }
 }
 

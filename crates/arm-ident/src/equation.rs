@@ -6,8 +6,8 @@
 use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{Chain, Joints, Pose, inverse_dynamics, joint_force, regressor, static_torque};
 
-use crate::calibration::{influence, predicted_force};
-use crate::response::{Course, HELD};
+use crate::calibration::{Nearby, Prediction, influence};
+use crate::response::{Answers, Course, HELD};
 use crate::trial::{Model, Trial};
 use crate::unknown::{Imperfection, Moment, Source, Unknown};
 
@@ -42,55 +42,103 @@ impl Rows {
     pub fn fits(&self, at: usize) -> bool {
         self.fits.as_ref().is_none_or(|fits| fits[at])
     }
-}
 
-/// Builds the rows of a trial for given unknowns.
-///
-/// The measured forces act through the Jacobian of `motion`, so that the same filter reaches both sides later.
-pub fn rows<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
-    trial: &Trial<N>,
-    motion: &Kinematics<N>,
-) -> Rows {
-    let samples = trial.len();
-    let mut columns = vec![vec![0.0; samples * N]; unknowns.len()];
-    let mut rhs = vec![0.0; samples * N];
-    let predicted = predicted_force(model, trial, motion);
-    let mut memory = Memory::new(model);
-    for i in 0..samples {
-        let at = Sample::new(model, trial, motion, i);
-        memory.advance(&at.motion, 1.0 / trial.rate);
-        let measured = at.measured - resisting_torque(&model.held, &at.motion, &memory.held);
-        rhs[i * N..(i + 1) * N].copy_from_slice(measured.as_slice());
-        let y = regressor(&model.chain, &at.pose, &at.motion.qd, &at.motion.qdd);
-        let fixed = inverse_dynamics(&model.chain, &at.pose, &at.motion.qd, &at.motion.qdd);
-        let inertial: [[Joints<f64, N>; 4]; N] =
-            core::array::from_fn(|k| y.segment_columns(&model.chain, k));
-        let mut explained = Joints::<f64, N>::zeros();
-        for (u, unknown) in unknowns.iter().enumerate() {
-            let column = match unknown.source {
-                Source::Segment(k, moment) => inertial[k][position(moment)],
-                Source::Effect(e, p) => gradient(&model.fitted[e], p, &at.motion, memory.fitted[e]),
-                Source::Calibration(what) => {
-                    influence(model, trial, motion, (&predicted, &memory, i), what)
-                }
-            };
-            if let Source::Segment(k, moment) = unknown.source {
-                explained += column * value_of(&model.chain, k, moment);
-            }
-            columns[u][i * N..(i + 1) * N].copy_from_slice(column.as_slice());
-        }
-        // What the rigid arm does besides the unknown moments: rotors, held normal moments, held segments.
-        for j in 0..N {
-            rhs[i * N + j] -= fixed[j] - explained[j];
+    /// Rows of zeros.
+    pub(crate) fn zeros<const N: usize>(unknowns: usize, samples: Vec<usize>) -> Self {
+        let length = samples.len() * N;
+        Self {
+            columns: vec![vec![0.0; length]; unknowns],
+            rhs: vec![0.0; length],
+            samples,
+            fits: None,
         }
     }
-    Rows {
-        columns,
-        rhs,
-        samples: (0..samples).collect(),
-        fits: None,
+}
+
+/// The rows of a trial, built a stretch after another.
+///
+/// The measured forces act through the Jacobian of the motion, so that the same filter reaches both sides later.
+pub(crate) struct Building<'a, const N: usize> {
+    model: &'a Model<N>,
+    unknowns: &'a [Unknown],
+    trial: &'a Trial<N>,
+    motion: &'a Kinematics<N>,
+    memory: Memory,
+    /// Where imperfections of the measurement are among the unknowns.
+    prediction: Option<Prediction<N>>,
+    /// Samples that are built.
+    built: usize,
+}
+
+impl<'a, const N: usize> Building<'a, N> {
+    /// From the first sample on.
+    pub fn new(
+        (model, unknowns): (&'a Model<N>, &'a [Unknown]),
+        trial: &'a Trial<N>,
+        motion: &'a Kinematics<N>,
+    ) -> Self {
+        Self {
+            model,
+            unknowns,
+            trial,
+            motion,
+            memory: Memory::new(model),
+            prediction: Prediction::of_unknowns(unknowns, model),
+            built: 0,
+        }
+    }
+
+    /// The rows of the next samples.
+    pub fn next(&mut self, count: usize) -> Rows {
+        let samples = self.built..self.built + count;
+        self.built += count;
+        let mut rows = Rows::zeros::<N>(self.unknowns.len(), samples.collect());
+        for k in 0..count {
+            self.sample(&mut rows, k);
+        }
+        rows
+    }
+
+    fn sample(&mut self, rows: &mut Rows, k: usize) {
+        let Self {
+            model,
+            unknowns,
+            trial,
+            motion,
+            ..
+        } = *self;
+        let i = rows.samples[k];
+        let here = k * N..(k + 1) * N;
+        let (qd, qdd) = (&motion.qd[i], &motion.qdd[i]);
+        let at = Sample::new(model, trial, (&motion.q[i], qd, qdd), i);
+        self.memory.advance(&at.motion, 1.0 / trial.rate);
+        let memory = &self.memory;
+        let predicted = self.prediction.as_mut();
+        let predicted = predicted.map_or_else(Nearby::default, |p| p.next(model, trial, motion));
+        let measured = at.measured - resisting_torque(&model.held, &at.motion, &memory.held);
+        rows.rhs[here.clone()].copy_from_slice(measured.as_slice());
+        let y = regressor(&model.chain, &at.pose, qd, qdd);
+        let fixed = inverse_dynamics(&model.chain, &at.pose, qd, qdd);
+        let inertial: [[Joints<f64, N>; 4]; N] =
+            core::array::from_fn(|s| y.segment_columns(&model.chain, s));
+        let mut explained = Joints::<f64, N>::zeros();
+        for (unknown, values) in unknowns.iter().zip(&mut rows.columns) {
+            let column = match unknown.source {
+                Source::Segment(s, moment) => inertial[s][position(moment)],
+                Source::Effect(e, p) => gradient(&model.fitted[e], p, &at.motion, memory.fitted[e]),
+                Source::Calibration(what) => {
+                    influence(model, trial, motion, (&predicted, memory, i), what)
+                }
+            };
+            if let Source::Segment(s, moment) = unknown.source {
+                explained += column * value_of(&model.chain, s, moment);
+            }
+            values[here.clone()].copy_from_slice(column.as_slice());
+        }
+        // What the rigid arm does besides the unknown moments: rotors, held normal moments, held segments.
+        for (j, value) in rows.rhs[here].iter_mut().enumerate() {
+            *value -= fixed[j] - explained[j];
+        }
     }
 }
 
@@ -101,45 +149,78 @@ pub fn rows<const N: usize>(
 /// simulated motion, with what each unknown changes of it; the right-hand side becomes `τ − Y(q) x + Z x` with the measured angles q and
 /// the model's own values x. The fit stands still where `Zᵀ (τ − Y(q) x) = 0`: Z are instruments, and the residual is that of the measured angles.
 ///
-/// A `delay` of the force channels \[s\], as it was last estimated, shifts the force of the simulated motion. Its first order alone would not do:
+/// A delay of the force channels, as it was last estimated, shifts the force of the simulated motion. Its first order alone would not do:
 /// of a force that swings five times a second, ten milliseconds take 5 % in the second order, which a fit buys with gains and masses.
-pub(crate) fn instrument<const N: usize>(
-    rows: &mut Rows,
-    (model, unknowns): (&Model<N>, &[Unknown]),
-    trial: &Trial<N>,
-    (course, delay): (&Course<N>, f64),
-) {
-    if N > HELD {
-        for (column, more) in rows.columns.iter_mut().zip(course.columns(model, unknowns)) {
-            for (value, more) in column.iter_mut().zip(more) {
-                *value += more;
+pub(crate) struct Instrument<'a, const N: usize> {
+    building: Building<'a, N>,
+    course: &'a Course<N>,
+    /// Of the force channels \[s\].
+    delay: f64,
+    answers: Option<Answers<'a, N>>,
+    memory: Memory,
+}
+
+impl<'a, const N: usize> Instrument<'a, N> {
+    /// From the first sample on.
+    ///
+    /// * `motion` - `course` at the samples of the trial
+    /// * `delay` - of the force channels \[s\]
+    pub fn new(
+        (model, unknowns): (&'a Model<N>, &'a [Unknown]),
+        trial: &'a Trial<N>,
+        (course, motion): (&'a Course<N>, &'a Kinematics<N>),
+        delay: f64,
+    ) -> Self {
+        Self {
+            building: Building::new((model, unknowns), trial, motion),
+            course,
+            delay,
+            answers: (N > HELD).then(|| course.answers(model, unknowns)),
+            memory: Memory::new(model),
+        }
+    }
+
+    /// The rows of the next samples.
+    pub fn next(&mut self, count: usize) -> Rows {
+        let mut rows = self.building.next(count);
+        let Building {
+            model,
+            unknowns,
+            trial,
+            motion,
+            ..
+        } = self.building;
+        if let Some(answers) = &mut self.answers {
+            for (column, more) in rows.columns.iter_mut().zip(answers.next(count)) {
+                for (value, more) in column.iter_mut().zip(more) {
+                    *value += more;
+                }
             }
         }
-    }
-    let mut motion = course.at_samples();
-    motion.q.clone_from(&trial.q);
-    let mut memory = Memory::new(model);
-    let delayed = course.change_by_delay(delay);
-    for i in 0..trial.len() {
-        let at = Sample::new(model, trial, &motion, i);
-        memory.advance(&at.motion, 1.0 / trial.rate);
-        let left = at.measured
-            - static_torque(&model.chain, &at.pose, delayed[i], 0.0)
-            - inverse_dynamics(&model.chain, &at.pose, &motion.qd[i], &motion.qdd[i])
-            - resisting_torque(&model.fitted, &at.motion, &memory.fitted)
-            - resisting_torque(&model.held, &at.motion, &memory.held);
-        rows.rhs[i * N..(i + 1) * N].copy_from_slice(left.as_slice());
-    }
-    for (unknown, column) in unknowns.iter().zip(&rows.columns) {
-        let value = match unknown.source {
-            Source::Segment(k, moment) => value_of(&model.chain, k, moment),
-            Source::Effect(e, p) => model.fitted[e].parameters[p],
-            Source::Calibration(Imperfection::TimeDelay) => delay,
-            Source::Calibration(_) => continue,
-        };
-        for (rest, column) in rows.rhs.iter_mut().zip(column) {
-            *rest += column * value;
+        for (left, &i) in rows.rhs.chunks_exact_mut(N).zip(&rows.samples) {
+            let (qd, qdd) = (&motion.qd[i], &motion.qdd[i]);
+            let at = Sample::new(model, trial, (&trial.q[i], qd, qdd), i);
+            self.memory.advance(&at.motion, 1.0 / trial.rate);
+            let delayed = self.course.change_by_delay(self.delay, i);
+            let rest = at.measured
+                - static_torque(&model.chain, &at.pose, delayed, 0.0)
+                - inverse_dynamics(&model.chain, &at.pose, qd, qdd)
+                - resisting_torque(&model.fitted, &at.motion, &self.memory.fitted)
+                - resisting_torque(&model.held, &at.motion, &self.memory.held);
+            left.copy_from_slice(rest.as_slice());
         }
+        for (unknown, column) in unknowns.iter().zip(&rows.columns) {
+            let value = match unknown.source {
+                Source::Segment(k, moment) => value_of(&model.chain, k, moment),
+                Source::Effect(e, p) => model.fitted[e].parameters[p],
+                Source::Calibration(Imperfection::TimeDelay) => self.delay,
+                Source::Calibration(_) => continue,
+            };
+            for (rest, column) in rows.rhs.iter_mut().zip(column) {
+                *rest += column * value;
+            }
+        }
+        rows
     }
 }
 
@@ -225,15 +306,19 @@ struct Sample<const N: usize> {
 }
 
 impl<const N: usize> Sample<N> {
-    fn new(model: &Model<N>, trial: &Trial<N>, motion: &Kinematics<N>, i: usize) -> Self {
-        let pose = Pose::new(&motion.q[i]);
+    fn new(
+        model: &Model<N>,
+        trial: &Trial<N>,
+        (q, qd, qdd): (&Joints<f64, N>, &Joints<f64, N>, &Joints<f64, N>),
+        i: usize,
+    ) -> Self {
+        let pose = Pose::new(q);
         let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let torque = trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i]);
-        let joint = joint_force(&model.chain, &pose, (&motion.qd[i], &motion.qdd[i]), force);
-        let mut seen =
-            Motion::new(i as f64 / trial.rate, motion.q[i], motion.qd[i]).with_joint_force(&joint);
-        seen.qdd = motion.qdd[i];
+        let joint = joint_force(&model.chain, &pose, (qd, qdd), force);
+        let mut seen = Motion::new(i as f64 / trial.rate, *q, *qd).with_joint_force(&joint);
+        seen.qdd = *qdd;
         Self {
             pose,
             motion: seen,

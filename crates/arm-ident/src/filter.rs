@@ -157,40 +157,43 @@ impl Butterworth {
     /// # Errors
     /// As [`Butterworth::both_ways`]; [`IdentError::Length`] for columns of different lengths.
     pub fn both_ways_all(&self, columns: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, IdentError> {
-        /// Columns side by side.
-        const WIDTH: usize = 4;
-        let n = columns.first().map_or(0, Vec::len);
-        let edge = self.padding();
-        for column in columns {
-            check_len("samples of columns", column.len(), n)?;
-            check_least("samples of column", n, edge + 1)?;
-            check_finite("column", column)?;
-        }
+        let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let mut out = Vec::with_capacity(columns.len());
-        for group in columns.chunks(WIDTH) {
-            let mut long = vec![[0.0; WIDTH]; n + 2 * edge];
-            for (c, column) in group.iter().enumerate() {
-                let (first, last) = (column[0], column[n - 1]);
-                for i in 1..=edge {
-                    long[edge - i][c] = 2.0 * first - column[i];
-                    long[edge + n - 1 + i][c] = 2.0 * last - column[n - 1 - i];
-                }
-                for (row, value) in long[edge..].iter_mut().zip(column) {
-                    row[c] = *value;
-                }
-            }
-            for _ in 0..2 {
-                widest(SideBySide {
-                    sections: &self.sections,
-                    rows: &mut long,
-                });
-                long.reverse();
-            }
-            for c in 0..group.len() {
-                out.push(long[edge..edge + n].iter().map(|row| row[c]).collect());
-            }
-        }
+        BothWays::new(self, columns.len())
+            .push::<1>(&slices, true, |_, smooth| out.push(smooth.all().collect()))?;
         Ok(out)
+    }
+
+    /// Samples after which what was before no longer shows: the slowest of what rings on has fallen below 2⁻⁶⁰.
+    pub fn reach(&self) -> usize {
+        let slowest = |s: &Section| {
+            if s.a[1] == 0.0 {
+                s.a[0].abs()
+            } else {
+                s.a[1].abs().sqrt()
+            }
+        };
+        let radius = self.sections.iter().map(slowest).fold(0.0, f64::max);
+        libm::ceil(-60.0 * core::f64::consts::LN_2 / libm::log(radius)) as usize
+    }
+
+    /// The state in which constant inputs give the same constant outputs (unit gain at rest).
+    fn at_rest(&self, first: Abreast) -> Vec<[Abreast; 2]> {
+        let of = |Section { b, a }: &Section| {
+            [
+                first.map(|x| (1.0 - b[0]) * x),
+                first.map(|x| (b[2] - a[1]) * x),
+            ]
+        };
+        self.sections.iter().map(of).collect()
+    }
+
+    fn pass_abreast(&self, state: &mut [[Abreast; 2]], rows: &mut [Abreast]) {
+        widest(SideBySide {
+            sections: &self.sections,
+            state,
+            rows,
+        });
     }
 
     fn pass(&self, column: &mut [f64]) {
@@ -207,26 +210,28 @@ impl Butterworth {
     }
 }
 
-/// A pass over columns side by side.
-struct SideBySide<'a, const W: usize> {
+/// Columns side by side.
+const WIDTH: usize = 4;
+
+/// One sample of columns side by side.
+type Abreast = [f64; WIDTH];
+
+/// A pass over columns side by side that goes on where it stopped.
+struct SideBySide<'a> {
     sections: &'a [Section],
-    rows: &'a mut [[f64; W]],
+    state: &'a mut [[Abreast; 2]],
+    rows: &'a mut [Abreast],
 }
 
-impl<const W: usize> Computation for SideBySide<'_, W> {
+impl Computation for SideBySide<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Some(&first) = self.rows.first() else {
-            return;
-        };
-        for Section { b, a } in self.sections {
-            // As in `pass`. The next section starts on the first value as it was, which this one passes on.
-            let mut z0 = first.map(|first| (1.0 - b[0]) * first);
-            let mut z1 = first.map(|first| (b[2] - a[1]) * first);
+        for (Section { b, a }, state) in self.sections.iter().zip(self.state) {
+            let [mut z0, mut z1] = *state;
             for row in self.rows.iter_mut() {
-                for c in 0..W {
+                for c in 0..WIDTH {
                     let x = row[c];
                     let y = b[0] * x + z0[c];
                     z0[c] = b[1] * x - a[0] * y + z1[c];
@@ -234,7 +239,176 @@ impl<const W: usize> Computation for SideBySide<'_, W> {
                     row[c] = y;
                 }
             }
+            *state = [z0, z1];
         }
+    }
+}
+
+/// [`Butterworth::both_ways`] of columns that come a stretch after another, in memory that does not grow with them.
+///
+/// What comes more than [`Butterworth::reach`] later no longer shows. Columns that come in one stretch have the same bits.
+pub(crate) struct BothWays<'a> {
+    filter: &'a Butterworth,
+    groups: Vec<Group>,
+    /// Room for the way back.
+    back: Vec<Abreast>,
+    /// Samples that came.
+    taken: usize,
+    /// Samples that were given.
+    given: usize,
+}
+
+/// Columns side by side on their way.
+#[derive(Default)]
+struct Group {
+    /// Filtered forward, waiting for what comes later; before the first sample is given with the padding in front.
+    ahead: Vec<Abreast>,
+    state: Vec<[Abreast; 2]>,
+}
+
+/// Some samples of one column, filtered both ways.
+pub(crate) struct Smooth<'a> {
+    /// From the last to the first.
+    back: &'a [Abreast],
+    lane: usize,
+}
+
+impl Smooth<'_> {
+    /// One of them, counted from the first.
+    pub fn at(&self, i: usize) -> f64 {
+        self.back[self.back.len() - 1 - i][self.lane]
+    }
+
+    /// All of them, from the first to the last.
+    fn all(&self) -> impl Iterator<Item = f64> {
+        self.back.iter().rev().map(|row| row[self.lane])
+    }
+}
+
+impl<'a> BothWays<'a> {
+    /// For a number of columns.
+    pub fn new(filter: &'a Butterworth, columns: usize) -> Self {
+        let groups = columns.div_ceil(WIDTH);
+        Self {
+            filter,
+            groups: (0..groups).map(|_| Group::default()).collect(),
+            back: Vec::new(),
+            taken: 0,
+            given: 0,
+        }
+    }
+
+    /// Samples that were given.
+    pub fn given(&self) -> usize {
+        self.given
+    }
+
+    /// Samples that will have been given after so many more.
+    pub fn given_with(&self, count: usize, last: bool) -> usize {
+        let taken = self.taken + count;
+        if last {
+            return taken;
+        }
+        self.given.max(taken.saturating_sub(self.filter.reach()))
+    }
+
+    /// Adds samples of every column, and gives those that are known by now.
+    ///
+    /// * `last` - whether these are the last ones
+    /// * `columns` - as many as the filter is for, `N` side by side in each slice
+    /// * `out` - called for every column, in this order
+    ///
+    /// # Errors
+    /// [`IdentError::TooFew`] for a first or last stretch not longer than the padding; [`IdentError::NotFinite`].
+    pub fn push<const N: usize>(
+        &mut self,
+        columns: &[&[f64]],
+        last: bool,
+        mut out: impl FnMut(usize, Smooth<'_>),
+    ) -> Result<(), IdentError> {
+        let count = columns.first().map_or(0, |values| values.len() / N);
+        let ready = self.given_with(count, last) - self.given;
+        let (filter, edge) = (self.filter, self.filter.padding());
+        let ends = (self.taken == 0, last);
+        for values in columns {
+            check_len("samples of columns", values.len(), count * N)?;
+            if ends.0 || ends.1 {
+                check_least("samples of column", count, edge + 1)?;
+            }
+            if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+                return Err(IdentError::NotFinite {
+                    name: "column",
+                    index: self.taken + at / N,
+                    found: values[at],
+                });
+            }
+        }
+        let front = if self.given == 0 { edge } else { 0 };
+        let wait = if last { edge } else { filter.reach() };
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            let channels = number * WIDTH..((number + 1) * WIDTH).min(columns.len() * N);
+            group.add(filter, (count, ends), |rows| {
+                for (lane, channel) in channels.clone().enumerate() {
+                    let values = columns[channel / N][channel % N..].iter().step_by(N);
+                    for (row, value) in rows.iter_mut().zip(values) {
+                        row[lane] = *value;
+                    }
+                }
+            });
+            if ready == 0 {
+                continue;
+            }
+            self.back.clear();
+            self.back.extend(group.ahead.iter().rev());
+            let mut state = filter.at_rest(self.back[0]);
+            filter.pass_abreast(&mut state, &mut self.back);
+            let back = &self.back[wait..wait + ready];
+            for (lane, channel) in channels.enumerate() {
+                out(channel, Smooth { back, lane });
+            }
+            if last {
+                group.ahead = Vec::new();
+            } else {
+                group.ahead.drain(..front + ready);
+            }
+        }
+        self.taken += count;
+        self.given += ready;
+        Ok(())
+    }
+}
+
+impl Group {
+    /// Filters more samples forward; before the first and after the last with the padding.
+    fn add(
+        &mut self,
+        filter: &Butterworth,
+        (count, (first, last)): (usize, (bool, bool)),
+        fill: impl FnOnce(&mut [Abreast]),
+    ) {
+        let edge = filter.padding();
+        let known = self.ahead.len();
+        let start = known + if first { edge } else { 0 };
+        let end = start + count;
+        self.ahead
+            .resize(end + if last { edge } else { 0 }, [0.0; WIDTH]);
+        fill(&mut self.ahead[start..end]);
+        let mut mirror = |at: usize, from: usize, to: usize| {
+            self.ahead[to] =
+                core::array::from_fn(|c| 2.0 * self.ahead[at][c] - self.ahead[from][c]);
+        };
+        for i in 1..=edge {
+            if first {
+                mirror(start, start + i, start - i);
+            }
+            if last {
+                mirror(end - 1, end - 1 - i, end - 1 + i);
+            }
+        }
+        if first {
+            self.state = filter.at_rest(self.ahead[0]);
+        }
+        filter.pass_abreast(&mut self.state, &mut self.ahead[known..]);
     }
 }
 

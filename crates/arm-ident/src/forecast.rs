@@ -10,7 +10,7 @@ use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Recording, Star
 use crate::condition::{Pieces, filtered};
 use crate::constraint::base_parameters;
 use crate::covariance::{Bread, standard_error};
-use crate::equation::{Kinematics, Memory, instrument, rows};
+use crate::equation::{Instrument, Kinematics, Memory};
 use crate::error::IdentError;
 use crate::response::{Course, parts};
 use crate::summary::base_name;
@@ -157,9 +157,11 @@ pub(crate) fn said<const N: usize>(
     let pieces = seen
         .iter()
         .map(|Seen { trial, course, .. }| {
-            let mut found = rows(model, &unknowns, trial, &course.at_samples());
-            instrument(&mut found, (model, &unknowns), trial, (course, 0.0));
-            filtered(&found, trial, question.accuracy.cutoff)
+            let motion = course.at_samples();
+            let mut rows = Instrument::new((model, &unknowns), trial, (course, &motion), 0.0);
+            filtered(trial, question.accuracy.cutoff, unknowns.len(), |count| {
+                rows.next(count)
+            })
         })
         .collect::<Result<Vec<Pieces>, _>>()?;
     let torque_noise: Vec<Vec<Covariance<N>>> = seen

@@ -3,15 +3,14 @@
 use arm_core::Chain;
 use arm_core::effect::Effect;
 
+use crate::clusters::cluster_ranges;
 use crate::condition::{Noise, Pieces, filtered, repeat_deviations, residual};
 use crate::constraint::{binding_gradients, common_scale, program};
-use crate::covariance::blocks;
-use crate::equation::{Rows, instrument, rows, value_of};
+use crate::cutoff::best_cutoff;
+use crate::equation::{Building, Instrument, value_of};
 use crate::error::IdentError;
 use crate::estimate::{Explained, Identified};
-use crate::motion::{
-    candidates, candidates_of_measured, measured, motion_cutoff, relative_speed_noise, speed_noise,
-};
+use crate::motion::{candidates, measured, motion_cutoff, relative_speed_noise, speed_noise};
 use crate::outcome::Outcome;
 use crate::response::{HELD, damped};
 use crate::restart::{Ended, best};
@@ -25,18 +24,10 @@ use crate::{Condenser, Factor, Matrix};
 const MOST_ROUNDS: usize = 15;
 /// The estimate stands when a round moves it by less than this, in units of its noise.
 const SETTLED: f64 = 1e-2;
-/// From this number of trials on, a trial is a cluster; below, trials are cut into blocks.
-const ENOUGH_TRIALS: usize = 10;
-/// Fewest clusters aimed at when trials are cut into blocks.
-const BLOCKS: usize = 12;
-/// Shortest block, in decimated samples.
-const SHORTEST_BLOCK: usize = 20;
 /// Dry friction is smoothed over this many standard deviations of the speed's noise.
 const DEAD_BAND: f64 = 3.0;
 /// Residual, relative to the torques, assumed before the first fit.
-const FIRST_GUESS: f64 = 0.05;
-/// A lower cutoff is preferred while its relative residual is within this factor of the best.
-const NEARLY_BEST: f64 = 1.1;
+pub(crate) const FIRST_GUESS: f64 = 0.05;
 
 /// Where the motion in the regressors comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +73,7 @@ pub fn identify<const N: usize>(
     trials: &[Trial<N>],
     options: &Options,
 ) -> Result<Identified<N>, IdentError> {
-    let fit: Vec<&Trial<N>> = trials.iter().filter(|t| t.role == Role::Fit).collect();
+    let fit: Vec<&Trial<N>> = fit_trials(trials).collect();
     if fit.is_empty() {
         return Err(IdentError::TooFew {
             name: "trials with role fit",
@@ -219,13 +210,15 @@ impl<const N: usize> Task<'_, N> {
             scale_free,
         } = *self;
         let mut current = start;
-        let mut last: Option<(Solved, Vec<Pieces>)> = None;
+        let (mut last, mut prepared): (Option<Solved>, Vec<Pieces>) = (None, Vec::new());
         let (mut shown, mut refused, mut settled) = (current.clone(), None, false);
         for _ in 0..MOST_ROUNDS {
             let delay = last
                 .as_ref()
-                .map_or(0.0, |(solved, _)| delay(unknowns, &solved.outcome.x));
-            let prepared = match prepare(&current, unknowns, trials, (cutoff, simulate, delay)) {
+                .map_or(0.0, |before| delay(unknowns, &before.outcome.x));
+            // Rows take most of the memory: those of the last round make room first.
+            prepared.clear();
+            prepared = match prepare(&current, unknowns, trials, (cutoff, simulate, delay)) {
                 Ok(prepared) => prepared,
                 // A step too far makes an arm that cannot be simulated: half of it is a step too.
                 Err(error) if last.is_some() => {
@@ -242,8 +235,8 @@ impl<const N: usize> Task<'_, N> {
             current = updated(&shown, unknowns, &solved.outcome.x)?;
             let moved = last
                 .as_ref()
-                .map_or(f64::INFINITY, |(before, _)| moved(&solved, before));
-            last = Some((solved, prepared));
+                .map_or(f64::INFINITY, |before| moved(&solved, before));
+            last = Some(solved);
             if moved < SETTLED {
                 settled = true;
                 break;
@@ -252,7 +245,7 @@ impl<const N: usize> Task<'_, N> {
         if let Some(error) = refused {
             return Err(error);
         }
-        let Some((solved, prepared)) = last else {
+        let Some(solved) = last else {
             unreachable!("there is at least one round")
         };
         let effects = of_effects(unknowns)
@@ -330,41 +323,6 @@ fn moved(solved: &Solved, before: &Solved) -> f64 {
     crate::matrix::norm(&solved.posterior.r.times(&step))
 }
 
-/// The lowest cutoff with which the fit trials are explained nearly as well as with the best one.
-///
-/// Judged by the residual relative to the size of the terms that have to cancel.
-fn best_cutoff<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
-    fit: &[&Trial<N>],
-) -> Result<f64, IdentError> {
-    let trials: Vec<Trial<N>> = fit.iter().map(|&t| t.clone()).collect();
-    let scale_free = fit.iter().all(|t| t.is_unloaded());
-    let mut scored = Vec::new();
-    for cutoff in candidates_of_measured(fit)? {
-        let prepared = prepare(model, unknowns, &trials, (cutoff, false, 0.0))?;
-        let pieces: Vec<&Pieces> = prepared.iter().collect();
-        let solved = first_solution(model, unknowns, &pieces, scale_free)?.0;
-        let rows = || prepared.iter().flatten();
-        let rest: Vec<f64> = rows()
-            .flat_map(|r| residual(r, &solved.outcome.x))
-            .collect();
-        let terms = rows().flat_map(|r| r.columns.iter().zip(&solved.outcome.x));
-        let terms: Vec<f64> = terms
-            .flat_map(|(c, &x)| c.iter().map(move |v| v * x))
-            .collect();
-        scored.push((
-            cutoff,
-            root_mean_square(rest.iter()) / root_mean_square(terms.iter()),
-        ));
-    }
-    let best = scored.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
-    Ok(scored
-        .iter()
-        .find(|s| s.1 <= NEARLY_BEST * best)
-        .map_or(scored[0].0, |s| s.0))
-}
-
 /// Filtered rows of every trial.
 fn prepare<const N: usize>(
     model: &Model<N>,
@@ -372,30 +330,46 @@ fn prepare<const N: usize>(
     trials: &[Trial<N>],
     (cutoff, simulate, delay): (f64, bool, f64),
 ) -> Result<Vec<Pieces>, IdentError> {
-    let mut model = model.clone();
-    if !simulate {
-        for trial in trials.iter().filter(|t| t.role == Role::Fit) {
-            let noise = speed_noise(trial, motion_cutoff(cutoff, trial.rate));
-            for effect in model.fitted.iter_mut().chain(&mut model.held) {
-                widen(
-                    effect,
-                    DEAD_BAND * noise.get(effect.index).copied().unwrap_or(0.0),
-                );
-            }
-        }
-    }
+    let model = if simulate {
+        model.clone()
+    } else {
+        widened(model, fit_trials(trials), cutoff)
+    };
     let of_trial = |(k, trial): (usize, &Trial<N>)| {
         // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
         if !simulate || (trial.role == Role::Test && !can_simulate(trial)) {
             let motion = measured(trial, cutoff)?;
-            return filtered(&rows(&model, unknowns, trial, &motion), trial, cutoff);
+            let mut rows = Building::new((&model, unknowns), trial, &motion);
+            return filtered(trial, cutoff, unknowns.len(), |count| rows.next(count));
         }
         let course = simulated(&model, trial, cutoff).map_err(|error| error.in_trial(k))?;
-        let mut found = rows(&model, unknowns, trial, &course.at_samples());
-        instrument(&mut found, (&model, unknowns), trial, (&course, delay));
-        filtered(&found, trial, cutoff)
+        let motion = course.at_samples();
+        let mut rows = Instrument::new((&model, unknowns), trial, (&course, &motion), delay);
+        filtered(trial, cutoff, unknowns.len(), |count| rows.next(count))
     };
     trials.iter().enumerate().map(of_trial).collect()
+}
+
+/// The trials that are fitted.
+fn fit_trials<const N: usize>(trials: &[Trial<N>]) -> impl Iterator<Item = &Trial<N>> {
+    trials.iter().filter(|t| t.role == Role::Fit)
+}
+
+/// The model with dry friction that changes its sign no faster than the noise of measured speeds.
+pub(crate) fn widened<'a, const N: usize>(
+    model: &Model<N>,
+    trials: impl Iterator<Item = &'a Trial<N>>,
+    cutoff: f64,
+) -> Model<N> {
+    let mut model = model.clone();
+    for trial in trials {
+        let noise = speed_noise(trial, motion_cutoff(cutoff, trial.rate));
+        for effect in model.fitted.iter_mut().chain(&mut model.held) {
+            let noise = noise.get(effect.index).copied().unwrap_or(0.0);
+            widen(effect, DEAD_BAND * noise);
+        }
+    }
+    model
 }
 
 /// Raises the smoothing speed of an effect that has one, within its bounds.
@@ -517,20 +491,12 @@ fn solve<const N: usize>(
     scale_free: bool,
 ) -> Result<Solved, IdentError> {
     let p = unknowns.len();
-    let weighed: Vec<Pieces> = fit
-        .iter()
-        .map(|pieces| {
-            let mut weighed = (*pieces).clone();
-            weighed.iter_mut().for_each(|rows| noise.weigh(rows));
-            weighed
-        })
-        .collect();
-    let clusters = cluster_ranges(&weighed.iter().collect::<Vec<_>>())?
+    let clusters = cluster_ranges(fit)?
         .iter()
         .map(|cluster| {
             let mut condenser = Condenser::new(p);
             for (rows, range) in cluster {
-                push(&mut condenser, rows, range.start * N..range.end * N)?;
+                noise.condense(&mut condenser, rows, range.clone())?;
             }
             Ok(condenser.finish())
         })
@@ -540,15 +506,7 @@ fn solve<const N: usize>(
         all.merge_factor(cluster)?;
     }
     let data = all.finish();
-    let mean: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
-    let sd: Vec<f64> = unknowns.iter().map(|u| u.sd).collect();
-    let posterior = data.with_prior(&mean, &sd)?;
-    let outcome = program(&posterior, unknowns, model, scale_free)?.solve()?;
-    if outcome.x.iter().any(|v| !v.is_finite()) {
-        return Err(IdentError::NoSolution {
-            status: outcome.status,
-        });
-    }
+    let (posterior, outcome) = estimated(&data, (model, unknowns), scale_free)?;
     let binding = binding_gradients(&outcome, unknowns, model);
     let equalities = if scale_free {
         vec![common_scale(unknowns, model)]
@@ -565,56 +523,22 @@ fn solve<const N: usize>(
     })
 }
 
-/// Stretches of data whose errors are independent: a trial each, or blocks of trials where there are few.
-///
-/// # Errors
-/// [`IdentError::TooFew`] when there are fewer than two.
-#[expect(clippy::type_complexity, reason = "a list of lists of stretches")]
-pub(crate) fn cluster_ranges<'a>(
-    fit: &[&'a Pieces],
-) -> Result<Vec<Vec<(&'a Rows, core::ops::Range<usize>)>>, IdentError> {
-    let samples: usize = fit
-        .iter()
-        .flat_map(|f| f.iter())
-        .map(|r| r.samples.len())
-        .sum();
-    let block = (samples / BLOCKS).max(SHORTEST_BLOCK);
-    let mut clusters = Vec::new();
-    for pieces in fit.iter().filter(|p| !p.is_empty()) {
-        if fit.len() >= ENOUGH_TRIALS {
-            clusters.push(pieces.iter().map(|r| (r, 0..r.samples.len())).collect());
-            continue;
-        }
-        for rows in pieces.iter() {
-            let n = rows.samples.len();
-            for range in blocks(n, block.min(n))? {
-                clusters.push(vec![(rows, range)]);
-            }
-        }
-    }
-    if clusters.len() < 2 {
-        return Err(IdentError::TooFew {
-            name: "usable stretches of data",
-            found: clusters.len(),
-            expected: 2,
+/// The estimate from a factor of weighed data, and that factor with the prior.
+pub(crate) fn estimated<const N: usize>(
+    data: &Factor,
+    (model, unknowns): (&Model<N>, &[Unknown]),
+    scale_free: bool,
+) -> Result<(Factor, Outcome), IdentError> {
+    let mean: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
+    let sd: Vec<f64> = unknowns.iter().map(|u| u.sd).collect();
+    let posterior = data.with_prior(&mean, &sd)?;
+    let outcome = program(&posterior, unknowns, model, scale_free)?.solve()?;
+    if outcome.x.iter().any(|v| !v.is_finite()) {
+        return Err(IdentError::NoSolution {
+            status: outcome.status,
         });
     }
-    Ok(clusters)
-}
-
-fn push(
-    condenser: &mut Condenser,
-    rows: &Rows,
-    range: core::ops::Range<usize>,
-) -> Result<(), IdentError> {
-    let mut row = vec![0.0; rows.columns.len()];
-    for i in range {
-        for (value, column) in row.iter_mut().zip(&rows.columns) {
-            *value = column[i];
-        }
-        condenser.push(&row, rows.rhs[i])?;
-    }
-    Ok(())
+    Ok((posterior, outcome))
 }
 
 /// The model with estimates in place of its own values.

@@ -46,6 +46,8 @@ pub mod rank;
 pub mod student;
 pub mod svd;
 
+mod clusters;
+mod cutoff;
 mod equality;
 mod orthogonal;
 mod outcome;

@@ -5,8 +5,12 @@
 //! of Janot, Vandanjon, Gautier 2014). Measured angles stay on the right-hand side, see
 //! [`instrument`](crate::equation::instrument).
 
+use core::ops::ControlFlow;
+
 use arm_core::Setup;
-use arm_sim::{Coupling, Drive, Experiment, HandlePath, Start, simulate};
+use arm_sim::{
+    Coupling, Drive, Engine, Experiment, HandlePath, Recording, Start, simulate_in_pieces,
+};
 
 use crate::error::IdentError;
 use crate::motion::low_pass;
@@ -40,10 +44,11 @@ pub(crate) fn simulated<const N: usize>(
             expected: 1,
         });
     };
-    let recording = simulate(&experiment(model, trial, handle, cutoff)?)?;
+    let recording = moved(&experiment(model, trial, handle, cutoff)?)?;
     let course = Course::new(&recording, trial.rate, parts(trial.rate));
+    drop(recording);
     let mut square = [0.0; N];
-    for (simulated, q) in course.at_samples().q.iter().zip(&trial.q) {
+    for (simulated, q) in course.angles_at_samples().zip(&trial.q) {
         for j in 0..N {
             square[j] += (simulated[j] - q[j]) * (simulated[j] - q[j]);
         }
@@ -59,6 +64,21 @@ pub(crate) fn simulated<const N: usize>(
         }
     }
     Ok(course)
+}
+
+/// The motion and the force of a run, the least part of what is recorded.
+fn moved<const N: usize>(experiment: &Experiment<N>) -> Result<Recording<N>, IdentError> {
+    const PIECE: usize = 4096;
+    let mut kept = Recording::default();
+    simulate_in_pieces(Engine::Native, experiment, PIECE, &mut |piece| {
+        let piece = piece.recording;
+        kept.q.extend(&piece.q);
+        kept.qd.extend(&piece.qd);
+        kept.qdd.extend(&piece.qdd);
+        kept.force_on_arm.extend(&piece.force_on_arm);
+        ControlFlow::Continue(())
+    })?;
+    Ok(kept)
 }
 
 fn experiment<const N: usize>(

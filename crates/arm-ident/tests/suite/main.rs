@@ -20,6 +20,7 @@ mod online;
 mod program;
 mod quasi_static;
 mod rank;
+mod streamed;
 mod student;
 mod svd;
 mod synthetic;
