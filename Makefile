@@ -120,11 +120,11 @@ GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
 
 hidden: build
 	cargo test --quiet --release -p hidden-world
-	$(GENERATE) --family null --seed 1000000 --count $(or $(HIDDEN_NULL),204)
-	$(GENERATE) --family single --seed 1010000 --count $(or $(HIDDEN_SINGLE),72)
-	$(GENERATE) --family double --seed 1020000 --count $(or $(HIDDEN_DOUBLE),16)
-	$(GENERATE) --family triple --seed 1030000 --count $(or $(HIDDEN_TRIPLE),12)
-	$(GENERATE) --family outside --seed 1040000 --count $(or $(HIDDEN_OUTSIDE),16)
+	$(GENERATE) --family null --seed 1100000 --count $(or $(HIDDEN_NULL),204)
+	$(GENERATE) --family single --seed 1110000 --count $(or $(HIDDEN_SINGLE),72)
+	$(GENERATE) --family double --seed 1120000 --count $(or $(HIDDEN_DOUBLE),16)
+	$(GENERATE) --family triple --seed 1130000 --count $(or $(HIDDEN_TRIPLE),12)
+	$(GENERATE) --family outside --seed 1140000 --count $(or $(HIDDEN_OUTSIDE),16)
 	$(BIN)/python bench/hidden/score.py $(HIDDEN)
 
 clean:
