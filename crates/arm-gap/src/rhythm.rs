@@ -27,14 +27,14 @@ pub enum Line {
 /// Slowest rhythm of muscles \[Hz\]: below it movements have power of their own.
 const SLOWEST_RHYTHM: f64 = 2.0;
 /// Slowest ripple of the robot \[Hz\].
-const SLOWEST_RIPPLE: f64 = 0.4;
+pub(crate) const SLOWEST_RIPPLE: f64 = 0.4;
 /// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
 const FASTEST_RIPPLE: f64 = 8.0;
 /// Gain below which a line is no rhythm: many frequencies and channels were looked at.
 const PLAIN: f64 = 60.0;
 /// Share of the squared sizes of a ripple over trials that may differ from one size: the robot makes the same one in every movement,
 /// a vibration of the arm follows what it does.
-const UNSTEADY: f64 = 0.05;
+pub(crate) const UNSTEADY: f64 = 0.05;
 /// Share of what is left in some channel that a rhythm must be.
 const SEEN: f64 = 0.05;
 /// Gain in which two explanations of a rhythm count as equal.

@@ -6,11 +6,11 @@ use core::f64::consts::FRAC_PI_2;
 use crate::anchor::Anchor;
 use crate::candidate::Library;
 use crate::fit::Fitted;
+use crate::rhythm::{SLOWEST_RIPPLE, UNSTEADY};
 use crate::scan::Scan;
+use crate::search::SLOW;
 use crate::study::Study;
 
-/// Frequencies that are asked \[Hz\].
-const BAND: [f64; 2] = [0.4, 3.0];
 /// Turns of the phase, over the longest trial, between two frequencies that are asked.
 const TURNS: f64 = 0.7;
 /// Most frequencies that are asked: of trials so long that these are not enough a line in the spectrum tells as much.
@@ -19,8 +19,6 @@ const MOST: usize = 120;
 const AT_ONCE: usize = 24;
 /// Frequencies asked to either side of the best one, and between it and the next.
 const CLOSER: i32 = 5;
-/// Share of a gain by which movements may differ in a ripple beyond what the noise makes: the robot makes the same one in each.
-const UNSTEADY: f64 = 0.05;
 
 impl<const N: usize> Study<'_, N> {
     /// Frequency \[Hz\] and phase \[rad\] of a slow ripple of the robot that is plain in all movements together, and alike in each;
@@ -35,11 +33,13 @@ impl<const N: usize> Study<'_, N> {
         let longest = |&t: &usize| self.courses[t].seen[0].len() as f64 / self.courses[t].rate;
         let longest = self.references.iter().map(longest).fold(1.0, f64::max);
         let step = TURNS / longest;
-        let count = libm::ceil((BAND[1] - BAND[0]) / step) as usize + 1;
+        let count = libm::ceil((SLOW - SLOWEST_RIPPLE) / step) as usize + 1;
         if !self.repeated || count > MOST {
             return None;
         }
-        let coarse: Vec<f64> = (0..count).map(|k| BAND[0] + step * k as f64).collect();
+        let coarse: Vec<f64> = (0..count)
+            .map(|k| SLOWEST_RIPPLE + step * k as f64)
+            .collect();
         let mut best: Option<Wave> = None;
         for frequencies in coarse.chunks(AT_ONCE) {
             best = better(best, self.waves_at(frequencies, (fitted, anchor)));

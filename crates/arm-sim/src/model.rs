@@ -312,8 +312,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     ) -> Joints<T, N> {
         let qd = motion.qd;
         let terms = (!self.in_link_form()).then(|| self.terms(pose, &qd));
-        let products = Products::of(&self.chain);
-        let mut resistance = None;
+        let mut arm = None;
         let mut qdd = Joints::<T, N>::repeat(T::ZERO);
         for pass in 0..self.passes() {
             if pass > 0 {
@@ -325,9 +324,11 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 Some(terms) => (qdd, *force) = self.accelerations(input, &torque, *force, terms),
                 None => {
                     let load = self.load(pose, &torque, *force);
-                    qdd = resistance
-                        .get_or_insert_with(|| Resistance::at(&products, pose, &qd))
-                        .accelerations(&products, pose, &load);
+                    let (products, resistance) = arm.get_or_insert_with(|| {
+                        let products = Products::of(&self.chain);
+                        (products, Resistance::at(&products, pose, &qd))
+                    });
+                    qdd = resistance.accelerations(products, pose, &load);
                 }
             }
         }
