@@ -1,12 +1,4 @@
-# Needs Rust and Python 3.10 or newer. Everything else goes into .venv.
-#
-#   make demo    build, run the main job on built-in data, print where the report is
-#   make test    every check: formatting, lints, Rust and Python tests, types, examples
-#   make bench   speed, beside other tools; make bench-kernels: of every part by itself
-#   make hidden  the gap workflow against hidden effects: some hours
-#   make crosscheck  the same bits on other architectures and two microcontrollers; half an hour the first time
-#   make wheel   a wheel for others, in out/wheels; on Linux for glibc 2.17 and newer
-#   make clean   remove what make has made
+# Needs Rust and Python 3.10 or newer. Everything else goes into .venv. `make help` lists the targets.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -25,22 +17,25 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: demo test bench bench-kernels hidden crosscheck wheel clean build format rust python
+.PHONY: help demo test bench bench-kernels hidden crosscheck wheel sdist docs lint-workflows clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
 
-demo: build
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
+
+demo: build ## build, run the main job on built-in data, print where the report is
 	$(BIN)/armrs demo -o out/demo
 	@echo "Report: out/demo/report.html"
 
 # The halves side by side, since each leaves a core idle at times; not as jobs of one make, whose job server cargo and the tests
 # would inherit.
-test: $(STAMPS)/venv
+test: $(STAMPS)/venv ## every check: formatting, lints, Rust and Python tests, types, examples
 	@unset MAKEFLAGS MFLAGS MAKELEVEL; $(MAKE) rust & half=$$!; $(MAKE) python; other=$$?; wait $$half && exit $$other
 	@echo "make test: everything passed"
 
-build: $(STAMPS)/build
+build: $(STAMPS)/build ## compile the extension module and install it into .venv
 
 # ---- the environment; a stamp is renewed when what it depends on is newer
 $(STAMPS)/venv:
@@ -66,7 +61,7 @@ $(STAMPS)/dev: $(PACKAGE) | $(STAMPS)/venv
 	@touch $@
 
 # ---- Rust
-rust: $(STAMPS)/rust
+rust: $(STAMPS)/rust ## the Rust half of `test`
 
 $(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/capi_header.sh scripts/digests.txt | $(STAMPS)/venv
 	cargo fmt --all --check
@@ -78,25 +73,25 @@ $(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/capi_header.sh scripts/d
 	@touch $@
 
 # ---- Python
-python: $(STAMPS)/dev
+python: $(STAMPS)/dev ## the Python half of `test`
 	$(BIN)/ruff format --check --quiet python tests scripts examples bench
 	$(BIN)/ruff check --quiet python tests scripts examples bench
 	$(BIN)/mypy --no-error-summary
 	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
 	$(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-format: $(STAMPS)/dev
+format: $(STAMPS)/dev ## format Rust and Python, mend what lints can mend
 	cargo fmt --all
 	$(BIN)/ruff format python tests scripts examples bench
 	$(BIN)/ruff check --fix python tests scripts examples bench
 
-crosscheck:
+crosscheck: ## the same bits on other architectures and two microcontrollers; half an hour the first time
 	scripts/crosscheck
 
 # On Linux with Zig's linker, which knows old versions of glibc; elsewhere as it is.
 OLD_GLIBC := $(if $(filter Linux,$(shell uname)),yes)
 
-wheel: $(STAMPS)/venv
+wheel: $(STAMPS)/venv ## a wheel for others, in out/wheels; on Linux for glibc 2.17 and newer
 	$(if $(OLD_GLIBC),$(BIN)/python -m pip install ziglang cargo-zigbuild)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python scripts/fmu_library.py $(if $(OLD_GLIBC),--portable)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --out out/wheels $(if $(OLD_GLIBC),--zig --compatibility manylinux_2_17)
@@ -107,18 +102,18 @@ $(STAMPS)/peers: bench/peers/requirements.txt | $(STAMPS)/venv
 	$(VENV)/peers/bin/python -m pip install -r bench/peers/requirements.txt
 	@touch $@
 
-bench: build $(STAMPS)/peers
+bench: build $(STAMPS)/peers ## speed, beside other tools
 	cargo build --quiet --release -p speed --example peer
 	PYTHONPATH=python $(VENV)/peers/bin/python bench/peers/compare.py -o out/bench
 
-bench-kernels:
+bench-kernels: ## speed of every part by itself
 	cargo bench --quiet -p speed
 
 # ---- the judge of the gap workflow. Seeds from 100000 on are scored, and only here; those below are for development.
 HIDDEN   := out/hidden
 GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
 
-hidden: build
+hidden: build ## the gap workflow against hidden effects: some hours
 	cargo test --quiet --release -p hidden-world
 	$(GENERATE) --family null --seed 1100000 --count $(or $(HIDDEN_NULL),204)
 	$(GENERATE) --family single --seed 1110000 --count $(or $(HIDDEN_SINGLE),72)
@@ -127,6 +122,25 @@ hidden: build
 	$(GENERATE) --family outside --seed 1140000 --count $(or $(HIDDEN_OUTSIDE),16)
 	$(BIN)/python bench/hidden/score.py $(HIDDEN)
 
-clean:
+sdist: $(STAMPS)/venv ## the source archive, in out/wheels, and a wheel built from it
+	$(BIN)/maturin sdist --out out/wheels
+	$(BIN)/python -m pip wheel --no-deps --wheel-dir out/from-sdist out/wheels/armrs-*.tar.gz
+
+# The site: pages of docs/, links checked, in out/site. What it is made with goes into an environment of its own.
+$(STAMPS)/docs: docs/requirements.txt | $(STAMPS)/venv
+	$(PYTHON) -m venv $(VENV)/docs
+	$(VENV)/docs/bin/python -m pip install -r docs/requirements.txt
+	@touch $@
+
+docs: $(STAMPS)/docs ## the documentation site, in out/site
+	NO_MKDOCS_2_WARNING=1 $(VENV)/docs/bin/mkdocs build --strict --quiet --site-dir out/site
+
+lint-workflows: $(STAMPS)/venv ## lint .github/workflows
+	$(BIN)/python -m pip install check-jsonschema zizmor
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
+	$(BIN)/zizmor --offline --quiet --min-severity medium .github
+
+clean: ## remove what make has made
 	rm -rf $(VENV) out
 	cargo clean
