@@ -7,6 +7,7 @@
 
 pub mod cast;
 pub mod effect;
+pub mod little_known;
 pub mod model;
 pub mod motion;
 pub mod output;

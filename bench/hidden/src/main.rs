@@ -11,7 +11,7 @@ use hidden_world::session::{Case, Session, case};
 use serde_json::{Value, json};
 
 const USAGE: &str = "\
-hidden-world generate --family null|single|double|triple|outside|all --seed S --count N -o DIR
+hidden-world generate --family null|single|double|triple|outside|little_known|all --seed S --count N -o DIR
                       [--strength strong|medium] [--from K] [--threads T]
 
 Writes N sessions: DIR/sS/data for the workflow, DIR/sS/truth.json, and DIR/manifest.json.

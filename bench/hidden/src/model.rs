@@ -41,8 +41,19 @@ impl Setting {
     /// Draws a rig.
     ///
     /// * `off` - how far the model's segments are off, in units of the uncertainty that it states
+    ///
+    /// # Errors
+    /// In words, when there is no such person.
     pub fn draw(random: &mut Random, off: f64) -> Result<Self, String> {
         let human = random.chance(0.5);
+        Self::of(human, off, random)
+    }
+
+    /// Draws the rig of a person or of the mechanical arm.
+    ///
+    /// # Errors
+    /// As for [`Self::draw`].
+    pub(crate) fn of(human: bool, off: f64, random: &mut Random) -> Result<Self, String> {
         let (person, links) = if human {
             let (person, links) = person(random)?;
             (Some(person), links)

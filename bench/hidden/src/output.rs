@@ -6,7 +6,8 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use crate::rig::Rig;
+use crate::little_known::{self, Slip};
+use crate::rig::{Passive, Rig};
 use crate::sensor::tolerance;
 use crate::session::{Case, Session, Trial};
 
@@ -46,8 +47,14 @@ fn table(session: &Session, trial: &Trial) -> String {
     }
     text.push_str(",Fy_N,Fz_N,qr1_rad,qr2_rad\n");
     let readings = &trial.readings;
+    // Whole hundredths of a second at the usual rate, thousandths at others.
+    let decimals = if session.noise.rate == crate::motion::RATE {
+        2
+    } else {
+        3
+    };
     for (k, time) in readings.time.iter().enumerate() {
-        let _ = write!(text, "{time:.2}");
+        let _ = write!(text, "{time:.decimals$}");
         for q in &readings.q[k] {
             let _ = write!(text, ",{q:.6}");
         }
@@ -69,8 +76,8 @@ fn dataset(session: &Session) -> String {
         "arm"
     };
     let mut text = format!(
-        "name = \"session {}\"\nmodel = \"model.toml\"\nforce_on = \"{on}\"\nsample_rate = 50.0\nsynthetic = true\n",
-        session.seed
+        "name = \"session {}\"\nmodel = \"model.toml\"\nforce_on = \"{on}\"\nsample_rate = {:?}\nsynthetic = true\n",
+        session.seed, session.noise.rate
     );
     if let Some(person) = &session.setting.person {
         let _ = write!(
@@ -125,9 +132,13 @@ fn model(session: &Session) -> String {
         );
     }
     for (joint, name) in rig.joints.iter().zip(names) {
+        let _ = write!(text, "\n[[arm.joint]]\nname = \"{name}\"\n");
+        if *joint == Passive::NONE {
+            continue;
+        }
         let _ = write!(
             text,
-            "\n[[arm.joint]]\nname = \"{name}\"\nstiffness = {}\nrest = {}\nviscosity = {}\ncoulomb = 0.0\n",
+            "stiffness = {}\nrest = {}\nviscosity = {}\ncoulomb = 0.0\n",
             number(joint.stiffness),
             number(joint.rest),
             number(joint.viscosity)
@@ -149,9 +160,13 @@ fn model(session: &Session) -> String {
 
 /// Everything that the workflow is not told. Effects come with joints and channels as the data set counts them.
 pub fn truth(session: &Session) -> Value {
-    let effects: Vec<Value> = session
-        .hidden
+    let laws = match session.case {
+        Case::LittleKnown(..) => little_known::laws(&session.setting),
+        _ => Vec::new(),
+    };
+    let effects: Vec<Value> = laws
         .iter()
+        .chain(&session.hidden)
         .map(|effect| {
             let mut parameters = Map::new();
             for scored in &effect.scored {
@@ -173,6 +188,7 @@ pub fn truth(session: &Session) -> Value {
         Case::Single(_, strength) => (Some(strength.name()), None),
         Case::Several(_) => (Some("strong"), None),
         Case::Outside(_) => (None, None),
+        Case::LittleKnown(_, strength) => (Some(strength.name()), None),
     };
     let calibration = &session.calibration;
     let placed: Vec<Value> = session
@@ -193,6 +209,7 @@ pub fn truth(session: &Session) -> Value {
             "angle_rad": session.noise.angle,
             "force_N": session.noise.force,
             "memory": session.noise.memory,
+            "rate_Hz": session.noise.rate,
             "quantum_N_rad": session.noise.quantum,
             "encoder_rad": session.noise.encoder,
         },
@@ -204,7 +221,22 @@ pub fn truth(session: &Session) -> Value {
         },
         "friction": if session.friction_grip > 1e3 { "sticks" } else { "creeps" },
         "placement": placed,
+        "slip": slipped(session),
         "segments": segments(&session.setting.truth),
+    })
+}
+
+/// What slipped in which trial.
+fn slipped(session: &Session) -> Option<Value> {
+    session.trials.iter().find_map(|trial| {
+        Some(match trial.slip? {
+            Slip::Handle(start, by) => {
+                json!({"trial": file(trial), "what": "handle", "start_s": start, "by_m": by})
+            }
+            Slip::Angle(start, joint, by) => {
+                json!({"trial": file(trial), "what": "angle", "joint": joint + 1, "start_s": start, "by_rad": by})
+            }
+        })
     })
 }
 

@@ -27,6 +27,15 @@ pub struct Passive {
     pub viscosity: f64,
 }
 
+impl Passive {
+    /// A joint without any law.
+    pub const NONE: Self = Self {
+        stiffness: 0.0,
+        rest: 0.0,
+        viscosity: 0.0,
+    };
+}
+
 /// Spring and damper between hand and handle, in y and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {

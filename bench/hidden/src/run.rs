@@ -7,9 +7,11 @@ use crate::rig::{Plane, Rig};
 use crate::start::{equilibrium, resting};
 use crate::world::World;
 
-/// What happened in a trial, at every [`KEPT`]th step.
+/// What happened in a trial, at every `kept`th step.
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
+    /// Steps from one record to the next.
+    pub kept: usize,
     /// Joint angles \[rad\].
     pub q: Vec<Vec<f64>>,
     /// Force on the arm \[N\].
@@ -18,9 +20,9 @@ pub struct Truth {
     pub robot: Vec<Plane>,
 }
 
-/// Steps from one record to the next: forces that are read late lie between samples.
+/// Steps from one record to the next at the usual rate: forces that are read late lie between samples.
 pub const KEPT: usize = 4;
-/// Records from one sample to the next.
+/// Records from one sample to the next at the usual rate.
 pub const RECORDS: usize = (STEPS / RATE) as usize / KEPT;
 
 /// What differs from trial to trial besides the movement.
@@ -30,6 +32,8 @@ pub struct Grip {
     pub in_hand: Plane,
     /// Where the handle is, beside where the robot's angles put it \[m\].
     pub in_room: Plane,
+    /// The handle slips in the hand: when \[s\], and by how much along the last segment and across \[m\].
+    pub slip: Option<(f64, Plane)>,
 }
 
 impl Grip {
@@ -37,14 +41,41 @@ impl Grip {
     pub const NOMINAL: Self = Self {
         in_hand: [0.0; 2],
         in_room: [0.0; 2],
+        slip: None,
     };
+
+    /// Where the hand holds the handle at a time, beside the tip of the last segment \[m\].
+    fn at(&self, time: f64) -> Plane {
+        let Some((start, by)) = self.slip else {
+            return self.in_hand;
+        };
+        let s = ((time - start) / SLIP_TIME).clamp(0.0, 1.0);
+        let part = s * s * (3.0 - 2.0 * s);
+        core::array::from_fn(|k| self.in_hand[k] + part * by[k])
+    }
+}
+
+/// How long a slip takes \[s\].
+const SLIP_TIME: f64 = 0.1;
+
+/// In which circumstances a trial is run.
+#[derive(Clone, Copy, Debug)]
+pub struct Conditions<'a> {
+    /// Its number.
+    pub trial: usize,
+    /// How the handle is held.
+    pub grip: &'a Grip,
+    /// Joint angles from which the equilibrium at the start is sought \[rad\].
+    pub near: &'a [f64],
+    /// Damping of dry friction where it sticks \[N m s/rad\].
+    pub friction_grip: f64,
+    /// Steps from one record to the next.
+    pub kept: usize,
 }
 
 /// Runs a trial.
 ///
 /// * `rig` - the true one, with the hidden effects applied to it
-/// * `near` - joint angles from which the equilibrium at the start is sought \[rad\]
-/// * `grip_of_friction` - damping of dry friction where it sticks \[N m s/rad\]
 ///
 /// # Errors
 /// In words, when it has no start or does not stay finite.
@@ -52,11 +83,11 @@ pub fn run(
     rig: &Rig,
     hidden: &[Hidden],
     lead: &Lead,
-    (trial, grip, near): (usize, &Grip, &[f64]),
-    grip_of_friction: f64,
+    conditions: &Conditions,
     random: &mut Random,
 ) -> Result<Truth, String> {
     let step = 1.0 / STEPS;
+    let Conditions { trial, grip, .. } = *conditions;
     let mut acting: Vec<_> = hidden
         .iter()
         .filter_map(|effect| effect.acting(rig, trial, random))
@@ -75,10 +106,14 @@ pub fn run(
         })
         .collect();
     let hand = rig.size() - 1;
-    let grip_point = [rig.links[hand].length + grip.in_hand[0], grip.in_hand[1]];
-    let q = equilibrium(rig, &acting, near, (handle[0], grip_point))?;
+    let held_at = |time: f64| {
+        let [x, y] = grip.at(time);
+        [rig.links[hand].length + x, y]
+    };
+    let grip_point = held_at(0.0);
+    let q = equilibrium(rig, &acting, conditions.near, (handle[0], grip_point))?;
     let dry = rubs(&acting, &resting(rig, &q));
-    let mut world = World::new(rig, &q, step, (dry, grip_of_friction));
+    let mut world = World::new(rig, &q, step, (dry, conditions.friction_grip));
     let mut bodies = world.read();
     // At rest the hinges carry what is in equilibrium.
     let mut weights = Loads::none(rig.size());
@@ -94,7 +129,10 @@ pub fn run(
     );
     world.note(&bodies, &bodies.clone(), &weights, held);
     let (mut speed_before, mut tip_before) = (bodies.qd.clone(), None);
-    let mut truth = Truth::default();
+    let mut truth = Truth {
+        kept: conditions.kept,
+        ..Truth::default()
+    };
     for n in 0..handle.len() {
         // Speeds are known half a step before now; forces need them now.
         let ahead = |k: usize| bodies.qd[k] + 0.5 * (bodies.qd[k] - speed_before[k]);
@@ -111,11 +149,12 @@ pub fn run(
             points,
             angles,
         };
+        let grip_point = held_at(now.time);
         let (tip, velocity) = grip_motion(rig, &now, grip_point, &mut tip_before, step);
         let lead_velocity = Lead::velocity(&handle, n);
         let rate = gap(&lead_velocity, &velocity);
         let force = rig.contact.force_on_arm(gap(&handle[n], &tip), rate);
-        if n % KEPT == 0 {
+        if n % conditions.kept == 0 {
             truth.q.push(now.q.clone());
             truth.force_on_arm.push(force);
             truth.robot.push(lead.robot[n]);

@@ -1,11 +1,11 @@
 //! What is read of a trial.
 
 use crate::effect::{Hidden, Law, Sensing};
-use crate::motion::RATE;
+use crate::little_known::Slip;
 use crate::motion::STEPS;
 use crate::random::Random;
 use crate::rig::Plane;
-use crate::run::{KEPT, RECORDS, Truth};
+use crate::run::Truth;
 
 /// Noise of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +16,8 @@ pub struct Noise {
     pub force: f64,
     /// Correlation of one sample with the next: 0 for white noise.
     pub memory: f64,
+    /// Samples a second \[Hz\].
+    pub rate: f64,
     /// Smallest step of a force \[N\] and of an angle \[rad\], 0 for none.
     pub quantum: [f64; 2],
     /// Of a joint angle of the robot \[rad\], besides the steps of its encoder.
@@ -90,15 +92,35 @@ pub struct Readings {
     pub robot: Vec<Plane>,
 }
 
+impl Noise {
+    /// Reads at another rate; slow noise keeps the time in which it fades.
+    pub fn resample(&mut self, rate: f64) {
+        self.memory = libm::pow(self.memory, self.rate / rate);
+        self.rate = rate;
+    }
+}
+
+impl Readings {
+    /// Keeps the first part of a trial.
+    pub fn keep(&mut self, part: f64) {
+        let count = libm::round(part * self.time.len() as f64) as usize;
+        self.time.truncate(count);
+        self.q.truncate(count);
+        self.force_on_arm.truncate(count);
+        self.robot.truncate(count);
+    }
+}
+
 /// Reads a trial.
 ///
 /// * `elapsed` - part of the session that is over when it begins, and when it ends
+/// * `slip` - what slips in this trial
 pub fn read(
     truth: &Truth,
     hidden: &[Hidden],
     calibration: &Calibration,
     noise: &Noise,
-    elapsed: [f64; 2],
+    (elapsed, slip): ([f64; 2], Option<Slip>),
     random: &mut Random,
 ) -> Readings {
     let faults: Vec<(&Hidden, Sensing)> = hidden
@@ -121,15 +143,21 @@ pub fn read(
         .map(|_| Coloured::new(noise.angle, noise.memory))
         .collect();
     let mut force_noise = [Coloured::new(noise.force, noise.memory); 2];
-    let samples = (truth.q.len() - 1) / RECORDS + 1;
+    let records = libm::round(STEPS / noise.rate) as usize / truth.kept;
+    let samples = (truth.q.len() - 1) / records + 1;
     let mut readings = Readings::default();
     for k in 0..samples {
-        let time = k as f64 / RATE;
-        let mut q = truth.q[k * RECORDS].clone();
-        let mut force = between(&forces, (time - late) * STEPS / KEPT as f64);
+        let time = k as f64 / noise.rate;
+        let mut q = truth.q[k * records].clone();
+        let mut force = between(&forces, (time - late) * STEPS / truth.kept as f64);
         let passed = elapsed[0] + (elapsed[1] - elapsed[0]) * k as f64 / samples as f64;
         for (hidden, fault) in &faults {
             distort(hidden, *fault, (time, passed), &mut q, &mut force);
+        }
+        if let Some(Slip::Angle(start, joint, by)) = slip
+            && time >= start
+        {
+            q[joint] += by;
         }
         for (j, q) in q.iter_mut().enumerate() {
             let read = *q + calibration.angle_offset[j] + angle_noise[j].next(random);
@@ -141,7 +169,7 @@ pub fn read(
                 + force_noise[c].next(random);
             force[c] = quantised(read, noise.quantum[0]);
         }
-        let robot = truth.robot[k * RECORDS]
+        let robot = truth.robot[k * records]
             .map(|q| quantised(q + noise.encoder * random.normal(), ENCODER));
         readings.time.push(time);
         readings.q.push(q);

@@ -2,11 +2,12 @@
 
 use crate::cast::{OUTSIDE, Scene, Strength, cast, cast_outside, family, kinds};
 use crate::effect::Hidden;
+use crate::little_known::{self, Slip};
 use crate::model::Setting;
-use crate::motion::{Lead, Movement, Pace, Profile};
+use crate::motion::{Lead, Movement, Pace, Profile, RATE, STEPS};
 use crate::random::Random;
 use crate::rig::{Plane, Rig};
-use crate::run::{Grip, Truth, run};
+use crate::run::{Conditions, Grip, KEPT, Truth, run};
 use crate::sensor::{Calibration, Noise, Readings, read, tolerance};
 
 /// What kind of session it is.
@@ -20,6 +21,8 @@ pub enum Case {
     Several(usize),
     /// One effect that no catalogue has.
     Outside(&'static str),
+    /// A rigid model of an arm with passive joints and so many further effects.
+    LittleKnown(usize, Strength),
 }
 
 impl Case {
@@ -31,6 +34,7 @@ impl Case {
             Self::Several(2) => "double",
             Self::Several(_) => "triple",
             Self::Outside(_) => "outside",
+            Self::LittleKnown(..) => "little_known",
         }
     }
 }
@@ -95,6 +99,8 @@ pub fn case(name: &str, strength: Option<Strength>, number: usize) -> Result<Cas
         "double" => Case::Several(2),
         "triple" => Case::Several(3),
         "outside" => outside(number),
+        // None, one and two further effects in turn.
+        "little_known" => Case::LittleKnown(number % 3, strength.unwrap_or(Strength::Strong)),
         "all" => {
             // Of ten, three nulls, four single effects, two combinations, one from outside.
             let (round, place) = (number / 10, number % 10);
@@ -108,7 +114,7 @@ pub fn case(name: &str, strength: Option<Strength>, number: usize) -> Result<Cas
         }
         _ => {
             return Err(format!(
-                "--family: found {name}; allowed: null, single, double, triple, outside, all"
+                "--family: found {name}; allowed: null, single, double, triple, outside, little_known, all"
             ));
         }
     })
@@ -125,6 +131,10 @@ pub struct Trial {
     pub test: bool,
     /// How the handle is held.
     pub grip: Grip,
+    /// What slips in it.
+    pub slip: Option<Slip>,
+    /// Part of the movement that was recorded.
+    pub recorded: f64,
     /// What was read.
     pub readings: Readings,
 }
@@ -174,24 +184,29 @@ impl Session {
             Case::Null(null) => Some(null),
             _ => None,
         };
+        let unknown = matches!(case, Case::LittleKnown(..));
         let mut random = Random::new(seed, stream::SETTING);
         let off = match null {
             None | Some(Imperfect::Segments | Imperfect::All) => 1.0,
             Some(_) => 0.0,
         };
-        let setting = Setting::draw(&mut random, off)?;
+        let setting = if unknown {
+            little_known::setting(&mut random)?
+        } else {
+            Setting::draw(&mut random, off)?
+        };
         let friction_grip = random.pick(&[1e6, 20.0]);
-        let plan = Plan::draw(&setting, seed)?;
+        let plan = Plan::draw(&setting, seed, unknown)?;
         let mut random = Random::new(seed, stream::SENSORS);
-        let noise = noise(null, &mut random);
+        let mut noise = noise(null, &mut random);
         let calibration = Calibration::draw(setting.model.size(), &mut random);
         let misplaced = match null {
-            None => random.chance(0.5),
+            None => random.chance(0.5) || unknown,
             Some(null) => matches!(null, Imperfect::Placement | Imperfect::All),
         };
         let in_hand = random.chance(0.5);
         let force_on_robot = random.chance(0.5);
-        let trials: Vec<Trial> = plan
+        let mut trials: Vec<Trial> = plan
             .trials
             .iter()
             .map(|(movement, repeat, test)| Trial {
@@ -203,9 +218,15 @@ impl Session {
                 } else {
                     Grip::NOMINAL
                 },
+                slip: None,
+                recorded: 1.0,
                 readings: Readings::default(),
             })
             .collect();
+        if unknown {
+            noise.resample(random.pick(&little_known::RATES));
+            plan.mishaps(&mut trials, setting.model.size(), &mut random);
+        }
         let mut session = Self {
             seed,
             case,
@@ -247,6 +268,11 @@ impl Session {
             Case::Null(_) => Ok(Vec::new()),
             Case::Single(kind, strength) => Ok(vec![cast(kind, *strength, scene, random)?]),
             Case::Outside(kind) => Ok(vec![cast_outside(kind, scene, random)?]),
+            Case::LittleKnown(count, strength) => {
+                let mut hidden = little_known::friction(self.setting.model.size(), random);
+                hidden.extend(little_known::further(*count, *strength, scene, random)?);
+                Ok(hidden)
+            }
             Case::Several(count) => {
                 let mut names: Vec<&str> = kinds().collect();
                 random.shuffle(&mut names);
@@ -277,11 +303,26 @@ impl Session {
                 let mut random = Random::new(self.seed, stream::TRIALS + k as u64);
                 let movement = &plan.movements[*movement];
                 let lead = lead(movement, &self.setting, &mut random)?;
-                let grip = &self.trials[k].grip;
-                let near = (k, grip, movement.from.as_slice());
-                run(&rig, hidden, &lead, near, self.friction_grip, &mut random)
+                let conditions = Conditions {
+                    trial: k,
+                    grip: &self.trials[k].grip,
+                    near: &movement.from,
+                    friction_grip: self.friction_grip,
+                    kept: self.kept(),
+                };
+                run(&rig, hidden, &lead, &conditions, &mut random)
             })
             .collect()
+    }
+
+    /// Steps from one record to the next: half as many where samples are not a whole number of the usual records apart.
+    fn kept(&self) -> usize {
+        let steps = libm::round(STEPS / self.noise.rate) as usize;
+        if steps.is_multiple_of(KEPT) {
+            KEPT
+        } else {
+            KEPT / 2
+        }
     }
 
     fn sense(&mut self, truths: &[Truth]) -> Result<(), String> {
@@ -294,14 +335,16 @@ impl Session {
             let place = order[k] as f64 * part;
             let elapsed = [place, place + part];
             let (hidden, noise) = (&self.hidden, &self.noise);
-            self.trials[k].readings = read(
+            let trial = &mut self.trials[k];
+            trial.readings = read(
                 truth,
                 hidden,
                 &self.calibration,
                 noise,
-                elapsed,
+                (elapsed, trial.slip),
                 &mut random,
             );
+            trial.readings.keep(trial.recorded);
         }
         Ok(())
     }
@@ -347,6 +390,7 @@ fn noise(null: Option<Imperfect>, random: &mut Random) -> Noise {
         angle: finest * random.within(0.02, 0.15).to_radians(),
         force: finest * random.within(0.05, 0.3),
         memory,
+        rate: RATE,
         quantum: random.pick(&[[0.0, 0.0], [0.0, 0.0], [0.054, 1e-4]]),
         encoder: random.within(1e-6, 4e-6),
     }
@@ -364,14 +408,19 @@ struct Plan {
 
 impl Plan {
     /// Draws movements until the robot reaches along all of them and the arm follows.
-    fn draw(setting: &Setting, seed: u64) -> Result<Self, String> {
+    fn draw(setting: &Setting, seed: u64, unknown: bool) -> Result<Self, String> {
         let mut random = Random::new(seed, stream::MOVEMENTS);
         let mut reason = String::new();
         for attempt in 0..40 {
             // Smaller and smaller, so that there is an end to it.
             let size = 1.0 - 0.015 * f64::from(attempt);
-            let (movements, for_checking) = movements(&setting.posture, size, &mut random);
-            match Self::survey(setting, movements, for_checking, &mut random) {
+            let mut movements = movements(&setting.posture, size, &mut random);
+            let mut repeats = [2, 3];
+            if unknown {
+                movements = little_known::choose(movements, &mut random);
+                repeats = [2, 5];
+            }
+            match Self::survey(setting, movements, repeats, &mut random) {
                 Ok(plan) => return Ok(plan),
                 Err(why) => reason = why,
             }
@@ -382,20 +431,27 @@ impl Plan {
     fn survey(
         setting: &Setting,
         movements: Vec<Movement>,
-        for_checking: usize,
+        repeats: [usize; 2],
         random: &mut Random,
     ) -> Result<Self, String> {
+        let for_checking = movements.len() - 1;
         let joints = setting.model.size();
         let (mut range, mut speed) = (vec![[f64::MAX, f64::MIN]; joints], vec![0.0_f64; joints]);
         for (m, movement) in movements.iter().enumerate() {
             let lead = lead(movement, setting, random)?;
-            let near = (0, &Grip::NOMINAL, movement.from.as_slice());
-            let truth = run(&setting.truth, &[], &lead, near, 0.0, random)?;
+            let conditions = Conditions {
+                trial: 0,
+                grip: &Grip::NOMINAL,
+                near: &movement.from,
+                friction_grip: 0.0,
+                kept: KEPT,
+            };
+            let truth = run(&setting.truth, &[], &lead, &conditions, random)?;
             inside(&truth, &setting.truth)?;
             if m == for_checking {
                 continue;
             }
-            let interval = crate::run::KEPT as f64 / crate::motion::STEPS;
+            let interval = KEPT as f64 / STEPS;
             for j in 0..joints {
                 for pair in truth.q.windows(2) {
                     let q = pair[1][j];
@@ -405,7 +461,10 @@ impl Plan {
             }
         }
         let mut trials = Vec::new();
-        let repeats = 2 + usize::from(random.chance(0.4));
+        let repeats = match repeats {
+            [2, 3] => 2 + usize::from(random.chance(0.4)),
+            [least, most] => least + random.below(most + 1 - least),
+        };
         let mut fitted: Vec<usize> = (0..movements.len())
             .filter(|m| *m != for_checking)
             .collect();
@@ -423,6 +482,23 @@ impl Plan {
             range,
             speed,
         })
+    }
+
+    /// A third of the trials ends early, and in one trial to fit something slips.
+    fn mishaps(&self, trials: &mut [Trial], joints: usize, random: &mut Random) {
+        for trial in trials.iter_mut() {
+            if random.chance(1.0 / 3.0) {
+                trial.recorded = random.within(0.7, 1.0);
+            }
+        }
+        let fitted: Vec<usize> = (0..trials.len()).filter(|k| !trials[*k].test).collect();
+        let k = random.pick(&fitted);
+        let duration = trials[k].recorded * self.movements[self.trials[k].0].duration;
+        let slip = little_known::slip(joints, duration, random);
+        if let Slip::Handle(start, by) = slip {
+            trials[k].grip.slip = Some((start, by));
+        }
+        trials[k].slip = Some(slip);
     }
 
     fn scene<'a>(&self, rig: &'a Rig) -> Scene<'a> {
@@ -452,8 +528,8 @@ fn inside(truth: &Truth, rig: &Rig) -> Result<(), String> {
     Ok(())
 }
 
-/// The movements of a session, and which of them is for checking alone.
-fn movements(posture: &[f64], size: f64, random: &mut Random) -> (Vec<Movement>, usize) {
+/// The movements of a session, the last of them for checking alone.
+fn movements(posture: &[f64], size: f64, random: &mut Random) -> Vec<Movement> {
     let mut away = |parts: &[(f64, f64)], sizes: [f64; 2]| -> Vec<Vec<f64>> {
         let wrist = random.within(-12.0, 12.0).to_radians();
         parts
@@ -508,7 +584,7 @@ fn movements(posture: &[f64], size: f64, random: &mut Random) -> (Vec<Movement>,
         .zip([0.25, 0.15, 0.0])
         .map(|(q, shift)| q + size * shift)
         .collect();
-    let all = vec![
+    vec![
         Movement::legs("slow-elbow", posture, &slow_elbow, &slow),
         Movement::legs("slow-shoulder", posture, &slow_shoulder, &slow_too),
         Movement::legs("both-large", posture, &both, &brisk),
@@ -516,7 +592,5 @@ fn movements(posture: &[f64], size: f64, random: &mut Random) -> (Vec<Movement>,
         Movement::legs("second-posture", &second, &elsewhere, &medium),
         Movement::legs("creep", posture, &creep, &crawl),
         Movement::waves("mixed", &between, &waves, 10.0, random),
-    ];
-    let last = all.len() - 1;
-    (all, last)
+    ]
 }

@@ -8,7 +8,7 @@ use hidden_world::model::Setting;
 use hidden_world::motion::{Lead, Movement, Pace, Profile, RATE};
 use hidden_world::random::Random;
 use hidden_world::rig::{Plane, Rig};
-use hidden_world::run::{Grip, RECORDS, Truth, run};
+use hidden_world::run::{Conditions, Grip, KEPT, RECORDS, Truth, run};
 
 /// A setting with an exact model and so many joints.
 pub fn setting(joints: usize) -> Setting {
@@ -59,8 +59,14 @@ pub fn rubbing(
     for effect in hidden {
         effect.alter(&mut rig);
     }
-    let near = (0, &Grip::NOMINAL, movement.from.as_slice());
-    run(&rig, hidden, lead, near, grip, &mut Random::new(7, 1)).expect("a run")
+    let conditions = Conditions {
+        trial: 0,
+        grip: &Grip::NOMINAL,
+        near: &movement.from,
+        friction_grip: grip,
+        kept: KEPT,
+    };
+    run(&rig, hidden, lead, &conditions, &mut Random::new(7, 1)).expect("a run")
 }
 
 /// The same trial with effects of the catalogue, driven by what the robot's encoders would say 50 times a second: angles

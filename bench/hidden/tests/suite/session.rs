@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 
 use hidden_world::cast::{OUTSIDE, Strength, family, kinds};
+use hidden_world::output;
+use hidden_world::rig::Passive;
 use hidden_world::session::{Case, IMPERFECT, Session, case};
 
 fn cases(name: &str, count: usize) -> Vec<Case> {
@@ -59,4 +61,43 @@ fn combinations_are_of_different_families_and_nulls_of_none() {
     let null = Session::new(53, Case::Null(IMPERFECT[0])).expect("a session");
     assert!(null.hidden.is_empty());
     assert_eq!(null.setting.truth, null.setting.model);
+}
+
+#[test]
+fn of_little_known_arms_the_model_says_nothing_of_the_joints() {
+    let mut rates = BTreeSet::new();
+    for seed in 61..65 {
+        let session =
+            Session::new(seed, Case::LittleKnown(1, Strength::Strong)).expect("a session");
+        let (model, truth) = (&session.setting.model, &session.setting.truth);
+        assert!(model.joints.iter().all(|joint| *joint == Passive::NONE));
+        assert!(truth.joints.iter().all(|joint| joint.stiffness >= 0.4));
+        for (there, said) in truth.links.iter().zip(&model.links) {
+            let off = (there.mass / said.mass - 1.0).abs();
+            assert!(off > 0.0 && off <= 0.15, "{off}");
+        }
+        // Springs, viscosities, whatever rubs, and one effect more.
+        let stated = output::truth(&session)["effects"]
+            .as_array()
+            .map_or(0, Vec::len);
+        let rubs = session
+            .hidden
+            .iter()
+            .filter(|h| h.kind == "coulomb")
+            .count();
+        assert_eq!(stated, 2 * model.size() + rubs + 1);
+        assert_eq!(session.hidden.len(), rubs + 1);
+        let slipped: Vec<_> = session.trials.iter().filter(|t| t.slip.is_some()).collect();
+        assert!(slipped.len() == 1 && !slipped[0].test);
+        let lengths: BTreeSet<_> = session
+            .trials
+            .iter()
+            .map(|t| t.readings.time.len())
+            .collect();
+        assert!(lengths.len() > 3);
+        let time = &session.trials[0].readings.time;
+        assert!((time[1] * session.noise.rate - 1.0).abs() < 1e-12);
+        rates.insert(session.noise.rate as u64);
+    }
+    assert!(rates.len() > 1);
 }

@@ -4,7 +4,7 @@ use arm_core::effect::{Effect, Kind};
 use hidden_world::cast::{Scene, Strength, cast, kinds};
 use hidden_world::effect::Hidden;
 use hidden_world::model::Setting;
-use hidden_world::motion::{Lead, Movement};
+use hidden_world::motion::{Lead, Movement, RATE};
 use hidden_world::random::Random;
 use hidden_world::rig::Plane;
 use hidden_world::run::Truth;
@@ -87,6 +87,7 @@ impl<const N: usize> Stage<N> {
             angle: 0.0,
             force: 0.0,
             memory: 0.0,
+            rate: RATE,
             quantum: [0.0; 2],
             encoder: 0.0,
         };
@@ -97,7 +98,7 @@ impl<const N: usize> Stage<N> {
             hidden,
             &calibration,
             &silent,
-            [0.0, 1.0],
+            ([0.0, 1.0], None),
             &mut random,
         );
         scaled(
