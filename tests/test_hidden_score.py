@@ -157,8 +157,8 @@ def test_tables(score: ModuleType, scored: Path, capsys: pytest.CaptureFixture[s
     assert "| false alarms over nulls: ≤ 2 % | 50.0 % | **no** |" in printed
     # What failed was not named.
     assert "| strong effects named, nothing else: ≥ 95 % | 50.0 % | **no** |" in printed
-    assert "| outside the catalogue “unexplained”: ≥ 80 % | 100.0 % | yes |" in printed
-    assert "| gap closed by ≥ 90 % wherever the naming is right: all | 100.0 % | yes |" in printed
+    assert "| outside the catalogue “unexplained”: ≥ 85 % | 100.0 % | yes |" in printed
+    assert "| gap closed by ≥ 90 % wherever the naming is right: ≥ 95 % | 100.0 % | yes |" in printed
     assert "| coulomb 2 | stribeck 2 | 1 | s4 |" in printed
     assert "| nothing | force_bias Fy | 1 | s2 |" in printed
     assert "| coulomb 2 | failed: status 2: no | 1 | s6 |" in printed
@@ -202,3 +202,49 @@ def test_a_bias_is_counted_as_the_file_shows_it(score: ModuleType) -> None:
     assert score.as_in_file(truth, "arm") is truth
     assert score.as_in_file(truth, "robot")["effects"][0]["parameters"]["bias"]["value"] == -0.5
     assert bias["parameters"]["bias"]["value"] == 0.5
+
+
+def little_known(slip: str | None = None) -> dict[str, Any]:
+    """A little-known arm: two springs and a viscosity, and perhaps a trial that slips."""
+    effects = [
+        effect("elastic", 1, stiffness=1.0, rest=-0.8),
+        effect("elastic", 2, stiffness=0.5, rest=1.0),
+        effect("viscous", 2, viscosity=0.1),
+    ]
+    return truth(*effects, family="little_known") | {"slip": None if slip is None else {"trial": slip}}
+
+
+def test_names_are_counted_one_by_one(score: ModuleType) -> None:
+    limits = [{"kind": "viscous", "joint": 2, "at_least": 0.06}, {"kind": "elastic", "joint": 2, "at_least": 0.2}]
+    said = answer(named("elastic", 1), named("relaxation", 2)) | {"would_have_seen": limits}
+    line = score.judge(little_known(), said)
+    assert (line["names"]["decided_right"], line["names"]["decided"]) == (1, 2)
+    assert line["names"]["found"] == ["elastic 1"]
+    # The viscosity is less than twice what would have been seen; the spring that was not named is more.
+    assert line["detectable"] == ["elastic 1", "elastic 2"]
+
+
+def test_a_name_that_is_not_decided_asks_whether_the_true_one_is_stated(score: ModuleType) -> None:
+    open_question = named("coulomb", 2, alternatives=[{"kind": "viscous", "joint": 2}]) | {"decided": False}
+    counts = score.judge(little_known(), answer(named("elastic", 1), open_question))["names"]
+    assert (counts["decided"], counts["decided_right"]) == (1, 1)
+    assert (counts["undecided"], counts["undecided_stated"]) == (1, 1)
+    assert counts["found"] == ["elastic 1", "viscous 2"]
+    beside = score.judge(little_known(), answer(open_question | {"alternatives": []}))["names"]
+    assert (beside["undecided"], beside["undecided_stated"], beside["found"]) == (1, 0, [])
+
+
+def test_a_name_of_the_trial_that_slips_is_neither_right_nor_wrong(score: ModuleType) -> None:
+    slipped = named("angle_offset", 1) | {"trial": "trials/fast_2.csv"}
+    assert score.judge(little_known("trials/fast_2.csv"), answer(slipped))["names"]["decided"] == 0
+    assert score.judge(little_known("trials/fast_1.csv"), answer(slipped))["names"]["decided"] == 1
+
+
+def test_a_verdict_above_an_open_gap_is_counted(score: ModuleType) -> None:
+    channels = {"q1_rad": {"calibrated": 3.0, "after": 1.6, "floor": 1.0}, "Fy_N": {"calibrated": 1.4, "after": None, "floor": 1.0}}
+    assert score.left_open(answer(gap=channels)) == ["q1_rad"]
+    line = {"session": "s1", "world": "rapier", "family": "little_known", "error": None, "hidden": ["elastic 1"], "seconds": 5.0}
+    counted = score.counted([line | score.judge(little_known(), answer(verdict="explained", gap=channels))])
+    assert counted["“explained” or “nothing missing” above an open gap"] == (1, 1)
+    honest = line | score.judge(little_known(), answer(verdict="unexplained", gap=channels))
+    assert score.counted([honest])["“explained” or “nothing missing” above an open gap"] == (0, 0)

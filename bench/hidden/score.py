@@ -29,6 +29,28 @@ CHANNEL_ABOVE_FLOOR = 1.1
 """A channel counts for the gap where the calibrated base is this much above the floor."""
 CLOSED = 0.9
 """Part of the gap that is to be closed where the naming is right."""
+OPEN = 1.5
+"""A channel of the test trials is open where what is left is more than this many times its floor."""
+SEEN = 2.0
+"""An effect counts for recall where it is at least this many times as large as the answer's `would_have_seen` says."""
+SHAPES = [
+    "rest",
+    "ratio",
+    "time",
+    "speed",
+    "threshold",
+    "direction",
+    "frequency",
+    "phase",
+    "start",
+    "duration",
+    "steepness",
+    "upper",
+    "lower",
+    "breakdown",
+    "recovery",
+]
+"""Parameters that say what an effect is like; the others say how large it is."""
 
 SAME = (("inertia", 1), ("motor_inertia", 1))
 """A rotor in the first joint and inertia of the first segment are one term of the equation of motion: either name is right."""
@@ -109,12 +131,60 @@ def errors(truth: Json, named: Json) -> dict[str, float]:
     return result
 
 
+def detectable(truth: Json, limits: list[Json]) -> bool:
+    """Whether an effect is twice as large as what the answer says that it would have seen; where it says nothing it is."""
+    size = max((abs(p["value"]) for name, p in truth["parameters"].items() if name not in SHAPES), default=math.inf)
+    least = [limit["at_least"] for limit in limits if same(truth, limit) and limit.get("at_least") is not None]
+    return all(size >= SEEN * limit for limit in least)
+
+
+def left_open(answer: Json) -> list[str]:
+    """Return the channels whose test gap the answer leaves open."""
+
+    def left(channel: Json) -> float | None:
+        return channel["calibrated"] if channel.get("after") is None else channel["after"]
+
+    gap = answer.get("gap") or {}
+    return [name for name, c in gap.items() if c.get("floor") and (left(c) or 0.0) > OPEN * c["floor"]]
+
+
+def names(truth: Json, named: list[Json]) -> Json:
+    """Count names one by one: those that are decided, those that are right, and hidden effects that were found.
+
+    A name that is not decided is one question: it is answered where the true effect is among those stated. A name of the one trial in
+    which a handle or a sensor slips is neither right nor wrong.
+    """
+    hidden, slip = truth["effects"], truth.get("slip") or {}
+    others = {id(effect): effect.get("alternatives") or [] for effect in named}
+    right = matched(hidden, named)
+    taken, found = [id(n) for _, n in right], [t for t, _ in right]
+    counted = [n for n in named if id(n) in taken or slip.get("trial") is None or n.get("trial") != slip["trial"]]
+    asked = [n for n in counted if n.get("decided") is False]
+    answered = 0
+    for effect in asked:
+        truths = [t for t in hidden if (t not in found and any(same(t, other) for other in others[id(effect)])) or same(t, effect)]
+        found += [t for t in truths[:1] if t not in found]
+        answered += bool(truths)
+    decided = [n for n in counted if n.get("decided") is not False]
+    return {
+        "decided": len(decided),
+        "decided_right": sum(id(n) in taken for n in decided),
+        "undecided": len(asked),
+        "undecided_stated": answered,
+        "found": [label(t) for t in found],
+    }
+
+
 def judge(truth: Json, answer: Json) -> Json:
     """Return how an answer of `armrs gap` compares with the truth."""
     hidden, named = truth["effects"], answer["effects"]
     pairs = matched(hidden, named)
     stated = named + [other for effect in named for other in effect.get("alternatives") or []]
+    limits = answer.get("would_have_seen") or []
     return {
+        "names": names(truth, named),
+        "detectable": [label(t) for t in hidden if detectable(t, limits)],
+        "open": left_open(answer),
         "verdict": answer["verdict"],
         "named": [label(effect) for effect in named],
         "alternatives": [label(effect) for effect in stated[len(named) :]],
@@ -159,6 +229,7 @@ def record(folder: Path) -> Json:
     truth = as_in_file(truth, force_on(folder))
     line = {
         "session": folder.name,
+        "world": truth.get("world", "rapier"),
         **{key: truth.get(key) for key in ("seed", "family", "strength", "null", "joints", "friction")},
         "memory": truth["noise"]["memory"],
         "hidden": [label(effect) for effect in truth["effects"]],
@@ -253,6 +324,7 @@ def overview(lines: list[Json]) -> str:
         ("two, strong", lambda r: r["family"] == "double"),
         ("three, strong", lambda r: r["family"] == "triple"),
         ("outside the catalogue", lambda r: r["family"] == "outside"),
+        ("little known", lambda r: r["family"] == "little_known"),
     ]
     rows = []
     for name, belongs in groups:
@@ -279,6 +351,62 @@ def overview(lines: list[Json]) -> str:
     head = ["sessions", "number", "something found", "named, nothing else", "true ones among alternatives", "something wrong named"]
     head += ["“unexplained”", "gap closed (median)", "95 % interval holds", "time (median)", "failed"]
     return table(head, rows)
+
+
+def answered(lines: list[Json]) -> list[Json]:
+    """Return the sessions that have an answer."""
+    return [line for line in lines if line["error"] is None]
+
+
+def part(count: int, of: int) -> str:
+    """Return `95 % (19/20)`."""
+    return f"{100 * count / of:.0f} % ({count}/{of})" if of else "–"
+
+
+def counted(lines: list[Json]) -> dict[str, tuple[int, int]]:
+    """Return what is counted name by name, each as so many of so many.
+
+    What has no answer has no names, and its effects are not found.
+    """
+    some = answered(lines)
+    each = [line["names"] for line in some]
+    seen = [(e, line) for line in some for e in line["detectable"]]
+    held = [h for line in some for h in line["covered"].values()]
+    silent = [line for line in some if line["verdict"] in ("explained", "nothing_missing")]
+    closed = [
+        line["closure"] for line in some if line["names"]["decided"] == line["names"]["decided_right"] and line["closure"] is not None
+    ]
+    lost = sum(len(line["hidden"]) for line in lines if line["error"] is not None)
+    return {
+        "names right": (sum(n["decided_right"] for n in each), sum(n["decided"] for n in each)),
+        "true one stated where undecided": (sum(n["undecided_stated"] for n in each), sum(n["undecided"] for n in each)),
+        "found of those twice the limit": (sum(e in line["names"]["found"] for e, line in seen), len(seen) + lost),
+        "found of all": (sum(len(n["found"]) for n in each), sum(len(line["hidden"]) for line in lines)),
+        "95 % interval holds": (sum(held), len(held)),
+        "“explained” or “nothing missing” above an open gap": (sum(bool(line["open"]) for line in silent), len(silent)),
+        "gap closed by 90 % where no name is wrong": (sum(c >= CLOSED for c in closed), len(closed)),
+        "answered": (len(some), len(lines)),
+    }
+
+
+def name_by_name(lines: list[Json]) -> str:
+    """Return names counted one by one, a column for the prepared and the little-known arms of each world."""
+    groups = {
+        f"{kind}, {world}": [line for line in lines if line["world"] == world and (line["family"] == "little_known") == little]
+        for world in dict.fromkeys(line["world"] for line in lines)
+        for kind, little in (("prepared", False), ("little known", True))
+    }
+    groups = {name: some for name, some in groups.items() if some}
+    columns = [counted(some) for some in groups.values()]
+    rows = [[what, *(part(*column[what]) for column in columns)] for what in columns[0]] if columns else []
+    rows.append(["time, median and longest", *(longest(some) for some in groups.values())])
+    return table(["counted name by name", *groups], rows)
+
+
+def longest(lines: list[Json]) -> str:
+    """Return the median time and the longest."""
+    seconds = [line["seconds"] for line in lines]
+    return f"{median(seconds):.0f} s, {max(seconds):.0f} s"
 
 
 def by_kind(lines: list[Json]) -> str:
@@ -338,7 +466,7 @@ def confusions(lines: list[Json]) -> str:
 
 
 def criteria(lines: list[Json]) -> list[tuple[str, str, bool | None]]:
-    """Return what issue 4 asks for, what was found, and whether that holds (None where there was nothing to see)."""
+    """Return what is asked for, what was found, and whether that holds (None where there was nothing to see)."""
 
     def ratio(some: list[Json], holds: Callable[[Json], bool]) -> float:
         return sum(line["error"] is None and bool(holds(line)) for line in some) / len(some) if some else math.nan
@@ -351,21 +479,36 @@ def criteria(lines: list[Json]) -> list[tuple[str, str, bool | None]]:
 
     closed = closures(family("single", "double", "triple"))
     held = [h for r in family("single", "double", "triple") if r["error"] is None for h in r["covered"].values()]
+    little, every = counted(family("little_known")), counted(lines)
+
+    def of(count: tuple[int, int]) -> float:
+        return count[0] / count[1] if count[1] else math.nan
+
     asked = [
         ("strong effects named, nothing else: ≥ 95 %", ratio(family("single", strength="strong"), named), 0.95, 1.0),
-        ("medium effects named, nothing else: ≥ 80 %", ratio(family("single", strength="medium"), named), 0.80, 1.0),
+        ("medium effects named, nothing else: ≥ 90 %", ratio(family("single", strength="medium"), named), 0.90, 1.0),
         ("the true one among those stated: ≥ 98 %", ratio(family("single"), lambda r: r["among_alternatives"]), 0.98, 1.0),
         ("false alarms over nulls: ≤ 2 %", ratio(family("null"), lambda r: r["detected"]), 0.0, 0.02),
-        ("outside the catalogue “unexplained”: ≥ 80 %", ratio(family("outside"), lambda r: r["verdict"] == "unexplained"), 0.80, 1.0),
-        ("two at once, both named, nothing else: ≥ 80 %", ratio(family("double"), named), 0.80, 1.0),
-        ("three at once, all named, nothing else: ≥ 70 %", ratio(family("triple"), named), 0.70, 1.0),
+        ("outside the catalogue “unexplained”: ≥ 85 %", ratio(family("outside"), lambda r: r["verdict"] == "unexplained"), 0.85, 1.0),
+        ("two at once, both named, nothing else: ≥ 90 %", ratio(family("double"), named), 0.90, 1.0),
+        ("three at once, all named, nothing else: ≥ 85 %", ratio(family("triple"), named), 0.85, 1.0),
         (
-            "gap closed by ≥ 90 % wherever the naming is right: all",
+            "gap closed by ≥ 90 % wherever the naming is right: ≥ 95 %",
             sum(c >= CLOSED for c in closed) / len(closed) if closed else math.nan,
-            1.0,
+            0.95,
             1.0,
         ),
         ("95 % interval holds the parameter: 90 to 98 %", sum(held) / len(held) if held else math.nan, 0.90, 0.98),
+        ("little known: names right: ≥ 97 %", of(little["names right"]), 0.97, 1.0),
+        ("little known: found of those twice the limit: ≥ 95 %", of(little["found of those twice the limit"]), 0.95, 1.0),
+        ("little known: 95 % interval holds the parameter: 90 to 98 %", of(little["95 % interval holds"]), 0.90, 0.98),
+        ("the true one stated where undecided: ≥ 98 %", of(every["true one stated where undecided"]), 0.98, 1.0),
+        (
+            "“explained” or “nothing missing” above an open gap: none",
+            of(every["“explained” or “nothing missing” above an open gap"]),
+            0.0,
+            0.0,
+        ),
         ("answered at all: 100 %", ratio(lines, lambda r: True), 1.0, 1.0),
     ]
     return [
@@ -378,7 +521,7 @@ def report(lines: list[Json]) -> str:
     """Return all tables."""
     marks = {True: "yes", False: "**no**", None: "–"}
     asked = table(["asked for", "found", "holds"], [[what, found, marks[holds]] for what, found, holds in criteria(lines)])
-    return "\n\n".join([asked, overview(lines), by_kind(lines), confusions(lines)])
+    return "\n\n".join([asked, name_by_name(lines), overview(lines), by_kind(lines), confusions(lines)])
 
 
 # ---- the command
@@ -386,31 +529,35 @@ def report(lines: list[Json]) -> str:
 
 def sessions(folder: Path) -> list[Path]:
     """Return the sessions that the manifest of a folder lists."""
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    return [folder / entry["folder"] for entry in manifest["sessions"]]
+    path = folder / "manifest.json"
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        return [folder / entry["folder"] for entry in manifest["sessions"]]
+    except (OSError, ValueError, KeyError) as wrong:
+        raise ValueError(f"{path}: {wrong}") from wrong
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run and score."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folder", type=Path, help="what hidden-world generate made")
+    parser.add_argument("folder", type=Path, nargs="+", help="what a world made; several are scored together, with tables in the first")
     parser.add_argument("--jobs", type=int, default=2, help="sessions at a time (2)")
     parser.add_argument("--timeout", type=float, default=600.0, help="of one session [s] (600)")
     parser.add_argument("--again", action="store_true", help="run also what has an answer")
     parser.add_argument("--only-score", action="store_true", help="score the answers that are there")
     options = parser.parse_args(arguments)
     try:
-        folders = sessions(options.folder)
-    except (OSError, ValueError, KeyError) as wrong:
-        print(f"{options.folder / 'manifest.json'}: {wrong}", file=sys.stderr)
+        folders = [session for folder in options.folder for session in sessions(folder)]
+    except ValueError as wrong:
+        print(wrong, file=sys.stderr)
         return 2
     if not options.only_score:
         run_all(folders, options.jobs, options.timeout, options.again)
     lines = [record(folder) for folder in folders if (folder / "outcome.json").is_file()]
     text = "".join(json.dumps(line) + "\n" for line in lines)
-    (options.folder / "scores.jsonl").write_text(text, encoding="utf-8")
+    (options.folder[0] / "scores.jsonl").write_text(text, encoding="utf-8")
     result = report(lines)
-    (options.folder / "scores.md").write_text(result + "\n", encoding="utf-8")
+    (options.folder[0] / "scores.md").write_text(result + "\n", encoding="utf-8")
     print(result)
     return int(any(holds is False for *_, holds in criteria(lines)))
 
