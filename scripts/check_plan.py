@@ -6,7 +6,7 @@ Each repetition draws the believed masses, centres of mass and inertias and the 
 planned trials with noise, and identifies. Shared by tests/test_plan.py.
 
 With three segments the hand hangs between wrist and handle and moves by half a degree: springs, friction and inertia of the wrist are read
-from little, and what they change of the motion counts (`arm_ident::response`).
+from little, and what they change of the motion counts (`arm_ident::regression::sensitivity`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 //! Rows to a triangular factor: time per pass over N rows.
 
-use arm_ident::Condenser;
+use arm_numerics::Condenser;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};

@@ -1,7 +1,7 @@
 //! From samples to an estimate: the streamed cascade (wrist, elbow, shoulder, with bounds) and the joint method.
 
-use arm_ident::joint::identify;
-use arm_ident::quasi_static::Stream;
+use arm_ident::cascade::quasi_static::Stream;
+use arm_ident::inference::joint_method::identify;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use speed::identification::{joint as asked, model, slow};
 use std::hint::black_box;

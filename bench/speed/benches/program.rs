@@ -1,7 +1,7 @@
 //! One constrained fit, from triangular factor to estimate.
 
-use arm_ident::Matrix;
-use arm_ident::program::{Cone, Program};
+use arm_numerics::Matrix;
+use arm_numerics::least_squares::program::{Cone, Program};
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};

@@ -2,7 +2,7 @@
 //!
 //! With `auto` as second argument the cutoff is chosen from the data.
 
-use arm_ident::joint::identify;
+use arm_ident::inference::joint_method::identify;
 use cpu_time::ProcessTime;
 use speed::identification::joint;
 

@@ -6,8 +6,8 @@ use arm_core::{
     Chain, Joints, Lanes, Load, Plane, Pose, Scalar, forward_dynamics, inverse_dynamics,
 };
 use arm_core::{Segment, models as arms};
-use arm_ident::quasi_static::{Cascade, Stream};
-use arm_ident::trial::Model;
+use arm_ident::cascade::quasi_static::{Cascade, Stream};
+use arm_ident::regression::trial::Model;
 use arm_sim::{Experiment, Integrator, models, simulate, simulate_batch};
 use cpu_time::ProcessTime;
 use std::hint::black_box;

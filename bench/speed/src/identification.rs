@@ -4,8 +4,8 @@ use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Segment, gravity, inverse_dynamics, jacobian, models,
 };
-use arm_ident::joint::{MotionSource, Options};
-use arm_ident::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::inference::joint_method::{MotionSource, Options};
+use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 

@@ -43,6 +43,8 @@ mod robot;
 mod scalar;
 mod series;
 mod setup;
+#[cfg(feature = "simd")]
+pub mod simd_dispatch;
 mod trajectory;
 mod unroll;
 

@@ -37,3 +37,9 @@ pub enum GapError {
     #[error("stopped")]
     Stopped,
 }
+
+impl From<arm_numerics::NumericsError> for GapError {
+    fn from(error: arm_numerics::NumericsError) -> Self {
+        Self::Numerics(error.into())
+    }
+}

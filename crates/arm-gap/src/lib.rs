@@ -1,39 +1,21 @@
 //! Where simulation and measured data of an arm disagree, which effect is missing, and what adding it gains.
+//!
+//! - [`data`]: the session, its repeats and its noise
+//! - [`measurement_model`]: what the channels would read if a hypothesis were true
+//! - [`sensitivity`]: how they answer small changes
+//! - [`candidates`]: the catalogue of effects as questions
+//! - [`selection`]: score tests, the search, model selection
+//! - [`trial_specific`]: what differs between trials
+//! - [`joint_torque`]: rigs without a robot
 
-pub mod anchor;
-pub mod apart;
-pub mod candidate;
-pub mod chance;
-pub mod disturbance;
+pub mod candidates;
+pub mod data;
 mod error;
-pub mod fit;
-pub mod free;
-pub mod groups;
-pub mod hypothesis;
-pub mod in_trial;
-pub mod judge;
-pub mod look;
-pub mod memory;
-pub mod misfit;
-pub mod noise;
-pub mod normal;
-pub mod predict;
-pub mod response;
-pub mod rhythm;
-mod ringing;
-mod rows;
-pub mod scan;
-pub mod search;
-pub mod separate;
-pub mod session;
-pub mod slow_ripple;
-pub mod spectrum;
-pub mod spread;
-pub mod stretches;
-pub mod study;
-pub mod swing;
-pub mod tabulated;
+pub mod joint_torque;
+pub mod measurement_model;
+pub mod selection;
+pub mod sensitivity;
 pub mod threads;
-mod unrepeated;
+pub mod trial_specific;
 
 pub use error::GapError;

@@ -2,10 +2,10 @@
 
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Elbow, Joints, Limits, Robot, Segment, Setup, Shape};
-use arm_gap::hypothesis::{Coordinate, Hypothesis, Target};
-use arm_gap::session::{Session, Sight};
-use arm_gap::study::Study;
-use arm_ident::trial::{Role, Tolerance, Trial};
+use arm_gap::data::prepared_session::Study;
+use arm_gap::data::session::{Session, Sight};
+use arm_gap::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use arm_ident::regression::trial::{Role, Tolerance, Trial};
 use arm_sim::{
     Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start, simulate,
 };

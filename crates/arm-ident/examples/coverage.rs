@@ -9,8 +9,8 @@
 
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Joints, Limits, Segment, Setup, Shape, models};
-use arm_ident::joint::{MotionSource, Options, identify};
-use arm_ident::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::inference::joint_method::{MotionSource, Options, identify};
+use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
 use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Start, simulate};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
+use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Chain, Joints, Lanes, Scalar};
-use arm_sim::widest::{Computation, widest};
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{
     IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
@@ -189,7 +189,7 @@ pub fn over_rows<'py, F: Kernel<K>, const K: usize, const N: usize>(
     let mut run = || {
         // Longer arms are rare, and code for their lanes long to compile.
         if const { F::IN_LANES && N <= 3 } && batch.is_some() {
-            return widest(Groups {
+            return dispatch(Groups {
                 kernel: PhantomData::<F>,
                 chain: chain.cast(),
                 inputs: &inputs,

@@ -3,6 +3,7 @@
 use arm_core::{Invalid, Shown};
 use arm_gap::GapError;
 use arm_ident::IdentError;
+use arm_numerics::NumericsError;
 use arm_sim::SimulationError;
 use pyo3::prelude::*;
 
@@ -57,23 +58,23 @@ pub fn invalid(error: Invalid) -> PyErr {
 }
 
 /// A refusal or failure of an identification: bad data and limits that nothing respects are `BadInput`, the rest is `IdentificationError`.
-pub fn identification(error: IdentError) -> PyErr {
-    let (number, error) = match error {
+pub fn identification(error: impl Into<IdentError>) -> PyErr {
+    let (number, error) = match error.into() {
         IdentError::InTrial { number, error } => (Some(number), *error),
         error => (None, error),
     };
     let refused = match error {
-        IdentError::TooFew {
+        IdentError::Numerics(NumericsError::TooFew {
             name,
             found,
             expected,
-        } => bad_input(name, found, &format!("at least {expected}")),
-        IdentError::OutOfRange {
+        }) => bad_input(name, found, &format!("at least {expected}")),
+        IdentError::Numerics(NumericsError::OutOfRange {
             name,
             found,
             min,
             max,
-        } => bad_input(
+        }) => bad_input(
             name,
             Shown(found),
             &format!("{} to {}", Shown(min), Shown(max)),
@@ -89,9 +90,9 @@ pub fn identification(error: IdentError) -> PyErr {
             ),
             &format!("{} {}", nearest.allowed, nearest.limit.words()[1]),
         ),
-        IdentError::Rank {
+        IdentError::Numerics(NumericsError::Rank {
             found, expected, ..
-        } => in_python(
+        }) => in_python(
             "IdentificationError",
             &format!(
                 "the data determine {found} of {expected} unknowns and nothing is known beforehand of the others: \

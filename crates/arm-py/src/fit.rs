@@ -1,7 +1,7 @@
 //! Fits by simulation.
 
 use arm_core::Chain;
-use arm_ident::by_simulation::{self, Free, Recorded};
+use arm_ident::inference::by_simulation::{self, Free, Recorded};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

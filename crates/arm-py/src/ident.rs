@@ -2,10 +2,10 @@
 
 use arm_core::effect::{Effect, Place};
 use arm_core::{Chain, Joints};
-use arm_ident::estimate::{Estimate, Explained, Identified};
-use arm_ident::joint::{MotionSource, Options};
-use arm_ident::trial::{Model, Role, Tolerance, Trial};
-use arm_ident::unknown::Source;
+use arm_ident::inference::estimate::{Estimate, Explained, Identified};
+use arm_ident::inference::joint_method::{MotionSource, Options};
+use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::regression::unknown::Source;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -211,7 +211,8 @@ pub fn identify<'py>(
             ..Default::default()
         };
         let result = match settings.method.as_str() {
-            "joint" => py.detach(|| arm_ident::joint::identify(&model, &trials, &options)),
+            "joint" => py
+                .detach(|| arm_ident::inference::joint_method::identify(&model, &trials, &options)),
             "cascade" => py.detach(|| arm_ident::cascade::identify(&model, &trials, &cascade)),
             other => return Err(bad_input("method", other, "joint or cascade")),
         }
@@ -233,7 +234,10 @@ fn outcome<'py, const N: usize>(
     out.set_item("cutoff", result.cutoff)?;
     out.set_item("clusters", result.clusters)?;
     out.set_item("speed_noise", &result.speed_noise)?;
-    out.set_item("speed_noise_allowed", arm_ident::motion::QUIET)?;
+    out.set_item(
+        "speed_noise_allowed",
+        arm_ident::regression::measured_motion::QUIET,
+    )?;
     out.set_item("trades", &result.trades)?;
     for (name, list) in [
         ("parameters", &result.parameters),

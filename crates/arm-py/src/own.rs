@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError, RwLock};
 use arm_core::effect::{
     Info, Kind, MAX_PARAMETERS, Own, Parameter, Place, Probe, Question, Values,
 };
-use arm_gap::tabulated::{Grid, Tabulated};
+use arm_gap::candidates::tabulated::{Grid, Tabulated};
 use numpy::ndarray::Array1;
 use numpy::{IntoPyArray, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;

@@ -2,8 +2,8 @@
 
 use arm_core::{Chain, Joints, Shape};
 use arm_ident::IdentError;
-use arm_ident::design::{Allowed, Excess, design};
-use arm_ident::forecast::{Accuracy, Forecast, Question, Task, forecast};
+use arm_ident::experiment_design::design::{Allowed, Excess, design};
+use arm_ident::experiment_design::forecast::{Accuracy, Forecast, Question, Task, forecast};
 use numpy::{PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

@@ -1,8 +1,8 @@
 //! The common low-pass and the derivatives behind it, for time series.
 
-use arm_ident::derivative;
-use arm_ident::filter::Butterworth;
-use arm_ident::motion::low_pass;
+use arm_ident::regression::measured_motion::low_pass;
+use arm_numerics::signal::derivative;
+use arm_numerics::signal::filter::Butterworth;
 use numpy::ndarray::{Array1, Array2};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;

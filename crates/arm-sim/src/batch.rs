@@ -12,8 +12,8 @@ use crate::native::{PlainSteps, diverged};
 use crate::prepare::{Prepared, add_ripple, commands, has_ripple};
 use crate::recorder::{Instant, Recorder, Row};
 use crate::step::{Inputs, Memory, step};
-use crate::widest::{Computation, widest};
 use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
+use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Runs in one group.
 const LANES: usize = 8;
@@ -173,10 +173,10 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
                 let ahead = common.ahead(next, most, |half_steps, out| {
                     commands(&first.experiment.drive, &schedule, half_steps, out);
                 });
-                widest(Advance { steps, ahead, at })
+                dispatch(Advance { steps, ahead, at })
             } else {
                 let ahead = feed.ahead(next, most, &mut own);
-                widest(Advance { steps, ahead, at })
+                dispatch(Advance { steps, ahead, at })
             };
         }
         if !state.is_finite() {

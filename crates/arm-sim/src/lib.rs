@@ -45,8 +45,6 @@ mod step;
 mod stepper;
 mod terms;
 #[doc(hidden)]
-pub mod widest;
-
 pub use batch::simulate_batch;
 pub use controlled::{Controlled, Controller, Fault, Safety, control};
 pub use digest::{Digest, definite, digest, digest_of};

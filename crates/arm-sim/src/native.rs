@@ -6,8 +6,8 @@ use crate::model::{Plain, State};
 use crate::prepare::Prepared;
 use crate::recorder::{Instant, Pieces, Recorder, Row};
 use crate::step::{Memory, step};
-use crate::widest::{Computation, widest};
 use crate::{Experiment, Partial, SimulationError};
+use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Pose, Scalar};
 
 /// Runs an experiment, recorded as a whole or in pieces; the loop does not allocate.
@@ -52,7 +52,7 @@ pub(crate) fn run<const N: usize>(
             let ahead = feed.ahead(next, most, |half_steps, out| {
                 prepared.inputs(half_steps, out);
             });
-            done += widest(Steps {
+            done += dispatch(Steps {
                 prepared: &prepared,
                 plain: plain.as_ref(),
                 ahead,

@@ -8,11 +8,11 @@ use arm_core::{Joints, Scalar, Setup};
 
 use crate::breaks::Breaks;
 use crate::model::{Input, Link, Model, Plain};
-use crate::widest::{Computation, widest};
 use crate::{
     Coupling, Drive, Experiment, Handle, HandlePath, Integrator, JointMotion, SimulationError,
     Start, stability, start,
 };
+use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Longest run: at 4 kHz three days. More is a slip of units.
 const MOST_STEPS: f64 = 1e9;
@@ -235,7 +235,7 @@ pub(crate) fn commands<const N: usize>(
         out.extend(times.map(|time| command(drive, time)));
         return;
     };
-    widest(Abreast {
+    dispatch(Abreast {
         path,
         schedule,
         half_steps,

@@ -9,7 +9,7 @@ use crate::Recording;
 use crate::model::{Input, Link, Model, Outcome, State, difference};
 use crate::prepare::Prepared;
 use crate::record::Piece;
-use crate::widest::{Computation, widest};
+use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Forces of a state, by whatever engine.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +58,7 @@ impl<T: Scalar> Row<T> {
 
     /// An instant of the native engine: forces follow from the model.
     pub fn fill<const N: usize>(&mut self, instant: &Instant<T, N>) {
-        widest(Native { row: self, instant });
+        dispatch(Native { row: self, instant });
     }
 
     /// An instant with forces of another engine.

@@ -9,8 +9,8 @@ use std::hint::black_box;
 use arm_core::effect::{Effect, Kind};
 use arm_core::estimator::{Estimator, Sample, Settings};
 use arm_core::{Chain, Elbow, Equation, Joints, Measured, Real, Robot, Segment};
-use arm_ident::joint::{Options, identify};
-use arm_ident::trial::{Model, Role, Trial};
+use arm_ident::inference::joint_method::{Options, identify};
+use arm_ident::regression::trial::{Model, Role, Trial};
 use arm_sim::{Channel, Integrator, Sensors, digest, models, simulate, simulate_batch};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;

@@ -2,7 +2,8 @@
 
 use arm_core::effect::{Effect, Kind};
 use arm_ident::IdentError;
-use arm_ident::by_simulation::{Fit, Free, Recorded, fit};
+use arm_ident::inference::by_simulation::{Fit, Free, Recorded, fit};
+use arm_numerics::NumericsError;
 use arm_sim::{Experiment, Integrator, Recording, models, simulate};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
@@ -138,15 +139,15 @@ fn what_cannot_be_fitted_is_refused() {
     let run = |recorded: &Recorded<3>, free: &[Free]| fit(&experiment(TRUE), recorded, free, 1);
     assert!(matches!(
         run(&recorded, &free(20.0)),
-        Err(IdentError::Length { .. })
+        Err(IdentError::Numerics(NumericsError::Length { .. }))
     ));
     assert!(matches!(
         run(&recorded, &[]),
-        Err(IdentError::TooFew { .. })
+        Err(IdentError::Numerics(NumericsError::TooFew { .. }))
     ));
     assert!(matches!(
         run(&recorded, &free(0.3)),
-        Err(IdentError::OutOfRange { .. })
+        Err(IdentError::Numerics(NumericsError::OutOfRange { .. }))
     ));
     let missing = Free {
         effect: 9,
@@ -154,7 +155,7 @@ fn what_cannot_be_fitted_is_refused() {
     };
     assert!(matches!(
         run(&recorded, &[missing]),
-        Err(IdentError::OutOfRange { .. })
+        Err(IdentError::Numerics(NumericsError::OutOfRange { .. }))
     ));
     let silent = Recorded {
         angle_noise: [0.0; 3],
@@ -162,6 +163,6 @@ fn what_cannot_be_fitted_is_refused() {
     };
     assert!(matches!(
         run(&silent, &free(20.0)),
-        Err(IdentError::OutOfRange { .. })
+        Err(IdentError::Numerics(NumericsError::OutOfRange { .. }))
     ));
 }

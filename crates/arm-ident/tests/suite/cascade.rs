@@ -5,8 +5,8 @@ use super::noise::Noise;
 use super::synthetic::{EXACT, Recipe, State, at_every_joint, wrong};
 use arm_core::{Joints, models};
 use arm_ident::cascade::{Options, identify};
-use arm_ident::estimate::{Decision, Identified};
-use arm_ident::trial::Trial;
+use arm_ident::inference::estimate::{Decision, Identified};
+use arm_ident::regression::trial::Trial;
 
 const BRAKES: [f64; 2] = [0.139, 0.161];
 const SPEED: f64 = 0.04;

@@ -4,8 +4,8 @@ use super::joint_method::{close, exactly, named, rms};
 use super::noise::{Noise, most};
 use super::synthetic::{EXACT, Recipe, State, sines, wrong};
 use arm_core::models;
-use arm_ident::joint::{Options, identify};
-use arm_ident::trial::{Tolerance, Trial};
+use arm_ident::inference::joint_method::{Options, identify};
+use arm_ident::regression::trial::{Tolerance, Trial};
 
 /// A trial in which one imperfection is put in, and what it is called in the result.
 struct Fault {

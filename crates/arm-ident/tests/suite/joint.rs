@@ -4,9 +4,9 @@ use super::joint_method::{close, exactly, human, named, rms, two_factors};
 use super::noise::Noise;
 use super::synthetic::{Recipe, State, at_every_joint, effect, sines, wrong};
 use arm_core::{Chain, Joints, models};
-use arm_ident::estimate::Decision;
-use arm_ident::joint::{Options, identify};
-use arm_ident::trial::Trial;
+use arm_ident::inference::estimate::Decision;
+use arm_ident::inference::joint_method::{Options, identify};
+use arm_ident::regression::trial::Trial;
 
 /// Half a period of the fastest sine is some 700 samples: the filter and the differences are exact to about 1e-6.
 const BY_SAMPLING: f64 = 2e-5;

@@ -5,8 +5,8 @@ use super::noise::Noise;
 use super::synthetic::{Recipe, at_every_joint, effect, sines, wrong};
 use arm_core::models;
 use arm_ident::IdentError;
-use arm_ident::joint::{MotionSource, Options, identify};
-use arm_ident::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::inference::joint_method::{MotionSource, Options, identify};
+use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
 
 #[test]
 fn what_stands_in_a_gap_has_no_influence() {

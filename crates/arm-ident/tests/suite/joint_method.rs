@@ -1,8 +1,8 @@
 //! What the tests of the joint method share: how they ask, and how they read the answer.
 
 use arm_core::{Chain, Segment, models};
-use arm_ident::estimate::{Estimate, Identified};
-use arm_ident::joint::{MotionSource, Options};
+use arm_ident::inference::estimate::{Estimate, Identified};
+use arm_ident::inference::joint_method::{MotionSource, Options};
 
 use super::synthetic::EXACT;
 

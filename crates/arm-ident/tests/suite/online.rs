@@ -8,9 +8,9 @@ use arm_core::{
     Chain, Contact, Elbow, Equation, Joints, Limits, Measured, Real, Robot, Segment, Setup, Shape,
     models,
 };
-use arm_ident::estimate::Identified;
-use arm_ident::joint::{Options, identify};
-use arm_ident::trial::{Model, Role, Trial};
+use arm_ident::inference::estimate::Identified;
+use arm_ident::inference::joint_method::{Options, identify};
+use arm_ident::regression::trial::{Model, Role, Trial};
 
 use super::noise::Noise;
 

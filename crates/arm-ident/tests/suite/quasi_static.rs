@@ -3,7 +3,7 @@
 use super::noise::Noise;
 use super::synthetic::wrong;
 use arm_core::{Chain, Joints, Plane, Pose, gravity, jacobian, models};
-use arm_ident::quasi_static::Stream;
+use arm_ident::cascade::quasi_static::Stream;
 
 const SAMPLES: usize = 3000;
 

@@ -1,6 +1,8 @@
 use crate::noise::{Noise, gap};
-use arm_ident::rank::{RankOptions, RankReport, analyse};
-use arm_ident::{Factor, IdentError, Matrix};
+use arm_ident::IdentError;
+use arm_ident::inference::rank::{RankOptions, RankReport, analyse};
+use arm_numerics::NumericsError;
+use arm_numerics::{Factor, Matrix};
 
 const G: f64 = 9.81;
 const A1: f64 = 0.322;
@@ -151,7 +153,10 @@ fn refuses_bad_input() {
     };
     assert!(matches!(
         with(Some(vec![1.0]), None),
-        Err(IdentError::Length { name: "scale", .. })
+        Err(IdentError::Numerics(NumericsError::Length {
+            name: "scale",
+            ..
+        }))
     ));
     assert!(with(Some(vec![1.0, 0.0]), None).is_err());
     assert!(with(None, Some(f64::NAN)).is_err());

@@ -5,11 +5,12 @@ use super::noise::Noise;
 use super::synthetic::{Recipe, at_every_joint, effect, sines, wrong};
 use arm_core::{Joints, models};
 use arm_ident::IdentError;
-use arm_ident::condition::filtered;
-use arm_ident::equation::Rows;
-use arm_ident::joint::identify;
-use arm_ident::motion::low_pass;
-use arm_ident::trial::{Role, Trial};
+use arm_ident::inference::joint_method::identify;
+use arm_ident::regression::equation::Rows;
+use arm_ident::regression::measured_motion::low_pass;
+use arm_ident::regression::preprocessing::filtered;
+use arm_ident::regression::trial::{Role, Trial};
+use arm_numerics::NumericsError;
 
 const RATE: f64 = 100.0;
 const CUTOFF: f64 = 5.0;
@@ -95,7 +96,13 @@ fn what_is_not_finite_is_named_by_its_sample() {
     all.columns[1][2 * 15_000 + 1] = f64::NAN;
     let refused = filtered(&trial, CUTOFF, 3, part_by_part(&all));
     assert!(
-        matches!(refused, Err(IdentError::NotFinite { index: 15_000, .. })),
+        matches!(
+            refused,
+            Err(IdentError::Numerics(NumericsError::NotFinite {
+                index: 15_000,
+                ..
+            }))
+        ),
         "{refused:?}"
     );
 }

@@ -4,7 +4,7 @@ use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Segment, inverse_dynamics, jacobian, static_torque,
 };
-use arm_ident::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
 
 /// Angles, speeds and accelerations at a time.
 pub type State<const N: usize> = [Joints<f64, N>; 3];

@@ -1,0 +1,4 @@
+//! The catalogue of effects as questions that a session can answer.
+
+pub mod candidate;
+pub mod tabulated;

@@ -1,0 +1,8 @@
+//! What was measured, made ready: session, repeats, the samples that are compared, noise.
+
+pub mod noise;
+pub mod prepared_session;
+pub mod repeats;
+pub mod session;
+pub(crate) mod unrepeated;
+pub mod valid_segments;

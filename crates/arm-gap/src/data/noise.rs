@@ -1,0 +1,320 @@
+//! The noise of a data set, from what differs between repeats of one movement, and the rows that it leaves white.
+//!
+//! Residuals of filtered samples are never white. Each channel is an autoregression in time, the innovations of the
+//! channels are correlated; both are read off repeats, where the model's errors cancel. Without repeats the residual of a
+//! fit takes their place: what the model lacks is in it too, so that less is seen, not more.
+
+use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
+
+use crate::GapError;
+use crate::data::valid_segments::Stretches;
+use crate::measurement_model::prediction::Channels;
+
+/// Highest order of the autoregressions.
+const ORDER: usize = 4;
+/// White noise of this share of a channel's range is always believed in: the path between samples, quantisation and the
+/// model's own simplifications are no better, however smooth the noise of the sensors is.
+const LEAST: f64 = 5e-4;
+
+/// What makes rows white.
+#[derive(Clone, Debug)]
+pub struct Noise {
+    whiteners: Vec<Whitener>,
+    /// What each sample weighs, by trial; nothing where all weigh the same.
+    weights: Vec<Channels>,
+    /// Inverse of the lower Cholesky factor of the innovations' correlation, row-major.
+    mix: Vec<f64>,
+}
+
+impl Noise {
+    /// White noise of unit size, until the data have told more.
+    ///
+    /// # Errors
+    /// None in practice: the model is valid.
+    pub fn unknown(channels: usize) -> Result<Self, GapError> {
+        let white = AutoRegression {
+            coefficients: Vec::new(),
+            sd: 1.0,
+        };
+        let mix = (0..channels * channels)
+            .map(|i| if i % (channels + 1) == 0 { 1.0 } else { 0.0 })
+            .collect();
+        Ok(Self {
+            whiteners: vec![Whitener::new(&white)?; channels],
+            weights: Vec::new(),
+            mix,
+        })
+    }
+
+    /// From deviations, for each trial its channels, thinned, in one list of stretches.
+    ///
+    /// * `deviations` - `[series][channel]`, already scaled for the freedom that their mean took
+    /// * `taken` - the like, whose products add up to the covariance of what was taken out of them and may have been noise
+    /// * `range` - size of each channel, below a share of which no noise is believed
+    /// * `told` - share of the samples of each channel that tell anything; the others are zero
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for series too short.
+    pub fn of(
+        deviations: &[Vec<Vec<f64>>],
+        taken: &[Vec<Vec<f64>>],
+        range: &[f64],
+        told: &[f64],
+    ) -> Result<Self, GapError> {
+        let channels = range.len();
+        let mut whiteners = Vec::with_capacity(channels);
+        for (c, range) in range.iter().enumerate() {
+            let least = (LEAST * range).max(1e-12);
+            let noisy: Vec<Vec<f64>> = deviations.iter().map(|d| roughened(&d[c], least)).collect();
+            let series: Vec<&[f64]> = noisy.iter().map(Vec::as_slice).collect();
+            let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
+            let model = if varies {
+                let taken: Vec<&[f64]> = taken.iter().map(|d| d[c].as_slice()).collect();
+                let mut model = AutoRegression::selected_about_zero(&series, &taken, ORDER)?;
+                model.sd /= told[c].max(1e-6).sqrt();
+                model
+            } else {
+                AutoRegression {
+                    coefficients: Vec::new(),
+                    sd: least,
+                }
+            };
+            whiteners.push(Whitener::new(&model)?);
+        }
+        let mut correlation = vec![0.0; channels * channels];
+        let count: usize = deviations.iter().map(|d| d[0].len()).sum();
+        for series in deviations.iter().chain(taken) {
+            let mut white = series.clone();
+            for (values, whitener) in white.iter_mut().zip(&whiteners) {
+                whitener.apply(values);
+            }
+            for a in 0..channels {
+                for b in 0..channels {
+                    correlation[a * channels + b] += dot(&white[a], &white[b]);
+                }
+            }
+        }
+        for a in 0..channels {
+            for b in 0..channels {
+                let both = count as f64 * f64::min(told[a], told[b]);
+                correlation[a * channels + b] /= f64::max(both, 1.0);
+            }
+            // The white noise that is believed in belongs to each channel alone.
+            correlation[a * (channels + 1)] = correlation[a * (channels + 1)].max(1.0);
+        }
+        Ok(Self {
+            whiteners,
+            weights: Vec::new(),
+            mix: inverse_factor(&correlation, channels),
+        })
+    }
+
+    /// Without repeats: white, as large as what is left, and larger by as much as it is correlated in time.
+    ///
+    /// An autoregression of what is left would take slow effects for noise.
+    ///
+    /// * `deviations` - what is left, already weighed
+    /// * `weights` - of every sample, by trial and channel
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for series too short.
+    pub fn without_repeats(
+        deviations: &[Vec<Vec<f64>>],
+        range: &[f64],
+        (told, weights): (&[f64], Vec<Channels>),
+    ) -> Result<Self, GapError> {
+        let mut noise = Self {
+            weights,
+            ..Self::unknown(range.len())?
+        };
+        for (c, range) in range.iter().enumerate() {
+            let (mut square, mut count, mut effective) = (0.0, 0.0, 0.0);
+            for series in deviations {
+                square += dot(&series[c], &series[c]);
+                count += told[c] * series[c].len() as f64;
+                effective += told[c] * effective_samples(&series[c])?.max(1.0);
+            }
+            let variance = square / f64::max(count, 1.0) * count / f64::max(effective, 1.0);
+            let model = AutoRegression {
+                coefficients: Vec::new(),
+                sd: libm::sqrt(variance).max((LEAST * range).max(1e-12)),
+            };
+            noise.whiteners[c] = Whitener::new(&model)?;
+        }
+        Ok(noise)
+    }
+
+    /// The same for other trials than those it was read off: there every sample weighs the same.
+    pub fn of_others(&self) -> Self {
+        Self {
+            whiteners: self.whiteners.clone(),
+            weights: Vec::new(),
+            mix: self.mix.clone(),
+        }
+    }
+
+    /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
+    pub fn whiten(&self, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
+        let picked = stretches.pick(channels);
+        let whitened = std::iter::zip(&self.whiteners, picked).map(|(whitener, pieces)| {
+            let mut row = Vec::with_capacity(stretches.len());
+            for mut piece in pieces {
+                whitener.apply(&mut piece);
+                row.extend(piece);
+            }
+            row
+        });
+        self.unmixed(whitened.collect())
+    }
+
+    /// Whitens a set of channels of one trial, whose samples weigh as they do there.
+    pub fn whiten_in(&self, trial: usize, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
+        let mut row = self.whiten(channels, stretches);
+        if let Some(weights) = self.weights.get(trial) {
+            let each = weights
+                .iter()
+                .flat_map(|w| stretches.samples().map(|i| w[i]));
+            for (value, weight) in row.iter_mut().zip(each) {
+                *value *= weight;
+            }
+        }
+        row
+    }
+
+    /// Whitens channels that are thinned already, in one stretch.
+    pub fn whiten_thinned(&self, channels: &[Vec<f64>]) -> Vec<f64> {
+        let mut rows = channels.to_vec();
+        for (row, whitener) in rows.iter_mut().zip(&self.whiteners) {
+            whitener.apply(row);
+        }
+        self.unmixed(rows)
+    }
+
+    fn unmixed(&self, mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+        let n = self.whiteners.len();
+        // From the last channel up: each row needs those before it unmixed.
+        for c in (0..n).rev() {
+            for i in 0..rows[c].len() {
+                rows[c][i] = (0..=c).fold(0.0, |s, b| s + self.mix[c * n + b] * rows[b][i]);
+            }
+        }
+        rows.into_iter().flatten().collect()
+    }
+}
+
+/// A series with white noise of a given size on it, the same in every run.
+fn roughened(series: &[f64], size: f64) -> Vec<f64> {
+    let mut state: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mut uniform = || {
+        // Knuth's multiplier; the upper bits are good enough for a floor of noise.
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    // A uniform number between −½ and ½ has the variance 1/12.
+    let scale = size * libm::sqrt(12.0);
+    series.iter().map(|v| v + scale * uniform()).collect()
+}
+
+/// Inverse of the lower Cholesky factor; a little of the diagonal is added where channels repeat each other.
+fn inverse_factor(correlation: &[f64], n: usize) -> Vec<f64> {
+    const RIDGE: f64 = 1e-3;
+    let mut lower = vec![0.0; n * n];
+    for j in 0..n {
+        for k in 0..=j {
+            let ridge = if j == k {
+                RIDGE * correlation[j * n + j].max(1e-6)
+            } else {
+                0.0
+            };
+            let mut value = correlation[j * n + k] + ridge;
+            for i in 0..k {
+                value -= lower[j * n + i] * lower[k * n + i];
+            }
+            lower[j * n + k] = if j == k {
+                value.max(1e-9).sqrt()
+            } else {
+                value / lower[k * n + k]
+            };
+        }
+    }
+    let mut inverse = vec![0.0; n * n];
+    for column in 0..n {
+        for j in column..n {
+            let mut value = if j == column { 1.0 } else { 0.0 };
+            for k in column..j {
+                value -= lower[j * n + k] * inverse[k * n + column];
+            }
+            inverse[j * n + column] = value / lower[j * n + j];
+        }
+    }
+    inverse
+}
+
+/// Sum of products in four interleaved partial sums: a fixed order that vector units can follow.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (heads, tails) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = heads
+        .remainder()
+        .iter()
+        .zip(tails.remainder())
+        .fold(0.0, |s, (x, y)| s + x * y);
+    for (x, y) in heads.zip(tails) {
+        for lane in 0..4 {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{RngCore, SeedableRng};
+
+    use super::*;
+
+    /// Sums of whitened rows vary as much as the rows say, or less: a floor of white noise that is believed in must not be
+    /// undone where channels are made independent.
+    #[test]
+    fn slow_noise_below_the_floor_is_not_better_known_than_it_is() {
+        const CHANNELS: usize = 3;
+        const N: usize = 90;
+        const RHO: f64 = 0.92;
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut normal = || {
+            // Twelve uniform numbers have the variance 1.
+            let sum: f64 = (0..12)
+                .map(|_| (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64)
+                .sum();
+            sum - 6.0
+        };
+        let size = 0.3 * LEAST;
+        let mut slow = || {
+            let mut x = size * normal();
+            let step = size * (1.0 - RHO * RHO).sqrt();
+            (0..N)
+                .map(|_| {
+                    let now = x;
+                    x = RHO * x + step * normal();
+                    now
+                })
+                .collect::<Vec<f64>>()
+        };
+        let series: Vec<Vec<Vec<f64>>> = (0..400)
+            .map(|_| (0..CHANNELS).map(|_| slow()).collect())
+            .collect();
+        let noise = Noise::of(&series, &[], &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
+        for c in 0..CHANNELS {
+            let squares = series.iter().map(|s| {
+                let sum: f64 = noise.whiten_thinned(s)[c * N..(c + 1) * N].iter().sum();
+                sum * sum / N as f64
+            });
+            let variance = squares.sum::<f64>() / series.len() as f64;
+            // Yule and Walker's equations of fourth order for slow and white noise together leave 1.22.
+            assert!(variance < 1.3, "{variance}");
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Which trials repeat one movement.
+
+use std::sync::Arc;
+
+use arm_ident::regression::trial::Trial;
+
+use crate::measurement_model::prediction::Course;
+
+/// Root mean square distance between the paths of two trials that are the same movement \[m, rad\].
+const SAME_PATH: f64 = 0.01;
+
+/// Trials that repeat one movement: the group of each, and the longest trial of every group.
+pub fn groups<const N: usize>(
+    trials: &[Trial<N>],
+    courses: &[Arc<Course<N>>],
+) -> (Vec<usize>, Vec<usize>) {
+    let mut group_of = Vec::with_capacity(trials.len());
+    let mut references: Vec<usize> = Vec::new();
+    for (i, trial) in trials.iter().enumerate() {
+        let found = references.iter().position(|&r| {
+            trials[r].configuration == trial.configuration
+                && same_rate(trials[r].rate, trial.rate)
+                && courses[r].is_like(&courses[i], SAME_PATH)
+        });
+        match found {
+            Some(group) => {
+                group_of.push(group);
+                if trial.len() > trials[references[group]].len() {
+                    references[group] = i;
+                }
+            }
+            None => {
+                group_of.push(references.len());
+                references.push(i);
+            }
+        }
+    }
+    (group_of, references)
+}
+
+/// Whether two sampling rates are one: time stamps are rounded.
+pub fn same_rate(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-3 * b
+}
+
+impl<const N: usize> Course<N> {
+    /// Whether another trial makes the same movement at the same times.
+    fn is_like(&self, other: &Self, allowed: f64) -> bool {
+        let (mine, theirs) = (self.path(), other.path());
+        let count = mine.len().min(theirs.len());
+        let longest = mine.len().max(theirs.len());
+        if count < longest - longest / 10 {
+            return false;
+        }
+        let square: f64 = std::iter::zip(&mine, &theirs)
+            .flat_map(|(a, b)| std::iter::zip(a, b).map(|(a, b)| (a - b) * (a - b)))
+            .sum();
+        square <= allowed * allowed * count as f64
+    }
+}

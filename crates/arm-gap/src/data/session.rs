@@ -1,0 +1,248 @@
+//! What is challenged and by what: the model as given, the trials, and what the calibration promises.
+
+use arm_core::effect::{Effect, KINDS, Kind, Place, Promise};
+use arm_core::{Chain, Contact, Setup};
+use arm_ident::regression::trial::{Role, Tolerance, Trial};
+use arm_sim::{SimulationError, altered};
+
+use crate::GapError;
+use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+
+/// A data set as the workflow sees it.
+#[derive(Clone, Debug)]
+pub struct Session<const N: usize> {
+    /// The rigid arm of the model.
+    pub chain: Chain<f64, N>,
+    /// Contact between hand and handle.
+    pub contact: Contact<f64>,
+    /// Effects that the model has.
+    pub effects: Vec<Effect<f64>>,
+    /// Relative standard deviation of masses, centres of mass and inertias; 0 holds them.
+    pub segment_uncertainty: f64,
+    /// What the calibration promises.
+    pub tolerance: Tolerance,
+    /// The trials.
+    pub trials: Vec<Trial<N>>,
+    /// What is compared.
+    pub sight: Sight,
+    /// Kinds of one's own that are asked besides those of the catalogue.
+    pub own: Vec<Kind>,
+}
+
+/// What is compared with the data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// Angles and forces of the closed chain, simulated along the robot's own path.
+    Led,
+    /// Joint torques, from inverse dynamics of the measured motion.
+    Torque,
+}
+
+/// A promise of the calibration is kept within this share of the tolerance (standard deviation): twice as far is the
+/// tolerance itself.
+const KEPT: f64 = 0.5;
+/// Standard deviations beyond which nothing that is known is refitted: what is further off is a fault, and has a name.
+pub(crate) const FURTHEST: f64 = 4.0;
+/// Relative standard deviation of what the model says of its own effects, and of the compliance of its contact.
+const KNOWN: f64 = 0.05;
+/// Relative standard deviation of what the model says of the damping of its contact.
+const DAMPED: f64 = 0.3;
+
+impl<const N: usize> Session<N> {
+    /// The rig as a hypothesis has it, with all effects applied that alter it.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for segments that cannot be, or an effect with a value or a place outside what its kind allows.
+    pub fn rig(&self, hypothesis: &Hypothesis<N>) -> Result<Setup<f64, N>, SimulationError> {
+        let setup = hypothesis.setup(&self.chain, self.contact)?;
+        altered(&setup, &hypothesis.effects())
+    }
+
+    /// All kinds that are asked.
+    pub fn kinds(&self) -> impl Iterator<Item = Kind> + '_ {
+        KINDS.iter().chain(&self.own).copied()
+    }
+
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        match self.sight {
+            Sight::Led => N + 2,
+            Sight::Torque => N,
+        }
+    }
+
+    /// Trials on which things are chosen and fitted.
+    pub fn fit_trials(&self) -> Vec<usize> {
+        self.of_role(Role::Fit)
+    }
+
+    /// Trials that are kept apart.
+    pub fn test_trials(&self) -> Vec<usize> {
+        self.of_role(Role::Test)
+    }
+
+    fn of_role(&self, role: Role) -> Vec<usize> {
+        (0..self.trials.len())
+            .filter(|&i| self.trials[i].role == role)
+            .collect()
+    }
+
+    /// The model as given.
+    pub fn given(&self) -> Hypothesis<N> {
+        let mut calibration = Vec::new();
+        for &kind in KINDS {
+            let Some(promise) = kind.probe().promise else {
+                continue;
+            };
+            if self.sight == Sight::Torque && promise != Promise::AngleOffset {
+                continue;
+            }
+            let places = match kind.info().place {
+                Place::AngleSensor => N,
+                Place::ForceSensor => 2,
+                _ => 1,
+            };
+            calibration.extend((0..places).map(|index| Effect::new(kind, index)));
+        }
+        Hypothesis {
+            segments: [[0.0; 3]; N],
+            contact: [[0.0; 2]; 2],
+            shift: [0.0; 2],
+            placement: [0.0; 2],
+            eccentricity: [[0.0; 2]; N],
+            known: self.effects.clone(),
+            calibration,
+            named: Vec::new(),
+        }
+    }
+
+    fn promised(&self, promise: Promise) -> f64 {
+        match promise {
+            Promise::AngleOffset => self.tolerance.angle_offset,
+            Promise::ForceBias => self.tolerance.force_bias,
+            Promise::ForceGain => self.tolerance.force_gain,
+            Promise::TimeDelay => self.tolerance.time_delay,
+        }
+    }
+
+    /// What is refitted with every question because it was never exact: segments, known effects, calibration.
+    pub fn nuisances(&self) -> Vec<Coordinate> {
+        let given = self.given();
+        let mut list = Vec::new();
+        let mut add = |target, sd: f64, lower: f64, upper: f64| {
+            if sd > 0.0 {
+                let value = given.get(target);
+                list.push(Coordinate {
+                    target,
+                    prior: Some((value, sd)),
+                    lower: f64::max(lower, value - FURTHEST * sd),
+                    upper: f64::min(upper, value + FURTHEST * sd),
+                    step: 0.25 * sd,
+                });
+            }
+        };
+        for k in 0..N {
+            for part in 0..3 {
+                // Where no torque acts, everything is known up to one common factor: the first segment's mass sets it.
+                if k == 0 && part == 0 && self.swings_freely() {
+                    continue;
+                }
+                add(
+                    Target::Segment(k, part),
+                    self.segment_uncertainty,
+                    -0.9,
+                    9.0,
+                );
+            }
+        }
+        for (e, effect) in self.effects.iter().enumerate() {
+            for (p, parameter) in effect.kind.info().parameters.iter().enumerate() {
+                let value = effect.parameters[p];
+                if parameter.linear && value != 0.0 {
+                    let target = Target::Known(e, p);
+                    add(target, KNOWN * value.abs(), parameter.min, parameter.max);
+                }
+            }
+        }
+        for (e, effect) in given.calibration.iter().enumerate() {
+            if let Some(promise) = effect.kind.probe().promise {
+                let sd = KEPT * self.promised(promise);
+                add(Target::Calibration(e), sd, f64::NEG_INFINITY, f64::INFINITY);
+            }
+        }
+        if self.sight == Sight::Torque {
+            let sd = KEPT * self.tolerance.angle_offset;
+            for (j, part) in (0..N).flat_map(|j| [(j, 0), (j, 1)]) {
+                let target = Target::Eccentricity(j, part);
+                add(target, sd, f64::NEG_INFINITY, f64::INFINITY);
+            }
+        }
+        if self.sight == Sight::Led {
+            let sd = KEPT * self.tolerance.handle_placement;
+            for axis in 0..2 {
+                add(Target::Contact(0, axis), KNOWN, -0.3, 0.5);
+                // A contact that damps much more cannot be stepped through.
+                add(Target::Contact(1, axis), DAMPED, -0.9, 0.5);
+                add(Target::Shift(axis), sd, f64::NEG_INFINITY, f64::INFINITY);
+            }
+        }
+        list
+    }
+
+    /// Whether no torque acts in any trial.
+    pub fn swings_freely(&self) -> bool {
+        self.trials.iter().all(Trial::is_unloaded)
+    }
+
+    /// What differs from one trial to the next: where the hand holds the handle, and where the handle is in the room.
+    pub fn by_trial(&self) -> Vec<Coordinate> {
+        let sd = KEPT * self.tolerance.handle_placement;
+        let placed = |target| Coordinate {
+            target,
+            prior: Some((0.0, sd)),
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            step: 0.25 * sd,
+        };
+        match self.sight {
+            Sight::Led if sd > 0.0 => vec![
+                placed(Target::Placement(0)),
+                placed(Target::Placement(1)),
+                placed(Target::Shift(0)),
+                placed(Target::Shift(1)),
+            ],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Refuses what no comparison can be made of.
+    ///
+    /// # Errors
+    /// [`GapError::Data`].
+    pub fn check(&self) -> Result<(), GapError> {
+        let refuse = |what, found: String, allowed| {
+            Err(GapError::Data {
+                what,
+                found,
+                allowed,
+            })
+        };
+        if self.fit_trials().is_empty() {
+            return refuse("trials to fit", "none".into(), "at least one");
+        }
+        for trial in &self.trials {
+            let missing = match self.sight {
+                Sight::Led => trial.handle.is_none() || trial.force_on_arm.is_none(),
+                Sight::Torque => trial.torque.is_none() && trial.force_on_arm.is_none(),
+            };
+            if missing {
+                return refuse(
+                    "channels",
+                    "a trial without them".into(),
+                    "the same channels in every trial",
+                );
+            }
+        }
+        Ok(())
+    }
+}

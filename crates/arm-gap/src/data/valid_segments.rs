@@ -1,0 +1,170 @@
+//! The samples of a trial that are compared, and what the force tells at each.
+
+use std::sync::Arc;
+
+use arm_core::Plane;
+use arm_ident::regression::trial::Trial;
+
+use crate::measurement_model::prediction::{Channels, Course, away_from_gaps, margin};
+
+/// Samples kept for each period of the cutoff.
+const SAMPLES_PER_PERIOD: f64 = 2.5;
+/// Periods of the cutoff around rest, where dry friction holds a joint, that count as rest.
+const NEAR_REST: f64 = 0.6;
+/// Fewest samples in a stretch that is used.
+const SHORTEST: usize = 8;
+
+/// What the force on the arm tells at one sample.
+///
+/// Dry friction holds a resting joint with any torque up to its own, and the force of the hand bears it. What is left to
+/// compare is the component that no torque in the resting joint changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Told {
+    /// Both components.
+    Both,
+    /// The one along a unit vector.
+    Along(Plane<f64>),
+    /// None.
+    Neither,
+}
+
+/// The samples of a trial that are compared: stretches without a gap, thinned to the common band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretches {
+    samples: Vec<Vec<usize>>,
+    /// What the force tells at every sample of the trial; both components where nothing is listed.
+    told: Arc<Vec<Told>>,
+}
+
+impl Stretches {
+    /// Of one trial.
+    ///
+    /// * `left_out` - samples that are not compared
+    /// * `told` - what the force tells at every sample; nothing listed: both components
+    pub fn of<const N: usize>(
+        trial: &Trial<N>,
+        course: &Course<N>,
+        left_out: &[bool],
+        told: Arc<Vec<Told>>,
+    ) -> Self {
+        let step = ((course.rate / (SAMPLES_PER_PERIOD * course.band)) as usize).max(1);
+        let sound = away_from_gaps(&trial.valid, margin(course.rate, course.band));
+        let n = trial.len();
+        let usable = |i: usize| sound[i] && left_out.get(i) != Some(&true);
+        // On one grid for all trials, so that repeats have the same samples.
+        let mut samples = Vec::new();
+        let mut current = Vec::new();
+        for i in (0..n).step_by(step) {
+            if usable(i) {
+                current.push(i);
+            } else if !current.is_empty() {
+                samples.push(core::mem::take(&mut current));
+            }
+        }
+        samples.push(current);
+        samples.retain(|stretch| stretch.len() >= SHORTEST);
+        Self { samples, told }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.samples.iter().map(Vec::len).sum()
+    }
+
+    /// Whether nothing is left.
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    /// Number of samples at which each of some channels tells anything.
+    pub fn told(&self, channels: usize) -> Vec<usize> {
+        let count = |least: usize| {
+            let components = self.samples.iter().flatten().map(|&i| match self.at(i) {
+                Told::Both => 2,
+                Told::Along(_) => 1,
+                Told::Neither => 0,
+            });
+            components.filter(|&n| n >= least).count()
+        };
+        let mut all = vec![self.len(); channels];
+        if !self.told.is_empty()
+            && let [.., first, second] = all.as_mut_slice()
+        {
+            (*first, *second) = (count(1), count(2));
+        }
+        all
+    }
+
+    /// Parts of the same number of samples, in order; the last may be shorter.
+    pub fn parts(&self, count: usize) -> Vec<Self> {
+        let size = self.len().div_ceil(count.max(1)).max(1);
+        let mut parts: Vec<Self> = Vec::new();
+        let mut seen = 0;
+        for stretch in &self.samples {
+            let mut rest = stretch.as_slice();
+            while !rest.is_empty() {
+                if seen % size == 0 {
+                    parts.push(Self {
+                        samples: Vec::new(),
+                        told: Arc::clone(&self.told),
+                    });
+                }
+                let (head, tail) = rest.split_at((size - seen % size).min(rest.len()));
+                if let Some(part) = parts.last_mut() {
+                    part.samples.push(head.to_vec());
+                }
+                (seen, rest) = (seen + head.len(), tail);
+            }
+        }
+        parts
+    }
+
+    /// The values of channels at the samples: `[channel][stretch][sample]`.
+    ///
+    /// Where the force tells one component alone, it stands in the place of the first, and zero in that of the second.
+    pub fn pick(&self, channels: &Channels) -> Vec<Vec<Vec<f64>>> {
+        let one = |channel: &Vec<f64>| -> Vec<Vec<f64>> {
+            let at = |s: &Vec<usize>| s.iter().map(|&i| channel[i]).collect();
+            self.samples.iter().map(at).collect()
+        };
+        let mut picked: Vec<Vec<Vec<f64>>> = channels.iter().map(one).collect();
+        if !self.told.is_empty()
+            && let [.., first, second] = picked.as_mut_slice()
+        {
+            for (k, stretch) in self.samples.iter().enumerate() {
+                for (at, &i) in stretch.iter().enumerate() {
+                    let (y, z) = (&mut first[k][at], &mut second[k][at]);
+                    (*y, *z) = match self.at(i) {
+                        Told::Both => (*y, *z),
+                        Told::Along(unit) => (unit[0] * *y + unit[1] * *z, 0.0),
+                        Told::Neither => (0.0, 0.0),
+                    };
+                }
+            }
+        }
+        picked
+    }
+
+    /// The samples one after the other.
+    pub fn samples(&self) -> impl Iterator<Item = usize> + '_ {
+        self.samples.iter().flatten().copied()
+    }
+
+    fn at(&self, sample: usize) -> Told {
+        self.told.get(sample).copied().unwrap_or(Told::Both)
+    }
+}
+
+/// Flags with everything near a flag flagged too.
+pub fn widened<const N: usize>(flags: &[bool], course: &Course<N>) -> Vec<bool> {
+    let near = ((NEAR_REST * course.rate / course.band) as usize).max(1);
+    let n = flags.len();
+    (0..n)
+        .map(|i| around(i, near, n).any(|k| flags[k]))
+        .collect()
+}
+
+/// The samples of `n` that are no further than `reach` from one.
+fn around(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
+    i.saturating_sub(reach)..(i + reach + 1).min(n)
+}

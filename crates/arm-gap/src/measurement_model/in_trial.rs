@@ -1,0 +1,171 @@
+//! A hypothesis as it is in one trial: where the handle is there, in the hand and in the room, and the phase that a rhythm is in.
+//!
+//! Neither is the same from one trial to the next, so that no other trial tells them. They are read off each trial by itself,
+//! whatever its role and whatever hypothesis is shown: two numbers each for the handle, as far as what is declared of it lets them
+//! go, and one for a rhythm.
+
+use arm_core::effect::{Effect, Nature};
+use arm_sim::SimulationError;
+use nalgebra::{DMatrix, DVector};
+
+use crate::data::noise::dot;
+use crate::data::prepared_session::Study;
+use crate::data::session::{FURTHEST, Session};
+use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::prediction::{Channels, Course, difference};
+use crate::selection::search::SLOW;
+use crate::sensitivity::linearization_point::slope;
+use crate::sensitivity::normal_equations::solve;
+use crate::trial_specific::component::shapes_of;
+
+/// Times that channels are weighed anew by what is left of them.
+const TURNS: usize = 2;
+
+/// Whether an effect swings with a phase of its own in every trial: muscles do, and so does what shakes a robot fast.
+fn is_rhythm(effect: &Effect<f64>) -> bool {
+    match effect.kind.probe().nature {
+        Nature::Rhythm => true,
+        Nature::Periodic => effect.parameters[shapes_of(effect.kind)[0]] > SLOW,
+        Nature::Lasting | Nature::Burst => false,
+    }
+}
+
+impl<const N: usize> Session<N> {
+    /// A hypothesis and rhythms, its own known ones besides, as they are in a trial.
+    ///
+    /// # Errors
+    /// [`SimulationError`] where the trial cannot be simulated with them.
+    pub fn in_trial(
+        &self,
+        (hypothesis, rhythms): (&Hypothesis<N>, &[Effect<f64>]),
+        course: &Course<N>,
+    ) -> Result<Hypothesis<N>, SimulationError> {
+        let mut own = hypothesis.clone();
+        let mut rhythms = rhythms.to_vec();
+        rhythms.extend(own.known.extract_if(.., |e| is_rhythm(e)));
+        let placed = self.by_trial();
+        if placed.is_empty() && rhythms.is_empty() {
+            return Ok(own);
+        }
+        let base = self.shown(&own, course)?;
+        let change = |changed: &Hypothesis<N>| self.shown(changed, course);
+        let mut columns = Vec::new();
+        for c in &placed {
+            let moved = own.clone().with(c.target, own.get(c.target) + c.step);
+            columns.push(slope(&change(&moved)?, &base, c.step));
+        }
+        for rhythm in &rhythms {
+            for phase in [0.0, 0.5 * core::f64::consts::PI] {
+                let mut swinging = own.clone();
+                swinging.named.push(with_phase(rhythm, phase));
+                columns.push(difference(&change(&swinging)?, &base));
+            }
+        }
+        let left = difference(&course.seen, &base);
+        let sd: Vec<Option<f64>> = (0..columns.len())
+            .map(|i| placed.get(i)?.prior.map(|(_, sd)| sd))
+            .collect();
+        let sizes = sizes(&left, &columns, &sd, course);
+        for (c, size) in std::iter::zip(&placed, &sizes) {
+            let value = own.get(c.target) + size;
+            own = own.with(c.target, value);
+        }
+        for (rhythm, size) in std::iter::zip(rhythms, sizes[placed.len()..].chunks_exact(2)) {
+            own.named.push(match size {
+                // What the trial does not tell stays as it is.
+                [0.0, 0.0] => rhythm,
+                _ => with_phase(&rhythm, libm::atan2(size[1], size[0])),
+            });
+        }
+        Ok(own)
+    }
+
+    fn shown(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Channels, SimulationError> {
+        let run = self.run(hypothesis, course)?;
+        self.read(hypothesis, course, &run)
+    }
+}
+
+impl<const N: usize> Study<'_, N> {
+    /// A hypothesis and rhythms as they are in every trial, whatever its role; as they were where one cannot be simulated.
+    pub fn in_trials(&self, believed: (&Hypothesis<N>, &[Effect<f64>])) -> Vec<Hypothesis<N>> {
+        let one = |trial: usize| {
+            let own = self.session.in_trial(believed, &self.courses[trial]);
+            own.unwrap_or_else(|_| {
+                let mut all = believed.0.clone();
+                all.named.extend_from_slice(believed.1);
+                all
+            })
+        };
+        self.parallel(self.courses.len(), one)
+    }
+}
+
+fn with_phase(rhythm: &Effect<f64>, phase: f64) -> Effect<f64> {
+    let mut effect = *rhythm;
+    effect.parameters[shapes_of(effect.kind)[1]] = phase;
+    effect
+}
+
+/// How much of each column is in what is left of a trial; zeros where it does not tell.
+///
+/// * `sd` - standard deviation of what is known of a column's size, which goes no further than [`FURTHEST`] of them
+fn sizes<const N: usize>(
+    left: &Channels,
+    columns: &[Channels],
+    sd: &[Option<f64>],
+    course: &Course<N>,
+) -> Vec<f64> {
+    let all: Vec<usize> = (0..columns.len()).collect();
+    let mut sizes = vec![0.0; columns.len()];
+    // In a band as many samples are independent as it has room for.
+    let share = f64::min(2.0 * course.band / course.rate, 1.0);
+    for _ in 0..TURNS {
+        let weights = weights(left, columns, &sizes, &course.counted);
+        let weighed = |channels: &Channels| -> Vec<f64> {
+            let each = std::iter::zip(channels, &weights);
+            each.flat_map(|(channel, weight)| {
+                let scale = libm::sqrt(share * weight);
+                let counted = std::iter::zip(channel, &course.counted);
+                counted.filter(|(_, c)| **c).map(move |(v, _)| scale * v)
+            })
+            .collect()
+        };
+        let rows: Vec<Vec<f64>> = columns.iter().map(weighed).collect();
+        let gram = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+            let known = sd[a].filter(|_| a == b).map_or(0.0, |sd| 1.0 / (sd * sd));
+            dot(&rows[a], &rows[b]) + known
+        });
+        let left = weighed(left);
+        let score = DVector::from_fn(columns.len(), |a, _| dot(&rows[a], &left));
+        let bounds = |i: usize| {
+            let furthest = sd[i].map_or(f64::INFINITY, |sd| FURTHEST * sd);
+            (-furthest, furthest)
+        };
+        match solve(&gram, &score, &all, &bounds) {
+            Some((found, _)) => sizes = found,
+            None => break,
+        }
+    }
+    sizes
+}
+
+/// One over the mean square of what columns of so many sizes leave of each channel.
+fn weights(left: &Channels, columns: &[Channels], sizes: &[f64], counted: &[bool]) -> Vec<f64> {
+    let one = |c: usize| {
+        let mut sum = f64::MIN_POSITIVE;
+        let mut count = 0.0;
+        for i in (0..left[c].len()).filter(|&i| counted[i]) {
+            let taken = std::iter::zip(columns, sizes);
+            let v = taken.fold(left[c][i], |v, (column, size)| v - size * column[c][i]);
+            sum += v * v;
+            count += 1.0;
+        }
+        count / sum
+    };
+    (0..left.len()).map(one).collect()
+}

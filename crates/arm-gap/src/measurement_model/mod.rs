@@ -1,0 +1,6 @@
+//! What the channels would read if a hypothesis were true.
+
+pub mod hypothesis;
+pub mod in_trial;
+pub mod internal_state;
+pub mod prediction;

@@ -1,0 +1,504 @@
+//! What the channels would read if a hypothesis were true.
+
+use arm_core::effect::{Effect, Motion, Place, resisting_torque};
+use arm_core::{Joints, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque};
+use arm_ident::regression::equation::Kinematics;
+use arm_ident::regression::measured_motion::{is_quiet, low_pass, measured, relative_speed_noise};
+use arm_ident::regression::trial::Trial;
+use arm_sim::{
+    Coupling, Drive, Experiment, HandlePath, Recording, Sensors, SimulationError, Start, simulate,
+};
+
+use crate::GapError;
+use crate::data::session::{Session, Sight};
+use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::measurement_model::internal_state;
+
+/// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
+pub type Channels = Vec<Vec<f64>>;
+
+/// Bandwidth in which channels are compared \[Hz\], the thesis' own.
+///
+/// Torques as well: an inverse dynamics of encoder angles that is low-passed as a whole is the equation of motion tested against smooth
+/// functions, so that what two differentiations add above the band drops out.
+const BAND: f64 = 5.0;
+/// Bandwidth of the handle's path, in bandwidths of the comparison: a robot that shakes at the edge of the comparison must
+/// keep its whole swing, or its forces are missed by newtons.
+const HANDLE_BAND: f64 = 4.0;
+/// Steps that are tried, longest first \[s\]; the last one is taken even where dry friction would like it shorter.
+pub(crate) const STEPS: [f64; 3] = [1e-3, 5e-4, 2.5e-4];
+/// Samples at the start whose mean tells where the arm was at rest.
+const START: usize = 5;
+
+/// A trial made ready: what was measured in the common band, and what drives the simulation.
+#[derive(Clone, Debug)]
+pub struct Course<const N: usize> {
+    /// Measured channels as they are.
+    pub raw: Channels,
+    /// Measured channels after the low-pass.
+    pub seen: Channels,
+    /// Sampling rate \[Hz\].
+    pub rate: f64,
+    /// Cutoff of the low-pass \[Hz\].
+    pub band: f64,
+    /// Samples over which a gap is measured: those that were measured. Where torques are compared, those [`MARGIN`] away from ends
+    /// and gaps, next to which filters and differences have guessed.
+    pub counted: Vec<bool>,
+    times: Vec<f64>,
+    handle: Vec<Plane<f64>>,
+    start: Joints<f64, N>,
+    motion: Option<Kinematics<N>>,
+}
+
+impl<const N: usize> Course<N> {
+    /// The path of the handle under a hypothesis: its base may be shifted.
+    ///
+    /// # Errors
+    /// As [`HandlePath::through_points`].
+    pub fn handle_path(
+        &self,
+        hypothesis: &Hypothesis<N>,
+    ) -> Result<HandlePath<N>, SimulationError> {
+        let shift = hypothesis.shift;
+        let points: Vec<Plane<f64>> = self
+            .handle
+            .iter()
+            .map(|p| [p[0] + shift[0], p[1] + shift[1]])
+            .collect();
+        HandlePath::through_points(&self.times, &points)
+    }
+
+    /// Where the movement goes: the handle of a led arm \[m\], else the joints \[rad\].
+    pub fn path(&self) -> Vec<Vec<f64>> {
+        match &self.motion {
+            None => self.handle.iter().map(|p| p.to_vec()).collect(),
+            Some(motion) => motion
+                .q
+                .iter()
+                .map(|q| q.iter().copied().collect())
+                .collect(),
+        }
+    }
+
+    /// The measured joint motion, where torques are compared.
+    pub fn motion(&self) -> Option<&Kinematics<N>> {
+        self.motion.as_ref()
+    }
+}
+
+/// A hypothesis played through on one trial, before the sensors.
+#[derive(Clone, Debug)]
+pub struct Run<const N: usize> {
+    experiment: Option<Experiment<N>>,
+    recording: Recording<N>,
+}
+
+impl<const N: usize> Run<N> {
+    /// What happened in the simulation; empty where torques are compared.
+    pub fn recording(&self) -> &Recording<N> {
+        &self.recording
+    }
+}
+
+impl<const N: usize> Session<N> {
+    /// Makes a trial ready.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for a trial too short for the filters.
+    pub fn course(&self, trial: usize) -> Result<Course<N>, GapError> {
+        let trial = &self.trials[trial];
+        let band = BAND.min(0.2 * trial.rate);
+        let raw = self.measured(trial);
+        let seen = smooth(&raw, band, trial.rate)?;
+        let handle = match &trial.handle {
+            Some(points) if self.sight == Sight::Led => {
+                let axis = |a: usize| points.iter().map(|p| p[a]).collect::<Vec<_>>();
+                let band = (HANDLE_BAND * band).min(0.4 * trial.rate);
+                let smooth = smooth(&[axis(0), axis(1)], band, trial.rate)?;
+                (0..points.len())
+                    .map(|i| [smooth[0][i], smooth[1][i]])
+                    .collect()
+            }
+            _ => Vec::new(),
+        };
+        let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
+        let span = first..(first + START).min(trial.len());
+        let count = span.len() as f64;
+        let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
+        let motion = match self.sight {
+            Sight::Led => None,
+            Sight::Torque => Some(motion(trial, band)?),
+        };
+        let margin = match self.sight {
+            Sight::Led => 0,
+            Sight::Torque => margin(trial.rate, band),
+        };
+        Ok(Course {
+            raw,
+            seen,
+            rate: trial.rate,
+            band,
+            counted: away_from_gaps(&trial.valid, margin),
+            times: (0..trial.len()).map(|i| i as f64 / trial.rate).collect(),
+            handle,
+            start,
+            motion,
+        })
+    }
+
+    fn measured(&self, trial: &Trial<N>) -> Channels {
+        let joint = |j: usize| trial.q.iter().map(|q| q[j]).collect::<Vec<_>>();
+        match self.sight {
+            Sight::Led => {
+                let force = |c: usize| {
+                    let forces = trial.force_on_arm.iter().flatten();
+                    forces.map(|f| f[c]).collect::<Vec<_>>()
+                };
+                (0..N).map(joint).chain((0..2).map(force)).collect()
+            }
+            Sight::Torque => {
+                let torque: Vec<Joints<f64, N>> = (0..trial.len())
+                    .map(|i| {
+                        let motors = trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i]);
+                        let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
+                        let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
+                        motors + static_torque(&self.chain, &Pose::new(&trial.q[i]), force, moment)
+                    })
+                    .collect();
+                (0..N)
+                    .map(|j| torque.iter().map(|t| t[j]).collect())
+                    .collect()
+            }
+        }
+    }
+
+    /// Plays a hypothesis through on a trial.
+    ///
+    /// # Errors
+    /// [`SimulationError`] where the hypothesis cannot be simulated.
+    pub fn run(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Run<N>, SimulationError> {
+        self.run_finely(hypothesis, course, 1)
+    }
+
+    /// The same, recorded `parts` times for each sample of the trial.
+    ///
+    /// # Errors
+    /// As [`Session::run`].
+    pub fn run_finely(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+        parts: usize,
+    ) -> Result<Run<N>, SimulationError> {
+        if self.sight == Sight::Torque {
+            return Ok(Run {
+                experiment: None,
+                recording: Recording::default(),
+            });
+        }
+        let drive = Drive::Handle {
+            path: course.handle_path(hypothesis)?,
+            coupling: Coupling::Compliant,
+        };
+        let setup = hypothesis.setup(&self.chain, self.contact)?;
+        let interval = 1.0 / course.rate / parts as f64;
+        let duration = course.times[course.times.len() - 1];
+        let mut experiment = Experiment::new(setup, drive, duration);
+        experiment.effects = hypothesis.effects();
+        experiment.output_interval = Some(interval);
+        let near = course.start - offsets(&experiment.effects);
+        experiment.start = Start::Equilibrium { near };
+        let limit = friction_limit(&experiment, &near);
+        let mut last = None;
+        for (i, step) in STEPS.into_iter().enumerate() {
+            if step > limit && i + 1 < STEPS.len() {
+                continue;
+            }
+            experiment.dt = interval / libm::ceil(interval / step - 1e-9);
+            let mut outcome = simulate(&experiment);
+            if matches!(outcome, Err(SimulationError::NoEquilibrium { .. })) {
+                experiment.start = Start::Given {
+                    q: near,
+                    qd: Joints::zeros(),
+                };
+                outcome = simulate(&experiment);
+            }
+            match outcome {
+                Ok(recording) => {
+                    return Ok(Run {
+                        experiment: Some(experiment),
+                        recording,
+                    });
+                }
+                Err(error) => last = Some(error),
+            }
+        }
+        Err(last.unwrap_or(SimulationError::Setting {
+            name: "step",
+            found: STEPS[0],
+            allowed: "a step that is tried",
+        }))
+    }
+
+    /// What the sensors would read of a run, in the common band.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for effects that are not valid, or a channel that is not finite.
+    pub fn read(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+        run: &Run<N>,
+    ) -> Result<Channels, SimulationError> {
+        let raw = self.read_raw(hypothesis, course, run)?;
+        smooth(&raw, course.band, course.rate).map_err(|_| SimulationError::Setting {
+            name: "simulated channel",
+            found: f64::NAN,
+            allowed: "finite numbers",
+        })
+    }
+
+    /// What the sensors would read of a run.
+    ///
+    /// # Errors
+    /// As [`Session::read`].
+    pub fn read_raw(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+        run: &Run<N>,
+    ) -> Result<Channels, SimulationError> {
+        let Some(experiment) = &run.experiment else {
+            return self.torques(hypothesis, course);
+        };
+        let mut experiment = experiment.clone();
+        experiment.effects = hypothesis.effects();
+        let mut sensors = Sensors::<N>::ideal();
+        sensors.rate = course.rate;
+        let readings = sensors.read(&experiment, &run.recording)?;
+        let count = course.times.len().min(readings.time.len());
+        let column = |values: &[f64], width: usize, entry: usize| -> Vec<f64> {
+            let mut out: Vec<f64> = (0..count).map(|i| values[i * width + entry]).collect();
+            let last = out.last().copied().unwrap_or(0.0);
+            out.resize(course.times.len(), last);
+            out
+        };
+        let angles = (0..N).map(|j| column(&readings.q, N, j));
+        let forces = (0..2).map(|c| column(&readings.force_on_arm, 2, c));
+        Ok(angles.chain(forces).collect())
+    }
+
+    /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led; torques in the common band, for
+    /// what differentiated angles say above it is noise.
+    pub fn measured_in<'c>(&self, course: &'c Course<N>) -> &'c Channels {
+        match self.sight {
+            Sight::Led => &course.raw,
+            Sight::Torque => &course.seen,
+        }
+    }
+
+    /// What a hypothesis shows in the place of [`Session::measured_in`].
+    ///
+    /// # Errors
+    /// As [`Session::run`] and [`Session::read`].
+    pub fn shown_in(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Channels, SimulationError> {
+        let run = self.run(hypothesis, course)?;
+        match self.sight {
+            Sight::Led => self.read_raw(hypothesis, course, &run),
+            Sight::Torque => self.read(hypothesis, course, &run),
+        }
+    }
+
+    /// Joint torques by inverse dynamics of the measured motion.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig that cannot be.
+    pub fn torques(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Channels, SimulationError> {
+        let Some(motion) = &course.motion else {
+            return Ok(Vec::new());
+        };
+        let effects = hypothesis.effects();
+        let chain = self.rig(hypothesis)?.chain()?;
+        let offset = offsets(&effects);
+        let mut states = vec![0.0; effects.len()];
+        let mut before: Option<Motion<f64, N>> = None;
+        let mut channels = vec![Vec::with_capacity(course.times.len()); N];
+        for (i, &time) in course.times.iter().enumerate() {
+            let (q, qd, qdd) = true_motion(hypothesis, motion, i);
+            let q = q - offset;
+            let pose = Pose::new(&q);
+            let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);
+            let mut at = Motion::new(time, q, qd).with_joint_force(&through);
+            at.qdd = qdd;
+            if let Some(from) = before.replace(at) {
+                internal_state::advance(&effects, (&from, &at), &mut states, 1.0 / course.rate);
+            }
+            let torque = inverse_dynamics(&chain, &pose, &qd, &qdd)
+                + resisting_torque(&effects, &at, &states);
+            for (channel, value) in channels.iter_mut().zip(torque.iter()) {
+                channel.push(*value);
+            }
+        }
+        Ok(channels)
+    }
+
+    /// Whether a change reaches the sensors alone, so that a run need not be repeated.
+    pub fn is_sensing(&self, hypothesis: &Hypothesis<N>, target: Target) -> bool {
+        let sensing = |effect: &Effect<f64>| {
+            matches!(
+                effect.kind.info().place,
+                Place::AngleSensor | Place::ForceSensor | Place::Sensors
+            )
+        };
+        match target {
+            Target::Segment(..)
+            | Target::Contact(..)
+            | Target::Shift(_)
+            | Target::Placement(_)
+            | Target::Eccentricity(..) => false,
+            Target::Known(e, _) => sensing(&hypothesis.known[e]),
+            Target::Calibration(_) => true,
+            Target::Named(e, _) => sensing(&hypothesis.named[e]),
+        }
+    }
+}
+
+/// Periods of the cutoff that are dropped next to an end or a gap.
+const MARGIN: f64 = 1.5;
+
+/// Samples next to an end or a gap that are no measurement any more once filters have passed.
+pub fn margin(rate: f64, band: f64) -> usize {
+    ((MARGIN * rate / band) as usize).max(1)
+}
+
+/// Samples that are at least so many away from ends and gaps.
+pub fn away_from_gaps(valid: &[bool], margin: usize) -> Vec<bool> {
+    let n = valid.len();
+    // How many samples without a gap end at each.
+    let mut run = 0;
+    let mut behind: Vec<usize> = Vec::with_capacity(n);
+    for &v in valid {
+        run = if v { run + 1 } else { 0 };
+        behind.push(run);
+    }
+    (0..n)
+        .map(|i| i >= margin && i + margin < n && behind[i + margin] > 2 * margin)
+        .collect()
+}
+
+/// Motion of the joints from measured angles, and from measured speeds only where the angles are too noisy for it.
+///
+/// A controller's speed is the derivative of its angles behind a filter that nobody knows. What it is late by works against viscous
+/// friction: 0.8 ms take all damping away from a pendulum of 0.3 m that rings for a minute.
+fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, GapError> {
+    let mut angles = trial.clone();
+    angles.speed = None;
+    let quiet = is_quiet(&relative_speed_noise(&[&angles], band)?);
+    Ok(measured(if quiet { &angles } else { trial }, band)?)
+}
+
+/// Low-passes every channel without phase.
+///
+/// # Errors
+/// [`GapError::Numerics`] for channels too short for the filter or not finite.
+pub fn smooth(channels: &[Vec<f64>], band: f64, rate: f64) -> Result<Channels, GapError> {
+    Ok(low_pass(band, rate)?.both_ways_all(channels)?)
+}
+
+/// Channels less channels, over the samples that both have.
+pub fn difference(a: &Channels, b: &Channels) -> Channels {
+    let one = |(a, b): (&Vec<f64>, &Vec<f64>)| std::iter::zip(a, b).map(|(a, b)| a - b).collect();
+    std::iter::zip(a, b).map(one).collect()
+}
+
+/// Angles, speeds and accelerations at a sample, without what an eccentric encoder adds to them.
+fn true_motion<const N: usize>(
+    hypothesis: &Hypothesis<N>,
+    motion: &Kinematics<N>,
+    i: usize,
+) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
+    let (mut q, mut qd, mut qdd) = (motion.q[i], motion.qd[i], motion.qdd[i]);
+    for (j, [cosine, sine]) in hypothesis.eccentricity.into_iter().enumerate() {
+        if cosine != 0.0 || sine != 0.0 {
+            let (sin, cos) = libm::sincos(q[j]);
+            // The error, and its first and second derivative with respect to the angle.
+            let error = cosine * cos + sine * sin;
+            let slope = sine * cos - cosine * sin;
+            qdd[j] -= slope * qdd[j] - error * qd[j] * qd[j];
+            qd[j] -= slope * qd[j];
+            q[j] -= error;
+        }
+    }
+    (q, qd, qdd)
+}
+
+/// Angles without what an eccentric encoder adds to them.
+pub(crate) fn unbent<const N: usize>(
+    hypothesis: &Hypothesis<N>,
+    q: &Joints<f64, N>,
+) -> Joints<f64, N> {
+    Joints::from_fn(|j, _| {
+        let [cosine, sine] = hypothesis.eccentricity[j];
+        let (sin, cos) = libm::sincos(q[j]);
+        q[j] - cosine * cos - sine * sin
+    })
+}
+
+/// What the sensors of the angles add to them.
+pub(crate) fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N> {
+    let mut reading = Reading::<f64, N> {
+        time: 0.0,
+        q: Joints::zeros(),
+        force_on_arm: [0.0; 2],
+        moment_on_arm: 0.0,
+    };
+    for effect in effects {
+        effect.distort(&mut reading);
+    }
+    reading.q
+}
+
+/// Longest step with which the steepest dry friction does not rattle \[s\]: one time constant of its slope at rest on the
+/// inertia of its joint.
+fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>) -> f64 {
+    const SPEED: f64 = 1e-5;
+    let Ok(setup) = experiment.altered() else {
+        return f64::INFINITY;
+    };
+    let Ok(chain) = setup.chain() else {
+        return f64::INFINITY;
+    };
+    let pose = Pose::new(q);
+    let zero = Joints::<f64, N>::zeros();
+    let weight = inverse_dynamics(&chain, &pose, &zero, &zero);
+    let through = joint_force(&chain, &pose, (&zero, &zero), [0.0; 2]);
+    let mut limit = f64::INFINITY;
+    for j in 0..N {
+        let resisting = |speed: f64| {
+            let mut qd = zero;
+            qd[j] = speed;
+            let motion = Motion::new(0.0, *q, qd).with_joint_force(&through);
+            resisting_torque(&experiment.effects, &motion, &[])[j]
+        };
+        let slope = (resisting(SPEED) - resisting(-SPEED)) / (2.0 * SPEED);
+        let mut unit = zero;
+        unit[j] = 1.0;
+        let inertia = (inverse_dynamics(&chain, &pose, &zero, &unit) - weight)[j];
+        if slope > 0.0 {
+            limit = f64::min(limit, inertia / slope);
+        }
+    }
+    limit
+}

@@ -1,0 +1,104 @@
+//! A first look: what calibration takes away, and what each kind of the catalogue would explain to first order.
+
+use arm_core::effect::Effect;
+
+use crate::GapError;
+use crate::candidates::candidate::{Candidate, Library};
+use crate::data::prepared_session::Study;
+use crate::data::session::Sight;
+use crate::measurement_model::hypothesis::Hypothesis;
+use crate::selection::fit::Fitted;
+use crate::selection::lack_of_fit::{Lack, lack_of_fit};
+use crate::selection::score_test::Scan;
+use crate::selection::search::Progress;
+use crate::trial_specific::tremor_detection::Line;
+
+/// What a first look shows; nothing in it was converged by simulation but the calibration.
+#[derive(Clone, Debug)]
+pub struct Look<const N: usize> {
+    /// The model after refitting what was never exact.
+    pub calibrated: Fitted<N>,
+    /// The same as it is in each trial; see [`crate::measurement_model::in_trial`].
+    pub in_trials: Vec<Hypothesis<N>>,
+    /// Its lack of fit.
+    pub lack: Lack,
+    /// Every candidate alone, the one that is most worth its price first.
+    pub suspects: Vec<Suspect>,
+}
+
+/// One candidate alone, to first order.
+#[derive(Clone, Debug)]
+pub struct Suspect {
+    /// The question.
+    pub candidate: Candidate,
+    /// The effect as it would be.
+    pub effect: Effect<f64>,
+    /// What it would explain.
+    pub gain: f64,
+    /// What it must explain to be named.
+    pub price: f64,
+    /// Smallest size of its first free parameter that would be named.
+    pub smallest: f64,
+}
+
+impl<const N: usize> Study<'_, N> {
+    /// Calibrates, and asks every candidate alone to first order.
+    ///
+    /// # Errors
+    /// [`GapError`] where the model as given cannot be simulated or fitted.
+    pub fn look(&mut self, progress: Progress<'_>) -> Result<Look<N>, GapError> {
+        progress("calibrating", 0.1)?;
+        let (mut calibrated, mut anchor) = self.calibrate()?;
+        if !self.repeated {
+            self.measure_noise(&anchor)?;
+            (calibrated, anchor) = self.calibrate()?;
+        }
+        progress("asking the catalogue", 0.6)?;
+        let library = Library::build(self, &anchor, None)?;
+        let scan = Scan::new(self, &calibrated, &anchor, &library)?.scaled();
+        let lack = lack_of_fit(self, &anchor, &calibrated);
+        let mut suspects: Vec<Suspect> = (0..scan.len())
+            .filter_map(|c| {
+                let choice = scan.evaluate(&[c])?;
+                let candidate = library.candidates[c].clone();
+                Some(Suspect {
+                    effect: candidate.found(&choice.coefficients[0]),
+                    gain: choice.gain / scan.scale,
+                    price: scan.price[c] * scan.spread[c],
+                    smallest: scan.smallest_seen(c),
+                    candidate,
+                })
+            })
+            .collect();
+        suspects.sort_by(|a, b| (b.gain - b.price).total_cmp(&(a.gain - a.price)));
+        // Of several shapes and questions of one effect the best stands for it, and shows as much as the clearest.
+        let mut best: Vec<Suspect> = Vec::new();
+        for suspect in suspects {
+            match best
+                .iter_mut()
+                .find(|b| b.candidate.is_same_effect(&suspect.effect))
+            {
+                Some(known) if known.candidate.free == suspect.candidate.free => {
+                    known.smallest = known.smallest.min(suspect.smallest);
+                }
+                Some(_) => {}
+                None => best.push(suspect),
+            }
+        }
+        if self.session.sight == Sight::Led {
+            let rhythm = self
+                .rhythm(&anchor, Line::BetweenRepeats)?
+                .map(|r| r.effect);
+            if let Some(hypothesis) = self.tuned(&calibrated.hypothesis, rhythm.as_slice()) {
+                calibrated.hypothesis = hypothesis;
+            }
+        }
+        progress("done", 1.0)?;
+        Ok(Look {
+            in_trials: self.in_trials((&calibrated.hypothesis, &[])),
+            calibrated,
+            lack,
+            suspects: best,
+        })
+    }
+}

@@ -1,0 +1,336 @@
+//! Fitting a hypothesis to the fit trials: Gauss and Newton's method, damped where it must be, near a simulated one.
+
+use nalgebra::DMatrix;
+
+use crate::GapError;
+use crate::candidates::candidate::Candidate;
+use crate::data::prepared_session::Study;
+use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::measurement_model::prediction::Channels;
+use crate::selection::score_variance::spread;
+use crate::sensitivity::linearization_point::Anchor;
+use crate::sensitivity::normal_equations::{Cluster, Normal, factor, solve};
+
+/// Most steps of a fit.
+const STEPS: usize = 6;
+/// Damping of the steps that are tried, as a share of the diagonal of the normal equations (Levenberg and Marquardt): what the data
+/// decide well moves on where a whole step leads astray.
+const DAMPING: [f64; 5] = [0.0, 0.01, 0.1, 1.0, 10.0];
+/// A step that gains less than this, in units of the noise, is the last,
+const ENOUGH: f64 = 0.2;
+/// and where the model is far from the data, less than this share of the cost.
+const SHARE: f64 = 1e-4;
+/// Times that a fit is simulated anew from where it ended.
+const AGAIN: usize = 4;
+
+/// A gain below this is none.
+pub(crate) fn enough(cost: f64) -> f64 {
+    ENOUGH + SHARE * cost
+}
+
+/// A hypothesis fitted to the fit trials.
+#[derive(Clone, Debug)]
+pub struct Fitted<const N: usize> {
+    /// The hypothesis at its best.
+    pub hypothesis: Hypothesis<N>,
+    /// The candidates that its named effects come from.
+    pub asked: Vec<Candidate>,
+    /// Whitened residual squares, and what the values cost against what was known of them.
+    pub cost: f64,
+    /// Residuals of the fitted trials.
+    pub residuals: Vec<Channels>,
+}
+
+impl<const N: usize> Fitted<N> {
+    /// The numbers of the named effects that a fit may change.
+    pub fn named(&self) -> Vec<Coordinate> {
+        named(&self.hypothesis, &self.asked)
+    }
+}
+
+fn named<const N: usize>(hypothesis: &Hypothesis<N>, asked: &[Candidate]) -> Vec<Coordinate> {
+    let each = asked.iter().enumerate();
+    each.flat_map(|(slot, c)| c.coordinates(slot, &hypothesis.named[slot]))
+        .collect()
+}
+
+/// The distance of each number from what was known of it, with its standard deviation.
+pub fn priors<const N: usize>(
+    hypothesis: &Hypothesis<N>,
+    coordinates: &[Coordinate],
+) -> Vec<Option<(f64, f64)>> {
+    coordinates
+        .iter()
+        .map(|c| {
+            c.prior
+                .map(|(mean, sd)| (hypothesis.get(c.target) - mean, sd))
+        })
+        .collect()
+}
+
+/// What the numbers of a hypothesis cost against what was known of them.
+pub fn departure<const N: usize>(hypothesis: &Hypothesis<N>, coordinates: &[Coordinate]) -> f64 {
+    let known = priors(hypothesis, coordinates).into_iter().flatten();
+    known
+        .map(|(distance, sd)| (distance / sd) * (distance / sd))
+        .sum()
+}
+
+impl<'a, const N: usize> Study<'a, N> {
+    /// A hypothesis near an anchor with its residuals and their cost.
+    fn state(
+        &self,
+        anchor: &Anchor<N>,
+        hypothesis: Hypothesis<N>,
+        asked: Vec<Candidate>,
+    ) -> Result<Fitted<N>, GapError> {
+        let residuals = self.residuals(anchor, &hypothesis)?;
+        let squares = anchor.rows.squares(self, &residuals);
+        let data: f64 = squares.iter().map(|c| c.square).sum();
+        let cost = data + departure(&hypothesis, &anchor.coordinates);
+        Ok(Fitted {
+            hypothesis,
+            asked,
+            cost,
+            residuals,
+        })
+    }
+
+    /// The normal equations of all unknowns at a fitted hypothesis: nuisances first, then the named effects' own, then
+    /// whatever else is asked.
+    ///
+    /// # Errors
+    /// As [`Study::responses_at`].
+    pub fn equations(
+        &self,
+        anchor: &Anchor<N>,
+        fitted: &Fitted<N>,
+        more: &[&crate::sensitivity::linearization_point::Response],
+    ) -> Result<(Vec<Coordinate>, Vec<Cluster>), GapError> {
+        let own = fitted.named();
+        let responses = self.responses_at(anchor, &fitted.hypothesis, &own)?;
+        let extra: Vec<_> = responses.iter().chain(more.iter().copied()).collect();
+        let clusters = anchor.rows.clusters(self, &extra, &fitted.residuals);
+        let coordinates = anchor.coordinates.iter().copied().chain(own).collect();
+        Ok((coordinates, clusters))
+    }
+
+    /// Fits the nuisances and the named effects of a hypothesis, followed from an anchor.
+    ///
+    /// * `asked` - the candidate behind each named effect
+    ///
+    /// # Errors
+    /// [`GapError`] where the start cannot be followed from the anchor.
+    pub fn fit(
+        &self,
+        anchor: &Anchor<N>,
+        start: Hypothesis<N>,
+        asked: Vec<Candidate>,
+    ) -> Result<Fitted<N>, GapError> {
+        let mut fitted = self.state(anchor, start, asked)?;
+        for _ in 0..STEPS {
+            let hypothesis = &fitted.hypothesis;
+            // What cannot be followed a little further on is fitted as far as it was.
+            let Ok((coordinates, clusters)) = self.equations(anchor, &fitted, &[]) else {
+                break;
+            };
+            let damped = |damping: &f64| {
+                let (usable, step) = stepped(&clusters, hypothesis, &coordinates, *damping)?;
+                let moved =
+                    std::iter::zip(&usable, step).fold(hypothesis.clone(), |h, (&i, step)| {
+                        let c = &coordinates[i];
+                        let value = hypothesis.get(c.target) + step;
+                        h.with(c.target, value.clamp(c.lower, c.upper))
+                    });
+                let next = self.state(anchor, moved, fitted.asked.clone()).ok()?;
+                (next.cost < fitted.cost).then_some(next)
+            };
+            // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands.
+            let Some(next) = DAMPING.iter().find_map(damped) else {
+                break;
+            };
+            let gained = fitted.cost - next.cost;
+            fitted = next;
+            if gained < enough(fitted.cost) {
+                break;
+            }
+        }
+        Ok(fitted)
+    }
+
+    /// Squares of what a fitted hypothesis leaves of each cluster when the others alone decide its numbers, to first order.
+    ///
+    /// # Errors
+    /// As [`Study::equations`].
+    pub fn foretold(&self, anchor: &Anchor<N>, fitted: &Fitted<N>) -> Result<f64, GapError> {
+        let hypothesis = &fitted.hypothesis;
+        let (coordinates, clusters) = self.equations(anchor, fitted, &[])?;
+        let mut sum = 0.0;
+        for (out, cluster) in clusters.iter().enumerate() {
+            let others: Vec<Cluster> = clusters
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| *i != out)
+                .map(|(_, c)| c.clone())
+                .collect();
+            let (usable, steps) =
+                stepped(&others, hypothesis, &coordinates, 0.0).unwrap_or_default();
+            sum += cluster.square;
+            for (&i, a) in usable.iter().zip(&steps) {
+                let row = usable.iter().zip(&steps);
+                let product = row.fold(0.0, |s, (&j, b)| s + cluster.gram[(i, j)] * b);
+                sum += a * (product - 2.0 * cluster.score[i]);
+            }
+        }
+        Ok(sum)
+    }
+
+    /// Fits a hypothesis, simulating it anew from where the fit ended until that changes nothing.
+    ///
+    /// # Errors
+    /// [`GapError`] where the hypothesis cannot be simulated.
+    pub fn settle(
+        &self,
+        start: Hypothesis<N>,
+        asked: Vec<Candidate>,
+    ) -> Result<(Fitted<N>, Anchor<'a, N>), GapError> {
+        let mut anchor = self.anchor(&start)?;
+        let mut before = self.state(&anchor, start, asked)?;
+        for _ in 0..AGAIN {
+            let after = self.fit(&anchor, before.hypothesis.clone(), before.asked.clone())?;
+            let gained = before.cost - after.cost;
+            if gained < 2.0 * enough(after.cost) {
+                return Ok((after, anchor));
+            }
+            let there = match self.anchor(&after.hypothesis) {
+                Ok(there) => there,
+                // What can be followed but not simulated is no answer.
+                Err(_) => break,
+            };
+            let simulated = self.state(&there, after.hypothesis, after.asked)?;
+            if simulated.cost > before.cost {
+                break;
+            }
+            (before, anchor) = (simulated, there);
+        }
+        Ok((before, anchor))
+    }
+}
+
+/// The unknowns that the equations decide anything about, and the step of each that lowers the cost most within its bounds;
+/// `None` where they are singular.
+pub(crate) fn stepped<const N: usize>(
+    clusters: &[Cluster],
+    hypothesis: &Hypothesis<N>,
+    coordinates: &[Coordinate],
+    damping: f64,
+) -> Option<(Vec<usize>, Vec<f64>)> {
+    let mut normal = Normal::new(clusters, &priors(hypothesis, coordinates));
+    let usable: Vec<usize> = (0..coordinates.len())
+        .filter(|&i| normal.gram[(i, i)] > 0.0)
+        .collect();
+    regularise(&mut normal.gram, hypothesis, coordinates);
+    for &i in &usable {
+        normal.gram[(i, i)] *= 1.0 + damping;
+    }
+    let bounds = |i: usize| {
+        let c = &coordinates[usable[i]];
+        let value = hypothesis.get(c.target);
+        (c.lower - value, c.upper - value)
+    };
+    let (steps, _) = solve(&normal.gram, &normal.score, &usable, &bounds)?;
+    Some((usable, steps))
+}
+
+/// Shapes that the data hardly decide move no further than their own size in one step.
+pub fn regularise<const N: usize>(
+    gram: &mut DMatrix<f64>,
+    hypothesis: &Hypothesis<N>,
+    coordinates: &[Coordinate],
+) {
+    for (i, c) in coordinates.iter().enumerate() {
+        if c.prior.is_none() {
+            let size = hypothesis.get(c.target).abs().max(10.0 * c.step);
+            gram[(i, i)] += 1.0 / (size * size);
+        }
+    }
+}
+
+/// How well the unknowns of a fitted hypothesis are known.
+#[derive(Clone, Debug)]
+pub struct Precision {
+    /// The unknowns: nuisances first, then the named effects' own.
+    pub coordinates: Vec<Coordinate>,
+    /// Standard deviation of each; infinite where nothing decides it.
+    pub sd: Vec<f64>,
+}
+
+impl Precision {
+    /// Share of what a law may miss of what it shows that may lie along one of its parameters, as sums of squares.
+    const ALONG: f64 = 1.0 / 9.0;
+
+    /// Widens what is known of the parameters of a named effect by what its law may miss.
+    ///
+    /// * `gain` - what the effect explains, in units of twice the log-likelihood
+    pub fn widen(&mut self, slot: usize, missed: f64, gain: f64) {
+        let wider = libm::sqrt(1.0 + Self::ALONG * missed * gain.max(0.0));
+        for (c, sd) in self.coordinates.iter().zip(&mut self.sd) {
+            if matches!(c.target, Target::Named(own, _) if own == slot) {
+                *sd *= wider;
+            }
+        }
+    }
+}
+
+impl<const N: usize> Study<'_, N> {
+    /// How well the unknowns of a fitted hypothesis are known.
+    ///
+    /// The spread between trials counts where it is larger than the noise tells.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] as [`Study::equations`].
+    pub fn precision(
+        &self,
+        anchor: &Anchor<N>,
+        fitted: &Fitted<N>,
+        scale: f64,
+    ) -> Result<Precision, GapError> {
+        let hypothesis = &fitted.hypothesis;
+        let (coordinates, clusters) = match self.equations(anchor, fitted, &[]) {
+            // Where a small change of what was found cannot be simulated, nothing can be said of how well it is known.
+            Err(GapError::Simulation { .. }) => {
+                let mut coordinates = anchor.coordinates.clone();
+                coordinates.extend(fitted.named());
+                let sd = vec![f64::INFINITY; coordinates.len()];
+                return Ok(Precision { coordinates, sd });
+            }
+            other => other?,
+        };
+        let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
+        regularise(&mut normal.gram, hypothesis, &coordinates);
+        let mut sd = vec![f64::INFINITY; coordinates.len()];
+        // A size at the limit of its kind is held there: the others are known as if it were exact. What was known before is
+        // known no better where it met the end of what is refitted.
+        let free: Vec<usize> = (0..coordinates.len())
+            .filter(|&i| {
+                let c = &coordinates[i];
+                let value = hypothesis.get(c.target);
+                let inside = value > c.lower && value < c.upper;
+                (inside || c.prior.is_some()) && normal.gram[(i, i)] > 0.0
+            })
+            .collect();
+        let left = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+            normal.gram[(free[a], free[b])]
+        });
+        if let Some(factor) = factor(left) {
+            let inverse = factor.inverse();
+            for (a, &i) in free.iter().enumerate() {
+                let row = free.iter().enumerate();
+                let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
+                let widen = f64::max(scale, spread(&clusters, &weights));
+                sd[i] = (inverse[(a, a)] * widen).sqrt();
+            }
+        }
+        Ok(Precision { coordinates, sd })
+    }
+}

@@ -1,0 +1,10 @@
+//! Which effects are missing: first-order score tests, search by fitting, model selection.
+
+pub mod first_order_screening;
+pub mod fit;
+pub mod lack_of_fit;
+pub mod model_discrimination;
+pub mod model_selection;
+pub mod score_test;
+pub mod score_variance;
+pub mod search;

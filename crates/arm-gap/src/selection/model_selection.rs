@@ -1,0 +1,402 @@
+//! What a named effect is worth: without it, against what could stand in its place, and at the price of its freedom.
+
+use std::cmp::Ordering;
+
+use arm_core::effect::{Effect, Place};
+
+use crate::GapError;
+use crate::candidates::candidate::{Candidate, Library, Twin};
+use crate::data::prepared_session::Study;
+use crate::measurement_model::hypothesis::Hypothesis;
+use crate::selection::fit::Fitted;
+use crate::selection::lack_of_fit::lack_of_fit;
+use crate::selection::score_test::{Choice, Scan};
+use crate::selection::search::{Progress, Settled};
+use crate::sensitivity::linearization_point::Anchor;
+use arm_numerics::statistics::distributions::chi_square_tail;
+
+/// Share of all that is explained that an effect must explain, whatever the others are.
+pub(crate) const FLOOR: f64 = 2e-5;
+/// The same without repeats: what sensors and a rigid model get wrong cannot be told from noise then, and an effect may be no more
+/// than what comes nearest to it.
+const FLOOR_UNREPEATED: f64 = 0.03;
+/// The same of what is left when all are named: a name for a small part of what cannot be explained would be a guess.
+const OF_WHAT_IS_LEFT: f64 = 0.2;
+/// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
+const TIE: f64 = 10.0;
+/// Alternatives that are converged by simulation for each named effect.
+const RIVALS: usize = 5;
+/// Share of what a named effect gains that another must gain to first order to be converged in its place.
+const RIVAL: f64 = 0.6;
+/// Times that a better alternative may take the place of a named effect.
+const EXCHANGES: usize = 4;
+
+/// Part of what a law misses that an effect in another place can stand for: what misses acts in the joint of the law, and seldom
+/// looks like something else.
+const ELSEWHERE: f64 = 0.25;
+
+/// What an effect may explain, as a sum of squares, without being there: what the law of a named one misses of what it shows.
+///
+/// * `gain` - what the named one explains
+fn mimicked(effect: &Effect<f64>, named: &Candidate, gain: f64) -> f64 {
+    let joints = |e: &Effect<f64>| match e.kind.info().place {
+        Place::Joint => e.index + 1 - usize::from(e.kind.crosses())..e.index + 2,
+        _ => 0..0,
+    };
+    let (own, other) = (joints(effect), joints(&named.effect));
+    let is_near = own.start < other.end && other.start < own.end;
+    named.kind().probe().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
+}
+
+/// The most that an effect may explain without being there beside named ones that together explain so much.
+pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explained: f64) -> f64 {
+    let each = named.iter().map(|c| mimicked(effect, c, explained));
+    each.fold(0.0, f64::max)
+}
+
+/// One effect that was named.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// Its place in the hypothesis.
+    pub slot: usize,
+    /// Probability of such a gain by chance, with all candidates that were asked.
+    pub p_value: f64,
+    /// What it gains, in units of twice the log-likelihood as the data scatter.
+    pub gain: f64,
+    /// Share of what can be explained that is lost without it.
+    pub share: f64,
+    /// What would explain the same: the candidate, and how much worse it does.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// Another effect that would explain what a named one does.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// The question that it answers.
+    pub candidate: Candidate,
+    /// The effect as it fits best.
+    pub effect: Effect<f64>,
+    /// How much worse it explains the data, in units of twice the log-likelihood.
+    pub worse: f64,
+    /// Squared cosine between what the two would show.
+    pub likeness: f64,
+}
+
+/// An alternative, fitted.
+struct Rival<const N: usize> {
+    alternative: Alternative,
+    fitted: Fitted<N>,
+}
+
+impl<'a, const N: usize> Study<'a, N> {
+    /// A fitted hypothesis without the effect at a place, fitted again; of infinite cost where nothing goes without it.
+    fn without(
+        &self,
+        fitted: &Fitted<N>,
+        slot: usize,
+        anchor: &Anchor<N>,
+    ) -> Result<Fitted<N>, GapError> {
+        let mut hypothesis: Hypothesis<N> = fitted.hypothesis.clone();
+        let mut asked = fitted.asked.clone();
+        hypothesis.named.remove(slot);
+        asked.remove(slot);
+        let again = |hypothesis: &Hypothesis<N>| match self.fit(
+            anchor,
+            hypothesis.clone(),
+            asked.clone(),
+        ) {
+            Err(GapError::Simulation { .. }) => Ok(None),
+            other => other.map(Some),
+        };
+        if let Some(less) = again(&hypothesis)? {
+            return Ok(less);
+        }
+        // What the effect had held up may be impossible without it: then from the segments as given.
+        hypothesis.segments = [[0.0; 3]; N];
+        if let Some(less) = again(&hypothesis)? {
+            return Ok(less);
+        }
+        // Or too far away to be followed.
+        let settled = self.settle(hypothesis.clone(), asked.clone());
+        Ok(settled.map_or_else(
+            |_| Fitted {
+                hypothesis,
+                asked,
+                cost: f64::INFINITY,
+                residuals: fitted.residuals.clone(),
+            },
+            |(less, _)| less,
+        ))
+    }
+
+    /// Goes back: effects that are no longer worth their price are taken out.
+    pub(crate) fn pruned(
+        &self,
+        (mut fitted, mut anchor): Settled<'a, N>,
+        calibrated: &Fitted<N>,
+        scale: f64,
+    ) -> Result<Settled<'a, N>, GapError> {
+        let floor = match self.repeated {
+            true => FLOOR,
+            false => FLOOR_UNREPEATED,
+        };
+        while !fitted.asked.is_empty() {
+            let mut weakest: Option<(f64, Fitted<N>)> = None;
+            // Not a number without repeats, which `max` passes over.
+            let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &anchor, &fitted).excess;
+            let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
+            let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
+            let without = without.collect::<Result<Vec<_>, _>>()?;
+            let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
+            // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
+            let foretold = match self.repeated {
+                true => None,
+                false => Some(self.foretold(&anchor, &fitted)?),
+            };
+            for (slot, less) in without.into_iter().enumerate() {
+                let mut gain = gains[slot];
+                if let Some(with) = foretold
+                    && gain.is_finite()
+                {
+                    gain = gain.min(self.foretold(&anchor, &less)? - with);
+                }
+                // Less may be the imperfect shape of another one.
+                let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
+                let least = others
+                    .map(|o| mimicked(&fitted.asked[slot].effect, &fitted.asked[o], gains[o]))
+                    .fold(floor, f64::max);
+                let candidate = &fitted.asked[slot];
+                let worth = gain / scale - candidate.price * candidate.spread;
+                let worth = if gain < least {
+                    worth.min(gain - least)
+                } else {
+                    worth
+                };
+                if worth < 0.0 && weakest.as_ref().is_none_or(|(least, _)| worth < *least) {
+                    weakest = Some((worth, less));
+                }
+            }
+            let Some((_, less)) = weakest else { break };
+            match self.settle(less.hypothesis, less.asked) {
+                Ok(settled) => (fitted, anchor) = settled,
+                // It may be worth little, and nothing can be simulated without it.
+                Err(GapError::Simulation { .. }) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok((fitted, anchor))
+    }
+
+    /// What could stand in the place of each named effect; a better one takes it.
+    pub(crate) fn judged(
+        &self,
+        (mut fitted, mut anchor): Settled<'a, N>,
+        calibrated: &Fitted<N>,
+        (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
+        progress: Progress<'_>,
+    ) -> Result<(Fitted<N>, Anchor<'a, N>, Vec<Named>), GapError> {
+        let mut exchanges = 0;
+        'again: loop {
+            let mut named = Vec::new();
+            let mut library = match fitted.asked.len() {
+                0 => None,
+                _ => Some(Library::build(self, &anchor, periodic)?),
+            };
+            let twins = match &mut library {
+                Some(library) => {
+                    let effects = fitted.hypothesis.named.iter().copied();
+                    let named: Vec<_> = fitted.asked.iter().cloned().zip(effects).collect();
+                    library.add_named(self, &anchor, &named)?
+                }
+                None => Vec::new(),
+            };
+            for (slot, twin) in twins.iter().enumerate() {
+                progress(
+                    "comparing alternatives",
+                    0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
+                )?;
+                let less = self.without(&fitted, slot, &anchor)?;
+                let gain = (less.cost - fitted.cost).min(f64::MAX);
+                let rivals = match &library {
+                    // Of what cannot be followed without it nothing can be said.
+                    Some(library) if less.cost.is_finite() => {
+                        let place = (slot, &less, twin.as_ref());
+                        let found = self.rivals(&fitted, place, (&anchor, library), scale);
+                        found.unwrap_or_default()
+                    }
+                    _ => Vec::new(),
+                };
+                // A shape that is refined may stand for what the law of another one misses.
+                let explained = calibrated.cost - less.cost;
+                let bent = mimicked_by_any(&fitted.asked[slot].effect, &less.asked, explained);
+                let better = rivals.iter().find(|r| {
+                    self.takes_over(
+                        &r.alternative,
+                        (&fitted.asked[slot], gain / scale),
+                        bent / scale,
+                    )
+                });
+                if exchanges < EXCHANGES
+                    && let Some(better) = better
+                {
+                    exchanges += 1;
+                    let Fitted {
+                        hypothesis, asked, ..
+                    } = better.fitted.clone();
+                    // What can be followed but not simulated is no answer.
+                    if let Ok(settled) = self.settle(hypothesis, asked) {
+                        // Others may have stood for what the former one missed.
+                        (fitted, anchor) = self.pruned(settled, calibrated, scale)?;
+                        continue 'again;
+                    }
+                }
+                let candidate = &fitted.asked[slot];
+                let chance = chi_square_tail(gain / scale, candidate.width());
+                named.push(Named {
+                    slot,
+                    p_value: (asked * chance).min(1.0),
+                    gain: gain / scale,
+                    share: gain / (calibrated.cost - fitted.cost).max(gain),
+                    alternatives: rivals
+                        .into_iter()
+                        .map(|r| r.alternative)
+                        .filter(|a| a.worse <= self.tie(candidate, gain / scale))
+                        .collect(),
+                });
+            }
+            named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
+            return Ok((fitted, anchor, named));
+        }
+    }
+
+    /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
+    ///
+    /// Without repeats nothing tells a law that is not exact from another one: what its kind may miss of what it shows decides nothing.
+    fn tie(&self, own: &Candidate, gain: f64) -> f64 {
+        match self.repeated {
+            true => TIE,
+            false => TIE.max(own.kind().probe().missed * gain),
+        }
+    }
+
+    /// Whether another effect takes the place of a named one.
+    ///
+    /// The better one does, when it earns the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
+    /// one with fewer parameters or, with as many, the one that stands before it in the catalogue: an intricate one bends itself to
+    /// what sensors and a rigid model get wrong.
+    fn takes_over(&self, rival: &Alternative, (own, gain): (&Candidate, f64), bent: f64) -> bool {
+        const BETTER: f64 = 0.05;
+        let shapes = |c: &Candidate| self.price_of_shapes(std::slice::from_ref(c));
+        let plain = |c: &Candidate| {
+            let place = self.session.kinds().position(|k| k == c.kind());
+            (c.kind().info().parameters.len(), place)
+        };
+        let handicap = match plain(&rival.candidate).cmp(&plain(own)) {
+            _ if self.repeated && own.shapes() > rival.candidate.shapes() => {
+                f64::max(shapes(own) - shapes(&rival.candidate), bent)
+            }
+            _ if self.repeated => shapes(own) - shapes(&rival.candidate),
+            Ordering::Less => self.tie(own, gain),
+            Ordering::Equal => 0.0,
+            Ordering::Greater => -self.tie(own, gain),
+        };
+        rival.worse < handicap - BETTER
+    }
+
+    /// Other effects in the place of one, fitted, the best first.
+    ///
+    /// Two things speak for another effect: what it explains once all is refitted without the named one, and how well it stands for
+    /// that one where all is as it was fitted. The first is blind where the refitting has gone to its bounds, the second where much
+    /// else changes with the exchange.
+    fn rivals(
+        &self,
+        fitted: &Fitted<N>,
+        (slot, less, twin): (usize, &Fitted<N>, Option<&Twin>),
+        (anchor, library): (&Anchor<N>, &Library),
+        scale: f64,
+    ) -> Result<Vec<Rival<N>>, GapError> {
+        let own = &fitted.asked[slot];
+        let refitted = Scan::new(self, less, anchor, library)?;
+        let others: Vec<usize> = (0..refitted.len())
+            .filter(|&c| {
+                let effect = &library.candidates[c].effect;
+                let is_named = less.asked.iter().any(|a| a.is_same_effect(effect));
+                !is_named && !own.is_same_effect(effect)
+            })
+            .collect();
+        // What the effect itself would gain to first order: what others gain to first order is held against that.
+        let gain = (0..refitted.len())
+            .filter(|&c| own.is_same_effect(&library.candidates[c].effect))
+            .filter_map(|c| refitted.evaluate(&[c]))
+            .map(|c| c.gain)
+            .fold(0.0, f64::max)
+            .min(less.cost - fitted.cost);
+        let mut hypothesis = fitted.hypothesis.clone();
+        hypothesis.named.remove(slot);
+        let as_fitted = Fitted {
+            hypothesis,
+            residuals: fitted.residuals.clone(),
+            ..less.clone()
+        };
+        let in_place = twin.and_then(|twin| {
+            let scan = Scan::new(self, &as_fitted, anchor, library).ok()?;
+            Some((scan, twin))
+        });
+        let mut singles: Vec<(f64, Choice, (&Scan, &Fitted<N>))> = Vec::new();
+        for &c in &others {
+            let choice = refitted.evaluate(&[c]);
+            let choice = choice.map(|choice| (choice.gain / gain, choice, (&refitted, less)));
+            let stand_in = in_place.as_ref().and_then(|(scan, twin)| {
+                let (part, choice) = scan.stand_in(c, twin)?;
+                Some((part, choice, (scan, &as_fitted)))
+            });
+            let both = choice.into_iter().chain(stand_in);
+            singles.extend(both.filter(|(part, ..)| *part > RIVAL));
+        }
+        singles.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut seen: Vec<&Candidate> = Vec::new();
+        let mut rivals = Vec::new();
+        for (_, choice, (scan, from)) in &singles {
+            let candidate = &library.candidates[choice.members[0]];
+            if seen.iter().any(|s| s.is_same_effect(&candidate.effect)) {
+                continue;
+            }
+            if seen.len() >= RIVALS {
+                break;
+            }
+            seen.push(candidate);
+            let mut asked = candidate.clone();
+            let member = choice.members[0];
+            (asked.price, asked.spread) = (scan.price[member], scan.spread[member]);
+            let Some(rival) = self.attempt(
+                from,
+                (std::slice::from_ref(&asked), &choice.coefficients),
+                anchor,
+            ) else {
+                continue;
+            };
+            let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
+            let likeness = twin.map_or(0.0, |t| scan.likeness(t.place, choice.members[0]));
+            let Some(&effect) = rival.hypothesis.named.last() else {
+                continue;
+            };
+            rivals.push(Rival {
+                alternative: Alternative {
+                    candidate: asked,
+                    effect,
+                    worse,
+                    likeness,
+                },
+                fitted: rival,
+            });
+        }
+        rivals.sort_by(|a, b| a.alternative.worse.total_cmp(&b.alternative.worse));
+        Ok(rivals)
+    }
+
+    /// What refined shapes must earn before a simpler explanation is given up for them (Schwarz' criterion).
+    pub(crate) fn price_of_shapes(&self, asked: &[Candidate]) -> f64 {
+        let shapes: f64 = asked.iter().map(Candidate::shapes).sum();
+        shapes * libm::log(self.rows_of_references() as f64)
+    }
+}

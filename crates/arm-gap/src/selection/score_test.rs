@@ -1,0 +1,297 @@
+//! What each candidate would explain, to first order: with everything refitted that was never exact.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::GapError;
+use crate::candidates::candidate::{Library, Twin};
+use crate::data::prepared_session::Study;
+use crate::selection::fit::{Fitted, priors, regularise};
+use crate::selection::score_variance::{spread, unlike};
+use crate::sensitivity::linearization_point::{Anchor, Response};
+use crate::sensitivity::normal_equations::{Normal, factor, solve};
+
+/// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
+/// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.
+pub const THRESHOLD: f64 = 12.0;
+
+/// The candidates' normal equations after everything else was projected off.
+pub struct Scan {
+    /// Products of the candidates' columns.
+    gram: DMatrix<f64>,
+    /// Their products with the residual.
+    score: DVector<f64>,
+    /// Columns of each candidate.
+    columns: Vec<std::ops::Range<usize>>,
+    /// How much more the score of each candidate scatters between repeats than the noise allows; at least one.
+    pub spread: Vec<f64>,
+    /// By how much movements differ in what each candidate gains, beyond chance; see [`unlike`].
+    pub unlike: Vec<f64>,
+    /// What each candidate must earn to be named.
+    pub price: Vec<f64>,
+    /// Misfit for each degree of freedom that no choice of candidates would take away; at least one, and one until it is measured
+    /// by [`Scan::scaled`].
+    pub scale: f64,
+    /// Cost before any choice, and degrees of freedom of the data.
+    square: f64,
+    freedom: f64,
+    bounds: Vec<(f64, f64)>,
+}
+
+/// Some candidates together.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Which, in rising order.
+    pub members: Vec<usize>,
+    /// Coefficients of their columns.
+    pub coefficients: Vec<Vec<f64>>,
+    /// Reduction of the cost.
+    pub gain: f64,
+    /// What is left of it when all have paid; more than zero for a choice worth making.
+    pub worth: f64,
+}
+
+impl Scan {
+    /// Projects nuisances and named effects off.
+    ///
+    /// # Errors
+    /// [`GapError`] where the fitted hypothesis cannot be simulated or is singular.
+    pub fn new<const N: usize>(
+        study: &Study<N>,
+        fitted: &Fitted<N>,
+        anchor: &Anchor<N>,
+        library: &Library,
+    ) -> Result<Self, GapError> {
+        let hypothesis = &fitted.hypothesis;
+        let asked: Vec<&Response> = library.responses.iter().flatten().collect();
+        let (known, clusters) = study.equations(anchor, fitted, &asked)?;
+        let mut prior = priors(hypothesis, &known);
+        prior.resize(known.len() + asked.len(), None);
+        let mut normal = Normal::new(&clusters, &prior);
+        regularise(&mut normal.gram, hypothesis, &known);
+        // Columns that nothing excites drop out of the projection, and so does what would leave its bounds.
+        let base: Vec<usize> = (0..known.len())
+            .filter(|&i| normal.gram[(i, i)] > 0.0)
+            .filter(|&i| {
+                let value = hypothesis.get(known[i].target);
+                let pull = normal.score[i];
+                !(value <= known[i].lower && pull < 0.0 || value >= known[i].upper && pull > 0.0)
+            })
+            .collect();
+        let first = known.len();
+        let count = asked.len();
+        let left = DMatrix::from_fn(base.len(), base.len(), |a, b| {
+            normal.gram[(base[a], base[b])]
+        });
+        let solver = factor(left).ok_or(GapError::Singular {
+            unknowns: base.len(),
+        })?;
+        let mut share = DMatrix::zeros(count, base.len());
+        for c in 0..count {
+            let right = DVector::from_fn(base.len(), |a, _| normal.gram[(base[a], first + c)]);
+            share.set_row(c, &solver.solve(&right).transpose());
+        }
+        let cross = DMatrix::from_fn(base.len(), count, |a, c| normal.gram[(base[a], first + c)]);
+        let gram = normal.gram.view((first, first), (count, count)) - &share * cross;
+        let score = normal.score.rows(first, count)
+            - &share * DVector::from_fn(base.len(), |a, _| normal.score[base[a]]);
+
+        let mut ranges = Vec::with_capacity(library.candidates.len());
+        let mut bounds = Vec::with_capacity(count);
+        for candidate in &library.candidates {
+            let start = bounds.len();
+            bounds.extend((0..candidate.width()).map(|i| candidate.bounds(i)));
+            ranges.push(start..bounds.len());
+        }
+        let rows = study.rows_of_references();
+        let mut scan = Self {
+            gram,
+            score,
+            columns: ranges,
+            spread: vec![1.0; library.candidates.len()],
+            unlike: vec![0.0; library.candidates.len()],
+            price: library
+                .candidates
+                .iter()
+                .map(|c| {
+                    let width = c.width() as f64;
+                    THRESHOLD + width * libm::log(rows as f64) + 2.0 * libm::log(c.tried as f64)
+                })
+                .collect(),
+            scale: 1.0,
+            square: normal.square,
+            freedom: normal.rows.saturating_sub(base.len() + 10).max(1) as f64,
+            bounds,
+        };
+        for index in 0..scan.columns.len() {
+            let Some(choice) = scan.evaluate(&[index]) else {
+                continue;
+            };
+            // The direction in which the candidate was found, on its columns and on what was projected off.
+            let range = scan.columns[index].clone();
+            let found: Vec<(usize, f64)> = range.zip(choice.coefficients[0].clone()).collect();
+            let own = found.iter().map(|(c, b)| (first + c, *b));
+            let others = base.iter().enumerate().map(|(a, &i)| {
+                let sum = found.iter();
+                (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(*c, a)]))
+            });
+            let weights: Vec<(usize, f64)> = own.chain(others).collect();
+            scan.spread[index] = spread(&clusters, &weights);
+            scan.unlike[index] = unlike(&clusters, &weights);
+        }
+        Ok(scan)
+    }
+
+    /// With the misfit measured that no choice takes away, in units of which worths and smallest sizes count.
+    pub fn scaled(mut self) -> Self {
+        let deepest = self.search(&[], 5, 8, &|_, _| true);
+        let best = deepest.iter().map(|c| c.gain).fold(0.0, f64::max);
+        self.scale = ((self.square - best) / self.freedom).max(1.0);
+        self
+    }
+
+    /// Number of candidates.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// What some candidates explain together; `None` where they cannot be told apart.
+    pub fn evaluate(&self, members: &[usize]) -> Option<Choice> {
+        self.answer(members, &self.score)
+    }
+
+    /// How well a candidate stands for a named effect: its part of what that one shows, and its coefficients.
+    pub fn stand_in(&self, candidate: usize, twin: &Twin) -> Option<(f64, Choice)> {
+        let shown = self.columns[twin.place].clone().zip(&twin.sizes);
+        let mut score = DVector::zeros(self.score.len());
+        let mut all = 0.0;
+        for (column, size) in shown.clone() {
+            score += self.gram.column(column) * *size;
+        }
+        for (column, size) in shown {
+            all += score[column] * size;
+        }
+        let choice = self.answer(&[candidate], &score)?;
+        (all > 0.0).then(|| (choice.gain / all, choice))
+    }
+
+    /// What some candidates explain of something with the given products with their columns.
+    fn answer(&self, members: &[usize], score: &DVector<f64>) -> Option<Choice> {
+        let columns: Vec<usize> = members
+            .iter()
+            .flat_map(|&m| self.columns[m].clone())
+            .collect();
+        let bounds = |i: usize| self.bounds[columns[i]];
+        let (steps, gain) = solve(&self.gram, score, &columns, &bounds)?;
+        let mut rest = steps.as_slice();
+        let coefficients = members
+            .iter()
+            .map(|&m| {
+                let (own, others) = rest.split_at(self.columns[m].len());
+                rest = others;
+                own.to_vec()
+            })
+            .collect();
+        let price: f64 = members
+            .iter()
+            .map(|&m| self.spread[m] * self.price[m])
+            .sum();
+        Some(Choice {
+            members: members.to_vec(),
+            coefficients,
+            gain,
+            worth: gain / self.scale - price,
+        })
+    }
+
+    /// The best choices that extend `from`, up to `depth` candidates more, by a beam of the given width.
+    ///
+    /// All choices that were met are returned, the most worth first. A candidate that looks like nothing alone is met
+    /// with others beside it.
+    pub fn search(
+        &self,
+        from: &[usize],
+        depth: usize,
+        width: usize,
+        allowed: &dyn Fn(&[usize], usize) -> bool,
+    ) -> Vec<Choice> {
+        let mut all: Vec<Choice> = Vec::new();
+        let mut beam = vec![from.to_vec()];
+        for _ in 0..depth {
+            let mut next: Vec<Choice> = Vec::new();
+            for members in &beam {
+                for candidate in 0..self.len() {
+                    if members.contains(&candidate) || !allowed(members, candidate) {
+                        continue;
+                    }
+                    let mut longer = members.clone();
+                    longer.push(candidate);
+                    longer.sort_unstable();
+                    if next.iter().any(|c| c.members == longer) {
+                        continue;
+                    }
+                    next.extend(self.evaluate(&longer));
+                }
+            }
+            next.sort_by(|a, b| {
+                b.worth
+                    .total_cmp(&a.worth)
+                    .then_with(|| a.members.cmp(&b.members))
+            });
+            all.extend(next.iter().take(8 * width).cloned());
+            beam = next.into_iter().take(width).map(|c| c.members).collect();
+        }
+        all.sort_by(|a, b| {
+            b.worth
+                .total_cmp(&a.worth)
+                .then_with(|| a.members.cmp(&b.members))
+        });
+        all
+    }
+
+    /// Smallest size of a candidate that would have been named, in the unit of its first parameter.
+    pub fn smallest_seen(&self, candidate: usize) -> f64 {
+        let information = self.columns[candidate]
+            .clone()
+            .map(|c| self.gram[(c, c)])
+            .fold(0.0, f64::max);
+        let price = self.scale * self.spread[candidate] * self.price[candidate];
+        if information > 0.0 {
+            libm::sqrt(price / information)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Squared cosine between what two candidates would show, after everything else was refitted.
+    pub fn likeness(&self, a: usize, b: usize) -> f64 {
+        let (i, j) = (self.columns[a].start, self.columns[b].start);
+        let (aa, bb) = (self.gram[(i, i)], self.gram[(j, j)]);
+        if aa > 0.0 && bb > 0.0 {
+            let ab = self.gram[(i, j)];
+            ab * ab / (aa * bb)
+        } else {
+            0.0
+        }
+    }
+}
+
+impl<const N: usize> Study<'_, N> {
+    /// Number of rows with one trial of each group.
+    pub fn rows_of_references(&self) -> usize {
+        let mut seen = Vec::new();
+        let mut rows = 0;
+        for &trial in &self.fitted {
+            if !seen.contains(&self.group_of[trial]) {
+                seen.push(self.group_of[trial]);
+                let told = self.stretches[trial].told(self.session.channels());
+                rows += told.iter().sum::<usize>();
+            }
+        }
+        rows.max(1)
+    }
+}

@@ -1,0 +1,103 @@
+//! How much scores scatter between repeats, beside what the noise allows.
+
+use crate::sensitivity::normal_equations::Cluster;
+
+/// Weight of "as the noise says", in trials.
+const BELIEF: f64 = 6.0;
+
+/// By how much movements differ in the size that they give an effect, beyond what the noise makes: the part of their squared
+/// distances from the common size that exceeds what chance makes in one of a thousand.
+///
+/// * `weights` - columns and their weights in the effect as all movements together tell it
+pub fn unlike(clusters: &[Cluster], weights: &[(usize, f64)]) -> f64 {
+    let groups = clusters.iter().map(|c| c.configuration + 1).max();
+    let (mut square, mut dof) = (0.0, -1.0);
+    for group in 0..groups.unwrap_or(0) {
+        let own = clusters.iter().filter(|c| c.configuration == group);
+        let (score, information) = own.fold((0.0, 0.0), |(s, i), c| {
+            (s + score(c, weights), i + expected(c, weights))
+        });
+        if information > 0.0 {
+            square += (score - information) * (score - information) / information;
+            dof += 1.0;
+        }
+    }
+    if dof < 1.0 {
+        return 0.0;
+    }
+    // Wilson and Hilferty's approximation of the quantile of chi squared.
+    let part = 2.0 / (9.0 * dof);
+    let root = 1.0 - part + 3.09 * libm::sqrt(part);
+    (square - dof * root * root * root).max(0.0)
+}
+
+/// Product of a trial's residual with an effect.
+fn score(c: &Cluster, weights: &[(usize, f64)]) -> f64 {
+    weights.iter().fold(0.0, |s, (i, w)| s + w * c.score[*i])
+}
+
+/// Variance of that product where the noise is as believed.
+fn expected(c: &Cluster, weights: &[(usize, f64)]) -> f64 {
+    weights.iter().fold(0.0, |s, (i, w)| {
+        let row = weights.iter();
+        s + w * row.fold(0.0, |t, (j, v)| t + v * c.gram[(*i, *j)])
+    })
+}
+
+/// Variance of a score between repeats of one movement over what the noise allows, shrunk towards one; at least one.
+///
+/// * `weights` - columns and their weights in the score
+pub fn spread(clusters: &[Cluster], weights: &[(usize, f64)]) -> f64 {
+    let groups = clusters.iter().map(|c| c.configuration + 1).max();
+    let (mut observed, mut predicted, mut dof) = (0.0, 0.0, 0.0);
+    for group in 0..groups.unwrap_or(0) {
+        let own: Vec<&Cluster> = clusters
+            .iter()
+            .filter(|c| c.configuration == group)
+            .collect();
+        if own.len() < 2 {
+            continue;
+        }
+        let n = own.len() as f64;
+        let scores: Vec<f64> = own.iter().map(|c| score(c, weights)).collect();
+        let mean = scores.iter().sum::<f64>() / n;
+        observed += scores.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>();
+        predicted += own.iter().map(|c| expected(c, weights)).sum::<f64>() / n * (n - 1.0);
+        dof += n - 1.0;
+    }
+    if predicted <= 0.0 {
+        return 1.0;
+    }
+    ((BELIEF + dof * observed / predicted) / (BELIEF + dof)).max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    /// Trials of several movements that give one effect these sizes, each known to a fifth.
+    fn told(sizes: &[f64]) -> Vec<Cluster> {
+        const INFORMATION: f64 = 25.0;
+        let one = |(configuration, size): (usize, &f64)| Cluster {
+            configuration,
+            gram: Arc::new(DMatrix::from_element(1, 1, INFORMATION)),
+            score: DVector::from_element(1, INFORMATION * size),
+            square: 0.0,
+            rows: 1,
+        };
+        sizes.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn movements_are_unlike_where_their_sizes_differ_by_more_than_chance() {
+        let common = [(0, 1.0)];
+        assert_eq!(unlike(&told(&[1.1, 0.8, 1.2, 0.9, 1.0, 1.0]), &common), 0.0);
+        // One movement makes it all: squared distances of 5 · 25 + 625, less the 20.5 that chance makes of five.
+        let one = unlike(&told(&[6.0, 0.0, 0.0, 0.0, 0.0, 0.0]), &common);
+        assert!((one - (750.0 - 20.5)).abs() < 0.3, "{one}");
+    }
+}

@@ -1,0 +1,316 @@
+//! Disturbances of single trials: a burst of torque, a sensor that slips.
+
+use arm_core::effect::{Effect, KINDS, Nature};
+
+use crate::data::noise::dot;
+use crate::data::prepared_session::Study;
+use crate::measurement_model::prediction::Channels;
+use crate::selection::lack_of_fit::{orthogonal, project_off};
+use crate::sensitivity::linearization_point::Anchor;
+use crate::trial_specific::component::Apart;
+
+impl<const N: usize> Study<'_, N> {
+    /// The clearest disturbance of a single trial; `None` when no trial stands out.
+    ///
+    /// A trial is compared with its repeats where it has some, else with the fitted model. Two shapes are tried: a burst
+    /// of torque in a joint, and an angle sensor that slips and stays off.
+    ///
+    /// * `scale` - misfit for each degree of freedom
+    pub fn disturbance(&self, anchor: &Anchor<N>, scale: f64) -> Option<Apart> {
+        let white: Vec<Vec<f64>> = self
+            .fitted
+            .iter()
+            .zip(&anchor.residuals)
+            .map(|(&t, r)| self.noise.whiten(r, &self.stretches[t]))
+            .collect();
+        // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
+        let each = self.fitted.iter();
+        let usual: Vec<Vec<Vec<f64>>> = each.map(|&trial| self.usual(anchor, trial)).collect();
+        let deviations: Vec<Vec<f64>> = (0..self.fitted.len())
+            .map(|m| {
+                let mut deviation = self.deviation(&white, m);
+                project_off(&mut deviation, &usual[m]);
+                deviation
+            })
+            .collect();
+        let suspects: Vec<usize> = (0..self.fitted.len())
+            .filter(|&m| self.has_repeat(m))
+            .filter(|&m| stands_out(&deviations[m], self.session.channels(), scale))
+            .collect();
+        let rows = self.rows_of_references() as f64;
+        let tried = (self.fitted.len() * 4 * N * 100) as f64;
+        let price =
+            crate::selection::score_test::THRESHOLD + libm::log(rows) + 2.0 * libm::log(tried);
+        let mut best: Option<Apart> = None;
+        for m in suspects {
+            let trial = self.fitted[m];
+            let see = |(effect, response): (Effect<f64>, Channels)| {
+                let mut row = self.noise.whiten(&response, &self.stretches[trial]);
+                project_off(&mut row, &usual[m]);
+                let square = dot(&row, &row);
+                (square > 0.0).then_some(Asked {
+                    effect,
+                    row,
+                    square,
+                })
+            };
+            let asked: Vec<Asked> = self
+                .shapes_in(anchor, trial)
+                .into_iter()
+                .filter_map(see)
+                .collect();
+            let others = self.repeats_of(m);
+            let shrink = shrunk(others.len());
+            for one in &asked {
+                let along = dot(&one.row, &deviations[m]);
+                // Of two repeats both deviate alike: the disturbed one is further from the model.
+                let own = dot(&one.row, &white[m]).abs();
+                let further = others.iter().all(|&o| own > dot(&one.row, &white[o]).abs());
+                let size = along / one.square;
+                // A sensor that moves within what the calibration promises of it is no finding.
+                let promised = match one.effect.kind.probe().promise {
+                    Some(_) => self.session.tolerance.angle_offset,
+                    None => 0.0,
+                };
+                let gain = along * size / scale;
+                let least = best.as_ref().map_or(price, |b| b.gain);
+                if !further || size.abs() <= promised || gain <= least {
+                    continue;
+                }
+                let group = others.iter().chain([&m]).map(|&o| deviations[o].as_slice());
+                let scatter = scatter_elsewhere(one, &asked, &group.collect::<Vec<_>>());
+                let gain = gain / scatter;
+                if gain > least {
+                    let mut effect = one.effect;
+                    effect.parameters[0] = size / shrink;
+                    best = Some(Apart {
+                        effect,
+                        sd: libm::sqrt(scale * scatter / one.square) / shrink,
+                        trial: Some(trial),
+                        gain,
+                        rivals: Vec::new(),
+                        locked: false,
+                        columns: Vec::new(),
+                        sizes: Vec::new(),
+                    });
+                }
+            }
+        }
+        best
+    }
+
+    /// Whitened columns of what differs from trial to trial without being a disturbance, each orthogonal to the others.
+    fn usual(&self, anchor: &Anchor<N>, trial: usize) -> Vec<Vec<f64>> {
+        let stretches = &self.stretches[trial];
+        let length = self.session.trials[trial].len();
+        let constant = |j: usize| {
+            let mut channels = vec![vec![0.0; length]; self.session.channels()];
+            channels[j] = vec![1.0; length];
+            channels
+        };
+        let own = anchor.own.iter();
+        let placed = own.map(|r| self.noise.whiten(&r.0[self.group_of[trial]], stretches));
+        let columns: Vec<Vec<f64>> = placed
+            .chain((0..N).map(|j| self.noise.whiten(&constant(j), stretches)))
+            .collect();
+        orthogonal(columns)
+    }
+
+    /// Other fitted trials with the same movement and the same samples.
+    fn repeats_of(&self, m: usize) -> Vec<usize> {
+        let group = self.group_of[self.fitted[m]];
+        (0..self.fitted.len())
+            .filter(|&o| {
+                let trial = self.fitted[o];
+                o != m
+                    && self.group_of[trial] == group
+                    && self.stretches[trial] == self.stretches[self.fitted[m]]
+            })
+            .collect()
+    }
+
+    fn has_repeat(&self, m: usize) -> bool {
+        !self.repeats_of(m).is_empty()
+    }
+
+    /// A trial's whitened residual less the mean of its repeats, scaled to the noise of one trial.
+    fn deviation(&self, white: &[Vec<f64>], m: usize) -> Vec<f64> {
+        let others = self.repeats_of(m);
+        if others.is_empty() {
+            return white[m].clone();
+        }
+        let n = others.len() as f64;
+        let shrink = shrunk(others.len());
+        (0..white[m].len())
+            .map(|i| {
+                let mean = others.iter().map(|&o| white[o][i]).sum::<f64>() / n;
+                shrink * (white[m][i] - mean)
+            })
+            .collect()
+    }
+
+    /// Unit disturbances of a trial with what they would show: bursts in every joint, slips of every angle sensor.
+    fn shapes_in(&self, anchor: &Anchor<N>, trial: usize) -> Vec<(Effect<f64>, Channels)> {
+        const EVERY: f64 = 0.1;
+        const LONG: [f64; 3] = [0.3, 0.6, 1.2];
+        const UNIT: f64 = 1e-2;
+        let course = &self.courses[self.references[self.group_of[trial]]];
+        let end = course.raw[0].len() as f64 / course.rate;
+        let starts = (end / EVERY) as usize;
+        let Some(line) = anchor.lines.get(self.group_of[trial]) else {
+            return Vec::new();
+        };
+        let bursts: Vec<Effect<f64>> = KINDS
+            .iter()
+            .filter(|k| k.probe().nature == Nature::Burst)
+            .flat_map(|&kind| {
+                (0..N).flat_map(move |j| {
+                    LONG.iter().flat_map(move |&long| {
+                        (0..starts).map(move |s| {
+                            Effect::new(kind, j).with(&[UNIT, EVERY * s as f64, long])
+                        })
+                    })
+                })
+            })
+            .collect();
+        let answered = self.parallel(bursts.len(), |i| {
+            let mut changed = anchor.hypothesis.clone();
+            changed.named.push(bursts[i]);
+            line.response(&changed, UNIT, (false, false)).ok()
+        });
+        let mut list: Vec<(Effect<f64>, Channels)> = std::iter::zip(bursts, answered)
+            .filter_map(|(effect, response)| Some((effect, response?)))
+            .collect();
+        let count = course.raw[0].len();
+        for &kind in KINDS {
+            if kind.info().place != arm_core::effect::Place::AngleSensor {
+                continue;
+            }
+            for j in 0..N {
+                // A slip within the trial; an offset from its start is how the sensor was put on.
+                for s in 10..starts.saturating_sub(10) {
+                    let first = (EVERY * s as f64 * course.rate) as usize;
+                    let mut channels = vec![vec![0.0; count]; self.session.channels()];
+                    for value in channels[j].iter_mut().skip(first) {
+                        *value = 1.0;
+                    }
+                    let mut effect = Effect::new(kind, j);
+                    // The time of the slip travels in the last place, which the kind does not use.
+                    effect.parameters[arm_core::effect::MAX_PARAMETERS - 1] = EVERY * s as f64;
+                    list.push((effect, channels));
+                }
+            }
+        }
+        list
+    }
+}
+
+/// Factor by which the difference of a trial and the mean of some repeats has the noise of one trial; one without repeats.
+fn shrunk(repeats: usize) -> f64 {
+    match repeats {
+        0 => 1.0,
+        n => 1.0 / libm::sqrt(1.0 + 1.0 / n as f64),
+    }
+}
+
+/// A disturbance that is asked for, with what it would show.
+struct Asked {
+    effect: Effect<f64>,
+    /// Whitened, without what is usual.
+    row: Vec<f64>,
+    square: f64,
+}
+
+/// How much more than noise the shape of a burst finds at other times of its movement, as a ratio of variances; at least one.
+///
+/// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like bursts at many times.
+///
+/// * `deviations` - of the trial and its repeats
+fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[&[f64]]) -> f64 {
+    /// Nine of ten squares of a standard normal number are smaller.
+    const NINE_OF_TEN: f64 = 2.706;
+    /// How long a burst is felt around it \[s\].
+    const FELT: f64 = 1.0;
+    if one.effect.kind.probe().nature != Nature::Burst {
+        return 1.0;
+    }
+    let span = |e: &Effect<f64>| (e.parameters[1] - FELT, e.parameters[1] + e.parameters[2]);
+    let own = span(&one.effect);
+    let elsewhere = asked.iter().filter(|other| {
+        let same = (other.effect.kind, other.effect.index) == (one.effect.kind, one.effect.index)
+            && other.effect.parameters[2] == one.effect.parameters[2];
+        let there = span(&other.effect);
+        same && (there.0 > own.1 || there.1 < own.0)
+    });
+    let mut squares: Vec<f64> = elsewhere
+        .flat_map(|other| {
+            deviations.iter().map(|d| {
+                let along = dot(&other.row, d);
+                along * along / other.square
+            })
+        })
+        .collect();
+    squares.sort_by(f64::total_cmp);
+    let tenth = squares.len().saturating_sub(1) * 9 / 10;
+    squares
+        .get(tenth)
+        .map_or(1.0, |s| f64::max(s / NINE_OF_TEN, 1.0))
+}
+
+/// Whether some second of a whitened deviation holds far more than noise.
+fn stands_out(deviation: &[f64], channels: usize, scale: f64) -> bool {
+    /// Rows of one window.
+    const WINDOW: usize = 12;
+    /// Excess in standard deviations.
+    const EXCESS: f64 = 4.5;
+    let samples = deviation.len() / channels.max(1);
+    let at = |s: usize| {
+        (0..channels).fold(0.0, |sum, c| {
+            let v = deviation[c * samples + s];
+            sum + v * v / scale
+        })
+    };
+    let squares: Vec<f64> = (0..samples).map(at).collect();
+    let dof = (WINDOW * channels) as f64;
+    squares.windows(WINDOW).any(|w| {
+        let sum: f64 = w.iter().sum();
+        sum > dof + EXCESS * libm::sqrt(2.0 * dof)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    /// Bursts of 0.5 s that start every 0.1 s of 10 s, each with a row of its own.
+    fn bursts() -> Vec<Asked> {
+        (0..95)
+            .map(|k| {
+                let mut row = vec![0.0; 95];
+                row[k] = 1.0;
+                let effect = Effect::new(Kind::Voluntary, 0).with(&[1e-2, 0.1 * k as f64, 0.5]);
+                Asked {
+                    effect,
+                    row,
+                    square: 1.0,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_burst_stands_out_against_other_times_and_not_against_itself() {
+        let asked = bursts();
+        // Far more than noise from 4.0 to 5.0 s alone: that is what a burst does.
+        let once: Vec<f64> = (0..95)
+            .map(|k| if (40..50).contains(&k) { 9.0 } else { 1.0 })
+            .collect();
+        assert_eq!(scatter_elsewhere(&asked[45], &asked, &[&once]), 1.0);
+        // As much all the time is no burst.
+        let always = vec![9.0; 95];
+        let scatter = scatter_elsewhere(&asked[45], &asked, &[&once, &always]);
+        assert!((scatter - 81.0 / 2.706).abs() < 1e-12, "{scatter}");
+    }
+}

@@ -1,0 +1,125 @@
+//! A slow ripple of the robot: movements have power of their own where it swings, so that it is no line in a spectrum; but it keeps
+//! its phase from trial to trial, and is asked as other effects are, frequency by frequency.
+
+use core::f64::consts::FRAC_PI_2;
+
+use crate::candidates::candidate::Library;
+use crate::data::prepared_session::Study;
+use crate::selection::fit::Fitted;
+use crate::selection::score_test::Scan;
+use crate::selection::search::SLOW;
+use crate::sensitivity::linearization_point::Anchor;
+use crate::trial_specific::tremor_detection::{SLOWEST_RIPPLE, UNSTEADY};
+
+/// Turns of the phase, over the longest trial, between two frequencies that are asked.
+const TURNS: f64 = 0.7;
+/// Most frequencies that are asked: of trials so long that these are not enough a line in the spectrum tells as much.
+const MOST: usize = 120;
+/// Frequencies asked at a time: products of all their columns are kept.
+const AT_ONCE: usize = 24;
+/// Frequencies asked to either side of the best one, and between it and the next.
+const CLOSER: i32 = 5;
+
+impl<const N: usize> Study<'_, N> {
+    /// Frequency \[Hz\] and phase \[rad\] of a slow ripple of the robot that is plain in all movements together, and alike in each;
+    /// `None` where there is none, trials are too long for it, or what was fitted cannot be followed a little further.
+    ///
+    /// * `scale` - misfit for each degree of freedom
+    pub fn slow_ripple(
+        &self,
+        (fitted, anchor): (&Fitted<N>, &Anchor<N>),
+        scale: f64,
+    ) -> Option<[f64; 2]> {
+        let longest = |&t: &usize| self.courses[t].seen[0].len() as f64 / self.courses[t].rate;
+        let longest = self.references.iter().map(longest).fold(1.0, f64::max);
+        let step = TURNS / longest;
+        let count = libm::ceil((SLOW - SLOWEST_RIPPLE) / step) as usize + 1;
+        if !self.repeated || count > MOST {
+            return None;
+        }
+        let coarse: Vec<f64> = (0..count)
+            .map(|k| SLOWEST_RIPPLE + step * k as f64)
+            .collect();
+        let mut best: Option<Wave> = None;
+        for frequencies in coarse.chunks(AT_ONCE) {
+            best = better(best, self.waves_at(frequencies, (fitted, anchor)));
+        }
+        let (_, [near, _]) = best?;
+        let closer = |k: i32| near + step * f64::from(k) / f64::from(CLOSER + 1);
+        let closer: Vec<f64> = (-CLOSER..=CLOSER).map(closer).collect();
+        let (_, wave) = better(best, self.waves_at(&closer, (fitted, anchor)))?;
+        let (library, scan) = self.scanned(&[wave], (fitted, anchor))?;
+        let choice = scan.evaluate(&[0])?;
+        let tried = 2.0 * libm::log(count as f64) + self.price_of_shapes(&library.candidates);
+        let worth = choice.gain / scale.max(1.0) - scan.spread[0] * scan.price[0] - tried;
+        let steady = scan.unlike[0] < UNSTEADY * choice.gain;
+        (worth > 0.0 && steady).then_some(wave)
+    }
+
+    fn scanned(
+        &self,
+        waves: &[[f64; 2]],
+        (fitted, anchor): (&Fitted<N>, &Anchor<N>),
+    ) -> Option<(Library, Scan)> {
+        let library = Library::of_waves(self, anchor, waves).ok()?;
+        let scan = Scan::new(self, fitted, anchor, &library).ok()?;
+        // One that cannot be asked is missing, and the others no longer stand in their places.
+        (library.candidates.len() == waves.len()).then_some((library, scan))
+    }
+
+    /// The frequency that explains most, with any phase and in both axes: its gain, and frequency and phase.
+    fn waves_at(
+        &self,
+        frequencies: &[f64],
+        (fitted, anchor): (&Fitted<N>, &Anchor<N>),
+    ) -> Option<Wave> {
+        let waves: Vec<[f64; 2]> = frequencies
+            .iter()
+            .flat_map(|&f| [[f, 0.0], [f, FRAC_PI_2]])
+            .collect();
+        let (_, scan) = self.scanned(&waves, (fitted, anchor))?;
+        let wave = |(k, &frequency): (usize, &f64)| {
+            let choice = scan.evaluate(&[2 * k, 2 * k + 1])?;
+            let phase = common_phase(&choice.coefficients[0], &choice.coefficients[1]);
+            Some((choice.gain, [frequency, phase]))
+        };
+        let all = frequencies.iter().enumerate().map(wave);
+        all.fold(None, better)
+    }
+}
+
+/// What a wave gains, and its frequency and phase.
+type Wave = (f64, [f64; 2]);
+
+/// The one that gains more.
+fn better(a: Option<Wave>, b: Option<Wave>) -> Option<Wave> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b.0 > a.0 { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// The phase \[rad\] that axes have in common whose sines and cosines are so large, in step or against each other.
+fn common_phase(sines: &[f64], cosines: &[f64]) -> f64 {
+    let (mut mixed, mut apart) = (0.0, 0.0);
+    for (s, c) in std::iter::zip(sines, cosines) {
+        mixed += 2.0 * s * c;
+        apart += s * s - c * c;
+    }
+    0.5 * libm::atan2(mixed, apart)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_against_each_other_have_one_phase() {
+        for phase in [-1.4_f64, -0.3, 0.0, 0.9, 1.5] {
+            let part = |size: f64| (size * libm::cos(phase), size * libm::sin(phase));
+            let ((ys, yc), (zs, zc)) = (part(3e-4), part(-1e-4));
+            let found = common_phase(&[ys, zs], &[yc, zc]);
+            assert!((found - phase).abs() < 1e-12, "{found} {phase}");
+        }
+    }
+}

@@ -1,0 +1,540 @@
+//! Rhythms of muscles and the robot's ripple: what swings, too fast for the common band or with another phase in every trial.
+
+use std::sync::Arc;
+
+use arm_core::effect::{Effect, KINDS, Kind, Nature};
+use arm_core::{Contact, Joints, Pose, jacobian};
+use nalgebra::{DMatrix, DVector};
+
+use crate::GapError;
+use crate::data::prepared_session::Study;
+use crate::data::repeats::same_rate;
+use crate::measurement_model::prediction::{Channels, Course, smooth};
+use crate::sensitivity::linearization_point::{Anchor, slope};
+use crate::sensitivity::normal_equations::factor;
+use crate::trial_specific::component::{Apart, shapes_of};
+use arm_numerics::signal::spectrum::{Sum, coefficient, line};
+
+/// Where a line is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// In what repeats differ by, where the model's own errors cancel: a rhythm of muscles has another phase in every trial.
+    BetweenRepeats,
+    /// Where tip and handle come apart: only the robot can be behind it.
+    OfTheRobot,
+}
+
+/// Slowest rhythm of muscles \[Hz\]: below it movements have power of their own.
+const SLOWEST_RHYTHM: f64 = 2.0;
+/// Slowest ripple of the robot \[Hz\].
+pub(crate) const SLOWEST_RIPPLE: f64 = 0.4;
+/// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
+const FASTEST_RIPPLE: f64 = 8.0;
+/// Gain below which a line is no rhythm: many frequencies and channels were looked at.
+const PLAIN: f64 = 60.0;
+/// Share of the squared sizes of a ripple over trials that may differ from one size: the robot makes the same one in every movement,
+/// a vibration of the arm follows what it does.
+pub(crate) const UNSTEADY: f64 = 0.05;
+/// Share of what is left in some channel that a rhythm must be.
+const SEEN: f64 = 0.05;
+/// Gain in which two explanations of a rhythm count as equal.
+const TIE: f64 = 10.0;
+/// Coherence of the phases of trials above which a rhythm is locked to their start.
+const LOCKED: f64 = 0.8;
+
+impl<const N: usize> Study<'_, N> {
+    /// Rhythms and ripple: a line in the spectrum of what is left, named by the pattern in which the channels follow.
+    ///
+    /// # Errors
+    /// [`GapError::Simulation`] where the hypothesis cannot be simulated.
+    pub fn rhythm(&self, anchor: &Anchor<N>, place: Line) -> Result<Option<Apart>, GapError> {
+        let residuals = self.raw_residuals(anchor)?;
+        let rate = self.courses[self.fitted[0]].rate;
+        if self
+            .fitted
+            .iter()
+            .any(|&t| !same_rate(self.courses[t].rate, rate))
+        {
+            return Ok(None);
+        }
+        let told = match place {
+            Line::BetweenRepeats => self.differences(&residuals),
+            Line::OfTheRobot => {
+                let trial = self.fitted[0];
+                let rig = self.session.rig(&anchor.hypothesis);
+                let rig = rig.map_err(|source| GapError::Simulation { trial, source })?;
+                std::iter::zip(&residuals, &self.fitted)
+                    .map(|(residual, &trial)| self.closure(residual, trial, &rig.contact))
+                    .collect()
+            }
+        };
+        let all: Vec<&Channels> = told.iter().collect();
+        // A robot mostly starts its movements in the same phase of what shakes it.
+        let (lowest, sums) = match place {
+            Line::BetweenRepeats => (SLOWEST_RHYTHM, &[Sum::Powers][..]),
+            Line::OfTheRobot => (SLOWEST_RIPPLE, &[Sum::Swings, Sum::Powers][..]),
+        };
+        let lines = sums.iter().filter_map(|sum| line(&all, rate, lowest, *sum));
+        let named = |frequency: f64| self.swinging_at(frequency, place, (anchor, &residuals));
+        Ok(lines.filter_map(named).next())
+    }
+
+    /// What swings at a frequency, where it is plain enough.
+    fn swinging_at(
+        &self,
+        frequency: f64,
+        place: Line,
+        (anchor, residuals): (&Anchor<N>, &[Channels]),
+    ) -> Option<Apart> {
+        let mut best: Vec<(f64, Explained)> = Vec::new();
+        for columns in self.swings(frequency) {
+            if place == Line::OfTheRobot && columns[0].kind.probe().nature != Nature::Periodic {
+                continue;
+            }
+            let answers = self.answers(anchor, frequency, &columns);
+            if let Some(explained) = self.explain(residuals, frequency, (&columns, &answers)) {
+                let worth = explained.gain - 8.0 * columns.len() as f64;
+                best.push((worth, explained));
+            }
+        }
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut list = best.into_iter();
+        // The steps of encoders sound in the springs of the contact: what looks like a fast ripple is that.
+        let sounds = |e: &Explained| {
+            e.effect.kind.probe().nature == Nature::Periodic && frequency >= FASTEST_RIPPLE
+        };
+        let (most, first) = list
+            .next()
+            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && e.is_steady() && !sounds(e))?;
+        let rivals = list
+            .filter(|(worth, other)| {
+                let same = (other.effect.kind, other.effect.index)
+                    == (first.effect.kind, first.effect.index);
+                worth + TIE > most && !same
+            })
+            .map(|(worth, other)| (other.effect, most - worth))
+            .collect();
+        Some(Apart {
+            effect: first.effect,
+            sd: first.sd,
+            trial: None,
+            gain: first.gain,
+            rivals,
+            locked: first.locked,
+            columns: first.columns,
+            sizes: first.sizes,
+        })
+    }
+
+    /// What each trial differs by from the mean of its repeats, over the samples that all have; trials without repeats
+    /// are left out.
+    fn differences(&self, residuals: &[Channels]) -> Vec<Channels> {
+        let mut out = Vec::new();
+        for (m, &trial) in self.fitted.iter().enumerate() {
+            let group = self.group_of[trial];
+            let members: Vec<&Channels> = std::iter::zip(residuals, &self.fitted)
+                .filter(|(_, t)| self.group_of[**t] == group)
+                .map(|(r, _)| r)
+                .collect();
+            if members.len() < 2 {
+                continue;
+            }
+            let count = members.iter().map(|r| r[0].len()).min().unwrap_or(0);
+            let n = members.len() as f64;
+            let scale = libm::sqrt(n / (n - 1.0));
+            let one = |c: usize| {
+                let mean = |i: usize| members.iter().map(|r| r[c][i]).sum::<f64>() / n;
+                (0..count)
+                    .map(|i| scale * (residuals[m][c][i] - mean(i)))
+                    .collect()
+            };
+            out.push((0..self.session.channels()).map(one).collect());
+        }
+        out
+    }
+
+    /// What is left between the arm's tip and the handle, stretch of the contact taken off: y and z \[m\].
+    fn closure(&self, residual: &Channels, trial: usize, contact: &Contact<f64>) -> Channels {
+        let course = &self.courses[trial];
+        let stretches = [0, 1].map(|axis| {
+            let spring = (contact.stiffness[axis], contact.damping[axis]);
+            stretch(&residual[N + axis], spring, course.rate)
+        });
+        let mut out = vec![Vec::new(); 2];
+        for i in 0..residual[0].len() {
+            let q = Joints::<f64, N>::from_fn(|j, _| course.seen[j][i]);
+            let moved = Joints::<f64, N>::from_fn(|j, _| residual[j][i]);
+            let tip = jacobian(&self.session.chain, &Pose::new(&q)) * moved;
+            for axis in 0..2 {
+                out[axis].push(tip[axis] + stretches[axis][i]);
+            }
+        }
+        out
+    }
+
+    /// Takes a rhythm out of the measured channels, so that it does not disturb what is fitted to them.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for channels that the filter refuses.
+    pub fn take_out(&mut self, anchor: &Anchor<N>, apart: &Apart) -> Result<(), GapError> {
+        for (sizes, &trial) in apart.sizes.iter().zip(&self.fitted.clone()) {
+            let Some(line) = anchor.lines.get(self.group_of[trial]) else {
+                continue;
+            };
+            let mut course = Course::clone(&self.courses[trial]);
+            for (k, column) in apart.columns.iter().enumerate() {
+                for quarter in [false, true] {
+                    let size = sizes[2 * k + usize::from(quarter)];
+                    let mut changed = anchor.hypothesis.clone();
+                    changed.named.push(small(column, apart.wave()[0], quarter));
+                    let Ok(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
+                        continue;
+                    };
+                    for (channel, swing) in course.raw.iter_mut().zip(&swing) {
+                        for (value, swing) in channel.iter_mut().zip(swing) {
+                            *value -= size * swing;
+                        }
+                    }
+                }
+            }
+            course.seen = smooth(&course.raw, course.band, course.rate)?;
+            self.courses[trial] = Arc::new(course);
+        }
+        Ok(())
+    }
+
+    /// What can swing at a frequency: for each explanation the effects whose swings it adds up.
+    fn swings(&self, frequency: f64) -> Vec<Vec<Effect<f64>>> {
+        let mut list = Vec::new();
+        for &kind in KINDS {
+            match kind.probe().nature {
+                Nature::Rhythm => {
+                    list.extend((0..N).map(|j| vec![swinging(kind, j, 0, frequency)]));
+                }
+                Nature::Periodic => {
+                    let axes: Vec<Effect<f64>> = kind.probe().questions[0]
+                        .free
+                        .iter()
+                        .map(|&p| swinging(kind, 0, p, frequency))
+                        .collect();
+                    list.extend(axes.iter().map(|&axis| vec![axis]));
+                    list.push(axes);
+                }
+                Nature::Lasting | Nature::Burst => {}
+            }
+        }
+        list
+    }
+
+    /// A rhythm with the size that simulated runs give it: what it shows to first order on a coarse grid is off by as much as
+    /// a tenth where an arm nearly rings with it. `None` where it cannot be simulated.
+    ///
+    /// Its standard deviation counts how sizes scatter from trial to trial.
+    pub fn sized(&self, anchor: &Anchor<N>, apart: &Apart) -> Option<Apart> {
+        let residuals = self.raw_residuals(anchor).ok()?;
+        let frequency = apart.wave()[0];
+        let size = apart.effect.parameters[free_of(apart.effect.kind)[0]].abs();
+        let shown = |group: usize, named: Option<Effect<f64>>| {
+            let mut hypothesis = anchor.hypothesis.clone();
+            hypothesis.named.extend(named);
+            let course = &self.courses[self.references[group]];
+            let run = self.session.run(&hypothesis, course).ok()?;
+            self.session.read_raw(&hypothesis, course, &run).ok()
+        };
+        let answer = |group: usize| {
+            let base = shown(group, None)?;
+            let each = apart.columns.iter().map(|column| {
+                let swinging = shown(group, Some(sized_at(column, frequency, size)))?;
+                Some(slope(&swinging, &base, size))
+            });
+            each.collect()
+        };
+        let answers = self.parallel(self.references.len(), answer);
+        let explained = self.explain(&residuals, frequency, (&apart.columns, &answers))?;
+        let sizes = explained.sizes.iter();
+        let sizes: Vec<f64> = sizes
+            .map(|s| libm::sqrt(s.iter().map(|v| v * v).sum::<f64>()))
+            .collect();
+        let n = sizes.len() as f64;
+        let mean = sizes.iter().sum::<f64>() / n;
+        let square = sizes.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>();
+        let scatter = libm::sqrt(square / (n * (n - 1.0).max(1.0)));
+        let mut effect = apart.effect;
+        for &p in free_of(effect.kind) {
+            let info = &effect.kind.info().parameters[p];
+            effect.parameters[p] = explained.effect.parameters[p].clamp(info.min, info.max);
+        }
+        Some(Apart {
+            effect,
+            sd: f64::max(explained.sd, scatter),
+            ..apart.clone()
+        })
+    }
+
+    /// What small swings show on each movement, to first order.
+    fn answers(&self, anchor: &Anchor<N>, frequency: f64, columns: &[Effect<f64>]) -> Vec<Answer> {
+        self.parallel(self.references.len(), |group| {
+            let line = anchor.lines.get(group)?;
+            let each = columns.iter().map(|effect| {
+                let mut changed = anchor.hypothesis.clone();
+                changed.named.push(small(effect, frequency, false));
+                line.response_raw(&changed, UNIT, (false, false)).ok()
+            });
+            each.collect()
+        })
+    }
+
+    /// How much of the line some swings explain, with a size and phase of their own in every trial.
+    ///
+    /// * `answers` - what one unit of each column shows on each movement
+    fn explain(
+        &self,
+        residuals: &[Channels],
+        frequency: f64,
+        (columns, answers): (&[Effect<f64>], &[Answer]),
+    ) -> Option<Explained> {
+        let rate = self.courses[self.fitted[0]].rate;
+        let channels = self.session.channels();
+        // The noise of each channel next to the line.
+        let beside = [-0.9, -0.6, 0.6, 0.9].map(|d| frequency + d);
+        let noise: Vec<f64> = (0..channels)
+            .map(|c| {
+                let powers = residuals.iter().flat_map(|r| {
+                    beside
+                        .iter()
+                        .map(move |&f| coefficient(&r[c], f, rate))
+                        .map(|[a, b]| a * a + b * b)
+                });
+                let (sum, count) = powers.fold((0.0, 0.0), |(s, n), p| (s + p, n + 1.0));
+                f64::max(sum / f64::max(count, 1.0), 1e-30)
+            })
+            .collect();
+        let k = columns.len();
+        let (mut gain, mut sizes) = (0.0, Vec::new());
+        let mut information = 0.0;
+        for (residual, &trial) in residuals.iter().zip(&self.fitted) {
+            let swings = answers[self.group_of[trial]].as_ref()?;
+            let swing = |column: &Channels, c: usize| coefficient(&column[c], frequency, rate);
+            // Complex least squares as real ones: each column turned by 0 and by 90°.
+            let mut gram = DMatrix::zeros(2 * k, 2 * k);
+            let mut score = DVector::zeros(2 * k);
+            for c in 0..channels {
+                let seen = coefficient(&residual[c], frequency, rate);
+                let turned: Vec<[f64; 2]> = swings
+                    .iter()
+                    .map(|column| swing(column, c))
+                    .flat_map(|[a, b]| [[a, b], [-b, a]])
+                    .collect();
+                for (a, x) in turned.iter().enumerate() {
+                    score[a] += (x[0] * seen[0] + x[1] * seen[1]) / noise[c];
+                    for (b, y) in turned.iter().enumerate() {
+                        gram[(a, b)] += (x[0] * y[0] + x[1] * y[1]) / noise[c];
+                    }
+                }
+            }
+            information += gram[(0, 0)];
+            let solution = factor(gram)?.solve(&score);
+            gain += 2.0 * solution.dot(&score);
+            sizes.push(solution);
+        }
+        let share = (0..channels)
+            .map(|c| {
+                let (mut line, mut all) = (0.0, 0.0);
+                for residual in residuals {
+                    let [a, b] = coefficient(&residual[c], frequency, rate);
+                    let count = residual[c].len() as f64;
+                    line += 0.5 * (a * a + b * b);
+                    let mean = residual[c].iter().sum::<f64>() / count;
+                    all += residual[c]
+                        .iter()
+                        .map(|v| (v - mean) * (v - mean))
+                        .sum::<f64>()
+                        / count;
+                }
+                line / f64::max(all, 1e-300)
+            })
+            .fold(0.0, f64::max);
+        let n = sizes.len() as f64;
+        let size = |a: usize| {
+            let square = |s: &DVector<f64>| s[2 * a] * s[2 * a] + s[2 * a + 1] * s[2 * a + 1];
+            libm::sqrt(sizes.iter().map(square).sum::<f64>() / n)
+        };
+        let mean = |i: usize| sizes.iter().map(|s| s[i]).sum::<f64>() / n;
+        let coherence = libm::hypot(mean(0), mean(1)) / size(0).max(1e-300);
+        let locked = coherence > LOCKED;
+        let phase = if locked {
+            libm::atan2(mean(1), mean(0))
+        } else {
+            libm::atan2(sizes[0][1], sizes[0][0])
+        };
+        // The columns are cosines, the kinds are sines.
+        let phase = phase + 0.5 * core::f64::consts::PI;
+        let mut effect = columns[0];
+        for (a, column) in columns.iter().enumerate() {
+            let p = size_of(column);
+            // Two axes swing in step or against each other.
+            let sign = if a > 0 && mean(0) * mean(2 * a) + mean(1) * mean(2 * a + 1) < 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
+            effect.parameters[p] = sign * size(a);
+        }
+        let [f, ph] = shapes_of(effect.kind);
+        effect.parameters[f] = frequency;
+        effect.parameters[ph] = phase;
+        Some(Explained {
+            effect,
+            sd: 1.0 / libm::sqrt(2.0 * information.max(1e-300)),
+            gain,
+            locked,
+            sizes: sizes.iter().map(|s| s.iter().copied().collect()).collect(),
+            columns: columns.to_vec(),
+            share,
+        })
+    }
+}
+
+/// How far a force \[N\] stretches a spring \[N/m\] with a damper \[N s/m\] beside it \[m\], by the trapezoidal rule.
+///
+/// The damper counts: it carries an eighth of the force of a muscle that trembles at 8 Hz, which would pass for a ripple of the
+/// robot.
+fn stretch(force: &[f64], (stiffness, damping): (f64, f64), rate: f64) -> Vec<f64> {
+    let slow = damping * rate;
+    let mut out: Vec<f64> = Vec::with_capacity(force.len());
+    for (i, now) in force.iter().enumerate() {
+        let next = match out.last() {
+            None => now / stiffness,
+            Some(last) => {
+                let mean = 0.5 * (now + force[i - 1]);
+                (mean - (0.5 * stiffness - slow) * last) / (0.5 * stiffness + slow)
+            }
+        };
+        out.push(next);
+    }
+    out
+}
+
+/// What one unit of each of some swings shows on a movement; `None` where one cannot be followed.
+type Answer = Option<Vec<Channels>>;
+
+struct Explained {
+    effect: Effect<f64>,
+    sd: f64,
+    gain: f64,
+    locked: bool,
+    sizes: Vec<Vec<f64>>,
+    columns: Vec<Effect<f64>>,
+    /// Largest share of the variance of a channel's residual.
+    share: f64,
+}
+
+impl Explained {
+    /// Whether a ripple is as large in one trial as in another, but for noise; rhythms of muscles need not be.
+    fn is_steady(&self) -> bool {
+        let trials = self.sizes.len() as f64;
+        let squares = self.sizes.iter();
+        let squares = squares.map(|s| s.iter().map(|v| v * v).sum::<f64>());
+        let (sum, square) = squares.fold((0.0, 0.0), |(a, b), s| (a + libm::sqrt(s), b + s));
+        // Of each swing the noise makes two numbers, which gain one unit each.
+        let noise = 2.0 * self.columns.len() as f64 * trials / self.gain;
+        let alike = sum * sum / (trials * square);
+        self.effect.kind.probe().nature != Nature::Periodic || 1.0 - alike < UNSTEADY + noise
+    }
+}
+
+/// The size with which swings are tried.
+const UNIT: f64 = 1e-3;
+
+/// Position of the size that is one in a swing.
+fn size_of(swing: &Effect<f64>) -> usize {
+    let free = free_of(swing.kind);
+    let one = free.iter().find(|&&p| swing.parameters[p] == 1.0);
+    one.copied().unwrap_or(free[0])
+}
+
+/// A swing of a small size, a quarter of a period earlier on demand.
+fn small(swing: &Effect<f64>, frequency: f64, earlier: bool) -> Effect<f64> {
+    let mut effect = sized_at(swing, frequency, UNIT);
+    if earlier {
+        effect.parameters[shapes_of(swing.kind)[1]] += 0.5 * core::f64::consts::PI;
+    }
+    effect
+}
+
+/// A swing of a size at a frequency.
+fn sized_at(swing: &Effect<f64>, frequency: f64, size: f64) -> Effect<f64> {
+    let mut effect = *swing;
+    effect.parameters[size_of(swing)] = size;
+    effect.parameters[shapes_of(swing.kind)[0]] = frequency;
+    effect
+}
+
+fn free_of(kind: Kind) -> &'static [usize] {
+    kind.probe().questions[0].free
+}
+
+/// A kind that swings with one of its sizes at one, the others at zero.
+fn swinging(kind: Kind, index: usize, size: usize, frequency: f64) -> Effect<f64> {
+    let mut effect = Effect::new(kind, index);
+    for &p in free_of(kind) {
+        effect.parameters[p] = 0.0;
+    }
+    effect.parameters[size] = 1.0;
+    let [f, phase] = shapes_of(kind);
+    effect.parameters[f] = frequency;
+    // The swing as a cosine, so that its coefficient is real.
+    effect.parameters[phase] = 0.5 * core::f64::consts::PI;
+    effect
+}
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::TAU;
+
+    use super::*;
+
+    #[test]
+    fn a_damper_beside_a_spring_is_no_stretch() {
+        let (rate, stiffness, damping, omega) = (50.0, 1e4, 50.0, TAU * 6.0);
+        let times: Vec<f64> = (0..500).map(|i| f64::from(i) / rate).collect();
+        let swing = |t: &f64| 1e-4 * libm::sin(omega * t);
+        let force: Vec<f64> = times
+            .iter()
+            .map(|t| stiffness * swing(t) + damping * omega * 1e-4 * libm::cos(omega * t))
+            .collect();
+        let off = |found: &[f64]| {
+            let errors = std::iter::zip(found, &times).skip(50);
+            errors
+                .map(|(f, t)| (f - swing(t)).abs())
+                .fold(0.0, f64::max)
+        };
+        let with = off(&stretch(&force, (stiffness, damping), rate));
+        let without = off(&stretch(&force, (stiffness, 0.0), rate));
+        assert!(without > 1.5e-5, "{without}");
+        assert!(with < 0.1 * without, "{with} {without}");
+    }
+
+    #[test]
+    fn a_ripple_is_as_large_in_one_trial_as_in_another() {
+        let mut kinds = KINDS.iter().copied();
+        let ripple = kinds.find(|k| k.probe().nature == Nature::Periodic);
+        let effect = Effect::new(ripple.expect("a periodic kind"), 0);
+        let steady = |sizes: &[f64], gain| {
+            let explained = Explained {
+                effect,
+                sd: 0.0,
+                gain,
+                locked: false,
+                sizes: sizes.iter().map(|s| vec![0.6 * s, -0.8 * s]).collect(),
+                columns: vec![effect],
+                share: 1.0,
+            };
+            explained.is_steady()
+        };
+        assert!(steady(&[1.0, 1.2, 0.8, 1.1, 0.9, 1.0], 1000.0));
+        assert!(!steady(&[1.0, 1.0, 1.0, 2.0, 2.0, 2.0], 1000.0));
+        // Noise alone makes sizes differ where there is hardly a line.
+        assert!(steady(&[1.0, 1.0, 1.0, 2.0, 2.0, 2.0], 100.0));
+    }
+}

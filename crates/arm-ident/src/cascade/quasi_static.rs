@@ -1,0 +1,283 @@
+//! The cascade on raw samples, in one streamed pass: angles and forces in, estimates out, nothing kept in between.
+//!
+//! One pass folds `[1, y_N … y_1 | t_N … t_1]` into a triangle of `2N + 1` columns, `y_k` being the gravity column of link k and
+//! `t_j` the torque `(JᵀF)_j`. The step of joint j needs the columns `1, y_N … y_j`, which lead: its own triangle is a corner of the
+//! common one. No filter, no intervals: use [`crate::cascade`] for these.
+
+use arm_core::{Chain, Joints, Lanes, Plane, Pose, Scalar, static_torque};
+
+use crate::cascade::{bounded, own, unknowns, weighed};
+use crate::error::IdentError;
+use crate::regression::trial::Model;
+use crate::regression::unknown::{Moment, Source, Unknown};
+use arm_core::simd_dispatch::{Computation, dispatch};
+use arm_numerics::error::{check_least, check_len};
+use arm_numerics::least_squares::condense::{BLOCK, Column, Condenser};
+use arm_numerics::least_squares::factor::Factor;
+use arm_numerics::linalg::matrix::{Matrix, add_scaled, dot};
+
+/// Samples that are computed with together.
+const WIDTH: usize = 4;
+
+/// Folds samples as they come. Memory is fixed when it is made; pushing never allocates.
+#[derive(Clone, Debug)]
+pub struct Stream<const N: usize> {
+    chain: Chain<f64, N>,
+    wide: Chain<Lanes<WIDTH>, N>,
+    condenser: Condenser,
+}
+
+impl<const N: usize> Stream<N> {
+    /// An empty stream for an arm; only its lengths, gravity and normal moments are used.
+    pub fn new(chain: &Chain<f64, N>) -> Self {
+        Self {
+            chain: *chain,
+            wide: chain.cast(),
+            condenser: Condenser::new(2 * N),
+        }
+    }
+
+    /// Adds samples.
+    ///
+    /// * `q` - joint angles \[rad\]
+    /// * `force_on_arm` - at the tip \[N\]
+    ///
+    /// # Errors
+    /// [`NumericsError::Length`](arm_numerics::NumericsError::Length); [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite), after which the samples before the bad one (or its block) stand.
+    pub fn push(
+        &mut self,
+        q: &[Joints<f64, N>],
+        force_on_arm: &[Plane<f64>],
+    ) -> Result<(), IdentError> {
+        check_len("force_on_arm", force_on_arm.len(), q.len())?;
+        let (mut q, mut force) = (q, force_on_arm);
+        while !q.is_empty() {
+            let wide = &self.wide;
+            if q.len() >= BLOCK
+                && self.condenser.push_panel(|panel| {
+                    dispatch(Fill {
+                        chain: wide,
+                        q: &q[..BLOCK],
+                        force: &force[..BLOCK],
+                        panel,
+                    });
+                })?
+            {
+                (q, force) = (&q[BLOCK..], &force[BLOCK..]);
+                continue;
+            }
+            let (columns, torque) = sample(&self.chain, &q[0], force[0]);
+            // As wide as six segments need.
+            let mut row = [0.0; 16];
+            row[0] = 1.0;
+            for k in 0..N {
+                row[1 + k] = columns[N - 1 - k];
+                row[1 + N + k] = torque[N - 1 - k];
+            }
+            self.condenser.push(&row[..2 * N], row[2 * N])?;
+            (q, force) = (&q[1..], &force[1..]);
+        }
+        Ok(())
+    }
+
+    /// All that the samples say.
+    pub fn finish(self) -> Condensed<N> {
+        Condensed {
+            factor: self.condenser.finish(),
+        }
+    }
+}
+
+/// Gravity column of every link \[N m/(kg m)\] and contact torque of every joint \[N m\], known normal moments taken off.
+#[inline(always)]
+fn sample<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    q: &Joints<T, N>,
+    force: Plane<T>,
+) -> ([T; N], Joints<T, N>) {
+    let pose = Pose::new(q);
+    let [gy, gz] = chain.gravity();
+    let (sin, cos) = (pose.sin(), pose.cos());
+    let mut torque = static_torque(chain, &pose, force, T::ZERO);
+    let mut beyond = T::ZERO;
+    for k in (0..N).rev() {
+        beyond += chain.normal_moments()[k] * (gy * cos[k] + gz * sin[k]);
+        torque[k] -= beyond;
+    }
+    (core::array::from_fn(|k| gy * sin[k] - gz * cos[k]), torque)
+}
+
+/// Writes the columns of a whole panel, several samples at a time.
+struct Fill<'a, const N: usize> {
+    chain: &'a Chain<Lanes<WIDTH>, N>,
+    q: &'a [Joints<f64, N>],
+    force: &'a [Plane<f64>],
+    panel: &'a mut [Column],
+}
+
+impl<const N: usize> Computation for Fill<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self {
+            chain,
+            q,
+            force,
+            panel,
+        } = self;
+        panel[0].fill(1.0);
+        for (at, (q, force)) in q
+            .chunks_exact(WIDTH)
+            .zip(force.chunks_exact(WIDTH))
+            .enumerate()
+        {
+            let angles = Joints::from_fn(|j, _| Lanes(core::array::from_fn(|l| q[l][j])));
+            let force = core::array::from_fn(|c| Lanes(core::array::from_fn(|l| force[l][c])));
+            let (columns, torque) = sample(chain, &angles, force);
+            let place = at * WIDTH..(at + 1) * WIDTH;
+            for k in 0..N {
+                panel[1 + k][place.clone()].copy_from_slice(&columns[N - 1 - k].0);
+                panel[1 + N + k][place.clone()].copy_from_slice(&torque[N - 1 - k].0);
+            }
+        }
+    }
+}
+
+/// All samples of a stream as one triangle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Condensed<const N: usize> {
+    factor: Factor,
+}
+
+/// What the cascade makes of a stream.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cascade<const N: usize> {
+    /// The unknowns with their bounds.
+    pub unknowns: Vec<Unknown>,
+    /// Their values.
+    pub x: Vec<f64>,
+    /// −1 at the lower bound, +1 at the upper bound, 0 between.
+    pub active: Vec<i8>,
+    /// `X_j`, what the data determine \[kg m\].
+    pub first_moments: [f64; N],
+    /// Root mean square of the residual of each joint \[N m\].
+    pub residual_rms: [f64; N],
+}
+
+impl<const N: usize> Condensed<N> {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.factor.rows
+    }
+
+    /// Wrist to shoulder, each under its bounds; see [`crate::cascade`]. A stream knows no direction of motion, so
+    /// dissipative torques are not among the unknowns.
+    ///
+    /// # Errors
+    /// [`NumericsError::TooFew`](arm_numerics::NumericsError::TooFew) for fewer samples than unknowns.
+    pub fn solve(&self, model: &Model<N>, bound_width: f64) -> Result<Cascade<N>, IdentError> {
+        let mut unknowns = unknowns(model, bound_width);
+        unknowns.retain(|u| match u.source {
+            Source::Effect(e, _) => model.fitted[e].kind == arm_core::effect::Kind::ConstantMoment,
+            _ => true,
+        });
+        check_least("samples", self.samples(), N + 2)?;
+        let mut x: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
+        let mut active = vec![0; unknowns.len()];
+        let mut first = *model.chain.first_moments();
+        let mut rms = [0.0; N];
+        for joint in (0..N).rev() {
+            let own = own(model, &unknowns, joint);
+            let (problem, rest) = self.step(model, &unknowns, &own, (joint, &first, &x))?;
+            let variance = f64::max(
+                problem.rho2 / (self.samples() - own.len()) as f64,
+                1e-20 * dot(&problem.z, &problem.z) / self.samples() as f64,
+            )
+            .max(f64::MIN_POSITIVE.sqrt());
+            let (mean, sd): (Vec<f64>, Vec<f64>) = own
+                .iter()
+                .map(|&u| (unknowns[u].mean, unknowns[u].sd))
+                .unzip();
+            let posterior = weighed(&problem, variance).with_prior(&mean, &sd)?;
+            let (values, at, _) = bounded(&posterior, &own, &unknowns)?;
+            rms[joint] = libm::sqrt((problem.residual2(&values)? + rest) / self.samples() as f64);
+            for ((&u, value), at) in own.iter().zip(values).zip(at) {
+                (x[u], active[u]) = (value, at);
+            }
+            first[joint] = first_moment(model, &unknowns, &x, joint);
+        }
+        Ok(Cascade {
+            unknowns,
+            x,
+            active,
+            first_moments: first,
+            residual_rms: rms,
+        })
+    }
+
+    /// The problem of one joint in its own unknowns, and the sum of squares that lies outside of its columns.
+    fn step(
+        &self,
+        model: &Model<N>,
+        unknowns: &[Unknown],
+        own: &[usize],
+        (joint, first, x): (usize, &[f64; N], &[f64]),
+    ) -> Result<(Factor, f64), IdentError> {
+        let size = 1 + N - joint;
+        let column = |link: usize| &self.factor.r.column(N - link)[..size];
+        let torque = if joint == 0 {
+            &self.factor.z[..]
+        } else {
+            self.factor.r.column(2 * N - joint)
+        };
+        let (inside, outside) = torque.split_at(size);
+        let mut z = inside.to_vec();
+        for link in joint + 1..N {
+            add_scaled(&mut z, -first[link], column(link));
+        }
+        // What this link carries beyond its own unknowns: segments that are known by now, or held.
+        let own_share: f64 = own
+            .iter()
+            .map(|&u| share(model, unknowns[u].source, joint) * x[u])
+            .sum();
+        add_scaled(
+            &mut z,
+            own_share - first_moment(model, unknowns, x, joint),
+            column(joint),
+        );
+        let y = Matrix::from_fn(size, own.len(), |i, c| match unknowns[own[c]].source {
+            Source::Effect(..) => self.factor.r.column(0)[i],
+            source => share(model, source, joint) * column(joint)[i],
+        });
+        let problem = Factor {
+            rows: self.samples(),
+            ..Factor::of(&y, &z)?
+        };
+        let beyond = dot(outside, outside) + if joint == 0 { self.factor.rho2 } else { 0.0 };
+        Ok((problem, beyond))
+    }
+}
+
+/// How much of an unknown is in `X_j`.
+fn share<const N: usize>(model: &Model<N>, source: Source, joint: usize) -> f64 {
+    match source {
+        Source::Segment(k, Moment::Along) if k == joint => 1.0,
+        Source::Segment(k, Moment::Mass) if k > joint => model.chain.segments()[joint].length,
+        _ => 0.0,
+    }
+}
+
+/// `X_j` with the unknowns at `x` and the rest as in the model.
+fn first_moment<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    x: &[f64],
+    joint: usize,
+) -> f64 {
+    let moved = unknowns
+        .iter()
+        .zip(x)
+        .map(|(u, x)| share(model, u.source, joint) * (x - u.mean));
+    model.chain.first_moments()[joint] + moved.sum::<f64>()
+}

@@ -1,0 +1,87 @@
+//! What an identification returns.
+
+use arm_core::effect::Effect;
+pub use arm_core::estimator::Decision;
+use arm_core::{Chain, Joints};
+
+use crate::regression::unknown::Source;
+use arm_numerics::least_squares::program::Status;
+
+/// One estimated quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Name as printed, joints counted from one.
+    pub name: String,
+    /// What it is an estimate of, where it is an unknown of the fit and not derived from several.
+    pub source: Option<Source>,
+    /// Zero-based joint or segment, where it belongs to one.
+    pub joint: Option<usize>,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Estimate.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Interval at the level asked for.
+    pub interval: [f64; 2],
+    /// What decided it.
+    pub decided_by: Decision,
+}
+
+/// How the model explains one trial, after filtering and decimation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explained<const N: usize> {
+    /// Index of each sample in the trial.
+    pub samples: Vec<usize>,
+    /// Torques that the measurement asks for \[N m\].
+    pub measured: Vec<Joints<f64, N>>,
+    /// Torques of the fitted model \[N m\].
+    pub fitted: Vec<Joints<f64, N>>,
+}
+
+impl<const N: usize> Explained<N> {
+    /// Sum of squared residuals and number of samples, for each joint.
+    pub fn square_sum(&self) -> ([f64; N], usize) {
+        let mut sum = [0.0; N];
+        for (m, f) in self.measured.iter().zip(&self.fitted) {
+            for j in 0..N {
+                sum[j] += (m[j] - f[j]) * (m[j] - f[j]);
+            }
+        }
+        (sum, self.measured.len())
+    }
+}
+
+/// The result of an identification.
+#[derive(Clone, Debug)]
+pub struct Identified<const N: usize> {
+    /// How the solver ended.
+    pub status: Status,
+    /// Number of combinations that the data determine.
+    pub rank: usize,
+    /// Number of unknowns, calibration not counted.
+    pub unknowns: usize,
+    /// The unknowns and what follows from them.
+    pub parameters: Vec<Estimate>,
+    /// The base parameters: what a movement of a planar chain can show at all.
+    pub combinations: Vec<Estimate>,
+    /// Calibrations that were refitted within their tolerance.
+    pub calibration: Vec<Estimate>,
+    /// In words: which unknowns trade against each other.
+    pub trades: Vec<String>,
+    /// Whether no torque acted, so that all parameters are known up to one common factor only.
+    pub scale_free: bool,
+    /// Cutoff of the common low-pass \[Hz\].
+    pub cutoff: f64,
+    /// Number of independent clusters behind the standard deviations.
+    pub clusters: usize,
+    /// Noise of each joint's speed relative to the speed itself, where the motion was measured; zero where it was simulated.
+    /// Above a few tenths friction, viscosity and inertia are biased in a way that no interval shows.
+    pub speed_noise: Vec<f64>,
+    /// For each trial handed in: how it is explained.
+    pub explained: Vec<Explained<N>>,
+    /// The arm with the estimates.
+    pub chain: Chain<f64, N>,
+    /// The fitted effects with their estimates.
+    pub fitted: Vec<Effect<f64>>,
+}

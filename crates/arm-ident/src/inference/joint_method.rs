@@ -1,0 +1,636 @@
+//! The joint method: all joints at once, all linear effects, physical consistency, honest intervals.
+
+use arm_core::Chain;
+use arm_core::effect::Effect;
+
+use crate::error::IdentError;
+use crate::inference::constraint::{binding_gradients, common_scale, program};
+use crate::inference::cutoff::best_cutoff;
+use crate::inference::estimate::{Explained, Identified};
+use crate::inference::independent_blocks::cluster_ranges;
+use crate::inference::multistart::{Ended, best};
+use crate::inference::summary::{Fit, summarise};
+use crate::regression::equation::{Building, Instrument, value_of};
+use crate::regression::measured_motion::{
+    candidates, measured, motion_cutoff, relative_speed_noise, speed_noise,
+};
+use crate::regression::preprocessing::{Noise, Pieces, filtered, repeat_deviations, residual};
+use crate::regression::sensitivity::{HELD, damped};
+use crate::regression::simulated_motion::simulated;
+use crate::regression::trial::{Model, Role, Tolerance, Trial};
+use crate::regression::unknown::{Imperfection, Moment, Source, Unknown, unknowns};
+use arm_numerics::NumericsError;
+use arm_numerics::least_squares::outcome::Outcome;
+use arm_numerics::{Condenser, Factor, Matrix};
+
+/// Most rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
+const MOST_ROUNDS: usize = 15;
+/// The estimate stands when a round moves it by less than this, in units of its noise.
+const SETTLED: f64 = 1e-2;
+/// Dry friction is smoothed over this many standard deviations of the speed's noise.
+const DEAD_BAND: f64 = 3.0;
+/// Residual, relative to the torques, assumed before the first fit.
+pub(crate) const FIRST_GUESS: f64 = 0.05;
+
+/// Where the motion in the regressors comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotionSource {
+    /// Simulated where the handle's path is known in every trial, else measured.
+    Auto,
+    /// Filtered and differentiated angles.
+    Measured,
+    /// Simulation of the closed chain along the measured path of the handle.
+    Simulated,
+}
+
+/// Choices of an identification.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Cutoff of the common low-pass \[Hz\]; chosen from the data when absent.
+    pub cutoff: Option<f64>,
+    /// Where the motion comes from.
+    pub motion: MotionSource,
+    /// What the calibration promises.
+    pub tolerance: Tolerance,
+    /// Probability of the intervals.
+    pub level: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            cutoff: None,
+            motion: MotionSource::Auto,
+            tolerance: Tolerance::default(),
+            level: 0.95,
+        }
+    }
+}
+
+/// Identifies a model on the trials whose role is [`Role::Fit`]; the others are only explained.
+///
+/// # Errors
+/// [`IdentError`] when there is nothing to fit on or with, a trial is too short for the filter, or no solution exists.
+pub fn identify<const N: usize>(
+    model: &Model<N>,
+    trials: &[Trial<N>],
+    options: &Options,
+) -> Result<Identified<N>, IdentError> {
+    let fit: Vec<&Trial<N>> = fit_trials(trials).collect();
+    if fit.is_empty() {
+        return Err(IdentError::Numerics(NumericsError::TooFew {
+            name: "trials with role fit",
+            found: 0,
+            expected: 1,
+        }));
+    }
+    let scale_free = fit.iter().all(|t| t.is_unloaded());
+    let simulate = match options.motion {
+        MotionSource::Auto => fit.iter().all(|t| can_simulate(t)),
+        MotionSource::Measured => false,
+        MotionSource::Simulated => true,
+    };
+    let unknowns = unknowns(model, &options.tolerance, &fit);
+    if unknowns
+        .iter()
+        .all(|u| matches!(u.source, Source::Calibration(_)))
+    {
+        return Err(IdentError::Numerics(NumericsError::TooFew {
+            name: "unknowns",
+            found: 0,
+            expected: 1,
+        }));
+    }
+    let cutoff = match options.cutoff {
+        Some(cutoff) => cutoff,
+        // Simulated motion is not bent by the filter: the lowest cutoff keeps out most noise.
+        None if simulate => candidates(&fit)[0],
+        None => best_cutoff(model, &unknowns, &fit)?,
+    };
+    let task = Task {
+        unknowns: &unknowns,
+        trials,
+        fit: &fit,
+        cutoff,
+        simulate,
+        scale_free,
+    };
+    let first = if simulate {
+        damped(model, cutoff)
+    } else {
+        model.clone()
+    };
+    let mut found = task.settle(first.clone())?;
+    // Where the robot holds every joint the motion is known, and the problem has one minimum.
+    if simulate && N > HELD {
+        let from = values(&first, &unknowns);
+        let start: Vec<f64> = of_effects(&unknowns).map(|(k, _)| from[k]).collect();
+        let limits: Vec<[f64; 2]> = of_effects(&unknowns).map(|(_, u)| [u.min, u.max]).collect();
+        found = best(found, &start, &limits, |other, effects| {
+            let mut x = values(&other.model, &unknowns);
+            for ((k, _), value) in of_effects(&unknowns).zip(effects) {
+                x[k] = *value;
+            }
+            task.settle(updated(&other.model, &unknowns, &x).ok()?).ok()
+        });
+    }
+    let Settled {
+        model: current,
+        solved,
+        prepared,
+        ..
+    } = found;
+    let explained = prepared
+        .iter()
+        .map(|pieces| explain(pieces, &solved.outcome.x))
+        .collect();
+    let fit_trials = fit;
+    let fit = Fit {
+        solved: &solved,
+        unknowns: &unknowns,
+        model: &current,
+        scale_free,
+        level: options.level,
+    };
+    let mut result = summarise(&fit, cutoff, explained)?;
+    if !simulate {
+        result.speed_noise = relative_speed_noise(&fit_trials, cutoff)?.to_vec();
+    }
+    Ok(result)
+}
+
+/// What rounds of a fit have in common.
+struct Task<'a, const N: usize> {
+    unknowns: &'a [Unknown],
+    trials: &'a [Trial<N>],
+    /// Those that are fitted.
+    fit: &'a [&'a Trial<N>],
+    cutoff: f64,
+    simulate: bool,
+    scale_free: bool,
+}
+
+/// Where rounds of a fit ended.
+struct Settled<const N: usize> {
+    model: Model<N>,
+    solved: Solved,
+    prepared: Vec<Pieces>,
+    /// Values of the fitted effects, and whether they are at a bound.
+    effects: Vec<(f64, i8)>,
+    settled: bool,
+    objective: f64,
+}
+
+impl<const N: usize> Ended for Settled<N> {
+    fn parameters(&self) -> Vec<(f64, i8)> {
+        self.effects.clone()
+    }
+
+    fn settled(&self) -> bool {
+        self.settled
+    }
+
+    fn objective(&self) -> f64 {
+        self.objective
+    }
+}
+
+/// The unknowns that belong to effects, with their places.
+fn of_effects(unknowns: &[Unknown]) -> impl Iterator<Item = (usize, &Unknown)> {
+    let numbered = unknowns.iter().enumerate();
+    numbered.filter(|(_, u)| matches!(u.source, Source::Effect(..)))
+}
+
+impl<const N: usize> Task<'_, N> {
+    /// Fits, linearises again and, where the motion is simulated, simulates again until the estimate stands.
+    fn settle(&self, start: Model<N>) -> Result<Settled<N>, IdentError> {
+        let Self {
+            unknowns,
+            trials,
+            fit,
+            cutoff,
+            simulate,
+            scale_free,
+        } = *self;
+        let mut current = start;
+        let (mut last, mut prepared): (Option<Solved>, Vec<Pieces>) = (None, Vec::new());
+        let (mut shown, mut refused, mut settled) = (current.clone(), None, false);
+        for _ in 0..MOST_ROUNDS {
+            let delay = last
+                .as_ref()
+                .map_or(0.0, |before| delay(unknowns, &before.outcome.x));
+            // Rows take most of the memory: those of the last round make room first.
+            prepared.clear();
+            prepared = match prepare(&current, unknowns, trials, (cutoff, simulate, delay)) {
+                Ok(prepared) => prepared,
+                // A step too far makes an arm that cannot be simulated: half of it is a step too.
+                Err(error) if last.is_some() => {
+                    current = half_way(&shown, &current, unknowns)?;
+                    refused = Some(error);
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            (shown, refused) = (current, None);
+            let fitted = self.fitted(&prepared);
+            let deviations = deviations(fit, &fitted);
+            let solved = weighted(&shown, unknowns, &fitted, (&deviations, scale_free))?;
+            current = updated(&shown, unknowns, &solved.outcome.x)?;
+            let moved = last
+                .as_ref()
+                .map_or(f64::INFINITY, |before| moved(&solved, before));
+            last = Some(solved);
+            if moved < SETTLED {
+                settled = true;
+                break;
+            }
+        }
+        if let Some(error) = refused {
+            return Err(error);
+        }
+        let Some(solved) = last else {
+            unreachable!("there is at least one round")
+        };
+        let effects = of_effects(unknowns)
+            .map(|(k, _)| (solved.outcome.x[k], solved.outcome.active[k]))
+            .collect();
+        let objective = self.objective(&prepared, &solved.outcome.x);
+        Ok(Settled {
+            model: current,
+            solved,
+            prepared,
+            effects,
+            settled,
+            objective,
+        })
+    }
+
+    /// The pieces of the trials that are fitted.
+    fn fitted<'p>(&self, prepared: &'p [Pieces]) -> Vec<&'p Pieces> {
+        let all = prepared.iter().zip(self.trials);
+        all.filter(|(_, t)| t.role == Role::Fit)
+            .map(|(p, _)| p)
+            .collect()
+    }
+
+    /// Twice the negative logarithm of what data and prior say of an estimate, whatever the weights: `n ln det S + Σ ((x − mean) / sd)²`, with
+    /// S the covariance of n residuals.
+    fn objective(&self, prepared: &[Pieces], x: &[f64]) -> f64 {
+        let residuals: Vec<Vec<f64>> = self
+            .fitted(prepared)
+            .into_iter()
+            .flatten()
+            .map(|rows| residual(rows, x))
+            .collect();
+        let samples = residuals.iter().map(Vec::len).sum::<usize>() / N;
+        let prior: f64 = self
+            .unknowns
+            .iter()
+            .zip(x)
+            .map(|(u, x)| (x - u.mean) / u.sd)
+            .map(|v| v * v)
+            .sum();
+        samples as f64 * Noise::<N>::of_all(&residuals).log_determinant() + prior
+    }
+}
+
+/// Whether the robot's angles alone tell how a trial moved: its path is known, and nothing else drives the arm.
+fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
+    let moment = trial.moment_on_arm.iter().flatten().any(|&m| m != 0.0);
+    let torque = trial
+        .torque
+        .iter()
+        .flatten()
+        .any(|t| t.iter().any(|&v| v != 0.0));
+    trial.handle.is_some() && !moment && !torque
+}
+
+/// The estimated delay of the force channels \[s\], zero where it is taken as known.
+fn delay(unknowns: &[Unknown], x: &[f64]) -> f64 {
+    let is_delay = |u: &Unknown| u.source == Source::Calibration(Imperfection::TimeDelay);
+    unknowns
+        .iter()
+        .position(is_delay)
+        .map_or(0.0, |place| x[place])
+}
+
+/// How far a round moved the estimate, in units of its noise.
+fn moved(solved: &Solved, before: &Solved) -> f64 {
+    let step: Vec<f64> = solved
+        .outcome
+        .x
+        .iter()
+        .zip(&before.outcome.x)
+        .map(|(a, b)| a - b)
+        .collect();
+    arm_numerics::linalg::matrix::norm(&solved.posterior.r.times(&step))
+}
+
+/// Filtered rows of every trial.
+fn prepare<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    trials: &[Trial<N>],
+    (cutoff, simulate, delay): (f64, bool, f64),
+) -> Result<Vec<Pieces>, IdentError> {
+    let model = if simulate {
+        model.clone()
+    } else {
+        widened(model, fit_trials(trials), cutoff)
+    };
+    let of_trial = |(k, trial): (usize, &Trial<N>)| {
+        // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
+        if !simulate || (trial.role == Role::Test && !can_simulate(trial)) {
+            let motion = measured(trial, cutoff)?;
+            let mut rows = Building::new((&model, unknowns), trial, &motion);
+            return filtered(trial, cutoff, unknowns.len(), |count| rows.next(count));
+        }
+        let course = simulated(&model, trial, cutoff).map_err(|error| error.in_trial(k))?;
+        let motion = course.at_samples();
+        let mut rows = Instrument::new((&model, unknowns), trial, (&course, &motion), delay);
+        filtered(trial, cutoff, unknowns.len(), |count| rows.next(count))
+    };
+    trials.iter().enumerate().map(of_trial).collect()
+}
+
+/// The trials that are fitted.
+fn fit_trials<const N: usize>(trials: &[Trial<N>]) -> impl Iterator<Item = &Trial<N>> {
+    trials.iter().filter(|t| t.role == Role::Fit)
+}
+
+/// The model with dry friction that changes its sign no faster than the noise of measured speeds.
+pub(crate) fn widened<'a, const N: usize>(
+    model: &Model<N>,
+    trials: impl Iterator<Item = &'a Trial<N>>,
+    cutoff: f64,
+) -> Model<N> {
+    let mut model = model.clone();
+    for trial in trials {
+        let noise = speed_noise(trial, motion_cutoff(cutoff, trial.rate));
+        for effect in model.fitted.iter_mut().chain(&mut model.held) {
+            let noise = noise.get(effect.index).copied().unwrap_or(0.0);
+            widen(effect, DEAD_BAND * noise);
+        }
+    }
+    model
+}
+
+/// Raises the smoothing speed of an effect that has one, within its bounds.
+fn widen(effect: &mut Effect<f64>, least: f64) {
+    for (value, parameter) in effect
+        .parameters
+        .iter_mut()
+        .zip(effect.kind.info().parameters)
+    {
+        if parameter.name == "smoothing" {
+            *value = value.max(least).min(parameter.max);
+        }
+    }
+}
+
+/// Scatter between the repeats of every movement; empty where too few movements were repeated.
+fn deviations<const N: usize>(fit: &[&Trial<N>], pieces: &[&Pieces]) -> Vec<Vec<f64>> {
+    let mut configurations: Vec<usize> = fit.iter().map(|t| t.configuration).collect();
+    configurations.sort_unstable();
+    configurations.dedup();
+    let mut all = Vec::new();
+    for configuration in configurations {
+        let repeats: Vec<&Pieces> = fit
+            .iter()
+            .zip(pieces)
+            .filter(|(t, _)| t.configuration == configuration)
+            .map(|(_, &p)| p)
+            .collect();
+        match repeat_deviations(&repeats) {
+            Some(found) => all.extend(found),
+            None => return Vec::new(),
+        }
+    }
+    all
+}
+
+/// A solved weighted problem and what is needed to say how certain it is.
+pub(crate) struct Solved {
+    /// The solution.
+    pub outcome: Outcome,
+    /// Factor of the weighed data, without prior.
+    pub data: Factor,
+    /// The same with the prior.
+    pub posterior: Factor,
+    /// Factors of the independent clusters.
+    pub clusters: Vec<Factor>,
+    /// Gradients of the inequalities and cones that bind, bounds excepted.
+    pub binding: Vec<Vec<f64>>,
+    /// Rows of the equalities.
+    pub equalities: Vec<Vec<f64>>,
+}
+
+/// Iteratively weighted least squares: the weights of the joints and the estimate in turn.
+fn weighted<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    fit: &[&Pieces],
+    (deviations, scale_free): (&[Vec<f64>], bool),
+) -> Result<Solved, IdentError> {
+    let (mut solved, level) = first_solution::<N>(model, unknowns, fit, scale_free)?;
+    // Repeats of a simulation without noise do not scatter, and tell nothing.
+    let repeated = root_mean_square(deviations.iter().flatten()) > 1e-6 * level;
+    for _ in 0..2 {
+        let rest = |x: &[f64]| -> Vec<Vec<f64>> {
+            fit.iter()
+                .flat_map(|p| p.iter())
+                .map(|r| residual(r, x))
+                .collect()
+        };
+        let residuals = rest(&solved.outcome.x);
+        // Data without any noise (a check on exact values) would make infinite weights.
+        if root_mean_square(residuals.iter().flatten()) <= 1e-9 * level {
+            break;
+        }
+        let noise = if repeated {
+            Noise::<N>::of_repeats(deviations)?.at_least(&residuals)
+        } else {
+            Noise::of_residuals(&residuals)?
+        };
+        solved = solve(model, unknowns, fit, &noise, scale_free)?;
+    }
+    Ok(solved)
+}
+
+/// The estimate under a first guess of white noise, and the size of the torques.
+fn first_solution<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    fit: &[&Pieces],
+    scale_free: bool,
+) -> Result<(Solved, f64), IdentError> {
+    let torque = root_mean_square(fit.iter().flat_map(|p| p.iter()).flat_map(|r| r.rhs.iter()));
+    // Without a load the torques of the known model tell what is large.
+    let x0: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
+    let rest: Vec<Vec<f64>> = fit
+        .iter()
+        .flat_map(|p| p.iter())
+        .map(|r| residual(r, &x0))
+        .collect();
+    let level = torque.max(root_mean_square(rest.iter().flatten()));
+    let noise = Noise::<N>::even((FIRST_GUESS * level).max(f64::MIN_POSITIVE.sqrt()));
+    Ok((solve(model, unknowns, fit, &noise, scale_free)?, level))
+}
+
+pub(crate) fn root_mean_square<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    if count > 0.0 {
+        libm::sqrt(sum / count)
+    } else {
+        0.0
+    }
+}
+
+fn solve<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    fit: &[&Pieces],
+    noise: &Noise<N>,
+    scale_free: bool,
+) -> Result<Solved, IdentError> {
+    let p = unknowns.len();
+    let clusters = cluster_ranges(fit)?
+        .iter()
+        .map(|cluster| {
+            let mut condenser = Condenser::new(p);
+            for (rows, range) in cluster {
+                noise.condense(&mut condenser, rows, range.clone())?;
+            }
+            Ok(condenser.finish())
+        })
+        .collect::<Result<Vec<_>, IdentError>>()?;
+    let mut all = Condenser::new(p);
+    for cluster in &clusters {
+        all.merge_factor(cluster)?;
+    }
+    let data = all.finish();
+    let (posterior, outcome) = estimated(&data, (model, unknowns), scale_free)?;
+    let binding = binding_gradients(&outcome, unknowns, model);
+    let equalities = if scale_free {
+        vec![common_scale(unknowns, model)]
+    } else {
+        Vec::new()
+    };
+    Ok(Solved {
+        outcome,
+        data,
+        posterior,
+        clusters,
+        binding,
+        equalities,
+    })
+}
+
+/// The estimate from a factor of weighed data, and that factor with the prior.
+pub(crate) fn estimated<const N: usize>(
+    data: &Factor,
+    (model, unknowns): (&Model<N>, &[Unknown]),
+    scale_free: bool,
+) -> Result<(Factor, Outcome), IdentError> {
+    let mean: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
+    let sd: Vec<f64> = unknowns.iter().map(|u| u.sd).collect();
+    let posterior = data.with_prior(&mean, &sd)?;
+    let outcome = program(&posterior, unknowns, model, scale_free)?.solve()?;
+    if outcome.x.iter().any(|v| !v.is_finite()) {
+        return Err(IdentError::NoSolution {
+            status: outcome.status,
+        });
+    }
+    Ok((posterior, outcome))
+}
+
+/// The model with estimates in place of its own values.
+fn updated<const N: usize>(
+    model: &Model<N>,
+    unknowns: &[Unknown],
+    x: &[f64],
+) -> Result<Model<N>, IdentError> {
+    let mut next = model.clone();
+    let mut segments = *model.chain.segments();
+    for (k, segment) in segments.iter_mut().enumerate() {
+        let value = |moment| {
+            unknowns
+                .iter()
+                .position(|u| u.source == Source::Segment(k, moment))
+                .map(|u| x[u])
+        };
+        let (Some(mass), Some(along), Some(inertia)) = (
+            value(Moment::Mass),
+            value(Moment::Along),
+            value(Moment::Inertia),
+        ) else {
+            continue;
+        };
+        let normal = value(Moment::Normal).unwrap_or(mass * segment.com[1]);
+        segment.mass = mass;
+        segment.com = [along / mass, normal / mass];
+        segment.inertia = (inertia - (along * along + normal * normal) / mass).max(0.0);
+    }
+    for (u, unknown) in unknowns.iter().enumerate() {
+        if let Source::Effect(e, p) = unknown.source {
+            next.fitted[e].parameters[p] = x[u];
+        }
+    }
+    next.chain = Chain::new(segments, model.chain.base(), model.chain.gravity())
+        .and_then(|c| c.with_rotor_inertia(*model.chain.rotor_inertia()))
+        .map_err(IdentError::Model)?;
+    Ok(next)
+}
+
+/// The model half way between two.
+fn half_way<const N: usize>(
+    from: &Model<N>,
+    to: &Model<N>,
+    unknowns: &[Unknown],
+) -> Result<Model<N>, IdentError> {
+    let x: Vec<f64> = values(from, unknowns)
+        .iter()
+        .zip(values(to, unknowns))
+        .map(|(a, b)| 0.5 * (a + b))
+        .collect();
+    updated(from, unknowns, &x)
+}
+
+/// The model's own values of the unknowns, zero for those of the calibration.
+fn values<const N: usize>(model: &Model<N>, unknowns: &[Unknown]) -> Vec<f64> {
+    unknowns
+        .iter()
+        .map(|u| match u.source {
+            Source::Segment(k, moment) => value_of(&model.chain, k, moment),
+            Source::Effect(e, p) => model.fitted[e].parameters[p],
+            Source::Calibration(_) => 0.0,
+        })
+        .collect()
+}
+
+/// How rows are explained by values of the unknowns.
+pub(crate) fn explain<const N: usize>(pieces: &Pieces, x: &[f64]) -> Explained<N> {
+    let mut out = Explained {
+        samples: Vec::new(),
+        measured: Vec::new(),
+        fitted: Vec::new(),
+    };
+    for piece in pieces {
+        out.samples.extend(&piece.samples);
+        let rest = residual(piece, x);
+        for (m, r) in piece.rhs.chunks_exact(N).zip(rest.chunks_exact(N)) {
+            out.measured.push(arm_core::Joints::from_column_slice(m));
+            out.fitted
+                .push(arm_core::Joints::from_fn(|j, _| m[j] - r[j]));
+        }
+    }
+    out
+}
+
+/// The design matrix that the weighed data leave, without the calibration columns.
+pub(crate) fn physical_columns(data: &Factor, unknowns: &[Unknown]) -> Matrix {
+    let keep: Vec<usize> = (0..unknowns.len())
+        .filter(|&u| !matches!(unknowns[u].source, Source::Calibration(_)))
+        .collect();
+    data.r.select_columns(&keep)
+}

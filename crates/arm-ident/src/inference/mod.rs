@@ -1,0 +1,11 @@
+//! From rows to estimates: the joint method, rank, intervals, restarts; fits by simulation.
+
+pub mod by_simulation;
+pub mod constraint;
+pub(crate) mod cutoff;
+pub mod estimate;
+pub(crate) mod independent_blocks;
+pub mod joint_method;
+pub(crate) mod multistart;
+pub mod rank;
+pub(crate) mod summary;

@@ -1,0 +1,373 @@
+//! From a solved problem to numbers with names, intervals and what decided them.
+
+use crate::error::IdentError;
+use crate::inference::constraint::base_parameters;
+use crate::inference::estimate::{Decision, Estimate, Explained, Identified};
+use crate::inference::joint_method::{Solved, physical_columns};
+use crate::inference::rank::{RankOptions, RankReport, analyse};
+use crate::regression::trial::Model;
+use crate::regression::unknown::{Moment, Source, Unknown};
+use arm_numerics::NumericsError;
+use arm_numerics::linalg::matrix::Matrix;
+use arm_numerics::statistics::distributions::student_t_quantile;
+use arm_numerics::statistics::sandwich_covariance::{Bread, information_ratio, standard_error};
+
+/// Relative singular value below which a combination does not act on the data. Filtering and whitening leave exact
+/// dependencies exact to rounding; inertia in a slow movement is many orders above.
+pub(crate) const RANK_TOLERANCE: f64 = 1e-8;
+/// Share in the null space below which a quantity counts as determined.
+const DETERMINED: f64 = 1e-4;
+/// A quantity with a prior counts as measured when the data took away this share of the prior variance.
+const MEASURED: f64 = 0.9;
+/// A bound decides a quantity when it narrows its standard deviation to less than this share.
+const FREE: f64 = 0.9;
+
+/// What is summarised.
+pub(crate) struct Fit<'a, const N: usize> {
+    pub solved: &'a Solved,
+    pub unknowns: &'a [Unknown],
+    pub model: &'a Model<N>,
+    pub scale_free: bool,
+    pub level: f64,
+}
+
+/// Covariance, intervals and decisions of a fit.
+pub(crate) struct Certainty<'a> {
+    pub unknowns: &'a [Unknown],
+    pub x: &'a [f64],
+    /// Unknowns that a bound or another physical limit takes part in deciding.
+    pub limited: Vec<bool>,
+    /// Relative standard deviation of the scale that the model gives to data without a load, else zero.
+    pub scale_sd: f64,
+    pub covariance: Spread,
+    /// Covariance as if no bound held, for what a bound narrows.
+    pub unbounded: Spread,
+    /// What the movements can tell apart.
+    pub report: RankReport,
+    /// Number of unknowns that are not calibration; they come first.
+    pub physical: usize,
+    /// Degrees of freedom of the scatter: clusters less one.
+    pub dof: f64,
+    /// Probability with which an interval holds the true value.
+    pub level: f64,
+}
+
+/// Covariance of the unknowns.
+pub(crate) struct Spread {
+    /// Of data and prior.
+    pub whole: Matrix,
+    /// The part that was read off the scatter of the clusters.
+    pub scatter: Matrix,
+}
+
+impl Spread {
+    /// Standard deviations of a linear function of the unknowns: the whole, and the part read off the scatter.
+    fn of(&self, w: &[f64]) -> Result<[f64; 2], IdentError> {
+        Ok([
+            standard_error(&self.whole, w)?,
+            standard_error(&self.scatter, w)?,
+        ])
+    }
+}
+
+/// Puts a result together.
+pub(crate) fn summarise<const N: usize>(
+    fit: &Fit<'_, N>,
+    cutoff: f64,
+    explained: Vec<Explained<N>>,
+) -> Result<Identified<N>, IdentError> {
+    let Fit {
+        solved, unknowns, ..
+    } = *fit;
+    let r = physical_columns(&solved.data, unknowns);
+    let physical = r.cols();
+    let options = RankOptions {
+        scale: None,
+        rows: solved.data.rows,
+        tolerance: Some(RANK_TOLERANCE),
+    };
+    let report = analyse(&r, &options)?;
+    let names: Vec<&str> = unknowns[..physical]
+        .iter()
+        .map(|u| u.name.as_str())
+        .collect();
+    let trades = report.describe_trades(&names)?;
+    let rank = report.rank - usize::from(fit.scale_free);
+    let clusters = solved.clusters.len();
+    let certainty = Certainty {
+        scale_sd: if fit.scale_free {
+            fit.model.segment_uncertainty
+        } else {
+            0.0
+        },
+        unknowns,
+        x: &solved.outcome.x,
+        limited: (0..unknowns.len())
+            .map(|u| solved.outcome.active[u] != 0 || solved.binding.iter().any(|b| b[u] != 0.0))
+            .collect(),
+        covariance: covariance(solved, unknowns, true)?,
+        unbounded: covariance(solved, unknowns, false)?,
+        report,
+        physical,
+        dof: (clusters - 1) as f64,
+        level: fit.level,
+    };
+    let mut parameters = Vec::new();
+    for (u, unknown) in unknowns[..physical].iter().enumerate() {
+        parameters.push(certainty.unknown(u)?);
+        if let Source::Segment(k, Moment::Inertia) = unknown.source {
+            let length = fit.model.chain.segments()[k].length;
+            parameters.extend(derived(&certainty, k, length)?);
+        }
+    }
+    for e in &mut parameters {
+        if let Some(Source::Effect(i, _)) = e.source {
+            e.joint = Some(fit.model.fitted[i].index);
+        }
+    }
+    let calibration = (physical..unknowns.len())
+        .map(|u| certainty.unknown(u))
+        .collect::<Result<_, _>>()?;
+    let mut combinations = Vec::new();
+    for (i, (weights, _)) in base_parameters(unknowns, fit.model).iter().enumerate() {
+        let (name, unit) = base_name::<N>(i);
+        combinations.push(Estimate {
+            joint: Some(i % N),
+            ..certainty.linear(weights, name, unit)?
+        });
+    }
+    Ok(Identified {
+        status: solved.outcome.status,
+        rank,
+        unknowns: physical,
+        parameters,
+        combinations,
+        calibration,
+        trades,
+        scale_free: fit.scale_free,
+        cutoff,
+        clusters,
+        speed_noise: vec![0.0; N],
+        explained,
+        chain: fit.model.chain,
+        fitted: fit.model.fitted.clone(),
+    })
+}
+
+/// `H⁻¹ (Σ s sᵀ n/(n−1) + prior) H⁻¹`: scatter of the clusters for the data, the prior's own variance for the prior.
+fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Spread, IdentError> {
+    let p = unknowns.len();
+    let mut binding = solved.equalities.clone();
+    if bounds {
+        binding.extend(solved.binding.iter().cloned());
+        for u in (0..p).filter(|&u| solved.outcome.active[u] != 0) {
+            binding.push((0..p).map(|i| if i == u { 1.0 } else { 0.0 }).collect());
+        }
+    }
+    let bread = Bread::new(&solved.posterior.r, &binding)?;
+    let n = solved.clusters.len() as f64;
+    let scores = solved
+        .clusters
+        .iter()
+        .map(|c| c.score(&solved.outcome.x))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mean: Vec<f64> = (0..p)
+        .map(|i| scores.iter().map(|s| s[i]).sum::<f64>() / n)
+        .collect();
+    let mut meat = Matrix::from_fn(p, p, |i, j| {
+        let scatter: f64 = scores
+            .iter()
+            .map(|s| (s[i] - mean[i]) * (s[j] - mean[j]))
+            .sum();
+        scatter * n / (n - 1.0)
+    });
+    let scatter = bread.sandwich(&meat)?;
+    for (i, unknown) in unknowns.iter().enumerate() {
+        if unknown.sd.is_finite() {
+            meat[(i, i)] += 1.0 / (unknown.sd * unknown.sd);
+        }
+    }
+    Ok(Spread {
+        whole: bread.sandwich(&meat)?,
+        scatter,
+    })
+}
+
+impl Certainty<'_> {
+    pub(crate) fn unknown(&self, u: usize) -> Result<Estimate, IdentError> {
+        let mut w = vec![0.0; self.unknowns.len()];
+        w[u] = 1.0;
+        let unknown = &self.unknowns[u];
+        let mut estimate = self.linear(&w, unknown.name.clone(), unknown.unit)?;
+        estimate.source = Some(unknown.source);
+        estimate.interval = estimate
+            .interval
+            .map(|end| end.clamp(unknown.min, unknown.max));
+        if let Source::Segment(k, _) = unknown.source {
+            estimate.joint = Some(k);
+        }
+        Ok(estimate)
+    }
+
+    /// A linear function of the unknowns.
+    pub(crate) fn linear(
+        &self,
+        w: &[f64],
+        name: String,
+        unit: &'static str,
+    ) -> Result<Estimate, IdentError> {
+        let value: f64 = w.iter().zip(self.x).map(|(w, x)| w * x).sum();
+        let (held, open) = (self.covariance.of(w)?, self.unbounded.of(w)?);
+        // A bound narrows also what hangs together with the unknown that sits on it. How far that is inside nobody knows, so
+        // that neither is known better than without the bound.
+        let narrowed = held[0] < FREE * open[0];
+        // A combination whose parts sit on a bound may still be free to move: X_j is, where m_{j+1} is not.
+        let limited = w.iter().zip(&self.limited).any(|(&w, &l)| w != 0.0 && l);
+        let bound = limited && narrowed;
+        let [std, scatter] = if narrowed { open } else { held };
+        // Without a load every value is a ratio to the model's scale, and knows no more than that scale.
+        let std = libm::hypot(std, self.scale_sd * value);
+        let reach = self.quantile(std, scatter)? * std;
+        let decided_by = if self.scale_sd > 0.0 && w[..self.physical].iter().any(|&v| v != 0.0) {
+            Decision::Prior
+        } else if bound {
+            Decision::Bound
+        } else {
+            self.decision(w, std)?
+        };
+        Ok(Estimate {
+            name,
+            source: None,
+            joint: None,
+            unit,
+            value,
+            std,
+            interval: [value - reach, value + reach],
+            decided_by,
+        })
+    }
+
+    /// Half width of an interval in standard deviations: of so many degrees of freedom as a sum of two variances has of which one
+    /// is known (Satterthwaite 1946), so that what the prior alone tells does not widen with the few clusters.
+    fn quantile(&self, std: f64, scatter: f64) -> Result<f64, IdentError> {
+        const NORMAL: f64 = 1e9;
+        let share = if scatter > 0.0 { std / scatter } else { NORMAL };
+        let dof = self.dof * share * share * share * share;
+        Ok(student_t_quantile(0.5 + self.level / 2.0, dof.min(NORMAL))?)
+    }
+
+    fn decision(&self, w: &[f64], std: f64) -> Result<Decision, IdentError> {
+        let prior = w
+            .iter()
+            .zip(self.unknowns)
+            .filter(|(w, _)| **w != 0.0)
+            .map(|(w, u)| w * u.sd);
+        let prior = libm::sqrt(prior.map(|v| v * v).sum());
+        let physical = &w[..self.physical];
+        if physical.iter().any(|&v| v != 0.0)
+            && self.report.undetermined_share(physical)? > DETERMINED
+        {
+            return Ok(Decision::Prior);
+        }
+        let measured = prior.is_infinite() || information_ratio(std, prior)? >= MEASURED;
+        Ok(if measured {
+            Decision::Data
+        } else {
+            Decision::Prior
+        })
+    }
+
+    /// A nonlinear function through its gradient; decided by the weakest of what it rests on.
+    pub(crate) fn nonlinear(
+        &self,
+        value: f64,
+        gradient: &[f64],
+        name: String,
+        unit: &'static str,
+    ) -> Result<Estimate, IdentError> {
+        let mut estimate = self.linear(gradient, name, unit)?;
+        let [low, high] = estimate.interval;
+        let reach = 0.5 * (high - low);
+        estimate.value = value;
+        estimate.interval = [value - reach, value + reach];
+        for (u, _) in gradient.iter().enumerate().filter(|(_, g)| **g != 0.0) {
+            match self.unknown(u)?.decided_by {
+                other if estimate.decided_by == Decision::Data => estimate.decided_by = other,
+                _ => {}
+            }
+        }
+        Ok(estimate)
+    }
+}
+
+/// Centre of mass and inertia about it, which follow from the unknowns of a segment.
+fn derived(certainty: &Certainty<'_>, k: usize, length: f64) -> Result<[Estimate; 2], IdentError> {
+    let find = |moment| {
+        certainty
+            .unknowns
+            .iter()
+            .position(|u| u.source == Source::Segment(k, moment))
+    };
+    let (Some(m), Some(h), Some(i)) = (
+        find(Moment::Mass),
+        find(Moment::Along),
+        find(Moment::Inertia),
+    ) else {
+        return Err(IdentError::Numerics(NumericsError::TooFew {
+            name: "unknowns of a segment",
+            found: 0,
+            expected: 3,
+        }));
+    };
+    let x = certainty.x;
+    let normal = find(Moment::Normal);
+    let n = normal.map_or(0.0, |n| x[n]);
+    let com = x[h] / x[m];
+    let mut to_com = vec![0.0; x.len()];
+    to_com[h] = 1.0 / x[m];
+    to_com[m] = -com / x[m];
+    let mut to_inertia = vec![0.0; x.len()];
+    to_inertia[i] = 1.0;
+    to_inertia[h] = -2.0 * com;
+    to_inertia[m] = (x[h] * x[h] + n * n) / (x[m] * x[m]);
+    if let Some(place) = normal {
+        to_inertia[place] = -2.0 * n / x[m];
+    }
+    let inertia = x[i] - (x[h] * x[h] + n * n) / x[m];
+    let mut list = [
+        certainty.nonlinear(com, &to_com, format!("l{}", k + 1), "m")?,
+        certainty.nonlinear(inertia, &to_inertia, format!("I{}", k + 1), "kg m^2")?,
+    ];
+    // The centre of mass is within the segment, and no inertia is negative.
+    for (estimate, most) in list.iter_mut().zip([length, f64::INFINITY]) {
+        estimate.joint = Some(k);
+        estimate.interval = estimate.interval.map(|end| end.clamp(0.0, most));
+    }
+    Ok(list)
+}
+
+/// Name and unit of base parameter `i` of `X_1 … X_N, J_1 … J_N`.
+pub(crate) fn base_name<const N: usize>(i: usize) -> (String, &'static str) {
+    let j = i % N + 1;
+    let beyond: Vec<String> = (j + 1..=N).map(|k| format!("m{k}")).collect();
+    let mass = match beyond.len() {
+        0 => String::new(),
+        1 => beyond[0].clone(),
+        _ => format!("({})", beyond.join(" + ")),
+    };
+    let tail = |arm: String| {
+        if mass.is_empty() {
+            String::new()
+        } else {
+            format!(" + {arm}*{mass}")
+        }
+    };
+    if i < N {
+        (format!("m{j}*l{j}{}", tail(format!("a{j}"))), "kg m")
+    } else {
+        (
+            format!("I{j} + m{j}*l{j}^2{}", tail(format!("a{j}^2"))),
+            "kg m^2",
+        )
+    }
+}

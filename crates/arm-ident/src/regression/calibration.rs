@@ -1,0 +1,155 @@
+//! How small imperfections of the measurement show in the rows of the regression.
+//!
+//! Each imperfection is a column: its first-order influence on the left-hand side. The columns are computed from the
+//! force that the *model* predicts, never from the measured one: a column that carries the noise of the right-hand side
+//! would explain that noise, and the fit would buy it with a wrong gain and parameters shrunk to match.
+
+use arm_core::effect::{Motion, resisting_torque};
+use arm_core::{Joints, Plane, Pose, Scalar, inverse_dynamics, jacobian, static_torque};
+
+use crate::regression::equation::{Kinematics, Memory};
+use crate::regression::trial::{Model, Trial};
+use crate::regression::unknown::{Imperfection, Source, Unknown};
+
+/// The force on the arm \[N\] that the model predicts for a motion, sample after sample.
+///
+/// Least squares of `Jᵀ F = B q̈ + C q̇ + G + R − τ − M` over the two components of the force; in a pose in which a component
+/// does no work (a stretched arm) that component is zero. Zero where the arm is not led by a force.
+pub(crate) struct Prediction<const N: usize> {
+    memory: Memory,
+    near: Nearby,
+    /// Samples of which the force is known.
+    known: usize,
+}
+
+/// The predicted force \[N\] at a sample and at those beside it; at an end the sample itself stands for what is beyond.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Nearby {
+    before: Plane<f64>,
+    here: Plane<f64>,
+    after: Plane<f64>,
+    /// Intervals from `before` to `after`.
+    span: usize,
+}
+
+impl<const N: usize> Prediction<N> {
+    /// Before the first sample; none where no imperfection of the measurement is among the unknowns.
+    pub fn of_unknowns(unknowns: &[Unknown], model: &Model<N>) -> Option<Self> {
+        let is_calibration = |u: &Unknown| matches!(u.source, Source::Calibration(_));
+        unknowns.iter().any(is_calibration).then(|| Self {
+            memory: Memory::new(model),
+            near: Nearby::default(),
+            known: 0,
+        })
+    }
+
+    /// The force about the next sample.
+    pub fn next(&mut self, model: &Model<N>, trial: &Trial<N>, motion: &Kinematics<N>) -> Nearby {
+        let first = self.known == 0;
+        if first {
+            self.near.after = self.force(model, trial, motion);
+            self.near.here = self.near.after;
+        }
+        self.near.before = self.near.here;
+        self.near.here = self.near.after;
+        let last = self.known == trial.len();
+        if !last {
+            self.near.after = self.force(model, trial, motion);
+        }
+        self.near.span = (2 - usize::from(first) - usize::from(last)).max(1);
+        self.near
+    }
+
+    /// The force at the first sample of which it is not known yet.
+    fn force(&mut self, model: &Model<N>, trial: &Trial<N>, motion: &Kinematics<N>) -> Plane<f64> {
+        let i = self.known;
+        self.known += 1;
+        if trial.force_on_arm.is_none() {
+            return [0.0; 2];
+        }
+        let (q, qd, qdd) = (&motion.q[i], &motion.qd[i], &motion.qdd[i]);
+        let pose = Pose::new(q);
+        let seen = Motion::new(i as f64 / trial.rate, *q, *qd);
+        self.memory.advance(&seen, 1.0 / trial.rate);
+        let torque = inverse_dynamics(&model.chain, &pose, qd, qdd)
+            + resisting_torque(&model.fitted, &seen, &self.memory.fitted)
+            + resisting_torque(&model.held, &seen, &self.memory.held)
+            - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i])
+            - Joints::repeat(trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]));
+        let j = jacobian(&model.chain, &pose);
+        let (a, b, c) = (
+            j.row(0).dot(&j.row(0)),
+            j.row(0).dot(&j.row(1)),
+            j.row(1).dot(&j.row(1)),
+        );
+        let rhs = j * torque;
+        // The smaller eigenvalue of J Jᵀ is set off from zero by this share of the larger.
+        let damping = 1e-3 * (a + c);
+        let (a, c) = (a + damping, c + damping);
+        let determinant = a * c - b * b;
+        [
+            (c * rhs[0] - b * rhs[1]) / determinant,
+            (a * rhs[1] - b * rhs[0]) / determinant,
+        ]
+    }
+}
+
+/// What one unit of an imperfection adds to the left-hand side of a sample's rows \[N m\].
+pub(crate) fn influence<const N: usize>(
+    model: &Model<N>,
+    trial: &Trial<N>,
+    motion: &Kinematics<N>,
+    (force, memory, i): (&Nearby, &Memory, usize),
+    what: Imperfection,
+) -> Joints<f64, N> {
+    let pose = Pose::new(&motion.q[i]);
+    match what {
+        Imperfection::AngleOffset(joint) => {
+            let time = i as f64 / trial.rate;
+            angle_offset(model, motion, (force.here, memory, i, time), joint)
+        }
+        Imperfection::ForceBias(channel) => {
+            let mut unit = [0.0; 2];
+            unit[channel] = 1.0;
+            static_torque(&model.chain, &pose, unit, 0.0)
+        }
+        Imperfection::ForceGain(channel) => {
+            let mut share = [0.0; 2];
+            share[channel] = force.here[channel];
+            static_torque(&model.chain, &pose, share, 0.0)
+        }
+        Imperfection::TimeDelay => {
+            let span = force.span as f64 / trial.rate;
+            let rate = [0, 1].map(|c| (force.after[c] - force.before[c]) / span);
+            -static_torque(&model.chain, &pose, rate, 0.0)
+        }
+        Imperfection::HandlePlacement(axis) => {
+            // A displaced handle lengthens the lever of the last segment; every joint feels the same moment.
+            let angle = motion.q[i].iter().fold(0.0, |sum, q| sum + q);
+            let (s, c) = Scalar::sin_cos(angle);
+            let direction = if axis == 0 { [c, s] } else { [-s, c] };
+            let moment = direction[0] * force.here[1] - direction[1] * force.here[0];
+            Joints::repeat(-moment)
+        }
+    }
+}
+
+/// The measured angle is the true one plus the offset: the row moves against the offset, and springs of the joints with it.
+fn angle_offset<const N: usize>(
+    model: &Model<N>,
+    motion: &Kinematics<N>,
+    (force, memory, i, time): (Plane<f64>, &Memory, usize, f64),
+    joint: usize,
+) -> Joints<f64, N> {
+    const STEP: f64 = 1e-5;
+    let row = |shift: f64| {
+        let mut q = motion.q[i];
+        q[joint] += shift;
+        let (pose, moving) = (Pose::new(&q), Motion::new(time, q, motion.qd[i]));
+        inverse_dynamics(&model.chain, &pose, &motion.qd[i], &motion.qdd[i])
+            + resisting_torque(&model.fitted, &moving, &memory.fitted)
+            + resisting_torque(&model.held, &moving, &memory.held)
+            - static_torque(&model.chain, &pose, force, 0.0)
+    };
+    (row(-STEP) - row(STEP)) / (2.0 * STEP)
+}

@@ -1,0 +1,411 @@
+//! From raw rows to those that are fitted: the common low-pass, decimation, and weights.
+
+use crate::error::IdentError;
+use crate::regression::equation::Rows;
+use crate::regression::measured_motion::low_pass;
+use crate::regression::trial::Trial;
+use arm_numerics::Condenser;
+use arm_numerics::error::check_least;
+use arm_numerics::signal::filter::{BothWays, Butterworth};
+use arm_numerics::statistics::autoregressive::effective_samples;
+
+/// Samples kept for each period of the cutoff frequency; a little above the two that the sampling theorem asks for.
+const SAMPLES_PER_PERIOD: f64 = 2.5;
+
+/// Periods of the cutoff frequency that are dropped next to an end or a gap, where filters and differences have guessed.
+const MARGIN: f64 = 1.5;
+
+/// Fewest decimated samples in a stretch that is used.
+const SHORTEST: usize = 8;
+
+/// Fewest samples that are built and filtered at once: what is shorter goes through in one.
+const STRETCH: usize = 4096;
+/// The same in lengths of what a filter rings on, which is filtered twice.
+const REACHES: usize = 4;
+
+/// Rows after filtering and decimation, in pieces without a gap.
+pub type Pieces = Vec<Rows>;
+
+/// The common low-pass of a trial and the samples that are kept.
+pub(crate) struct Thinning {
+    filter: Butterworth,
+    /// A list for each piece.
+    kept: Vec<Vec<usize>>,
+    samples: usize,
+}
+
+impl Thinning {
+    /// For rows that are low-passed at `cutoff` \[Hz\].
+    ///
+    /// # Errors
+    /// [`IdentError`] for a trial too short for the filter.
+    pub fn new<const N: usize>(trial: &Trial<N>, cutoff: f64) -> Result<Self, IdentError> {
+        let filter = low_pass(cutoff, trial.rate)?;
+        check_least("samples of column", trial.len(), filter.padding() + 1)?;
+        let step = ((trial.rate / (SAMPLES_PER_PERIOD * cutoff)) as usize).max(1);
+        let margin = ((MARGIN * trial.rate / cutoff) as usize).max(1);
+        Ok(Self {
+            filter,
+            kept: kept_samples(&trial.valid, margin, step),
+            samples: trial.len(),
+        })
+    }
+
+    /// Samples in each piece.
+    pub fn lengths(&self) -> Vec<usize> {
+        self.kept.iter().map(Vec::len).collect()
+    }
+
+    /// Room for the samples before `end` that were not given yet, with the number of their piece.
+    fn upto(
+        &self,
+        end: usize,
+        (piece, before): &mut (usize, usize),
+        room: impl Fn(&[usize]) -> Rows,
+    ) -> Vec<(usize, Rows)> {
+        let mut list = Vec::new();
+        while let Some(samples) = self.kept.get(*piece) {
+            let rest = &samples[*before..];
+            let count = rest.partition_point(|&sample| sample < end);
+            if count > 0 {
+                list.push((*piece, room(&rest[..count])));
+            }
+            if count < rest.len() {
+                *before += count;
+                break;
+            }
+            (*piece, *before) = (*piece + 1, 0);
+        }
+        list
+    }
+
+    /// [`filtered`], none of it kept.
+    ///
+    /// * `take` - gets rows that are kept, in the order of time, and the number of their piece
+    ///
+    /// # Errors
+    /// [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite), and what `take` refuses.
+    pub fn stream<const N: usize>(
+        &self,
+        unknowns: usize,
+        mut build: impl FnMut(usize) -> Rows,
+        mut take: impl FnMut(usize, Rows) -> Result<(), IdentError>,
+    ) -> Result<(), IdentError> {
+        let stretch = STRETCH.max(REACHES * self.filter.reach());
+        let mut smooth = BothWays::new(&self.filter, (unknowns + 1) * N);
+        let (mut left, mut next) = (self.samples, (0, 0));
+        while left > 0 {
+            // A last one that is short would not hold what is mirrored at the end.
+            let count = if left < 2 * stretch { left } else { stretch };
+            left -= count;
+            let last = left == 0;
+            let from = smooth.given();
+            let mut ready = self.upto(smooth.given_with(count, last), &mut next, |samples| {
+                Rows::zeros::<N>(unknowns, samples.to_vec())
+            });
+            let raw = build(count);
+            let columns = raw.columns.iter().chain([&raw.rhs]);
+            let columns: Vec<&[f64]> = columns.map(Vec::as_slice).collect();
+            smooth.push::<N>(&columns, last, |channel, values| {
+                let (u, j) = (channel / N, channel % N);
+                for (_, rows) in &mut ready {
+                    let Rows {
+                        columns,
+                        rhs,
+                        samples,
+                        ..
+                    } = rows;
+                    let column = columns.get_mut(u).unwrap_or(rhs);
+                    for (place, sample) in column[j..].iter_mut().step_by(N).zip(samples) {
+                        *place = values.at(*sample - from);
+                    }
+                }
+            })?;
+            ready
+                .into_iter()
+                .try_for_each(|(piece, rows)| take(piece, rows))?;
+        }
+        Ok(())
+    }
+}
+
+/// Low-passes all columns and the right-hand side of a trial alike, keeps one sample in some, and drops what a gap or an end has touched.
+///
+/// Rows are asked for a stretch at a time, so that those of the whole trial are never held.
+///
+/// * `cutoff` - of the low-pass \[Hz\]
+/// * `unknowns` - number of columns
+/// * `build` - gives the rows of the next samples, as many as it is asked for
+///
+/// # Errors
+/// [`IdentError`] for a trial too short for the filter.
+pub fn filtered<const N: usize>(
+    trial: &Trial<N>,
+    cutoff: f64,
+    unknowns: usize,
+    build: impl FnMut(usize) -> Rows,
+) -> Result<Pieces, IdentError> {
+    let thinning = Thinning::new(trial, cutoff)?;
+    let room = |n: &Vec<usize>| Rows {
+        columns: (0..unknowns)
+            .map(|_| Vec::with_capacity(n.len() * N))
+            .collect(),
+        rhs: Vec::with_capacity(n.len() * N),
+        samples: Vec::with_capacity(n.len()),
+        fits: None,
+    };
+    let mut pieces: Pieces = thinning.kept.iter().map(room).collect();
+    thinning.stream::<N>(unknowns, build, |piece, rows| {
+        let whole = &mut pieces[piece];
+        for (all, some) in whole.columns.iter_mut().zip(&rows.columns) {
+            all.extend(some);
+        }
+        whole.rhs.extend(&rows.rhs);
+        whole.samples.extend(&rows.samples);
+        Ok(())
+    })?;
+    Ok(pieces)
+}
+
+/// Indices of the samples to keep, a list for each stretch that is at least `margin` away from gaps and ends.
+fn kept_samples(valid: &[bool], margin: usize, step: usize) -> Vec<Vec<usize>> {
+    let mut pieces = Vec::new();
+    let mut current: Vec<usize> = Vec::new();
+    let mut start = 0;
+    for i in 0..=valid.len() {
+        if i < valid.len() && valid[i] {
+            continue;
+        }
+        let mut at = start + margin;
+        while at + margin < i {
+            current.push(at);
+            at += step;
+        }
+        if current.len() > SHORTEST {
+            pieces.push(core::mem::take(&mut current));
+        }
+        current.clear();
+        start = i + 1;
+    }
+    pieces
+}
+
+/// How much the rows weigh: the inverse Cholesky factor of the covariance of one sample's torques.
+///
+/// Where a movement was repeated, the covariance is that of the scatter between repeats, which is noise and nothing else;
+/// then joints that the same force noise disturbs are weighed together. Without repeats only one variance a joint is
+/// taken from the residual: what a model lacks is in it too, and must not steer the estimate through the weights.
+/// That rows are not independent in time is left to the clustered covariance; here it only lowers the weight against the
+/// prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise<const N: usize> {
+    /// Lower triangular, row-major \[1/(N m)\].
+    inverse: [[f64; N]; N],
+}
+
+/// Share of the largest variance that is added to every joint, so that no combination of torques is trusted beyond the model.
+pub(crate) const LEAST_SHARE: f64 = 1e-3;
+
+impl<const N: usize> Noise<N> {
+    /// The same in every joint \[N m\].
+    pub fn even(sd: f64) -> Self {
+        Self::from_covariance(&core::array::from_fn(|j| {
+            core::array::from_fn(|k| if j == k { sd * sd } else { 0.0 })
+        }))
+    }
+
+    /// Rows as they are.
+    pub(crate) fn none() -> Self {
+        let one = |j, k| if j == k { 1.0 } else { 0.0 };
+        Self {
+            inverse: core::array::from_fn(|j| core::array::from_fn(|k| one(j, k))),
+        }
+    }
+
+    /// From residuals, given as pieces of joint-interleaved values \[N m\].
+    ///
+    /// # Errors
+    /// [`NumericsError::TooFew`](arm_numerics::NumericsError::TooFew) when a piece is too short.
+    pub fn of_residuals(residuals: &[Vec<f64>]) -> Result<Self, IdentError> {
+        let mut covariance = second_moments::<N>(residuals);
+        let shrink = redundancy::<N>(residuals)?;
+        for j in 0..N {
+            for k in 0..N {
+                covariance[j][k] = if j == k {
+                    covariance[j][j] * shrink[j]
+                } else {
+                    0.0
+                };
+            }
+        }
+        Ok(Self::from_covariance(&covariance))
+    }
+
+    /// From deviations of repeats from their mean, already corrected for the freedom that the mean took.
+    ///
+    /// # Errors
+    /// [`NumericsError::TooFew`](arm_numerics::NumericsError::TooFew) when a piece is too short.
+    pub fn of_repeats(deviations: &[Vec<f64>]) -> Result<Self, IdentError> {
+        let mut covariance = second_moments::<N>(deviations);
+        let shrink = redundancy::<N>(deviations)?.into_iter().fold(1.0, f64::max);
+        covariance.iter_mut().flatten().for_each(|v| *v *= shrink);
+        Ok(Self::from_covariance(&covariance))
+    }
+
+    /// Of all that residuals have in common between joints, as if they were independent in time.
+    pub fn of_all(residuals: &[Vec<f64>]) -> Self {
+        Self::from_covariance(&second_moments::<N>(residuals))
+    }
+
+    fn from_covariance(covariance: &[[f64; N]; N]) -> Self {
+        let largest = (0..N)
+            .map(|j| covariance[j][j])
+            .fold(f64::MIN_POSITIVE, f64::max);
+        let mut lower = [[0.0; N]; N];
+        for j in 0..N {
+            for k in 0..=j {
+                let mut value = covariance[j][k] + if j == k { LEAST_SHARE * largest } else { 0.0 };
+                for i in 0..k {
+                    value -= lower[j][i] * lower[k][i];
+                }
+                lower[j][k] = if j == k {
+                    value.max(LEAST_SHARE * largest).sqrt()
+                } else {
+                    value / lower[k][k]
+                };
+            }
+        }
+        let mut inverse = [[0.0; N]; N];
+        for column in 0..N {
+            for j in column..N {
+                let mut value = if j == column { 1.0 } else { 0.0 };
+                for k in column..j {
+                    value -= lower[j][k] * inverse[k][column];
+                }
+                inverse[j][column] = value / lower[j][j];
+            }
+        }
+        Self { inverse }
+    }
+
+    /// The same weights, lowered until the residuals are no larger than the noise: what repeats do not show but the
+    /// model cannot explain limits how far data may overrule what is known beforehand.
+    pub fn at_least(mut self, residuals: &[Vec<f64>]) -> Self {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for sample in residuals.iter().flat_map(|p| p.chunks_exact(N)) {
+            for j in 0..N {
+                let value = (0..=j).fold(0.0, |sum, k| sum + self.inverse[j][k] * sample[k]);
+                sum += value * value;
+                count += 1.0;
+            }
+        }
+        let excess = libm::sqrt(sum / f64::max(count, 1.0));
+        if excess > 1.0 {
+            self.inverse.iter_mut().flatten().for_each(|v| *v /= excess);
+        }
+        self
+    }
+
+    /// Logarithm of the covariance's determinant.
+    pub fn log_determinant(&self) -> f64 {
+        (0..N).map(|j| -2.0 * libm::log(self.inverse[j][j])).sum()
+    }
+
+    /// Folds rows into a factor, weighed.
+    ///
+    /// * `range` - samples of them
+    ///
+    /// # Errors
+    /// [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite) for rows that are not finite.
+    pub(crate) fn condense(
+        &self,
+        condenser: &mut Condenser,
+        rows: &Rows,
+        range: core::ops::Range<usize>,
+    ) -> Result<(), IdentError> {
+        let width = rows.columns.len() + 1;
+        let mut sample = vec![0.0; N * width];
+        for i in range {
+            for (u, values) in rows.columns.iter().chain([&rows.rhs]).enumerate() {
+                let values = &values[i * N..(i + 1) * N];
+                for j in 0..N {
+                    sample[j * width + u] =
+                        (0..=j).fold(0.0, |sum, k| sum + self.inverse[j][k] * values[k]);
+                }
+            }
+            for row in sample.chunks_exact(width) {
+                condenser.push(&row[..width - 1], row[width - 1])?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Mean products of the joints' values.
+fn second_moments<const N: usize>(pieces: &[Vec<f64>]) -> [[f64; N]; N] {
+    let mut sum = [[0.0; N]; N];
+    let mut count = 0.0;
+    for sample in pieces.iter().flat_map(|p| p.chunks_exact(N)) {
+        count += 1.0;
+        for j in 0..N {
+            for k in 0..N {
+                sum[j][k] += sample[j] * sample[k];
+            }
+        }
+    }
+    sum.map(|row| row.map(|v| v / f64::max(count, 1.0)))
+}
+
+/// Samples for each effective sample, by joint; at least one.
+fn redundancy<const N: usize>(pieces: &[Vec<f64>]) -> Result<[f64; N], IdentError> {
+    let mut out = [1.0; N];
+    for (j, value) in out.iter_mut().enumerate() {
+        let (mut count, mut effective) = (0.0, 0.0);
+        for piece in pieces {
+            let series: Vec<f64> = piece.iter().skip(j).step_by(N).copied().collect();
+            count += series.len() as f64;
+            effective += effective_samples(&series)?.max(1.0);
+        }
+        *value = f64::max(count / effective, 1.0);
+    }
+    Ok(out)
+}
+
+/// Deviations of the right-hand sides of repeats from their mean, scaled by `√(n/(n−1))`.
+///
+/// * `repeats` - filtered rows of trials of one movement
+///
+/// `None` unless there are at least three, all with the same samples in one piece.
+pub fn repeat_deviations(repeats: &[&Pieces]) -> Option<Vec<Vec<f64>>> {
+    let n = repeats.len();
+    let first = repeats.first()?.first()?;
+    if n < 3
+        || repeats
+            .iter()
+            .any(|p| p.len() != 1 || p[0].samples != first.samples)
+    {
+        return None;
+    }
+    let mean = |i: usize| repeats.iter().map(|p| p[0].rhs[i]).sum::<f64>() / n as f64;
+    let correction = libm::sqrt(n as f64 / (n as f64 - 1.0));
+    let means: Vec<f64> = (0..first.rhs.len()).map(mean).collect();
+    let deviation = |p: &&Pieces| {
+        p[0].rhs
+            .iter()
+            .zip(&means)
+            .map(|(v, m)| (v - m) * correction)
+            .collect()
+    };
+    Some(repeats.iter().map(deviation).collect())
+}
+
+/// Residual of rows at given parameters, joint-interleaved.
+pub fn residual(rows: &Rows, x: &[f64]) -> Vec<f64> {
+    let mut out = rows.rhs.clone();
+    for (column, &value) in rows.columns.iter().zip(x) {
+        for (r, c) in out.iter_mut().zip(column) {
+            *r -= c * value;
+        }
+    }
+    out
+}

@@ -1,0 +1,297 @@
+//! What an unknown changes in the torques by moving the arm otherwise.
+//!
+//! A robot that leads the hand does not hold every joint: where the arm has more joints than the handle has directions, what it
+//! does between shoulder and handle depends on its own springs, friction and inertia. Torques computed along a simulated motion
+//! then follow an unknown twice, directly and through the motion. The second part comes from the equation of motion linearised
+//! along the run, `M q̈ + D q̇ + (K + Jᵀ S J) q = −Y`, which is solved implicitly, so that a stiff contact and dry friction need
+//! no short steps.
+
+use arm_core::effect::{Kind, Motion, resisting_torque};
+use arm_core::{Joints, Plane, Pose, inertia, inverse_dynamics, jacobian, static_torque};
+use arm_sim::Recording;
+use nalgebra::SMatrix;
+
+use crate::regression::equation::{Building, Kinematics, Memory};
+use crate::regression::trial::{Model, Role, Trial};
+use crate::regression::unknown::{Source, Unknown};
+
+/// Joints that a handle holds; what is left of their freedom is the give of the contact, which is none to speak of.
+pub(crate) const HELD: usize = 2;
+/// Samples a second that follow the arm's own vibrations between the samples of a trial \[Hz\].
+const FINE: f64 = 200.0;
+/// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
+const THETA: f64 = 0.55;
+/// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
+const NUDGE: (f64, f64) = (1e-6, 1e-5);
+
+/// The model from which a fit starts: what the robot does not hold is damped so far that its own vibrations die out as fast as the rows end.
+///
+/// A joint of which nobody knows how it is damped rings in a simulation for as long as it likes and in no phase with the truth; a fit that is
+/// linearised along such a run ends at a viscosity of zero once in ten times. Along a smooth run it finds back from ten times too much.
+pub(crate) fn damped<const N: usize>(model: &Model<N>, cutoff: f64) -> Model<N> {
+    let stretched = inertia(&model.chain, &Pose::new(&Joints::zeros()));
+    let mut start = model.clone();
+    for effect in &mut start.fitted {
+        if effect.kind == Kind::Viscous && (HELD..N).contains(&effect.index) {
+            let enough = stretched[(effect.index, effect.index)] * core::f64::consts::TAU * cutoff;
+            let most = effect.kind.info().parameters[0].max;
+            effect.parameters[0] = effect.parameters[0].max(enough).min(most);
+        }
+    }
+    start
+}
+
+/// Steps for each sample of a trial.
+pub(crate) fn parts(rate: f64) -> usize {
+    libm::ceil(FINE / rate).max(1.0) as usize
+}
+
+/// A simulated run, more finely sampled than the trial that it belongs to.
+#[derive(Clone, Debug)]
+pub(crate) struct Course<const N: usize> {
+    /// What moved, as a trial without noise.
+    fine: Trial<N>,
+    motion: Kinematics<N>,
+    parts: usize,
+}
+
+impl<const N: usize> Course<N> {
+    /// From a recording with `parts` samples for each of a trial at `rate` \[Hz\].
+    pub fn new(recording: &Recording<N>, rate: f64, parts: usize) -> Self {
+        let joints = |values: &[f64]| -> Vec<Joints<f64, N>> {
+            values
+                .chunks_exact(N)
+                .map(Joints::from_column_slice)
+                .collect()
+        };
+        let force = recording.force_on_arm.chunks_exact(2);
+        let motion = Kinematics {
+            q: joints(&recording.q),
+            qd: joints(&recording.qd),
+            qdd: joints(&recording.qdd),
+        };
+        let fine = Trial {
+            role: Role::Fit,
+            configuration: 0,
+            rate: rate * parts as f64,
+            q: motion.q.clone(),
+            speed: None,
+            force_on_arm: Some(force.map(|f| [f[0], f[1]]).collect()),
+            moment_on_arm: None,
+            torque: None,
+            handle: None,
+            valid: vec![true; motion.q.len()],
+        };
+        Self {
+            fine,
+            motion,
+            parts,
+        }
+    }
+
+    /// The motion at the samples of the trial.
+    pub fn at_samples(&self) -> Kinematics<N> {
+        let pick = |values: &[Joints<f64, N>]| values.iter().step_by(self.parts).copied().collect();
+        Kinematics {
+            q: pick(&self.motion.q),
+            qd: pick(&self.motion.qd),
+            qdd: pick(&self.motion.qdd),
+        }
+    }
+
+    /// The angles at the samples of the trial.
+    pub fn angles_at_samples(&self) -> impl Iterator<Item = &Joints<f64, N>> {
+        self.motion.q.iter().step_by(self.parts)
+    }
+
+    /// The force on the arm at the samples of the trial \[N\].
+    pub fn force_at_samples(&self) -> Vec<Plane<f64>> {
+        let force = self.fine.force_on_arm.iter().flatten();
+        force.step_by(self.parts).copied().collect()
+    }
+
+    /// What a delay of the force channels \[s\] takes from the force that they read at a sample of the trial \[N\]; before the first
+    /// sample and after the last the force holds.
+    pub fn change_by_delay(&self, delay: f64, sample: usize) -> Plane<f64> {
+        let force = self.fine.force_on_arm.as_deref().unwrap_or_default();
+        let last = force.len() as f64 - 1.0;
+        let i = sample * self.parts;
+        let place = (i as f64 - delay * self.fine.rate).clamp(0.0, last);
+        let first = place.floor().clamp(1.0, (last - 2.0).max(1.0)) - 1.0;
+        let x = place - first;
+        // Lagrange through the samples 0, 1, 2, 3 from the first.
+        let (a, b, c, d) = (x, x - 1.0, x - 2.0, x - 3.0);
+        let weights = [
+            -b * c * d / 6.0,
+            a * c * d / 2.0,
+            -a * b * d / 2.0,
+            a * b * c / 6.0,
+        ];
+        let then = |axis: usize| -> f64 {
+            let near = force[first as usize..].iter().zip(weights);
+            near.map(|(f, w)| w * f[axis]).sum()
+        };
+        [0, 1].map(|axis| then(axis) - force[i][axis])
+    }
+
+    /// What the unknowns of the arm change, from the first sample on.
+    pub fn answers<'a>(&'a self, model: &'a Model<N>, unknowns: &'a [Unknown]) -> Answers<'a, N> {
+        let count = unknowns
+            .iter()
+            .take_while(|u| !matches!(u.source, Source::Calibration(_)))
+            .count();
+        Answers {
+            course: self,
+            model,
+            direct: Building::new((model, &unknowns[..count]), &self.fine, &self.motion),
+            memory: Memory::new(model),
+            moved: vec![Moved::default(); count],
+            done: 0,
+        }
+    }
+}
+
+/// What one unit of each unknown of the arm adds to the torques through speeds and accelerations, a stretch after another.
+pub(crate) struct Answers<'a, const N: usize> {
+    course: &'a Course<N>,
+    model: &'a Model<N>,
+    /// What each adds directly.
+    direct: Building<'a, N>,
+    memory: Memory,
+    /// What one unit of each has changed of the motion.
+    moved: Vec<Moved<N>>,
+    /// Samples of the course that are behind.
+    done: usize,
+}
+
+/// A change of the motion.
+#[derive(Clone, Copy, Debug)]
+struct Moved<const N: usize> {
+    q: Joints<f64, N>,
+    qd: Joints<f64, N>,
+    qdd: Joints<f64, N>,
+}
+
+impl<const N: usize> Default for Moved<N> {
+    fn default() -> Self {
+        let (q, qd, qdd) = (Joints::zeros(), Joints::zeros(), Joints::zeros());
+        Self { q, qd, qdd }
+    }
+}
+
+impl<const N: usize> Answers<'_, N> {
+    /// Columns like those of [`Building`] for the next samples of the trial, none for the calibration.
+    pub fn next(&mut self, count: usize) -> Vec<Vec<f64>> {
+        let Course { fine, parts, .. } = self.course;
+        let from = self.done;
+        let to = (from + count * parts).min(fine.len());
+        let direct = self.direct.next(to - from);
+        let mut out = vec![Vec::with_capacity(count * N); self.moved.len()];
+        for i in from..to {
+            let slopes = self.slopes(i);
+            let push = (i - from) * N..(i - from + 1) * N;
+            for ((moved, y), out) in self.moved.iter_mut().zip(&direct.columns).zip(&mut out) {
+                let push = -Joints::from_column_slice(&y[push.clone()]);
+                moved.advance(&slopes, &push, (i == 0, 1.0 / fine.rate));
+                if i % parts == 0 {
+                    let torque = slopes.mass * moved.qdd + slopes.own_damping * moved.qd;
+                    out.extend(torque.iter());
+                }
+            }
+        }
+        self.done = to;
+        out
+    }
+
+    /// The slopes at the next sample of the course.
+    fn slopes(&mut self, i: usize) -> Slopes<N> {
+        let Course { fine, motion, .. } = self.course;
+        let model = self.model;
+        let step = THETA / fine.rate;
+        let force = fine.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
+        let (q, qd, qdd) = (motion.q[i], motion.qd[i], motion.qdd[i]);
+        let moving = |q, qd| Motion::new(i as f64 / fine.rate, q, qd);
+        self.memory.advance(&moving(q, qd), 1.0 / fine.rate);
+        let memory = &self.memory;
+        let left = |q, qd, qdd: &Joints<f64, N>| {
+            let (pose, motion) = (Pose::new(&q), moving(q, qd));
+            inverse_dynamics(&model.chain, &pose, &qd, qdd)
+                + resisting_torque(&model.fitted, &motion, &memory.fitted)
+                + resisting_torque(&model.held, &motion, &memory.held)
+                - static_torque(&model.chain, &pose, force, 0.0)
+        };
+        let unit = |j, size| {
+            let mut change = Joints::<f64, N>::zeros();
+            change[j] = size;
+            change
+        };
+        let here = left(q, qd, &qdd);
+        let matrix = |column: &dyn Fn(usize) -> Joints<f64, N>| {
+            let columns: [Joints<f64, N>; N] = core::array::from_fn(column);
+            SMatrix::<f64, N, N>::from_columns(&columns)
+        };
+        let mass = matrix(&|j| left(q, qd, &(qdd + unit(j, 1.0))) - here);
+        let own_damping = matrix(&|j| {
+            let d = unit(j, NUDGE.1);
+            (left(q, qd + d, &qdd) - left(q, qd - d, &qdd)) / (2.0 * NUDGE.1)
+        });
+        let own_stiffness = matrix(&|j| {
+            let d = unit(j, NUDGE.0);
+            (left(q + d, qd, &qdd) - left(q - d, qd, &qdd)) / (2.0 * NUDGE.0)
+        });
+        let jacobian = jacobian(&model.chain, &Pose::new(&q));
+        let through = |gain: Plane<f64>| {
+            let mut scaled = jacobian;
+            for (axis, gain) in gain.into_iter().enumerate() {
+                scaled.row_mut(axis).scale_mut(gain);
+            }
+            jacobian.transpose() * scaled
+        };
+        let damping = own_damping + through(model.contact.damping);
+        let stiffness = own_stiffness + through(model.contact.stiffness);
+        // At rest, in the first instant, only angles give way.
+        let whole = if i == 0 {
+            stiffness
+        } else {
+            mass + damping * step + stiffness * (step * step)
+        };
+        Slopes {
+            inverse: whole.try_inverse().unwrap_or_else(SMatrix::zeros),
+            mass,
+            own_damping,
+            damping,
+            stiffness,
+        }
+    }
+}
+
+impl<const N: usize> Moved<N> {
+    fn advance(&mut self, s: &Slopes<N>, push: &Joints<f64, N>, (first, h): (bool, f64)) {
+        if first {
+            self.q = s.inverse * push;
+            return;
+        }
+        let (early, late) = (h * (1.0 - THETA), h * THETA);
+        let Self { q, qd, qdd } = *self;
+        let speed: Joints<f64, N> = qd + qdd * early;
+        let angle = q + speed * late + qd * early;
+        let next = s.inverse * (push - s.damping * speed - s.stiffness * angle);
+        let faster = speed + next * late;
+        *self = Self {
+            q: q + (faster * late + qd * early),
+            qd: faster,
+            qdd: next,
+        };
+    }
+}
+
+/// How torques follow the motion at one instant.
+struct Slopes<const N: usize> {
+    mass: SMatrix<f64, N, N>,
+    /// Of the arm without the contact, whose force is measured.
+    own_damping: SMatrix<f64, N, N>,
+    damping: SMatrix<f64, N, N>,
+    stiffness: SMatrix<f64, N, N>,
+    /// Of what multiplies the new accelerations of a step.
+    inverse: SMatrix<f64, N, N>,
+}

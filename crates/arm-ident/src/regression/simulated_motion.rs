@@ -1,0 +1,118 @@
+//! Joint motion for the regressors, from a simulation of the closed chain along the measured path of the handle.
+//!
+//! Differentiated camera angles make dry friction and viscosity unreadable: the sign and size of a resting joint's speed
+//! are noise. The simulated arm is led by the robot's own angles, which are known far better (an instrument in the sense
+//! of Janot, Vandanjon, Gautier 2014). Measured angles stay on the right-hand side, see
+//! [`instrument`](crate::regression::equation::instrument).
+
+use core::ops::ControlFlow;
+
+use arm_core::Setup;
+use arm_sim::{
+    Coupling, Drive, Engine, Experiment, HandlePath, Recording, Start, simulate_in_pieces,
+};
+
+use crate::error::IdentError;
+use crate::regression::measured_motion::low_pass;
+use crate::regression::sensitivity::{Course, HELD, parts};
+use crate::regression::trial::{Model, Trial};
+use arm_numerics::NumericsError;
+
+/// Longest simulation step \[s\]; small enough for stiff contacts and smoothed dry friction.
+const LONGEST_STEP: f64 = 0.25e-3;
+/// Bandwidth of the handle's path, in bandwidths of the rows. Wider, and noise of the robot's encoders makes a resting arm
+/// creep to and fro, which is read as friction; narrower, and the corners of the path are rounded twice.
+const HANDLE_BAND: f64 = 2.0;
+/// The same for an arm that the robot does not hold in every joint. Its own vibrations and the sign of its dry friction answer
+/// to what is faster than the rows: rounded corners of the path made the viscosity of a wrist a third too small.
+const HANDLE_BAND_OF_FREE: f64 = 4.0;
+/// Largest root mean square difference between simulated and measured angles that is still the same movement \[rad\].
+const SAME_MOVEMENT: f64 = 0.15;
+
+/// The run that the model makes along the handle's path of a trial.
+///
+/// # Errors
+/// [`IdentError`] when the handle's path is not known, the simulation stops, or it moves elsewhere than the measured arm.
+pub(crate) fn simulated<const N: usize>(
+    model: &Model<N>,
+    trial: &Trial<N>,
+    cutoff: f64,
+) -> Result<Course<N>, IdentError> {
+    let Some(handle) = &trial.handle else {
+        return Err(IdentError::Numerics(NumericsError::TooFew {
+            name: "robot angles in every trial",
+            found: 0,
+            expected: 1,
+        }));
+    };
+    let recording = moved(&experiment(model, trial, handle, cutoff)?)?;
+    let course = Course::new(&recording, trial.rate, parts(trial.rate));
+    drop(recording);
+    let mut square = [0.0; N];
+    for (simulated, q) in course.angles_at_samples().zip(&trial.q) {
+        for j in 0..N {
+            square[j] += (simulated[j] - q[j]) * (simulated[j] - q[j]);
+        }
+    }
+    for (j, sum) in square.iter().enumerate() {
+        let found = libm::sqrt(sum / trial.len() as f64);
+        if found > SAME_MOVEMENT {
+            return Err(IdentError::OtherMovement {
+                joint: j + 1,
+                found,
+                allowed: SAME_MOVEMENT,
+            });
+        }
+    }
+    Ok(course)
+}
+
+/// The motion and the force of a run, the least part of what is recorded.
+fn moved<const N: usize>(experiment: &Experiment<N>) -> Result<Recording<N>, IdentError> {
+    const PIECE: usize = 4096;
+    let mut kept = Recording::default();
+    simulate_in_pieces(Engine::Native, experiment, PIECE, &mut |piece| {
+        let piece = piece.recording;
+        kept.q.extend(&piece.q);
+        kept.qd.extend(&piece.qd);
+        kept.qdd.extend(&piece.qdd);
+        kept.force_on_arm.extend(&piece.force_on_arm);
+        ControlFlow::Continue(())
+    })?;
+    Ok(kept)
+}
+
+fn experiment<const N: usize>(
+    model: &Model<N>,
+    trial: &Trial<N>,
+    handle: &[[f64; 2]],
+    cutoff: f64,
+) -> Result<Experiment<N>, IdentError> {
+    let band = if N > HELD {
+        HANDLE_BAND_OF_FREE
+    } else {
+        HANDLE_BAND
+    };
+    let filter = low_pass((band * cutoff).min(0.4 * trial.rate), trial.rate)?;
+    let axis = |a: usize| filter.both_ways(&handle.iter().map(|p| p[a]).collect::<Vec<_>>());
+    let (y, z) = (axis(0)?, axis(1)?);
+    let points: Vec<[f64; 2]> = y.into_iter().zip(z).map(|(y, z)| [y, z]).collect();
+    let interval = 1.0 / trial.rate;
+    let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 * interval).collect();
+    let parts = parts(trial.rate) as f64;
+    let steps = parts * libm::ceil(interval / parts / LONGEST_STEP);
+    let drive = Drive::Handle {
+        path: HandlePath::through_points(&times, &points)?,
+        coupling: Coupling::Compliant,
+    };
+    let mut experiment = Experiment::new(
+        Setup::new(&model.chain, model.contact),
+        drive,
+        times[times.len() - 1],
+    );
+    experiment.effects = model.fitted.iter().chain(&model.held).copied().collect();
+    experiment.start = Start::Equilibrium { near: trial.q[0] };
+    experiment.dt = interval / steps;
+    experiment.output_interval = Some(interval / parts);
+    Ok(experiment)
+}

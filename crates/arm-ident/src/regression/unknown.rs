@@ -1,0 +1,225 @@
+//! The unknowns of an identification and what is known of each beforehand.
+
+use arm_core::effect::Place;
+
+use crate::regression::trial::{Model, Tolerance, Trial};
+
+/// Smallest mass that a fit may return \[kg\].
+pub(crate) const LEAST_MASS: f64 = 1e-3;
+
+/// An inertial parameter of a segment, in which the dynamics are linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// Mass \[kg\].
+    Mass,
+    /// Mass × centre of mass along the segment \[kg m\].
+    Along,
+    /// Mass × centre of mass normal to the segment \[kg m\].
+    Normal,
+    /// Moment of inertia about the proximal joint \[kg m²\].
+    Inertia,
+}
+
+/// A small imperfection of the measurement that the calibration allows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Imperfection {
+    /// Offset of a joint angle \[rad\].
+    AngleOffset(usize),
+    /// Bias of a force channel \[N\].
+    ForceBias(usize),
+    /// Relative gain error of a force channel.
+    ForceGain(usize),
+    /// Delay of the forces \[s\].
+    TimeDelay,
+    /// Displacement of the handle along (0) or normal to (1) the last segment \[m\].
+    HandlePlacement(usize),
+}
+
+/// What a column of the regression stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// An inertial parameter of a segment.
+    Segment(usize, Moment),
+    /// A linear parameter of a fitted effect: index of the effect, index of the parameter.
+    Effect(usize, usize),
+    /// A calibration that is refitted within its tolerance.
+    Calibration(Imperfection),
+}
+
+/// One unknown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknown {
+    /// What it stands for.
+    pub source: Source,
+    /// Name as printed, joints counted from one.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Value expected beforehand.
+    pub mean: f64,
+    /// Its standard deviation; infinite where nothing is known.
+    pub sd: f64,
+    /// Smallest value allowed.
+    pub min: f64,
+    /// Largest value allowed.
+    pub max: f64,
+}
+
+/// The unknowns of a model on given trials: segments, effects, calibration, in this order.
+pub fn unknowns<const N: usize>(
+    model: &Model<N>,
+    tolerance: &Tolerance,
+    trials: &[&Trial<N>],
+) -> Vec<Unknown> {
+    let mut list = Vec::new();
+    if model.segment_uncertainty > 0.0 {
+        for k in 0..N {
+            list.extend(segment(model, k));
+        }
+    }
+    for (i, effect) in model.fitted.iter().enumerate() {
+        let info = effect.kind.info();
+        if info.place != Place::Joint {
+            continue;
+        }
+        for (p, parameter) in info.parameters.iter().enumerate().filter(|(_, p)| p.linear) {
+            list.push(Unknown {
+                source: Source::Effect(i, p),
+                name: format!("{}{} {}", info.kind, effect.index + 1, parameter.name),
+                unit: parameter.unit,
+                mean: 0.0,
+                sd: f64::INFINITY,
+                min: parameter.min,
+                max: parameter.max,
+            });
+        }
+    }
+    list.extend(calibration::<N>(tolerance, trials));
+    list
+}
+
+fn segment<const N: usize>(model: &Model<N>, k: usize) -> Vec<Unknown> {
+    let s = &model.chain.segments()[k];
+    let u = model.segment_uncertainty;
+    let along = s.mass * s.com[0];
+    let about_joint = s.inertia + s.mass * (s.com[0] * s.com[0] + s.com[1] * s.com[1]);
+    let j = k + 1;
+    let unknown = |moment, name: String, unit, mean: f64, sd, min, max| Unknown {
+        source: Source::Segment(k, moment),
+        name,
+        unit,
+        mean,
+        sd,
+        min,
+        max,
+    };
+    // Mass and centre of mass are uncertain independently: the product has both uncertainties.
+    let product = u * core::f64::consts::SQRT_2;
+    let spread =
+        |mean: f64, relative: f64, scale: f64| (mean.abs() * relative).max(1e-3 * u * scale);
+    let inf = f64::INFINITY;
+    let mut list = vec![
+        unknown(
+            Moment::Mass,
+            format!("m{j}"),
+            "kg",
+            s.mass,
+            spread(s.mass, u, 1.0),
+            LEAST_MASS,
+            inf,
+        ),
+        unknown(
+            Moment::Along,
+            format!("m{j}*l{j}"),
+            "kg m",
+            along,
+            spread(along, product, s.mass * s.length),
+            0.0,
+            inf,
+        ),
+    ];
+    if s.com[1] != 0.0 {
+        let normal = s.mass * s.com[1];
+        list.push(unknown(
+            Moment::Normal,
+            format!("m{j}*n{j}"),
+            "kg m",
+            normal,
+            spread(normal, product, along),
+            -inf,
+            inf,
+        ));
+    }
+    list.push(unknown(
+        Moment::Inertia,
+        format!("I{j} + m{j}*l{j}^2"),
+        "kg m^2",
+        about_joint,
+        spread(about_joint, 2.0 * u, s.mass * s.length * s.length),
+        0.0,
+        inf,
+    ));
+    list
+}
+
+/// What the calibration of the sensors leaves open, within a tolerance.
+pub(crate) fn calibration<const N: usize>(
+    tolerance: &Tolerance,
+    trials: &[&Trial<N>],
+) -> Vec<Unknown> {
+    let mut list = Vec::new();
+    let mut push = |imperfection, name: String, unit, sd: f64| {
+        if sd > 0.0 {
+            let source = Source::Calibration(imperfection);
+            list.push(Unknown {
+                source,
+                name,
+                unit,
+                mean: 0.0,
+                sd,
+                min: -f64::INFINITY,
+                max: f64::INFINITY,
+            });
+        }
+    };
+    for j in 0..N {
+        push(
+            Imperfection::AngleOffset(j),
+            format!("angle offset {}", j + 1),
+            "rad",
+            tolerance.angle_offset,
+        );
+    }
+    if trials.iter().any(|t| t.force_on_arm.is_some()) {
+        for (c, channel) in ["Fy", "Fz"].iter().enumerate() {
+            push(
+                Imperfection::ForceBias(c),
+                format!("force bias {channel}"),
+                "N",
+                tolerance.force_bias,
+            );
+            push(
+                Imperfection::ForceGain(c),
+                format!("force gain {channel}"),
+                "1",
+                tolerance.force_gain,
+            );
+        }
+        push(
+            Imperfection::TimeDelay,
+            "time delay".into(),
+            "s",
+            tolerance.time_delay,
+        );
+        for (axis, direction) in ["along", "normal"].iter().enumerate() {
+            let name = format!("handle placement {direction}");
+            push(
+                Imperfection::HandlePlacement(axis),
+                name,
+                "m",
+                tolerance.handle_placement,
+            );
+        }
+    }
+    list
+}

@@ -1,0 +1,372 @@
+//! Streamed square-root condensation: any number of rows to one small triangular factor.
+//!
+//! Rows `[yᵀ | b]` of a least-squares problem `min Σ (yᵀx − b)²` are collected in a panel of [`BLOCK`] rows. A full panel is folded into the triangle
+//! `[R z; 0 ρ]` by Householder reflections that act on one row of the triangle and the whole panel (the "triangle on top of a rectangle" QR of
+//! Golub & Van Loan, *Matrix Computations*, 5.2 and 6.5). The Gram matrix is never formed, so errors grow with `cond(Y)` and not with its square.
+//!
+//! The order of operations depends on the order of the rows only, never on how they are grouped into calls.
+
+use crate::error::{NumericsError, check_len};
+use crate::least_squares::factor::Factor;
+use crate::linalg::matrix::Matrix;
+use arm_core::simd_dispatch::{Computation, dispatch};
+
+/// Rows in a panel.
+pub const BLOCK: usize = 128;
+
+/// Partial sums that a dot product keeps apart, so that it can be vectorised without changing its value.
+const LANES: usize = 8;
+
+/// Larger absolute values are refused: their squares, summed over many rows, would overflow. Columns below its inverse count as zero.
+pub const LARGEST: f64 = 1e140;
+
+/// Sums of squares below this are taken as zero, as their inverse would overflow.
+const NOTHING: f64 = 1e-280;
+
+/// One column of a panel.
+pub type Column = [f64; BLOCK];
+
+/// Folds rows of a least-squares problem into a triangular factor. Memory is fixed at [`Condenser::new`]; pushing never allocates.
+///
+/// ```
+/// use arm_numerics::Condenser;
+/// let mut condenser = Condenser::new(2);
+/// for (t, b) in [(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)] {
+///     condenser.push(&[1.0, t], b)?;
+/// }
+/// let x = condenser.finish().solve()?;
+/// assert!((x[0] - 1.0).abs() < 1e-14 && (x[1] - 2.0).abs() < 1e-14);
+/// # Ok::<(), arm_numerics::NumericsError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Condenser {
+    /// Number of parameters.
+    p: usize,
+    /// Rows that were pushed.
+    rows: usize,
+    /// The triangle `[R z; 0 ρ]`, row after row, `(p+1)²`.
+    triangle: Vec<f64>,
+    /// `p + 1` columns of rows that wait; the last column is the right-hand side.
+    panel: Vec<Column>,
+    /// How many rows wait.
+    waiting: usize,
+}
+
+impl Condenser {
+    /// An empty condenser for `p` parameters.
+    pub fn new(p: usize) -> Self {
+        Self {
+            p,
+            rows: 0,
+            triangle: vec![0.0; (p + 1) * (p + 1)],
+            panel: vec![[0.0; BLOCK]; p + 1],
+            waiting: 0,
+        }
+    }
+
+    /// Number of parameters `p`.
+    pub fn parameters(&self) -> usize {
+        self.p
+    }
+
+    /// Number of rows pushed so far.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Adds one row `yᵀx ≈ b`. Weighting is the caller's: multiply both by 1/sd.
+    ///
+    /// * `row` - y, `p` numbers
+    /// * `rhs` - b
+    ///
+    /// # Errors
+    /// [`NumericsError::Length`]; [`NumericsError::NotFinite`] for NaN, infinity or a magnitude above [`LARGEST`]. A refused row changes nothing.
+    #[inline]
+    pub fn push(&mut self, row: &[f64], rhs: f64) -> Result<(), NumericsError> {
+        if row.len() != self.p || !(acceptable(row) & acceptable(&[rhs])) {
+            return Err(self.refusal(row, rhs));
+        }
+        let at = self.waiting;
+        for (column, &value) in self.panel.iter_mut().zip(row.iter().chain([&rhs])) {
+            column[at] = value;
+        }
+        self.waiting += 1;
+        self.rows += 1;
+        if self.waiting == BLOCK {
+            self.fold();
+        }
+        Ok(())
+    }
+
+    /// Adds many rows.
+    ///
+    /// * `rows` - `n × p` numbers, row after row
+    /// * `rhs` - `n` numbers
+    ///
+    /// # Errors
+    /// As [`Condenser::push`]; rows before a refused one have been added.
+    pub fn push_block(&mut self, rows: &[f64], rhs: &[f64]) -> Result<(), NumericsError> {
+        check_len("rows", rows.len(), rhs.len() * self.p)?;
+        if self.p == 0 {
+            return rhs.iter().try_for_each(|&b| self.push(&[], b));
+        }
+        let (mut rows, mut rhs) = (rows, rhs);
+        while !rhs.is_empty() {
+            let take = rhs.len().min(BLOCK - self.waiting);
+            let (now, later) = rows.split_at(take * self.p);
+            let (b, rest) = rhs.split_at(take);
+            if !(acceptable(now) & acceptable(b)) {
+                // Row by row up to the bad one, which is then named.
+                let mut pairs = now.chunks_exact(self.p).zip(b);
+                return pairs.try_for_each(|(row, &b)| self.push(row, b));
+            }
+            self.take_block(now, b);
+            (rows, rhs) = (later, rest);
+        }
+        Ok(())
+    }
+
+    /// Adds [`BLOCK`] rows at once where no row waits; `false`, and nothing is done, where some do.
+    ///
+    /// * `write` - writes `p + 1` columns, the last of them b
+    ///
+    /// # Errors
+    /// [`NumericsError::NotFinite`] as [`Condenser::push`]; then none of the rows is added.
+    #[inline]
+    pub fn push_panel(&mut self, write: impl FnOnce(&mut [Column])) -> Result<bool, NumericsError> {
+        if self.waiting > 0 {
+            return Ok(false);
+        }
+        write(&mut self.panel);
+        for column in &self.panel {
+            if !dispatch(Accept(column)) {
+                let bad = |v: &&f64| v.abs() >= LARGEST || v.is_nan();
+                return Err(NumericsError::NotFinite {
+                    name: "rows",
+                    index: self.rows,
+                    found: column.iter().find(bad).copied().unwrap_or(f64::NAN),
+                });
+            }
+        }
+        self.waiting = BLOCK;
+        self.rows += BLOCK;
+        self.fold();
+        Ok(true)
+    }
+
+    /// Adds all rows of another condenser, after those pushed here. The result depends on the order of merging in its last bits: merge in a fixed order.
+    ///
+    /// # Errors
+    /// [`NumericsError::Length`] if `other` has another number of parameters.
+    pub fn merge(&mut self, other: &Condenser) -> Result<(), NumericsError> {
+        check_len("other", other.p, self.p)?;
+        let rows = self.rows + other.rows;
+        let width = self.p + 1;
+        for k in 0..width {
+            self.push_with(|j| {
+                if j < k {
+                    0.0
+                } else {
+                    other.triangle[k * width + j]
+                }
+            });
+        }
+        for i in 0..other.waiting {
+            self.push_with(|j| other.panel[j][i]);
+        }
+        self.rows = rows;
+        Ok(())
+    }
+
+    /// Adds the problem that a factor stands for, its residual included.
+    ///
+    /// # Errors
+    /// [`NumericsError::Length`] if `factor` has another number of parameters; [`NumericsError::NotFinite`].
+    pub fn merge_factor(&mut self, factor: &Factor) -> Result<(), NumericsError> {
+        check_len("factor", factor.z.len(), self.p)?;
+        factor.check()?;
+        let rows = self.rows + factor.rows;
+        let (p, rho) = (self.p, factor.rho2.sqrt());
+        for i in 0..p {
+            self.push_with(|j| if j < p { factor.r[(i, j)] } else { factor.z[i] });
+        }
+        self.push_with(|j| if j < p { 0.0 } else { rho });
+        self.rows = rows;
+        Ok(())
+    }
+
+    /// The factor of all rows pushed. Its diagonal is not negative.
+    pub fn finish(mut self) -> Factor {
+        self.fold();
+        let (p, width) = (self.p, self.p + 1);
+        let sign = |i: usize| {
+            if self.triangle[i * width + i] < 0.0 {
+                -1.0
+            } else {
+                1.0
+            }
+        };
+        let r = Matrix::from_fn(p, p, |i, j| {
+            if j < i {
+                0.0
+            } else {
+                sign(i) * self.triangle[i * width + j]
+            }
+        });
+        let z = (0..p)
+            .map(|i| sign(i) * self.triangle[i * width + p])
+            .collect();
+        let rho = self.triangle[p * width + p];
+        Factor {
+            r,
+            z,
+            rho2: rho * rho,
+            rows: self.rows,
+        }
+    }
+
+    /// Copies acceptable rows, at most as many as there is room for.
+    fn take_block(&mut self, rows: &[f64], rhs: &[f64]) {
+        let places = self.waiting..self.waiting + rhs.len();
+        for (j, column) in self.panel.iter_mut().enumerate() {
+            let column = &mut column[places.clone()];
+            if j == self.p {
+                column.copy_from_slice(rhs);
+            } else {
+                let values = rows[j..].iter().step_by(self.p);
+                for (place, value) in column.iter_mut().zip(values) {
+                    *place = *value;
+                }
+            }
+        }
+        self.waiting = places.end;
+        self.rows += rhs.len();
+        if self.waiting == BLOCK {
+            self.fold();
+        }
+    }
+
+    fn push_with(&mut self, value: impl Fn(usize) -> f64) {
+        for (j, column) in self.panel.iter_mut().enumerate() {
+            column[self.waiting] = value(j);
+        }
+        self.waiting += 1;
+        if self.waiting == BLOCK {
+            self.fold();
+        }
+    }
+
+    /// Folds the waiting rows into the triangle.
+    fn fold(&mut self) {
+        if self.waiting == 0 {
+            return;
+        }
+        if self.waiting < BLOCK {
+            for column in &mut self.panel {
+                column[self.waiting..].fill(0.0);
+            }
+        }
+        self.waiting = 0;
+        dispatch(Reflect {
+            panel: &mut self.panel,
+            triangle: &mut self.triangle,
+        });
+    }
+
+    #[cold]
+    fn refusal(&self, row: &[f64], rhs: f64) -> NumericsError {
+        if row.len() != self.p {
+            return NumericsError::Length {
+                name: "row",
+                found: row.len(),
+                expected: self.p,
+            };
+        }
+        let bad = |v: &f64| v.abs() >= LARGEST || v.is_nan();
+        match row.iter().find(|v| bad(v)) {
+            Some(&found) => NumericsError::NotFinite {
+                name: "row",
+                index: self.rows,
+                found,
+            },
+            None => NumericsError::NotFinite {
+                name: "rhs",
+                index: self.rows,
+                found: rhs,
+            },
+        }
+    }
+}
+
+/// Reflects a panel into a triangle, a column after another.
+struct Reflect<'a> {
+    panel: &'a mut [Column],
+    triangle: &'a mut [f64],
+}
+
+impl Computation for Reflect<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { panel, triangle } = self;
+        let width = panel.len();
+        for k in 0..width {
+            let (head, rest) = panel.split_at_mut(k + 1);
+            let v = &head[k];
+            let below = dot(v, v);
+            if below < NOTHING {
+                continue;
+            }
+            let row = &mut triangle[k * width + k..(k + 1) * width];
+            let alpha = row[0];
+            let length = (alpha * alpha + below).sqrt();
+            let beta = if alpha > 0.0 { -length } else { length };
+            row[0] = beta;
+            // The reflection is I − u uᵀ / (β(β−α)) with u = [α−β; v]: no division of the panel, no cancellation.
+            let first = alpha - beta;
+            let factor = 1.0 / (beta * (beta - alpha));
+            for (x, r) in rest.iter_mut().zip(&mut row[1..]) {
+                let s = (first * *r + dot(v, x)) * factor;
+                *r -= s * first;
+                subtract(x, s, v);
+            }
+        }
+    }
+}
+
+/// Whether a column is [`acceptable`].
+struct Accept<'a>(&'a Column);
+
+impl Computation for Accept<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        acceptable(self.0)
+    }
+}
+
+/// Whether all numbers are finite and small enough; false for NaN.
+#[inline(always)]
+fn acceptable(values: &[f64]) -> bool {
+    values.iter().fold(true, |ok, v| ok & (v.abs() < LARGEST))
+}
+
+#[inline(always)]
+fn dot(a: &Column, b: &Column) -> f64 {
+    let mut sums = [0.0; LANES];
+    for (x, y) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for l in 0..LANES {
+            sums[l] += x[l] * y[l];
+        }
+    }
+    ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
+}
+
+#[inline(always)]
+fn subtract(x: &mut Column, s: f64, v: &Column) {
+    for (x, v) in x.iter_mut().zip(v) {
+        *x -= s * v;
+    }
+}

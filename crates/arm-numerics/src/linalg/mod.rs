@@ -1,0 +1,5 @@
+//! Dense linear algebra of small matrices.
+
+pub mod matrix;
+pub mod orthogonal;
+pub mod svd;

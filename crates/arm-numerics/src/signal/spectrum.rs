@@ -1,0 +1,122 @@
+//! Lines in the spectrum of what is left: frequencies at which residuals swing in every trial.
+
+use core::f64::consts::TAU;
+
+use crate::statistics::distributions::chi_square_tail;
+
+/// Highest frequency at which a line is looked for \[Hz\]: no muscle and no led arm swings faster.
+const HIGHEST: f64 = 15.0;
+/// Probability by chance below which a line is one, over all frequencies and channels.
+const CHANCE: f64 = 1e-6;
+/// How far around a frequency its neighbourhood reaches, and where it starts \[Hz\].
+const AROUND: (f64, f64) = (0.3, 1.5);
+
+/// One Fourier coefficient of a column, tapered by a Hann window.
+pub fn coefficient(column: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
+    let n = column.len() as f64;
+    let mut sum = [0.0; 2];
+    let mean = column.iter().sum::<f64>() / n;
+    for (i, value) in column.iter().enumerate() {
+        let taper = 0.5 - 0.5 * libm::cos(TAU * (i as f64 + 0.5) / n);
+        let (sin, cos) = libm::sincos(TAU * frequency * i as f64 / rate);
+        sum[0] += taper * (value - mean) * cos;
+        sum[1] -= taper * (value - mean) * sin;
+    }
+    sum.map(|s| s * 4.0 / n)
+}
+
+/// How swings of several trials are put together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sum {
+    /// By their power: each may have a phase of its own.
+    Powers,
+    /// As they are: what has the same phase in every trial stands out, and noise and what movements do not share averages out.
+    Swings,
+}
+
+impl Sum {
+    /// Power of one channel of all trials at a frequency.
+    fn power(self, trials: &[&Vec<Vec<f64>>], c: usize, (frequency, rate): (f64, f64)) -> f64 {
+        let count = trials.len() as f64;
+        let each = trials.iter().map(|t| coefficient(&t[c], frequency, rate));
+        match self {
+            Self::Powers => each.map(|[a, b]| a * a + b * b).sum::<f64>() / count,
+            Self::Swings => {
+                let [a, b] = each.fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+                (a * a + b * b) / (count * count)
+            }
+        }
+    }
+
+    fn freedom(self, trials: usize) -> usize {
+        match self {
+            Self::Powers => 2 * trials,
+            Self::Swings => 2,
+        }
+    }
+}
+
+/// The strongest line: its frequency \[Hz\]; `None` when nothing stands out.
+///
+/// * `trials` - channels of every trial, all at the same rate
+/// * `lowest` - frequency at which it begins to look \[Hz\]: below it movements have power of their own
+///
+/// Each channel's power over trials is compared with the upper quartile of its neighbourhood.
+pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Option<f64> {
+    if trials.is_empty() {
+        return None;
+    }
+    let shortest = trials.iter().map(|t| t[0].len()).min()?;
+    let channels = trials[0].len();
+    let step = 0.5 * rate / shortest as f64;
+    let highest = HIGHEST.min(0.45 * rate);
+    let count = ((highest - lowest) / step) as usize;
+    let frequency = |k: usize| lowest + step * k as f64;
+    let mut best: Option<(f64, f64)> = None;
+    for c in 0..channels {
+        let power: Vec<f64> = (0..count)
+            .map(|k| sum.power(trials, c, (frequency(k), rate)))
+            .collect();
+        for k in 0..count {
+            let around: Vec<f64> = (0..count)
+                .filter(|&o| {
+                    let apart = (frequency(o) - frequency(k)).abs();
+                    apart > AROUND.0 && apart < AROUND.1
+                })
+                .map(|o| power[o])
+                .collect();
+            // Both sides must be there, or a slope would look like a line.
+            let both = frequency(k) - AROUND.0 > lowest && frequency(k) + AROUND.0 < highest;
+            if around.len() < 8 || !both {
+                continue;
+            }
+            let mut sorted = around;
+            sorted.sort_by(f64::total_cmp);
+            // The larger of the quartiles above: red noise rises to one side.
+            let level = sorted[sorted.len() * 3 / 4];
+            let ratio = power[k] / level.max(f64::MIN_POSITIVE);
+            let dof = sum.freedom(trials.len());
+            let chance = chi_square_tail(ratio * dof as f64, dof) * (count * channels) as f64;
+            if chance < CHANCE && best.is_none_or(|(most, _)| ratio > most) {
+                best = Some((ratio, frequency(k)));
+            }
+        }
+    }
+    let (_, near) = best?;
+    // The peak of all channels together, on a finer grid.
+    let total = |f: f64| -> f64 {
+        let mut all = 0.0;
+        for c in 0..channels {
+            let size: f64 = trials
+                .iter()
+                .map(|t| t[c].iter().map(|v| v * v).sum::<f64>())
+                .sum();
+            all += sum.power(trials, c, (f, rate)) / size.max(f64::MIN_POSITIVE);
+        }
+        all
+    };
+    let fine = (-10..=10).map(|k| near + 0.1 * step * f64::from(k));
+    fine.map(|f| (total(f), f))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, f)| f)
+}

@@ -1,0 +1,285 @@
+//! Residuals that are not white: autocovariance, effective number of samples, autoregressive models and whitening.
+//!
+//! A series is one uninterrupted trial. Several trials are given side by side and never joined: no lag crosses their ends.
+
+use crate::error::{NumericsError, check_finite, check_least, check_range};
+use crate::linalg::matrix::dot;
+
+/// `γ_k = (1/n) Σ_t (x_t − x̄)(x_{t+k} − x̄)` for `k = 0 … lags`.
+///
+/// # Errors
+/// [`NumericsError::TooFew`] unless there are more samples than lags, [`NumericsError::NotFinite`].
+pub fn autocovariance(series: &[f64], lags: usize) -> Result<Vec<f64>, NumericsError> {
+    check_least("samples of series", series.len(), lags + 1)?;
+    check_finite("series", series)?;
+    let x = centred(series);
+    Ok((0..=lags).map(|k| lagged(&x, k) / x.len() as f64).collect())
+}
+
+/// How many independent samples would fix the mean of this series as well as its `n` correlated ones: `n / (1 + 2 Σ ρ_k)`, between 1 and `n`.
+///
+/// The sum ends where a pair `ρ_{2m} + ρ_{2m+1}` is no longer positive (initial positive sequence, Geyer 1992).
+///
+/// # Errors
+/// [`NumericsError::TooFew`] below 2 samples, [`NumericsError::NotFinite`].
+pub fn effective_samples(series: &[f64]) -> Result<f64, NumericsError> {
+    check_least("samples of series", series.len(), 2)?;
+    check_finite("series", series)?;
+    let x = centred(series);
+    let n = x.len() as f64;
+    let variance = dot(&x, &x);
+    if variance == 0.0 {
+        return Ok(1.0);
+    }
+    let mut time = -1.0;
+    for m in (0..x.len() - 1).step_by(2) {
+        let pair = (lagged(&x, m) + lagged(&x, m + 1)) / variance;
+        if pair <= 0.0 {
+            break;
+        }
+        time += 2.0 * pair;
+    }
+    Ok((n / time.max(1.0)).clamp(1.0, n))
+}
+
+/// `x_t = Σ_k a_k x_{t−k} + e_t`, `k = 1 … p`, with white `e` of standard deviation `sd`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AutoRegression {
+    /// `a_1 … a_p`.
+    pub coefficients: Vec<f64>,
+    /// Standard deviation of the innovation, in the unit of the series.
+    pub sd: f64,
+}
+
+impl AutoRegression {
+    /// Fit by the Yule–Walker equations (Levinson–Durbin) to the pooled autocovariance of several trials. Always stationary; biased towards zero on short series.
+    ///
+    /// # Errors
+    /// [`NumericsError::TooFew`] unless some series is longer than `order` and not constant, [`NumericsError::NotFinite`].
+    pub fn yule_walker(series: &[&[f64]], order: usize) -> Result<Self, NumericsError> {
+        let centred = prepared(series, order)?;
+        let total: usize = centred.iter().map(Vec::len).sum();
+        let gamma: Vec<f64> = (0..=order)
+            .map(|k| centred.iter().fold(0.0, |sum, x| sum + lagged(x, k)) / total as f64)
+            .collect();
+        let mut a: Vec<f64> = Vec::with_capacity(order);
+        let mut variance = gamma[0];
+        for m in 1..=order {
+            let k = if variance > 0.0 {
+                (gamma[m]
+                    - a.iter()
+                        .enumerate()
+                        .fold(0.0, |s, (i, a)| s + a * gamma[m - 1 - i]))
+                    / variance
+            } else {
+                0.0
+            };
+            extend(&mut a, k);
+            variance *= 1.0 - k * k;
+        }
+        Ok(Self {
+            coefficients: a,
+            sd: variance.max(0.0).sqrt(),
+        })
+    }
+
+    /// Fit by Burg's method, pooled over trials: least forward and backward prediction error, always stationary, less biased than Yule–Walker.
+    ///
+    /// # Errors
+    /// As [`AutoRegression::yule_walker`].
+    pub fn burg(series: &[&[f64]], order: usize) -> Result<Self, NumericsError> {
+        let path = burg_path(prepared(series, order)?, order, samples(series));
+        Ok(path.last().cloned().unwrap_or(Self {
+            coefficients: Vec::new(),
+            sd: 0.0,
+        }))
+    }
+
+    /// The order `0 … most` with the smallest corrected Akaike criterion, fitted by Burg's method.
+    ///
+    /// # Errors
+    /// As [`AutoRegression::yule_walker`], with `most` for the order.
+    pub fn selected(series: &[&[f64]], most: usize) -> Result<Self, NumericsError> {
+        let n = samples(series);
+        Ok(Self::best(burg_path(prepared(series, most)?, most, n), n))
+    }
+
+    /// The same for series whose mean is known to be zero. A mean that is taken out of short series takes slow noise with it.
+    ///
+    /// Whatever else was fitted and taken out takes some as well. What of it may have been noise counts in every product, and
+    /// not in the number of samples: the expectation step of restricted maximum likelihood (Dempster, Laird and Rubin 1977).
+    ///
+    /// * `taken` - series whose products add up to the covariance of what was taken out, as far as it is not known
+    ///
+    /// # Errors
+    /// As [`AutoRegression::selected`].
+    pub fn selected_about_zero(
+        series: &[&[f64]],
+        taken: &[&[f64]],
+        most: usize,
+    ) -> Result<Self, NumericsError> {
+        prepared(series, most)?;
+        let all = series.iter().chain(taken).map(|s| s.to_vec()).collect();
+        let n = samples(series);
+        Ok(Self::best(burg_path(all, most, n), n))
+    }
+
+    fn best(path: Vec<Self>, samples: usize) -> Self {
+        let criterion = |model: &Self| {
+            let k = model.coefficients.len() as f64 + 1.0;
+            let n = samples as f64;
+            2.0 * n * libm::log(model.sd.max(f64::MIN_POSITIVE))
+                + 2.0 * k * n / (n - k - 1.0).max(1.0)
+        };
+        let mut path = path.into_iter();
+        let first = path.next().unwrap_or(Self {
+            coefficients: Vec::new(),
+            sd: 0.0,
+        });
+        path.fold(first, |best, model| {
+            if criterion(&model) < criterion(&best) {
+                model
+            } else {
+                best
+            }
+        })
+    }
+
+    /// Variance of the mean of many samples times their number: `sd² / (1 − Σ a)²`.
+    pub fn long_run_variance(&self) -> f64 {
+        let rest = 1.0 - self.coefficients.iter().sum::<f64>();
+        (self.sd / rest) * (self.sd / rest)
+    }
+}
+
+fn samples(series: &[&[f64]]) -> usize {
+    series.iter().map(|s| s.len()).sum()
+}
+
+/// Burg's models of order 0, 1, … `order` of series that stand for a number of samples.
+fn burg_path(mut forward: Vec<Vec<f64>>, order: usize, samples: usize) -> Vec<AutoRegression> {
+    let mut backward = forward.clone();
+    let mut variance = forward.iter().fold(0.0, |sum, x| sum + dot(x, x)) / samples as f64;
+    let mut a: Vec<f64> = Vec::with_capacity(order);
+    let mut path = vec![AutoRegression {
+        coefficients: Vec::new(),
+        sd: variance.sqrt(),
+    }];
+    for m in 1..=order {
+        let (mut cross, mut power) = (0.0, 0.0);
+        for (f, b) in forward.iter().zip(&backward) {
+            for t in m..f.len() {
+                cross += f[t] * b[t - 1];
+                power += f[t] * f[t] + b[t - 1] * b[t - 1];
+            }
+        }
+        let k = if power > 0.0 {
+            2.0 * cross / power
+        } else {
+            0.0
+        };
+        for (f, b) in forward.iter_mut().zip(&mut backward) {
+            for t in (m..f.len()).rev() {
+                let (ft, bt) = (f[t], b[t - 1]);
+                f[t] = ft - k * bt;
+                b[t] = bt - k * ft;
+            }
+        }
+        extend(&mut a, k);
+        variance *= 1.0 - k * k;
+        path.push(AutoRegression {
+            coefficients: a.clone(),
+            sd: variance.max(0.0).sqrt(),
+        });
+    }
+    path
+}
+
+/// Turns a stationary autoregressive series into white noise of unit variance. Applied alike to the residual (or right-hand side) and to every regressor column
+/// of a trial, it turns generalised least squares into ordinary least squares.
+///
+/// The first `p` samples are whitened with the predictors of lower order, so no sample is lost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Whitener {
+    /// Predictor of order 0, 1, … p, with one over the standard deviation of its error.
+    predictors: Vec<(Vec<f64>, f64)>,
+}
+
+impl Whitener {
+    /// The whitener of a model.
+    ///
+    /// # Errors
+    /// [`NumericsError::OutOfRange`] if the model is not stationary or its `sd` not positive.
+    pub fn new(model: &AutoRegression) -> Result<Self, NumericsError> {
+        check_range("sd", model.sd, [f64::MIN_POSITIVE, f64::MAX])?;
+        check_finite("coefficients", &model.coefficients)?;
+        let mut a = model.coefficients.clone();
+        let mut sd = model.sd;
+        let mut predictors = vec![(a.clone(), 1.0 / sd)];
+        while let Some(k) = a.pop() {
+            check_range(
+                "partial correlation of the model",
+                k,
+                [-1.0 + 1e-12, 1.0 - 1e-12],
+            )?;
+            let below = 1.0 - k * k;
+            a = (0..a.len())
+                .map(|i| (a[i] + k * a[a.len() - 1 - i]) / below)
+                .collect();
+            sd /= below.sqrt();
+            predictors.push((a.clone(), 1.0 / sd));
+        }
+        predictors.reverse();
+        Ok(Self { predictors })
+    }
+
+    /// Whitens one column of one trial in place.
+    pub fn apply(&self, column: &mut [f64]) {
+        let order = self.predictors.len() - 1;
+        // Backwards, so that every sample still finds its unfiltered past.
+        for t in (0..column.len()).rev() {
+            let (a, inverse) = &self.predictors[t.min(order)];
+            let predicted = a
+                .iter()
+                .enumerate()
+                .fold(0.0, |sum, (i, a)| sum + a * column[t - 1 - i]);
+            column[t] = (column[t] - predicted) * inverse;
+        }
+    }
+}
+
+/// Levinson's step: from order m − 1 to m by the partial correlation `k`.
+fn extend(a: &mut Vec<f64>, k: f64) {
+    let m = a.len();
+    *a = (0..m).map(|i| a[i] - k * a[m - 1 - i]).chain([k]).collect();
+}
+
+fn prepared(series: &[&[f64]], order: usize) -> Result<Vec<Vec<f64>>, NumericsError> {
+    series.iter().try_for_each(|s| check_finite("series", s))?;
+    let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
+    check_least("samples of the longest series", longest, order + 2)?;
+    let centred: Vec<Vec<f64>> = series.iter().map(|s| centred(s)).collect();
+    check_least(
+        "series that vary",
+        centred
+            .iter()
+            .filter(|x| x.iter().any(|v| *v != 0.0))
+            .count(),
+        1,
+    )?;
+    Ok(centred)
+}
+
+pub(crate) fn centred(series: &[f64]) -> Vec<f64> {
+    let mean = series.iter().sum::<f64>() / series.len().max(1) as f64;
+    series.iter().map(|v| v - mean).collect()
+}
+
+/// `Σ_t x_t x_{t+k}`.
+fn lagged(x: &[f64], k: usize) -> f64 {
+    if k < x.len() {
+        dot(&x[..x.len() - k], &x[k..])
+    } else {
+        0.0
+    }
+}

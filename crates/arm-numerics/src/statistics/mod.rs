@@ -1,0 +1,6 @@
+//! Distributions, and the covariance of estimates whose residuals are correlated.
+
+pub mod autoregressive;
+pub mod distributions;
+pub mod long_run;
+pub mod sandwich_covariance;

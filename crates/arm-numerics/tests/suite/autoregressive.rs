@@ -1,0 +1,155 @@
+use crate::noise::{Noise, gap};
+use arm_numerics::NumericsError;
+use arm_numerics::statistics::autoregressive::{
+    AutoRegression, Whitener, autocovariance, effective_samples,
+};
+
+const SECOND_ORDER: [f64; 2] = [1.2, -0.5];
+
+/// `x_t = 1.2 x_{t−1} − 0.5 x_{t−2} + 0.3 e_t`, after its transient.
+fn second_order(noise: &mut Noise, n: usize) -> Vec<f64> {
+    let mut x = vec![0.0; n + 200];
+    for t in 2..x.len() {
+        x[t] = SECOND_ORDER[0] * x[t - 1] + SECOND_ORDER[1] * x[t - 2] + 0.3 * noise.normal();
+    }
+    x.split_off(200)
+}
+
+#[test]
+fn autocovariance_by_hand() {
+    // x − mean = (−1, 1, −1, 1)
+    let gamma = autocovariance(&[1.0, 3.0, 1.0, 3.0], 3).expect("four");
+    assert!(gap(&gamma, &[1.0, -0.75, 0.5, -0.25]) < 1e-15);
+}
+
+#[test]
+fn both_fits_find_the_model_that_made_the_series() {
+    let mut noise = Noise::new(61);
+    let trials: Vec<Vec<f64>> = (0..5).map(|_| second_order(&mut noise, 4000)).collect();
+    let series: Vec<&[f64]> = trials.iter().map(Vec::as_slice).collect();
+    for model in [
+        AutoRegression::yule_walker(&series, 2),
+        AutoRegression::burg(&series, 2),
+    ] {
+        let model = model.expect("long enough");
+        assert!(gap(&model.coefficients, &SECOND_ORDER) < 0.02, "{model:?}");
+        assert!((model.sd - 0.3).abs() < 0.005);
+        // sd² / (1 − 1.2 + 0.5)² = 1
+        assert!((model.long_run_variance() - 1.0).abs() < 0.1);
+    }
+    let selected = AutoRegression::selected(&series, 8).expect("long enough");
+    assert!(
+        (2..=4).contains(&selected.coefficients.len()),
+        "{selected:?}"
+    );
+    let white: Vec<f64> = (0..2000).map(|_| noise.normal()).collect();
+    let order = AutoRegression::selected(&[&white], 8)
+        .expect("long enough")
+        .coefficients
+        .len();
+    assert!(order <= 1, "{order}");
+}
+
+#[test]
+fn whitening_makes_unit_white_noise_and_loses_no_sample() {
+    let mut noise = Noise::new(62);
+    let model = AutoRegression {
+        coefficients: SECOND_ORDER.to_vec(),
+        sd: 0.3,
+    };
+    let whitener = Whitener::new(&model).expect("stationary");
+    let mut x = second_order(&mut noise, 20_000);
+    let n = x.len();
+    whitener.apply(&mut x);
+    assert_eq!(x.len(), n);
+    let gamma = autocovariance(&x, 5).expect("long");
+    assert!((gamma[0] - 1.0).abs() < 0.03);
+    assert!(gamma[1..].iter().all(|g| g.abs() < 0.03), "{gamma:?}");
+
+    // The first samples too have unit variance: over many short trials.
+    let mut power = [0.0; 4];
+    for _ in 0..20_000 {
+        let mut short = noise.slow(0.9, 4);
+        let model = AutoRegression {
+            coefficients: vec![0.9],
+            sd: (1.0 - 0.81_f64).sqrt(),
+        };
+        Whitener::new(&model).expect("stationary").apply(&mut short);
+        power
+            .iter_mut()
+            .zip(short)
+            .for_each(|(p, v)| *p += v * v / 20_000.0);
+    }
+    assert!(gap(&power, &[1.0; 4]) < 0.05, "{power:?}");
+}
+
+/// AR(1) with ρ = 0.9: `n (1 − ρ)/(1 + ρ) = n / 19`.
+#[test]
+fn slow_noise_counts_for_few_samples() {
+    let mut noise = Noise::new(63);
+    let n = 20_000;
+    let effective = effective_samples(&noise.slow(0.9, n)).expect("long");
+    assert!(
+        (effective / (n as f64 / 19.0) - 1.0).abs() < 0.25,
+        "{effective}"
+    );
+    let white: Vec<f64> = (0..n).map(|_| noise.normal()).collect();
+    assert!(effective_samples(&white).expect("long") > 0.9 * n as f64);
+    assert_eq!(effective_samples(&[2.0; 10]).expect("constant"), 1.0);
+}
+
+/// Means that were taken out of short series take slow noise with them, unless what they may have been counts.
+#[test]
+fn noise_that_left_with_a_mean_is_counted() {
+    const RHO: f64 = 0.92;
+    const N: usize = 90;
+    let mut noise = Noise::new(11);
+    let series: Vec<Vec<f64>> = (0..400)
+        .map(|_| {
+            let slow = noise.slow(RHO, N);
+            let mean = slow.iter().sum::<f64>() / N as f64;
+            slow.iter().map(|v| v - mean).collect()
+        })
+        .collect();
+    let (mut sum, mut correlation) = (1.0, 1.0);
+    for k in 1..N {
+        correlation *= RHO;
+        sum += 2.0 * (1.0 - k as f64 / N as f64) * correlation;
+    }
+    let variance: f64 = sum / N as f64;
+    let unknown = vec![variance.sqrt(); N];
+    let series: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
+    let taken = vec![unknown.as_slice(); series.len()];
+    let long = |taken: &[&[f64]]| {
+        let model = AutoRegression::selected_about_zero(&series, taken, 1).expect("long enough");
+        model.long_run_variance() * (1.0 - RHO) / (1.0 + RHO)
+    };
+    assert!(long(&[]) < 0.6, "{}", long(&[]));
+    assert!((long(&taken) - 1.0).abs() < 0.1, "{}", long(&taken));
+}
+
+#[test]
+fn refuses_what_cannot_be_fitted() {
+    assert!(matches!(
+        AutoRegression::burg(&[&[1.0, 2.0]], 3),
+        Err(NumericsError::TooFew { .. })
+    ));
+    assert!(AutoRegression::yule_walker(&[], 1).is_err());
+    assert!(AutoRegression::yule_walker(&[&[5.0; 20]], 1).is_err());
+    assert!(AutoRegression::burg(&[&[1.0, f64::NAN, 2.0, 1.0]], 1).is_err());
+    let explosive = AutoRegression {
+        coefficients: vec![1.1],
+        sd: 1.0,
+    };
+    assert!(matches!(
+        Whitener::new(&explosive),
+        Err(NumericsError::OutOfRange { .. })
+    ));
+    let silent = AutoRegression {
+        coefficients: vec![0.5],
+        sd: 0.0,
+    };
+    assert!(Whitener::new(&silent).is_err());
+    assert!(autocovariance(&[1.0; 3], 3).is_err());
+    assert!(effective_samples(&[1.0]).is_err());
+}

@@ -1,0 +1,83 @@
+use arm_numerics::NumericsError;
+use arm_numerics::statistics::distributions::{student_t_quantile, student_t_two_sided_tail};
+
+/// Agreement asked of quantiles and tails.
+const TOLERANCE: f64 = 1e-10;
+
+/// scipy 1.17.1: `stats.t.ppf(p, dof)`; each row also checked with mpmath's 40-digit incomplete beta function.
+const QUANTILES: [(f64, f64, f64); 12] = [
+    (0.6, 1.0, 0.32491969623290634),
+    (0.975, 1.0, 12.706204736174694),
+    (1.0 - 1e-8, 1.0, 31830988.45843601),
+    (0.995, 2.0, 9.924843200918287),
+    (0.975, 3.0, 3.1824463052837078),
+    (0.975, 9.0, 2.262157162798205),
+    (1.0 - 1e-8, 9.0, 18.283967445453246),
+    (0.995, 29.5, 2.753133270256325),
+    (0.6, 100.0, 0.25402218245822766),
+    (0.975, 1000.0, 1.9623390808264083),
+    (1.0 - 1e-8, 1000.0, 5.657912336788832),
+    (0.975, 1e5, 1.9599877075346095),
+];
+
+#[test]
+fn quantiles_are_those_of_scipy() {
+    for (probability, dof, expected) in QUANTILES {
+        let found = student_t_quantile(probability, dof).expect("in range");
+        assert!(
+            (found / expected - 1.0).abs() < TOLERANCE,
+            "{probability} {dof}: {found}"
+        );
+    }
+    let low = student_t_quantile(0.025, 9.0).expect("in range");
+    assert!((low + 2.262157162798205).abs() < TOLERANCE);
+    assert_eq!(student_t_quantile(0.5, 3.0).expect("in range"), 0.0);
+}
+
+/// mpmath, 40 digits: `betainc(dof/2, 1/2, 0, dof/(dof+t²), regularized=True)`.
+#[test]
+fn tails_are_those_of_mpmath() {
+    for (t, dof, expected) in [
+        (0.5, 1.0, 0.704_832_764_699_133_5),
+        (2.0, 9.0, 0.076_552_823_770_701_04),
+        (-5.0, 3.0, 0.015_392_438_073_302_301),
+        (1.96, 1000.0, 0.050_273_184_955_748_718),
+        (30.0, 4.0, 7.352_856_097_661_322_1e-6),
+        (0.01, 60.0, 0.992_054_463_517_930_8),
+    ] {
+        let found = student_t_two_sided_tail(t, dof).expect("in range");
+        assert!(
+            (found / expected - 1.0).abs() < TOLERANCE,
+            "{t} {dof}: {found}"
+        );
+    }
+}
+
+#[test]
+fn tail_undoes_quantile() {
+    for dof in [0.5, 1.0, 4.0, 9.0, 77.7, 1e4, 1e7] {
+        for probability in [0.5001, 0.7, 0.9, 0.999, 1.0 - 1e-12] {
+            let t = student_t_quantile(probability, dof).expect("in range");
+            let back = 1.0 - 0.5 * student_t_two_sided_tail(t, dof).expect("in range");
+            assert!((back - probability).abs() < 1e-12, "{probability} {dof}");
+        }
+    }
+}
+
+#[test]
+fn refuses_what_has_no_answer() {
+    assert!(matches!(
+        student_t_quantile(1.0, 3.0),
+        Err(NumericsError::OutOfRange {
+            name: "probability",
+            ..
+        })
+    ));
+    assert!(matches!(
+        student_t_quantile(0.9, 0.0),
+        Err(NumericsError::OutOfRange { name: "dof", .. })
+    ));
+    assert!(student_t_quantile(f64::NAN, 3.0).is_err());
+    assert!(student_t_two_sided_tail(f64::NAN, 3.0).is_err());
+    assert_eq!(student_t_two_sided_tail(f64::INFINITY, 3.0), Ok(0.0));
+}

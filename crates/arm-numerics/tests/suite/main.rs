@@ -1,0 +1,14 @@
+//! One module per source file; `noise` is what they share.
+
+mod autoregressive;
+mod bits;
+mod condense;
+mod derivative;
+mod distributions;
+mod factor;
+mod filter;
+mod long_run;
+mod noise;
+mod program;
+mod sandwich_covariance;
+mod svd;
