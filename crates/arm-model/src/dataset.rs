@@ -1,0 +1,317 @@
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+use crate::fields::{Bounds, Fields};
+use crate::value::by_value;
+use crate::{Refused, Subject, Table, Tolerance, Value, file, toml_file, unknown};
+
+/// What the forces in the files act on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ForceOn {
+    /// The force of the arm on the robot's handle.
+    Robot,
+    /// The opposite.
+    Arm,
+}
+
+const FORCES: [(&str, ForceOn); 2] = [("robot", ForceOn::Robot), ("arm", ForceOn::Arm)];
+
+impl ForceOn {
+    /// The word for it in files.
+    pub fn name(self) -> &'static str {
+        FORCES[self as usize].0
+    }
+}
+
+/// What a trial is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// To choose and to fit on.
+    Fit,
+    /// To test on; nothing is ever chosen or fitted on it.
+    Test,
+}
+
+const ROLES: [(&str, Role); 2] = [("fit", Role::Fit), ("test", Role::Test)];
+
+impl Role {
+    /// The word for it in files.
+    pub fn name(self) -> &'static str {
+        ROLES[self as usize].0
+    }
+}
+
+/// A mass that is fixed to a segment in some configurations, such as one part of an orthosis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AddedMass {
+    /// Number of the segment, from 1.
+    pub segment: i64,
+    /// \[kg\]
+    pub mass: f64,
+    /// From the segment's proximal joint \[m\].
+    pub at: f64,
+    /// Where it is worn.
+    pub configurations: Vec<String>,
+}
+
+impl AddedMass {
+    /// Reads a table; `place` names it in refusals.
+    ///
+    /// # Errors
+    /// [`Refused`] for an unknown or missing key and for a value out of bounds.
+    pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
+        let mut fields = Fields::new(place, value)?;
+        fields.only(&["segment", "mass", "at"], &["configurations"])?;
+        let whole = fields.whole("segment", 1)?;
+        let kilograms = Bounds::finite("kg").above(0.0).most(20.0);
+        let metres = Bounds::finite("m")
+            .least(0.0)
+            .most(2.0)
+            .hint("millimetres?");
+        Ok(Self {
+            segment: whole.unwrap_or(1),
+            mass: fields.number("mass", &kilograms)?,
+            at: fields.number("at", &metres)?,
+            configurations: fields.names("configurations")?,
+        })
+    }
+
+    /// The mass as it stands in a file.
+    pub fn to_table(&self) -> Table {
+        let names = self.configurations.iter().map(|n| n.as_str().into());
+        Table::new()
+            .with("segment", self.segment)
+            .with("mass", self.mass)
+            .with("at", self.at)
+            .with("configurations", names.collect::<Vec<Value>>())
+    }
+}
+
+/// What `dataset.toml` says of one trial.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct TrialEntry {
+    /// Its file, below the folder of the data set.
+    pub file: String,
+    /// The name of the movement, shared by its repeats.
+    pub configuration: String,
+    /// Number of the repeat, from 1.
+    pub repeat: i64,
+    /// What it is for.
+    pub role: Role,
+}
+
+impl TrialEntry {
+    /// Reads a table; `place` names it in refusals.
+    ///
+    /// # Errors
+    /// [`Refused`] for an unknown or missing key and for a value that is not allowed.
+    pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
+        let mut fields = Fields::new(place, value)?;
+        fields.only(&["file", "configuration", "role"], &["repeat"])?;
+        let file = fields.required_text("file")?;
+        let configuration = fields.required_text("configuration")?;
+        let repeat = fields.whole("repeat", 1)?.unwrap_or(1);
+        let role = fields.choice("role", &ROLES)?.unwrap_or(Role::Fit);
+        Ok(Self {
+            file,
+            configuration,
+            repeat,
+            role,
+        })
+    }
+
+    /// The entry as it stands in a file.
+    pub fn to_table(&self) -> Table {
+        Table::new()
+            .with("file", self.file.as_str())
+            .with("configuration", self.configuration.as_str())
+            .with("repeat", self.repeat)
+            .with("role", self.role.name())
+    }
+}
+
+/// The content of `dataset.toml`, before any trial is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// Its name, where it states one.
+    pub name: Option<String>,
+    /// The model that the data challenge, below the folder of the data set.
+    pub model: String,
+    /// What the forces act on.
+    pub force_on: Option<ForceOn>,
+    /// As stated \[Hz\].
+    pub sample_rate: Option<f64>,
+    /// Whether the trials were simulated.
+    pub synthetic: bool,
+    /// Whose arm it is.
+    pub subject: Subject,
+    /// What the calibration promises.
+    pub tolerance: Tolerance,
+    /// Masses that are worn in some configurations besides the model.
+    pub added: Vec<AddedMass>,
+    /// The trials, in the order of the file.
+    pub trials: Vec<TrialEntry>,
+}
+
+impl Description {
+    /// Reads `dataset.toml`.
+    ///
+    /// # Errors
+    /// [`Refused`] with file, table, key, the value found and the values allowed.
+    pub fn load(path: &Path) -> Result<Self, Refused> {
+        let text = file::read(path, "a TOML file")?;
+        Self::from_toml(&text).map_err(|refused| refused.in_file(path))
+    }
+
+    /// Reads the text of `dataset.toml`.
+    ///
+    /// # Errors
+    /// [`Refused`] with table, key, the value found and the values allowed.
+    pub fn from_toml(text: &str) -> Result<Self, Refused> {
+        Self::from_value("", toml_file::read(text)?.into())
+    }
+
+    /// The text of `dataset.toml`.
+    pub fn to_toml(&self) -> String {
+        toml_file::write(&self.to_table())
+    }
+
+    /// Reads a description of any format.
+    ///
+    /// # Errors
+    /// [`Refused`] with table, key, the value found and the values allowed.
+    pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
+        let mut fields = Fields::new(place, value)?;
+        fields.only(
+            &["model", "trial"],
+            &[
+                "name",
+                "force_on",
+                "sample_rate",
+                "synthetic",
+                "subject",
+                "tolerance",
+                "added",
+            ],
+        )?;
+        let tables = fields.tables("trial", "trial")?;
+        let trials = (1..)
+            .zip(tables)
+            .map(|(k, table)| TrialEntry::from_value(&format!("[[trial]] {k}"), table))
+            .collect::<Result<Vec<_>, _>>()?;
+        check_trials(&trials)?;
+        let rate = Bounds::finite("Hz").above(0.0).most(1e6);
+        let table = |value: Option<Value>| value.unwrap_or_else(|| Table::new().into());
+        Ok(Self {
+            name: fields.maybe_text("name")?,
+            model: fields.required_text("model")?,
+            force_on: fields.choice("force_on", &FORCES)?,
+            sample_rate: fields.maybe_number("sample_rate", &rate)?,
+            subject: Subject::from_value("[subject]", table(fields.take("subject")))?,
+            tolerance: Tolerance::from_value("[tolerance]", table(fields.take("tolerance")))?,
+            added: added(fields.tables("added", "added")?, &trials)?,
+            synthetic: fields.flag("synthetic")?,
+            trials,
+        })
+    }
+
+    /// The description as it stands in a file; tolerances only where they are not the usual ones.
+    pub fn to_table(&self) -> Table {
+        let list = |tables: Vec<Table>| Value::List(tables.into_iter().map(Value::Table).collect());
+        let mut table = Table::new();
+        table.push("name", self.name.clone());
+        table.push("model", self.model.as_str());
+        table.push("force_on", self.force_on.map(ForceOn::name));
+        table.push("sample_rate", self.sample_rate);
+        if self.synthetic {
+            table.push("synthetic", true);
+        }
+        if self.subject != Subject::default() {
+            table.push("subject", self.subject.to_table());
+        }
+        if self.tolerance != Tolerance::default() {
+            table.push("tolerance", self.tolerance.to_table());
+        }
+        if !self.added.is_empty() {
+            table.push(
+                "added",
+                list(self.added.iter().map(AddedMass::to_table).collect()),
+            );
+        }
+        table.with(
+            "trial",
+            list(self.trials.iter().map(TrialEntry::to_table).collect()),
+        )
+    }
+}
+
+by_value!(AddedMass, TrialEntry, Description);
+
+fn added(tables: Vec<Value>, trials: &[TrialEntry]) -> Result<Vec<AddedMass>, Refused> {
+    let read = |(k, table): (usize, Value)| {
+        let place = format!("[[added]] {k}");
+        let item = AddedMass::from_value(&place, table)?;
+        let known: Vec<&str> = trials.iter().map(|t| t.configuration.as_str()).collect();
+        match item
+            .configurations
+            .iter()
+            .find(|n| !known.contains(&n.as_str()))
+        {
+            Some(name) => {
+                let place = format!("{place}, configurations");
+                Err(unknown(&place, name, "configuration", &known))
+            }
+            None => Ok(item),
+        }
+    };
+    (1..).zip(tables).map(read).collect()
+}
+
+fn check_trials(trials: &[TrialEntry]) -> Result<(), Refused> {
+    let mut by_file: BTreeMap<PathBuf, usize> = BTreeMap::new();
+    let mut by_repeat: BTreeMap<(&str, i64), usize> = BTreeMap::new();
+    for (number, trial) in (1..).zip(trials) {
+        let first = *by_file.entry(normal(&trial.file)).or_insert(number);
+        if first != number {
+            return Err(Refused::new(
+                format!("[[trial]] {number}, file"),
+                Value::from(trial.file.as_str()).shown(),
+                format!("each file once: [[trial]] {first} has it already"),
+            ));
+        }
+        let repeat = (trial.configuration.as_str(), trial.repeat);
+        let first = *by_repeat.entry(repeat).or_insert(number);
+        if first != number {
+            return Err(Refused::new(
+                format!("[[trial]] {number}, repeat"),
+                format!("repeat {} of \"{}\"", trial.repeat, trial.configuration),
+                format!("each repeat once: [[trial]] {first} has it already"),
+            ));
+        }
+    }
+    if trials.iter().any(|trial| trial.role == Role::Fit) {
+        return Ok(());
+    }
+    Err(Refused::new(
+        "[[trial]]",
+        "no trial with role = \"fit\"",
+        "at least one",
+    ))
+}
+
+/// A path without what leads nowhere.
+fn normal(file: &str) -> PathBuf {
+    let mut out = PathBuf::new();
+    for part in Path::new(file).components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir
+                if matches!(out.components().next_back(), Some(Component::Normal(_))) =>
+            {
+                out.pop();
+            }
+            part => out.push(part),
+        }
+    }
+    out
+}

@@ -1,0 +1,69 @@
+use crate::fields::{Bounds, Fields};
+use crate::value::by_value;
+use crate::{Refused, Table, Value};
+
+/// Sex, as the literature's tables distinguish it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Sex {
+    /// Male.
+    Male,
+    /// Female.
+    Female,
+}
+
+const SEXES: [(&str, Sex); 2] = [("male", Sex::Male), ("female", Sex::Female)];
+
+impl Sex {
+    /// The word for it in files.
+    pub fn name(self) -> &'static str {
+        SEXES[self as usize].0
+    }
+}
+
+/// Whose arm it is. Body mass, height and sex are used for the literature values, the name for a history.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Subject {
+    /// \[kg\]
+    pub body_mass: Option<f64>,
+    /// \[m\]
+    pub height: Option<f64>,
+    /// As the literature's tables distinguish it.
+    pub sex: Option<Sex>,
+    /// By which sessions of one person are found again.
+    pub name: Option<String>,
+}
+
+impl Subject {
+    const BODY_MASS: Bounds = Bounds::finite("kg").least(1.0).most(500.0);
+    const HEIGHT: Bounds = Bounds::finite("m")
+        .least(0.3)
+        .most(3.0)
+        .hint("centimetres?");
+
+    /// Reads a table; `place` names it in refusals.
+    ///
+    /// # Errors
+    /// [`Refused`] for an unknown key and for a value out of bounds.
+    pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
+        let mut fields = Fields::new(place, value)?;
+        fields.only(&[], &["body_mass", "height", "sex", "name"])?;
+        Ok(Self {
+            body_mass: fields.maybe_number("body_mass", &Self::BODY_MASS)?,
+            height: fields.maybe_number("height", &Self::HEIGHT)?,
+            sex: fields.choice("sex", &SEXES)?,
+            name: fields.maybe_text("name")?,
+        })
+    }
+
+    /// The subject as it stands in a file.
+    pub fn to_table(&self) -> Table {
+        let mut table = Table::new();
+        table.push("body_mass", self.body_mass);
+        table.push("height", self.height);
+        table.push("sex", self.sex.map(Sex::name));
+        table.push("name", self.name.clone());
+        table
+    }
+}
+
+by_value!(Subject);
