@@ -15,10 +15,10 @@ import sys
 import numpy as np
 
 from armrs import Dataset, Effect, Model, Movement, Tolerance, demo, identify
-from armrs.reproduce import people
-from armrs.reproduce.mechanical import MEASUREMENTS, SPEED, truth
-from armrs.reproduce.printed import MECHANICAL, REFERENCE
-from armrs.reproduce.simulation import MECHANICAL_PATH
+from armrs.thesis import people
+from armrs.thesis.mechanical import MEASUREMENTS, SPEED, truth
+from armrs.thesis.printed import MECHANICAL, REFERENCE
+from armrs.thesis.simulation import MECHANICAL_PATH
 
 LIMITS = {"m1*l1 + a1*m2": 1.0, "m2*l2": 1.0, "brake 1": 3.0, "brake 2": 3.0}
 """[%]"""

@@ -20,11 +20,12 @@ from collections.abc import Iterator
 import numpy as np
 
 import armrs
-from armrs import Dataset, Effect, Joint, Model, Movement, Sensors, Simulated, Subject, Tolerance, Trial, moments
-from armrs.dataset import Added
-from armrs.dependence import Course, fit, together
-from armrs.experiment import literature_arm
+from armrs import Dataset, Effect, Joint, Model, Movement, Sensors, Simulated, Subject, Tolerance, Trial
+from armrs.analysis.joint_coupling import Course, fit, together
+from armrs.io.dataset import Added
 from armrs.model import Contact, Robot
+from armrs.workflows import passive
+from armrs.workflows.experiment import literature_arm
 
 SHOULDER_HELD = (-68.0, -40.0, -16.0, 10.0, 36.0)
 ELBOW_HELD = (27.0, 40.0, 50.0, 60.0, 70.0)
@@ -109,7 +110,7 @@ def session(known: list[Configuration], seed: int, scatter: float, coupling: flo
     )
 
 
-def true_curve(c: Configuration, curve: moments.PassiveCurve) -> tuple[np.ndarray, np.ndarray]:
+def true_curve(c: Configuration, curve: passive.PassiveCurve) -> tuple[np.ndarray, np.ndarray]:
     """Return the hidden elastic and dissipative moments at the angles of a curve, from the torques of the simulation [N m]."""
     j = c.joint - 1
     total = c.run.columns["torque.resisting"][:, j]
@@ -128,7 +129,7 @@ def recovered(known: list[Configuration], runs: int, scatter: float, coupling: f
     """Yield configuration, part, and of each run the relative error (root mean square over angles) and whether its interval holds."""
     held: dict[tuple[str, str], list[tuple[float, bool]]] = {}
     for seed in range(runs):
-        result = moments.passive_moments(session(known, seed, scatter, coupling))
+        result = passive.passive_moments(session(known, seed, scatter, coupling))
         for c in known:
             curve = next(k for k in result.curves if k.configuration == c.name and k.joint == c.joint)
             for part, true in zip(("elastic", "half_width"), true_curve(c, curve), strict=True):
@@ -144,7 +145,7 @@ def recovered(known: list[Configuration], runs: int, scatter: float, coupling: f
 def coupled(coupling: float, runs: int) -> dict[str, tuple[float, np.ndarray]]:
     """Return how often a coupling is found with the thesis' scatter, by each joint and by both, and the couplings found [N m/rad]."""
     known = configurations(coupling)
-    found = [moments.passive_moments(session(known, 10_000 + seed, 1.0, coupling)) for seed in range(runs)]
+    found = [passive.passive_moments(session(known, 10_000 + seed, 1.0, coupling)) for seed in range(runs)]
     by = {f"joint {joint}": [next(d for d in f.dependence if d.joint == joint) for f in found] for joint in (1, 2)}
     shares = {name: (float(np.mean([d.coupled for d in ds])), np.array([d["coupling"].value for d in ds])) for name, ds in by.items()}
     both = [f.couplings[0] for f in found]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import armrs
-from armrs.dataset import Dataset
+from armrs.io.dataset import Dataset
 
 ROBOT = armrs.Robot((0.5, 0.45), (1.0, -0.1), "up")
 

@@ -36,7 +36,7 @@ def test_reads_a_session(session: Session) -> None:
     data = armrs.load_dataset(session.folder)
     assert (data.name, data.force_on, data.sample_rate) == ("S1", "robot", 50.0)
     assert (data.subject.body_mass, data.subject.height, data.subject.sex) == (77.0, 1.8, "male")
-    assert data.tolerance == armrs.dataset.Tolerance(force_bias_N=0.4)
+    assert data.tolerance == armrs.Tolerance(force_bias_N=0.4)
     assert data.tolerance.angle_offset == pytest.approx(np.radians(0.3))
     assert data.model == armrs.load_model(session.folder / "model.toml")
     assert [t.file for t in data.fit_trials] == ["trials/slow_1.csv"]

@@ -116,7 +116,7 @@ def test_the_session_of_files_md_loads_and_is_what_was_simulated(session: Path) 
 
 
 def test_the_rows_of_files_md_are_read_as_it_says(session: Path) -> None:
-    from armrs.samples import read_samples
+    from armrs.io.samples import read_samples
 
     shown = read_samples(session / "shown.csv")
     elbow = shown.values[shown.names.index("q2_deg")]
@@ -125,7 +125,7 @@ def test_the_rows_of_files_md_are_read_as_it_says(session: Path) -> None:
 
 def test_a_horizontal_arm_that_is_carried_has_the_force_up() -> None:
     """The check of `force_on` in files.md: the last segment horizontal, the arm relaxed."""
-    from armrs.demo import true_model
+    from armrs.workflows.demo import true_model
 
     model = true_model().replace(joints=(armrs.Joint("shoulder"), armrs.Joint("elbow")))
     for shoulder in (-80.0, -45.0, 40.0):
@@ -146,7 +146,7 @@ def test_every_default_of_files_md_is_that_of_the_code() -> None:
 
 
 def test_files_md_names_every_key_of_an_identification(session: Path) -> None:
-    from armrs.results import identified_data
+    from armrs.report.results import identified_data
 
     text = (DOCS / "files.md").read_text(encoding="utf-8")
     data = identified_data(armrs.identify(session))
@@ -158,8 +158,8 @@ def test_the_python_of_the_readme_prints_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Blocks that name a folder run where the demonstration has been; there a comment behind `print` is what it prints."""
-    from armrs.dataset import write_dataset
-    from armrs.demo import measure, true_model
+    from armrs.io.dataset import write_dataset
+    from armrs.workflows.demo import measure, true_model
 
     monkeypatch.chdir(tmp_path)
     write_dataset(measure(true_model()), "armrs-demo/data")
@@ -219,7 +219,7 @@ def test_the_map_of_the_architecture_is_complete() -> None:
 
 
 def test_every_test_and_function_of_the_table_of_equations_exists() -> None:
-    text = (ROOT / "python" / "armrs" / "reproduce" / "equations.md").read_text(encoding="utf-8")
+    text = (ROOT / "python" / "armrs" / "thesis" / "equations.md").read_text(encoding="utf-8")
     suites: dict[str, list[str]] = {}
     for path in (*ROOT.glob("crates/*/tests/**/*.rs"), *ROOT.glob("tests/*.py")):
         suites.setdefault(path.name, []).append(path.read_text(encoding="utf-8"))
@@ -227,7 +227,7 @@ def test_every_test_and_function_of_the_table_of_equations_exists() -> None:
     assert len(tests) > 15
     for file, name in tests:
         assert any(re.search(rf"^(?:fn|def) {name}\b", source, flags=re.M) for source in suites[file]), f"{file}::{name}"
-    sources = [p.read_text(encoding="utf-8") for p in (*ROOT.glob("crates/*/src/**/*.rs"), *ROOT.glob("python/armrs/*.py"))]
+    sources = [p.read_text(encoding="utf-8") for p in (*ROOT.glob("crates/*/src/**/*.rs"), *ROOT.glob("python/armrs/**/*.py"))]
     rows = [line.split("|") for line in text.splitlines() if re.match(r"\| 3\.", line)]
     for name in itertools.chain(*(re.findall(r"`(?:\w+::)?(\w+)`", row[2]) for row in rows)):
         declared = re.compile(rf"\b(?:fn|def|struct|class) {name}\b|\b{name}: |\"{name}\"")

@@ -17,13 +17,13 @@ import armrs
 from armrs import cli
 from armrs.cosim import Slave
 from armrs.cosim.imported import ImportedSlave, platform_folder
-from armrs.demo import true_model
 from armrs.errors import BadInput, SlaveError
 from armrs.fmu import names
 from armrs.fmu.check import check_fmu
 from armrs.fmu.description import read_description, unpack
 from armrs.fmu.export import export_fmu
 from armrs.model import Model, Segment
+from armrs.workflows.demo import true_model
 
 ROOT = Path(__file__).parents[1]
 START = np.radians([-60.0, 50.0])

@@ -11,9 +11,9 @@ import pytest
 
 from armrs.cosim import Slave
 from armrs.cosim.imported import library_path
-from armrs.demo import true_model
 from armrs.fmu.description import read_description, unpack
 from armrs.fmu.export import export_fmu
+from armrs.workflows.demo import true_model
 
 SOURCE = Path(__file__).parent / "importer.c"
 

@@ -12,12 +12,12 @@ import pytest
 
 import armrs
 from armrs import cli
-from armrs.dataset import Dataset, write_dataset
-from armrs.discrepancy import calibrate, compare
-from armrs.discrepancy.results import gap_data, write_gap
-from armrs.discrepancy.shapes import portrait
-from armrs.discrepancy.suspicion import examine
 from armrs.errors import BadInput
+from armrs.io.dataset import Dataset, write_dataset
+from armrs.workflows.gap import calibrate, compare
+from armrs.workflows.gap.results import gap_data, write_gap
+from armrs.workflows.gap.shapes import portrait
+from armrs.workflows.gap.suspicion import examine
 from browser import opened
 from gap_sessions import session
 

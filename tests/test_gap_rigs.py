@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs.dataset import Dataset
+from armrs.io.dataset import Dataset
 
 DRY = ("coulomb", "load_friction")
 

@@ -13,11 +13,11 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.catalogue import catalogue
-from armrs.dataset import Dataset, write_dataset
-from armrs.discrepancy import Alternative, calibrate, compare, confirm, detectable, separate
-from armrs.discrepancy.found import Value
-from armrs.discrepancy.results import gap_data, write_gap
 from armrs.errors import BadInput
+from armrs.io.dataset import Dataset, write_dataset
+from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, separate
+from armrs.workflows.gap.found import Value
+from armrs.workflows.gap.results import gap_data, write_gap
 from gap_sessions import model, session
 
 VISCOUS = armrs.Effect("viscous", 2, parameters={"viscosity": 0.4})

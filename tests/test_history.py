@@ -12,8 +12,8 @@ import pytest
 
 import armrs
 from armrs import BadInput, Identified
-from armrs import history as sessions
 from armrs.cli import main
+from armrs.workflows import history as sessions
 
 
 @pytest.fixture(scope="module")

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import armrs
+from armrs.analysis.quantities import value_in
 from armrs.catalogue import catalogue
 from armrs.cli import main
-from armrs.demo import BRAKES
-from armrs.quantities import value_in
+from armrs.workflows.demo import BRAKES
 
 # DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
 DFKI_M2L2 = 0.6043459469186889 * 0.18377686083653508

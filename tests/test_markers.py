@@ -11,8 +11,8 @@ import pytest
 import armrs
 from armrs import BadInput
 from armrs.cli import main
-from armrs.markers import Markers
-from armrs.opensim import Motion, read_motion, write_motion
+from armrs.io.markers import Markers
+from armrs.io.opensim import Motion, read_motion, write_motion
 
 C3D = "pyomeca_markers_analogs.c3d"
 ARM = ["CLAV_AC", "EPICl+EPICm", "STYLr+STYLu"]

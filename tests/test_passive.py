@@ -10,7 +10,7 @@ import pytest
 
 import armrs
 from armrs import cli
-from armrs.demo import BRAKES
+from armrs.workflows.demo import BRAKES
 from conftest import Session
 
 FRICTION = 0.01

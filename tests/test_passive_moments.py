@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs import Dataset, Trial, moments, relaxed, uncertainty
-from armrs.dependence import Course, fit
+from armrs import Dataset, Trial
+from armrs.analysis import passivity_checks, uncertainty
+from armrs.analysis.joint_coupling import Course, fit
+from armrs.workflows import passive
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import check_passive
@@ -27,7 +29,7 @@ def session(known: list[check_passive.Configuration]) -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def result(session: Dataset) -> moments.PassiveMoments:
+def result(session: Dataset) -> passive.PassiveMoments:
     return armrs.passive_moments(session)
 
 
@@ -40,7 +42,7 @@ def test_hidden_moments_come_back_in_all_ten_configurations(known: list[check_pa
     assert sum(inside.sum() for *_, inside in rows) >= 70
 
 
-def test_the_orthosis_counts(session: Dataset, result: moments.PassiveMoments) -> None:
+def test_the_orthosis_counts(session: Dataset, result: passive.PassiveMoments) -> None:
     without = armrs.passive_moments(session.replace(added=()))
     for a, b in zip(result.curves, without.curves, strict=True):
         shift = np.nanmax(np.abs(a.elastic - b.elastic))
@@ -80,7 +82,7 @@ def test_the_coupling_is_found_with_the_scatter_of_the_thesis_and_not_made_up() 
     assert check_passive.over_trials(0.0, runs) / runs < 0.05 + beyond_chance
 
 
-def test_the_shape_comes_back(result: moments.PassiveMoments, known: list[check_passive.Configuration]) -> None:
+def test_the_shape_comes_back(result: passive.PassiveMoments, known: list[check_passive.Configuration]) -> None:
     elbow = next(d for d in result.dependence if d.joint == 2)
     assert (elbow.adjacent, elbow.trials, elbow.coupled) == (1, 30, True)
     # Without tone the trials scatter by a thousandth; what the low-pass leaves of the ends of the movement is as large.
@@ -109,7 +111,7 @@ def test_a_line_needs_no_exponential() -> None:
     assert fit([Course(c.angle, c.moment, 0.5, "one") for c in courses], 2, 1) is None
 
 
-def test_jacobian_and_monte_carlo_agree(session: Dataset, result: moments.PassiveMoments) -> None:
+def test_jacobian_and_monte_carlo_agree(session: Dataset, result: passive.PassiveMoments) -> None:
     own = result.trials[0]
     there = np.isfinite(own.q).all(axis=1)
     q, force = own.q[there][::20], own.force[there][::20]  # type: ignore[index]
@@ -121,7 +123,7 @@ def test_jacobian_and_monte_carlo_agree(session: Dataset, result: moments.Passiv
     assert by_jacobian[:, 0].max() > 0.2
 
 
-def test_masses_move_the_elastic_mean_and_hardly_the_hysteresis(result: moments.PassiveMoments) -> None:
+def test_masses_move_the_elastic_mean_and_hardly_the_hysteresis(result: passive.PassiveMoments) -> None:
     for curve in result.curves:
         if curve.joint == 1 and curve.configuration.startswith("elbow"):
             assert np.nanmean(curve.elastic_systematic) > 0.2 > 0.02 > np.nanmean(curve.half_width_systematic)
@@ -136,16 +138,16 @@ def test_muscles_that_wake_up_are_seen() -> None:
     def trial(emg: dict[str, np.ndarray]) -> Trial:
         return Trial("a.csv", "a", 1, "fit", t, np.zeros((300, 1)), np.zeros((300, 2)), emg=emg)
 
-    assert relaxed.muscles_silent([trial({"emg_biceps": quiet})]).passed is True
-    check = relaxed.muscles_silent([trial({"emg_biceps": quiet, "emg_triceps": burst})])
+    assert passivity_checks.muscles_silent([trial({"emg_biceps": quiet})]).passed is True
+    check = passivity_checks.muscles_silent([trial({"emg_biceps": quiet, "emg_triceps": burst})])
     assert check.passed is False and "emg_triceps rises to" in check.text and "of a.csv" in check.text
-    assert relaxed.muscles_silent([trial({})]).passed is None
-    assert relaxed.slow_enough([("a", 1, 0.02), ("b", 2, 0.3)]).passed is False
-    assert relaxed.slow_enough([("a", 1, 0.02)]).passed is True
+    assert passivity_checks.muscles_silent([trial({})]).passed is None
+    assert passivity_checks.slow_enough([("a", 1, 0.02), ("b", 2, 0.3)]).passed is False
+    assert passivity_checks.slow_enough([("a", 1, 0.02)]).passed is True
 
 
 def test_the_result_says_it_all(session: Dataset, tmp_path: Path) -> None:
-    from armrs.results import passive_data, write_passive
+    from armrs.report.results import passive_data, write_passive
 
     result = armrs.passive_moments(session)
     data = passive_data(result)

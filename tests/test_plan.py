@@ -13,7 +13,7 @@ import pytest
 import armrs
 from armrs import BadInput, Dataset, Effect, IdentificationError, Joint, Limits, Movement, Sensors, Trial
 from armrs.cli import main
-from armrs.discrepancy import detectable
+from armrs.workflows.gap import detectable
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import check_plan
@@ -167,7 +167,7 @@ def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture
     assert movement.waypoints.shape == (7, 2)
     experiment = f'model = "../model.toml"\n{(tmp_path / "out/plan.toml").read_text()}'
     (tmp_path / "out/e.toml").write_text(experiment, encoding="utf-8")
-    from armrs.experiment import load_experiment
+    from armrs.workflows.experiment import load_experiment
 
     assert [r.configuration for r in load_experiment(tmp_path / "out/e.toml").runs] == ["planned 1", "planned 2"]
 

@@ -13,7 +13,7 @@ import pytest
 import armrs
 from armrs import BadInput
 from armrs.cli import main
-from armrs.demo import true_model
+from armrs.workflows.demo import true_model
 
 FIRST = "trials/slow_1.csv"
 
@@ -91,7 +91,7 @@ def test_one_joint_that_is_still_may_be_held(slow_arm: Path, tmp_path: Path, cap
 
 
 def test_sound_data_pass(slow_arm: Path) -> None:
-    from armrs.plausibility import refuse_implausible
+    from armrs.io.plausibility import refuse_implausible
 
     data = armrs.load_dataset(slow_arm)
     assert refusal(lambda: refuse_implausible(data)) is None

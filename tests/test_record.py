@@ -11,7 +11,7 @@ import pytest
 import armrs
 from armrs import BadInput
 from armrs.cli import main
-from armrs.experiment import load_experiment
+from armrs.workflows.experiment import Controller, load_experiment
 
 EXPERIMENT = """\
 name = "virtual S1"
@@ -179,7 +179,7 @@ def test_the_experiment_of_the_documents_loads() -> None:
     text = (Path(__file__).parents[1] / "docs" / "files.md").read_text(encoding="utf-8")
     block = text.partition("```toml EXPERIMENT.toml\n")[2].partition("```")[0]
     assert block
-    for name, value in vars(armrs.experiment.Controller()).items():
+    for name, value in vars(Controller()).items():
         assert f"{name} = {value}" in block
 
 

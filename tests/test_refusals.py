@@ -14,8 +14,8 @@ import pytest
 
 import armrs
 from armrs import BadInput, cli
-from armrs.demo import true_model
-from armrs.moments import passive_moments
+from armrs.workflows.demo import true_model
+from armrs.workflows.passive import passive_moments
 
 
 class Folder:
@@ -217,7 +217,7 @@ def test_passive_moments_say_that_effects_do_not_count(slow_arm: Path, capsys: p
 @pytest.mark.parametrize("exists", [False, True])
 def test_a_folder_is_never_left_half_written(slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exists: bool) -> None:
     """The report is written last; when it fails, nothing else has changed."""
-    from armrs import report
+    from armrs.report import pages
 
     out = tmp_path / "out"
     if exists:
@@ -230,7 +230,7 @@ def test_a_folder_is_never_left_half_written(slow_arm: Path, tmp_path: Path, mon
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr(report, "write_report", fails)
+        patched.setattr(pages, "write_report", fails)
         assert cli.main(["passive", str(slow_arm), "-o", str(out)]) == 2
     assert {p.name: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
     assert [p for p in tmp_path.iterdir() if p != out] == []

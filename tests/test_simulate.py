@@ -19,12 +19,13 @@ import pytest
 from pyarrow import parquet
 
 import armrs
-from armrs import cli, figures
-from armrs.files import json_text
-from armrs.results import simulated_columns, simulated_data
-from armrs.samples import write_samples
-from armrs.simulation import PIECE
-from armrs.streamed import stream
+from armrs import cli
+from armrs.io.files import json_text
+from armrs.io.samples import write_samples
+from armrs.report import figures
+from armrs.report.results import simulated_columns, simulated_data
+from armrs.workflows.simulate import PIECE
+from armrs.workflows.streamed import stream
 from conftest import MODEL
 
 
@@ -156,7 +157,7 @@ def test_memory_does_not_grow_with_the_run(slow_arm: Path, tmp_path: Path) -> No
 def test_what_is_kept_on_disk_has_no_name(slow_arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that nothing is left of a run that is killed."""
     usual, used = tempfile.TemporaryFile, []
-    monkeypatch.setattr("armrs.files.tempfile.TemporaryFile", lambda dir: used.append((dir, usual(dir=dir))) or used[-1][1])
+    monkeypatch.setattr("armrs.io.files.tempfile.TemporaryFile", lambda dir: used.append((dir, usual(dir=dir))) or used[-1][1])
     movement = armrs.load_movement(slow_arm / "movement.toml", 2)
     with stream(armrs.load_model(slow_arm / "truth.toml"), movement, tmp_path / "a" / "b", duration=12.0, rate=4000.0) as run:
         assert run.samples == 48_001 and used[0][0] == tmp_path
@@ -178,7 +179,7 @@ def test_a_full_disk_is_said_and_nothing_is_left(
                 raise OSError(errno.ENOSPC, "No space left on device")
             return super().write(data)
 
-    monkeypatch.setattr("armrs.files.tempfile.TemporaryFile", lambda dir: Full())
+    monkeypatch.setattr("armrs.io.files.tempfile.TemporaryFile", lambda dir: Full())
     assert run("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", *LONG, "-o", out) == 2
     error = capsys.readouterr().err
     assert "No space left on device" in error and error.count("\n") == 1

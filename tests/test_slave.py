@@ -13,10 +13,10 @@ import pytest
 from armrs import Joint, Model, simulate
 from armrs.cosim import Partner, Slave, Status
 from armrs.cosim.imported import ImportedSlave
-from armrs.demo import true_model
 from armrs.errors import BadInput, SlaveError
 from armrs.fmu.export import export_fmu
 from armrs.model import Contact, Effect, Segment
+from armrs.workflows.demo import true_model
 
 KINDS = ("python", "fmi2", "fmi3")
 START = np.radians([-60.0, 50.0])

@@ -17,12 +17,12 @@ from pyarrow import parquet
 import armrs
 from armrs import BadInput
 from armrs.cli import main
-from armrs.identification import identify
-from armrs.laboratory import measure
 from armrs.montecarlo import load_sweep
 from armrs.montecarlo.case import compute, resampled
 from armrs.montecarlo.change import vary_of
 from armrs.montecarlo.summary import Moments
+from armrs.workflows.identify import identify
+from armrs.workflows.record import measure
 
 EXPERIMENT = """\
 [subject]

@@ -14,7 +14,7 @@ import pytest
 
 import armrs
 from armrs import ArmrsError, BadInput
-from armrs.demo import handed_over, true_model
+from armrs.workflows.demo import handed_over, true_model
 
 MODEL = true_model()
 BELIEVED = handed_over(MODEL)

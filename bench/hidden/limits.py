@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 import armrs
+from armrs.io.trial import Trial
 from armrs.model import Effect, Model, Segment
-from armrs.simulation import Sensors
-from armrs.trial import Trial
+from armrs.workflows.simulate import Sensors
 
 STEP = 0.5e-3
 """Of the simulations [s]."""

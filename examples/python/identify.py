@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import armrs
-from armrs.demo import handed_over, true_model
+from armrs.workflows.demo import handed_over, true_model
 
 truth = true_model()
 movement = armrs.Movement(np.radians([[-60, 60], [-48, 60], [-60, 60], [-60, 72], [-60, 60]]), speed=0.1, shape="smooth")

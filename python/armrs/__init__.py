@@ -9,36 +9,34 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import cosim as cosim
     from ._armrs import Arm as Arm
     from ._armrs import __version__ as __version__
+    from .analysis.fitting import SimulationFit as SimulationFit
+    from .analysis.fitting import fit_by_simulation as fit_by_simulation
     from .catalogue import Parameter as Parameter
-    from .conversion import convert as convert
-    from .dataset import Dataset as Dataset
-    from .dataset import Subject as Subject
-    from .dataset import Tolerance as Tolerance
-    from .dataset import load_dataset as load_dataset
-    from .dataset import write_dataset as write_dataset
-    from .demo import Demonstration as Demonstration
-    from .demo import run_demo as run_demo
-    from .discrepancy import GapFound as GapFound
-    from .discrepancy import find_gap as find_gap
+    from .custom_effects import OwnEffect as OwnEffect
+    from .custom_effects import own_effect as own_effect
     from .errors import ArmrsError as ArmrsError
     from .errors import BadInput as BadInput
     from .errors import IdentificationError as IdentificationError
     from .errors import SimulationError as SimulationError
     from .errors import SlaveError as SlaveError
-    from .fitting import SimulationFit as SimulationFit
-    from .fitting import fit_by_simulation as fit_by_simulation
     from .fmu.check import check_fmu as check_fmu
     from .fmu.export import export_fmu as export_fmu
-    from .identification import Estimate as Estimate
-    from .identification import Identified as Identified
-    from .identification import identify as identify
-    from .laboratory import Recorded as Recorded
-    from .laboratory import record as record
-    from .markers import Markers as Markers
-    from .markers import PlanarMotion as PlanarMotion
-    from .markers import planar_motion as planar_motion
+    from .io.conversion import convert as convert
+    from .io.dataset import Dataset as Dataset
+    from .io.dataset import Subject as Subject
+    from .io.dataset import Tolerance as Tolerance
+    from .io.dataset import load_dataset as load_dataset
+    from .io.dataset import write_dataset as write_dataset
+    from .io.markers import Markers as Markers
+    from .io.markers import PlanarMotion as PlanarMotion
+    from .io.markers import planar_motion as planar_motion
+    from .io.motions import convert_markers as convert_markers
+    from .io.motions import convert_motion as convert_motion
+    from .io.motions import read_markers as read_markers
+    from .io.trial import Trial as Trial
     from .model import Contact as Contact
     from .model import Effect as Effect
     from .model import Joint as Joint
@@ -46,60 +44,66 @@ if TYPE_CHECKING:
     from .model import Robot as Robot
     from .model import Segment as Segment
     from .model import load_model as load_model
-    from .moments import PassiveCurve as PassiveCurve
-    from .moments import PassiveMoments as PassiveMoments
-    from .moments import passive_moments as passive_moments
     from .montecarlo import Sweep as Sweep
     from .montecarlo import Swept as Swept
     from .montecarlo import load_sweep as load_sweep
     from .montecarlo import sweep as sweep
-    from .motions import convert_markers as convert_markers
-    from .motions import convert_motion as convert_motion
-    from .motions import read_markers as read_markers
-    from .own import OwnEffect as OwnEffect
-    from .own import own_effect as own_effect
-    from .planning import Instruments as Instruments
-    from .planning import Limits as Limits
-    from .planning import Plan as Plan
-    from .planning import forecast as forecast
-    from .planning import plan as plan
-    from .report import write_report as write_report
-    from .simulation import Channel as Channel
-    from .simulation import Movement as Movement
-    from .simulation import Sensors as Sensors
-    from .simulation import Simulated as Simulated
-    from .simulation import load_movement as load_movement
-    from .simulation import simulate as simulate
-    from .trial import Trial as Trial
+    from .report import plotting as plotting
+    from .report.pages import write_report as write_report
+    from .workflows import demo as demo
+    from .workflows import gap as gap
+    from .workflows.demo import Demonstration as Demonstration
+    from .workflows.demo import run_demo as run_demo
+    from .workflows.gap import GapFound as GapFound
+    from .workflows.gap import find_gap as find_gap
+    from .workflows.identify import Estimate as Estimate
+    from .workflows.identify import Identified as Identified
+    from .workflows.identify import identify as identify
+    from .workflows.passive import PassiveCurve as PassiveCurve
+    from .workflows.passive import PassiveMoments as PassiveMoments
+    from .workflows.passive import passive_moments as passive_moments
+    from .workflows.plan import Instruments as Instruments
+    from .workflows.plan import Limits as Limits
+    from .workflows.plan import Plan as Plan
+    from .workflows.plan import forecast as forecast
+    from .workflows.plan import plan as plan
+    from .workflows.record import Recorded as Recorded
+    from .workflows.record import record as record
+    from .workflows.simulate import Channel as Channel
+    from .workflows.simulate import Movement as Movement
+    from .workflows.simulate import Sensors as Sensors
+    from .workflows.simulate import Simulated as Simulated
+    from .workflows.simulate import load_movement as load_movement
+    from .workflows.simulate import simulate as simulate
 
-# A module is never named like a public function: importing it would put the module in the place of the function.
+# No module or package directly below `armrs` is named like a public function: importing it would put it in the place of the function.
 _HOMES = {
     "_armrs": ("Arm", "__version__", "build_profile"),
     "catalogue": ("Parameter",),
-    "conversion": ("convert",),
-    "dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
-    "demo": ("Demonstration", "run_demo"),
-    "discrepancy": ("GapFound", "find_gap"),
+    "io.conversion": ("convert",),
+    "io.dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
+    "workflows.demo": ("Demonstration", "run_demo"),
+    "workflows.gap": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
-    "fitting": ("SimulationFit", "fit_by_simulation"),
+    "analysis.fitting": ("SimulationFit", "fit_by_simulation"),
     "fmu.check": ("check_fmu",),
     "fmu.export": ("export_fmu",),
-    "identification": ("Estimate", "Identified", "identify"),
-    "laboratory": ("Recorded", "record"),
-    "markers": ("Markers", "PlanarMotion", "planar_motion"),
+    "workflows.identify": ("Estimate", "Identified", "identify"),
+    "workflows.record": ("Recorded", "record"),
+    "io.markers": ("Markers", "PlanarMotion", "planar_motion"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
-    "moments": ("PassiveCurve", "PassiveMoments", "passive_moments"),
+    "workflows.passive": ("PassiveCurve", "PassiveMoments", "passive_moments"),
     "montecarlo": ("Sweep", "Swept", "load_sweep", "sweep"),
-    "motions": ("convert_markers", "convert_motion", "read_markers"),
-    "own": ("OwnEffect", "own_effect"),
-    "planning": ("Instruments", "Limits", "Plan", "forecast", "plan"),
-    "report": ("write_report",),
-    "simulation": ("Channel", "Movement", "Sensors", "Simulated", "load_movement", "simulate"),
-    "trial": ("Trial",),
+    "io.motions": ("convert_markers", "convert_motion", "read_markers"),
+    "custom_effects": ("OwnEffect", "own_effect"),
+    "workflows.plan": ("Instruments", "Limits", "Plan", "forecast", "plan"),
+    "report.pages": ("write_report",),
+    "workflows.simulate": ("Channel", "Movement", "Sensors", "Simulated", "load_movement", "simulate"),
+    "io.trial": ("Trial",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
-_MODULES = ("cosim", "demo", "discrepancy", "plotting")
+_MODULES = {"cosim": "cosim", "demo": "workflows.demo", "gap": "workflows.gap", "plotting": "report.plotting"}
 """Modules that are of use by themselves; `armrs.demo` loads the module."""
 
 __all__ = sorted(_HOME_OF)
@@ -107,7 +111,7 @@ __all__ = sorted(_HOME_OF)
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        return importlib.import_module(f".{name}", __name__)
+        return importlib.import_module(f".{_MODULES[name]}", __name__)
     module = _HOME_OF.get(name)
     if module is None:
         raise AttributeError(f"module 'armrs' has no attribute {name!r}")

@@ -17,7 +17,7 @@ class ArmrsError(Exception):
     Attributes
     ----------
     trial : int, optional
-        Index of the trial it is about, where the core says so; `armrs.dataset.naming_trials` turns it into the name of a file.
+        Index of the trial it is about, where the core says so; `armrs.io.dataset.naming_trials` turns it into the name of a file.
     """
 
     trial: int | None = None

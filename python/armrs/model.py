@@ -13,9 +13,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from . import checks, files, tomlfile
+from . import checks
 from .catalogue import Kind, catalogue
 from .errors import BadInput, Text, unknown_name
+from .io import files, tomlfile
 
 CHANNELS = ("Fy", "Fz", "Mx")
 MOST_SEGMENTS = 6

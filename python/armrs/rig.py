@@ -10,7 +10,7 @@ from .catalogue import FORCE_CHANNELS, catalogue
 from .model import Effect, Model
 
 if TYPE_CHECKING:
-    from .dataset import Tolerance
+    from .io.dataset import Tolerance
 
 NO_CONTACT = ((10_000.0, 10_000.0), (25.0, 25.0))
 """Stiffness [N/m] and damping [N s/m] of the thesis' contact, where a model says nothing."""

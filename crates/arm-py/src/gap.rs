@@ -163,7 +163,7 @@ pub fn find_gap<'py>(
     each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()))
 }
 
-/// Calibrates a model, and asks every candidate alone to first order; see `armrs.discrepancy.calibrate`.
+/// Calibrates a model, and asks every candidate alone to first order; see `armrs.gap.calibrate`.
 #[pyfunction]
 #[pyo3(signature = (rig, trials, settings, progress=None))]
 pub fn look<'py>(

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from .. import console
 from ..errors import BadInput, Text
+from ..report import console
 from .common import JsonFile, MaybeFolder, Source, command_line, present, writable
 
 
@@ -62,10 +62,10 @@ def identify(
     half the variation of a joint's torque is left (above a fifth there is a warning), or when speeds are noise to a good part. Such a
     result is not added to a history.
     """
-    from .. import history as sessions
-    from .. import results, words
-    from ..dataset import load_dataset
-    from ..identification import identify as run_identification
+    from ..io.dataset import load_dataset
+    from ..report import results, words
+    from ..workflows import history as sessions
+    from ..workflows.identify import identify as run_identification
 
     folder = writable(out, json)
     data = load_dataset(dataset)
@@ -112,9 +112,9 @@ def gap(
     Everything is chosen and fitted on the fit trials; the gap is measured on the test trials. Exit status 1 when something is left
     that no effect of the catalogue explains.
     """
-    from ..dataset import load_dataset
-    from ..discrepancy import calibrate, find_gap, words
-    from ..discrepancy.results import gap_data, write_gap
+    from ..io.dataset import load_dataset
+    from ..workflows.gap import calibrate, find_gap, words
+    from ..workflows.gap.results import gap_data, write_gap
 
     if quick and out is not None:
         raise BadInput("--quick", Text("-o beside it"), "--json, or nothing: a first answer has no report")
@@ -151,9 +151,9 @@ def passive(
 
     Exit status 1 when no joint moved long enough in both directions.
     """
-    from .. import results, words
-    from ..dataset import load_dataset
-    from ..moments import passive_moments
+    from ..io.dataset import load_dataset
+    from ..report import results, words
+    from ..workflows.passive import passive_moments
 
     folder = writable(out, json)
     data = load_dataset(dataset)

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import typer
 
-from .. import console
+from ..report import console
 from .common import JsonFile, OutFolder, command_line, present, writable
 
 
 def demo(context: typer.Context, out: OutFolder = Path("armrs-demo"), json: JsonFile = None) -> None:
     """Do the main job on built-in data: simulate the experiment, identify the arm, compare with what is known, write a report."""
-    from .. import words
-    from ..demo import run_demo
-    from ..report import read_result
+    from ..report import words
+    from ..report.pages import read_result
+    from ..workflows.demo import run_demo
 
     writable(out, json)
     with console.progress("demo"):
@@ -28,8 +28,8 @@ def reproduce(context: typer.Context, out: OutFolder = Path("armrs-thesis"), jso
 
     Takes about 40 seconds of one core; what is being computed is shown.
     """
-    from .. import words
-    from ..reproduce import run_reproduce
+    from ..report import words
+    from ..thesis import run_reproduce
 
     writable(out, json)
     with console.stages("the thesis") as tell:

@@ -12,8 +12,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .. import files
 from ..errors import BadInput, Text
+from ..io import files
 
 
 def _named(value: str | Path) -> Path:

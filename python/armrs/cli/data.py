@@ -10,8 +10,9 @@ from typing import Annotated, Any
 
 import typer
 
-from .. import console, files
 from ..errors import ArmrsError, BadInput, Text, unknown_name
+from ..io import files
+from ..report import console
 from .common import JsonFile, OutFolder, listed, present, writable
 
 
@@ -74,11 +75,12 @@ def convert(
     json: JsonFile = None,
 ) -> None:
     """Convert between file formats, every value kept to the bit; turn marker trajectories into joint angles and segment lengths."""
-    from .. import motions, words
-    from ..conversion import convert as run_conversion
-    from ..markers import MARKER_SUFFIXES
-    from ..opensim import MOTION_SUFFIXES
-    from ..samples import SUFFIXES
+    from ..io import motions
+    from ..io.conversion import convert as run_conversion
+    from ..io.markers import MARKER_SUFFIXES
+    from ..io.opensim import MOTION_SUFFIXES
+    from ..io.samples import SUFFIXES
+    from ..report import words
 
     suffix = _suffix_of(source, (*SUFFIXES, *MOTION_SUFFIXES, *MARKER_SUFFIXES))
     chosen, named = listed(points), listed(coordinates)
@@ -116,7 +118,7 @@ def report(
     out: OutFolder = Path(),
 ) -> None:
     """Make one self-contained HTML report, report.html, of any results."""
-    from ..report import write_report
+    from ..report.pages import write_report
 
     print(write_report(sources, files.output_folder(out, "-o") / "report.html"))
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .. import console
 from ..errors import BadInput, Text
+from ..report import console
 from .common import JsonFile, MaybeFolder, OutFolder, SamplesFormat, command_line, listed, present, samples_suffix, writable
 
 if TYPE_CHECKING:
-    from ..trial import Reading
+    from ..io.trial import Reading
 
 
 class Engine(str, enum.Enum):
@@ -67,10 +67,10 @@ def simulate(
     json: JsonFile = None,
 ) -> None:
     """Simulate the closed-chain experiment: a robot leads the arm."""
-    from .. import results, words
     from ..model import load_model
-    from ..simulation import load_movement
-    from ..streamed import stream
+    from ..report import results, words
+    from ..workflows.simulate import load_movement
+    from ..workflows.streamed import stream
 
     if (movement is None) == (trial is None):
         found = Text("neither" if movement is None else "both")
@@ -131,10 +131,11 @@ def plan(
 
     Exit status 1 when a parameter will stay uncertain by more than half its value.
     """
-    from .. import planning, words
-    from ..discrepancy import detectable
     from ..model import load_model
-    from ..simulation import load_movement
+    from ..report import words
+    from ..workflows import plan as planning
+    from ..workflows.gap import detectable
+    from ..workflows.simulate import load_movement
 
     folder = writable(out, json)
     arm = load_model(model)
@@ -171,9 +172,9 @@ def record(
 
     Exit status 1 when the safety supervisor stopped a trial; that trial is not in the data set.
     """
-    from .. import words
-    from ..experiment import load_experiment
-    from ..laboratory import record as run_record
+    from ..report import words
+    from ..workflows.experiment import load_experiment
+    from ..workflows.record import record as run_record
 
     writable(out, json)
     planned = load_experiment(experiment)
@@ -232,7 +233,7 @@ def sweep(
 
 def _single_trial(path: Path, n_joints: int) -> Reading:
     """Read a trial that stands alone. Its forces are not used, so that it does not matter what they act on."""
-    from ..trial import read_trial
+    from ..io.trial import read_trial
 
     try:
         reading = read_trial(

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from .. import console
 from ..errors import BadInput
+from ..report import console
 from .common import JsonFile, MaybeFolder, OutFile, SamplesFormat, command_line, present, samples_suffix, writable
 
 app = typer.Typer(
@@ -112,11 +112,11 @@ def fmu_run(
     Exit status 1 when the run is no result: it diverged, the coupling creates energy, or the iteration did not converge. Then only the
     diagnosis is written, and no samples.
     """
-    from .. import words
     from ..cosim.master import run_system
     from ..cosim.outcome import coupled_data, write_coupled
     from ..cosim.system import load_system
     from ..errors import CoupledError
+    from ..report import words
 
     suffix = samples_suffix(to, out)
     folder = writable(out, json)

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import figures, files, plotting, results
-from ..samples import write_samples
+from ..io import files
+from ..io.samples import write_samples
+from ..report import figures, plotting, results
 from .master import Coupled
 
 

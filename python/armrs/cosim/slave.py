@@ -12,7 +12,7 @@ from .. import _armrs, checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from ..model import Model, load_model
 from ..rig import rig
-from ..simulation import DEFAULT_DT
+from ..workflows.simulate import DEFAULT_DT
 from .partner import Partner, Status, StepResult, Variable, listed
 
 PORTS = ("force", "motion")

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks, tomlfile
+from .. import checks
 from ..errors import BadInput, Text, unknown_name
+from ..io import tomlfile
 from .imported import ImportedSlave
 from .partner import Partner, Variable
 from .slave import Slave

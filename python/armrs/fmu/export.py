@@ -11,11 +11,12 @@ from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
-from .. import _armrs, checks, files
+from .. import _armrs, checks
 from ..cosim.imported import platform_folder
 from ..cosim.partner import Variable
 from ..cosim.slave import Slave
 from ..errors import ArmrsError
+from ..io import files
 from ..model import Model
 
 IDENTIFIER = "ArmRs"

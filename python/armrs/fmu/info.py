@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from .. import console
+from ..report import console
 from .description import archive, read_description
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..dataset import Dataset
+from ..analysis.quantities import value_in
 from ..errors import ArmrsError, one_line
-from ..identification import Estimate, Identified, identify
-from ..laboratory import measure
+from ..io.dataset import Dataset
 from ..model import Model
-from ..quantities import value_in
+from ..workflows.identify import Estimate, Identified, identify
+from ..workflows.record import measure
 from .spec import Question, Sweep
 
 Row = dict[str, Any]

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import plotting, tables
-from ..figures import Drawn, quantity_name
+from ..report import plotting, tables
+from ..report.figures import Drawn, quantity_name
 from .summary import Quantity, Summary
 
 MOST_PANELS = 12

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .. import files
-from ..results import origin, write_result
+from ..io import files
+from ..report.results import origin, write_result
 from . import figures
 from .change import Vary
 from .spec import Sweep

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import checks, files
-from ..laboratory import check_required
+from .. import checks
+from ..io import files
+from ..workflows.record import check_required
 from . import results, workers
 from .spec import Sweep, load_sweep
 from .store import Store

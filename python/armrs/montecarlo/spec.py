@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import _armrs, checks, tomlfile
-from ..dataset import Dataset, load_dataset
+from .. import _armrs, checks
 from ..errors import BadInput, Text
-from ..experiment import Experiment, experiment_of, model_at
-from ..identification import LEVELS, cascade_can, effects_of
+from ..io import tomlfile
+from ..io.dataset import Dataset, load_dataset
 from ..model import Model
+from ..workflows.experiment import Experiment, experiment_of, model_at
+from ..workflows.identify import LEVELS, cascade_can, effects_of
 from .change import Vary, vary_of
 
 MOST_CASES = 1_000_000
@@ -188,7 +189,7 @@ def _resampled(table: dict[str, Any], path: Path, draft: Sweep) -> Sweep:
     if sum(t.role == "fit" for t in dataset.trials) < 2:
         raise BadInput("dataset", Text("one trial to fit"), "at least two, to draw from")
     _check_question(draft.question, dataset.model)
-    from ..discrepancy.results import digest
+    from ..workflows.gap.results import digest
 
     return dataclasses.replace(draft, dataset=dataset, digest=_digest(table, {"files": digest(dataset)}))
 

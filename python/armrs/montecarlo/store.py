@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from .. import files
 from ..errors import BadInput, Text
-from ..samples import write_table
+from ..io import files
+from ..io.samples import write_table
 from .case import Row
 from .spec import Sweep
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import tables
-from ..tables import Table
+from ..report import tables
+from ..report.tables import Table
 
 MEANING = (
     "Error is what was found less the truth; claimed is the mean of the standard deviations that the identifications state. Coverage is "
@@ -101,7 +101,7 @@ def count_lines(data: Mapping[str, Any]) -> list[str]:
 
 def swept(data: Mapping[str, Any], run: Mapping[str, Any], written: Sequence[Path]) -> None:
     """Print a sweep, what this run of it took, and where its files are."""
-    from .. import words
+    from ..report import words
 
     words.head(data)
     if data["vary"]:
@@ -124,7 +124,7 @@ def run_line(run: Mapping[str, Any]) -> str:
 
 def page(data: Mapping[str, Any]) -> str:
     """Return the sections of a report."""
-    from ..report import bullets, heading, paragraph, table
+    from ..report.pages import bullets, heading, paragraph, table
 
     out = heading("The cases") + bullets(count_lines(data))
     if data["vary"]:

@@ -1,0 +1,93 @@
+"""Reading and writing TOML: what armrs needs of it, with refusals on one line."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from .. import checks
+from ..errors import BadInput, Text, not_utf8
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_Made = TypeVar("_Made")
+_LIMIT = 16 * 1024 * 1024
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def read(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the tables of a TOML file, or raise `BadInput` naming file, line and column."""
+    content = read_text(path, "a TOML file")
+    try:
+        return tomllib.loads(content)
+    except tomllib.TOMLDecodeError as error:
+        message, _, position = str(error).partition(" (at ")
+        place = position.rstrip(")") or "TOML"
+        raise BadInput(place, Text(message), "TOML", file=path) from None
+
+
+def load(path: str | os.PathLike[str], make: Callable[[dict[str, Any], Path], _Made]) -> _Made:
+    """Return what `make` builds of the tables of a TOML file and its path; a refusal without a file names this one."""
+    document = read(path)
+    try:
+        return make(document, Path(path))
+    except BadInput as error:
+        raise error.within(file=error.file or path) from None
+
+
+def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> str:
+    """Return the text of a UTF-8 file of at most `most` bytes, or raise `BadInput`."""
+    file = checks.path("file", path)
+    try:
+        is_folder, size = file.is_dir(), file.stat().st_size
+        raw = b"" if is_folder or size > most else file.read_bytes()
+    except OSError as error:
+        raise BadInput("file", Text(error.strerror or "unreadable"), f"{what} that can be read", file=path) from None
+    except ValueError:  # a path with a null character
+        raise BadInput("file", Text("a name no file can have"), what, file=path) from None
+    if is_folder:
+        raise BadInput("file", Text("a folder"), what, file=path)
+    if size > most:
+        raise BadInput("file", Text(f"{size} bytes"), f"{what} of at most {most} bytes", file=path)
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise not_utf8(f"line {line}", raw, error, file=path) from None
+
+
+def value(item: object) -> str:
+    """Write one value; a float is written with all the digits that reading it back needs."""
+    if isinstance(item, bool):
+        return "true" if item else "false"
+    if isinstance(item, (int, float)):
+        return repr(item)
+    if isinstance(item, str):
+        return '"' + "".join(_escape(c) for c in item) + '"'
+    if isinstance(item, (list, tuple)):
+        return "[" + ", ".join(value(part) for part in item) + "]"
+    raise TypeError(f"no TOML form for {type(item).__name__}")
+
+
+def lines(table: Mapping[str, object]) -> list[str]:
+    """Write the plain keys of one table, leaving out those that are None."""
+    return [f"{_key(key)} = {value(item)}" for key, item in table.items() if item is not None]
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else value(key)
+
+
+def _escape(character: str) -> str:
+    if character in '"\\':
+        return "\\" + character
+    if character < " " or character == "\x7f":
+        return f"\\u{ord(character):04x}"
+    return character

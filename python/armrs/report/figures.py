@@ -1,0 +1,290 @@
+"""Whole figures of results: which plots stand together, and the words below them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..analysis.joint_coupling import LEAST_HELD, Dependence
+from ..io.trial import Trial
+from ..workflows.identify import Explained, Identified
+from ..workflows.passive import PassiveMoments
+from ..workflows.simulate import Simulated
+from . import plotting, tables
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..workflows.streamed import Run
+
+MOST_CONFIGURATIONS = 8
+"""So many movements are drawn; with more, a report would be too long to read."""
+
+
+Part = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure with the name of its file, its title and what it shows in words; `section` is the part of a report it belongs to."""
+
+    name: str
+    title: str
+    text: str
+    figure: Figure
+    section: str = ""
+
+
+def identified(result: Identified, data: Mapping[str, Any]) -> list[Drawn]:
+    """Draw an identification: parameters with intervals, and torques measured and fitted for every movement."""
+    joints = data["data"]["joints"]
+    with plotting.style():
+        return [parameters([*data["parameters"], *data["combinations"]], joints, data["level"]), *_torques(result, joints)]
+
+
+def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level: float) -> Drawn:
+    """Draw estimates with intervals, one panel a unit."""
+    unique = list({(tables.label(item), item.get("joint")): item for item in reversed(items)}.values())[::-1]
+    units = list(dict.fromkeys(item["unit"] for item in unique))
+    panels = [[item for item in unique if item["unit"] == unit] for unit in units]
+    sizes = [len(panel) + 1.1 for panel in panels]
+    columns = 2 if len(panels) > 1 else 1
+    split = _balanced(sizes, columns)
+    height = max(sum(sizes[k] for k in column) for column in split)
+    figure = plotting.figure(5.4 * columns, 0.36 * height + 0.9)
+    for place, column in zip(figure.subfigures(1, columns, squeeze=False)[0], split, strict=True):
+        spare = height - sum(sizes[k] for k in column)
+        ratios = [sizes[k] for k in column] + ([spare] if spare > 0.5 else [])
+        axes = place.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0]
+        for ax, k in zip(axes, column, strict=False):
+            plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], ax)
+        for ax in axes[len(column) :]:
+            ax.set_axis_off()
+    plotting.interval_legend(figure, unique)
+    text = (
+        f"Bars are {100 * level:g} % intervals. A full marker rests on the measurement. A hollow one does not: where the movements leave a "
+        "value open it is that of the model as given, moved only as far as the combinations that are measured ask for."
+    )
+    return Drawn("parameters", "Parameters with intervals", text, figure)
+
+
+def history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
+    """Draw every parameter over sessions, with twice its standard deviation."""
+    columns = min(3, max(1, len(courses)))
+    rows = max(1, -(-len(courses) // columns))
+    with plotting.style():
+        figure = plotting.figure(3.6 * columns, 2.4 * rows)
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        for ax, course in zip(axes, courses, strict=False):
+            place = np.arange(len(course["dates"]))
+            colour = plotting.ORANGE if course["changed"] else plotting.BLUE
+            ax.errorbar(place, course["values"], 2.0 * np.asarray(course["stds"]), fmt="o-", color=colour, capsize=3)
+            ax.set_xticks(place, [date[2:] for date in course["dates"]], rotation=45, fontsize="small")
+            name = course["name"] if course["joint"] is None else f"{course['kind']} {course['joint']} {course['name']}"
+            ax.set(title=f"{name}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
+            ax.title.set_fontsize("small")
+        for ax in axes[len(courses) :]:
+            ax.set_axis_off()
+    text = (
+        "Parameters that the data decided, over the sessions; bars are twice the standard deviation. "
+        "An orange one differs in the last session."
+    )
+    return Drawn("history", "Over the sessions", text, figure)
+
+
+def quantity_name(item: Mapping[str, Any], joints: Sequence[str]) -> str:
+    """Name a quantity beside an axis."""
+    if item["kind"] in ("segment", "combination"):
+        return plotting.symbol(item["name"])
+    return f"{tables.label(item)} {tables.where(item, joints)}".strip()
+
+
+def _balanced(sizes: Sequence[float], columns: int) -> list[list[int]]:
+    """Share panels among columns so that these become about equally high; the order stays within each."""
+    split: list[list[int]] = [[] for _ in range(columns)]
+    for k in sorted(range(len(sizes)), key=lambda k: -sizes[k]):
+        min(split, key=lambda column: sum(sizes[i] for i in column)).append(k)
+    return sorted(sorted(column) for column in split)
+
+
+def _torques(result: Identified, joints: Sequence[str]) -> list[Drawn]:
+    drawn = []
+    names = list(dict.fromkeys(e.trial.configuration for e in result.explained))
+    for configuration in names[:MOST_CONFIGURATIONS]:
+        own = [e for e in result.explained if e.trial.configuration == configuration]
+        shown = next((e for e in own if e.trial.role == "test"), own[0])
+        n = len(joints)
+        figure = plotting.figure(5.0 * max(n, 1) + 0.4, 4.6)
+        axes = figure.subplots(2, n, squeeze=False, sharex=True, height_ratios=(2.0, 1.0))
+        for j, name in enumerate(joints):
+            plotting.torque(_elapsed(shown), shown.measured[:, j], shown.fitted[:, j], axes[0, j], title=name)
+            plotting.residual([(_elapsed(e), e.measured[:, j] - e.fitted[:, j], e.trial.role) for e in own], axes[1, j])
+            axes[0, j].set_xlabel("")
+        text = (
+            f"Above, joint torques of {shown.trial.file} ({shown.trial.role} trial): what the measured forces and motion ask for, and what "
+            f"the fitted model gives. Below, what is left in all {len(own)} repeats."
+        )
+        drawn.append(Drawn(f"torques-{slug(configuration)}", f"Torques of the movement {configuration}", text, figure))
+    return drawn
+
+
+def _elapsed(explained: Explained) -> np.ndarray:
+    """Return times since the start of the trial, so that repeats lie on one another whatever their clock says."""
+    return explained.t - explained.trial.t[0]
+
+
+_TORQUES = {
+    "inertial": "inertia",
+    "centrifugal": "centrifugal",
+    "coriolis": "Coriolis",
+    "gravity": "gravity",
+    "frame": "moving base",
+    "resisting": "resisting",
+    "drive": "motor",
+    "contact": "contact",
+}
+"""Torque columns of a recording, and how a legend names them."""
+_MOST_DRAWN = 20_000
+"""Samples of a curve; more fall on the same pixels."""
+_VISIBLE = 5e-3
+"""A torque below this part of the largest would be a line on the axis."""
+
+
+def outline(run: Run) -> Simulated:
+    """Return a run that looks the same when it is drawn: of a long one, the lowest and highest values of every few samples."""
+    together = 1 if run.samples <= _MOST_DRAWN else -(-2 * run.samples // _MOST_DRAWN)
+    parts = [_extremes(piece, together) for piece in run.pieces()]
+    return parts[0].with_columns({name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns})
+
+
+def _extremes(piece: Simulated, together: int) -> Simulated:
+    """Return what is drawn of a piece: two samples for every so many, of each column the lowest value and the highest."""
+    starts = np.arange(0, len(piece.t), together)
+    middles = np.minimum(starts + together // 2, len(piece.t) - 1)
+
+    def of(name: str, values: np.ndarray) -> np.ndarray:
+        if together == 1:
+            return values
+        both = (
+            (values[starts], values[middles])
+            if name == "time"
+            else (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
+        )
+        return np.stack(both, axis=1).reshape(-1, *values.shape[1:])
+
+    kept = ["time", "q", "qd", "qdd", "force_on_arm", *(name for name in piece.columns if name.startswith("torque."))]
+    return piece.with_columns({name: of(name, piece.columns[name]) for name in kept})
+
+
+def simulated(result: Simulated, trial: Trial | None = None) -> list[Drawn]:
+    """Draw a run: angles, force and every torque of each joint. A trial that drove it is drawn behind the angles."""
+    names = [joint.name for joint in result.model.joints]
+    n = len(names)
+    columns = max(n, 2)
+    with plotting.style():
+        figure = plotting.figure(4.6 * columns, 6.4)
+        grid = figure.add_gridspec(2, 2 * columns)
+        top = [figure.add_subplot(grid[0, k * columns : (k + 1) * columns]) for k in range(2)]
+        measured = None if trial is None else np.column_stack([np.interp(result.t, trial.t - trial.t[0], q) for q in trial.q.T])
+        plotting.angles(result.t, result.q, names, top[0], measured=measured)
+        plotting.force(result.t, result.force_on_arm, top[1])
+        largest = {key: np.abs(result.columns[f"torque.{key}"]).max(axis=0) for key in _TORQUES}
+        limit = _VISIBLE * np.max(list(largest.values()), axis=0)
+        visible = {key: label for key, label in _TORQUES.items() if (largest[key] > limit).any()}
+        for j, name in enumerate(names):
+            share = 2 * columns // n
+            ax = figure.add_subplot(grid[1, j * share : (j + 1) * share])
+            shown = {label: result.columns[f"torque.{key}"][:, j] for key, label in visible.items()}
+            plotting.contributions(result.t, shown, ax, title=f"Torques: {name}")
+    text = (
+        "Inertial, centrifugal, Coriolis, gravity and resisting torques stand on the left of the equation of motion, those of motors and "
+        "contact on the right. Torques that would be a line on the axis are left out."
+    )
+    if trial is not None:
+        text += f" The broad lines are the angles measured in {trial.file}."
+    return [Drawn("simulated", "Angles, force and torques", text, figure)]
+
+
+def passive(result: PassiveMoments) -> list[Drawn]:
+    """Draw passive moments: for each configuration the samples by direction of motion, elastic mean and half width."""
+    names = [joint.name for joint in result.dataset.model.joints]
+    drawn = []
+    with plotting.style():
+        for configuration in list(dict.fromkeys(c.configuration for c in result.curves))[:MOST_CONFIGURATIONS]:
+            curves = [c for c in result.curves if c.configuration == configuration]
+            own = [m for m in result.trials if m.trial.configuration == configuration]
+            figure = plotting.figure(4.9 * len(curves) + 0.4, 5.6)
+            axes = figure.subplots(2, len(curves), squeeze=False, sharex="col", height_ratios=(1.7, 1.0))
+            for (above, below), curve in zip(axes.T, curves, strict=True):
+                j = curve.joint - 1
+                rising, falling = ([(m.q[d, j], m.moment[d, j]) for m in own for d in [m.direction[:, j] == sign]] for sign in (1, -1))
+                plotting.hysteresis(rising, falling, above, title=names[j])
+                plotting.mean_and_spread(curve.angle, curve.elastic, curve.elastic_std, above, label="elastic mean")
+                plotting.mean_and_spread(
+                    curve.angle, curve.half_width, curve.half_width_std, below, label="half width (dissipative)", colour=plotting.PURPLE
+                )
+                above.set(ylabel="passive moment [N m]", xlabel="")
+                below.set_ylim(bottom=min(0.0, below.get_ylim()[0]))
+            text = (
+                f"Above, samples of {len(own)} repeats by direction of motion and the mean of both directions. Below, half the difference "
+                "of both directions. Bands are one standard deviation over the repeats."
+            )
+            drawn.append(Drawn(f"passive-{slug(configuration)}", f"Passive moments of the movement {configuration}", text, figure))
+        drawn += [_dependence(result, d, names) for d in result.dependence]
+    return drawn
+
+
+def _dependence(result: PassiveMoments, fitted: Dependence, names: Sequence[str]) -> Drawn:
+    """Draw elastic moments of one joint in all configurations, and what was fitted to them."""
+    figure = plotting.figure(6.4, 4.2)
+    ax = figure.subplots()
+    moved = [c for c in result.curves if c.joint == fitted.joint and np.ptp(c.angle) > LEAST_HELD]
+    own = sorted(moved, key=lambda c: float(c.held[:, fitted.adjacent - 1].mean()))
+    for number, curve in enumerate(own):
+        held = float(curve.held[:, fitted.adjacent - 1].mean())
+        colour = plotting.shade(number / max(len(own) - 1, 1))
+        ax.plot(np.degrees(curve.angle), curve.elastic, ".", color=colour, label=f"{names[fitted.adjacent - 1]} at {np.degrees(held):.0f}°")
+        ax.plot(np.degrees(curve.angle), fitted.at(curve.angle, held), "-", color=colour)
+    ax.set(title=names[fitted.joint - 1], xlabel="joint angle [°]", ylabel="elastic moment [N m]")
+    ax.legend(fontsize="small")
+    text = "Points are elastic means over the repeats of each configuration, lines the fitted double exponential with slope and coupling."
+    return Drawn(f"dependence-{fitted.joint}", f"{names[fitted.joint - 1]}: own and adjacent angle", text, figure)
+
+
+def direction_of_motion(before: Sequence[Part], after: Sequence[Part], joints: Sequence[str]) -> Drawn:
+    """Draw what is left of the torques against the angle, without and with friction.
+
+    A part holds angle, unexplained torque and direction of motion of one trial, each of shape (n, n_joints).
+    """
+    n = len(joints)
+    with plotting.style():
+        figure = plotting.figure(4.9 * n + 0.4, 6.4)
+        axes = figure.subplots(2, n, squeeze=False, sharex="col", sharey="col")
+        for row, (parts, which) in zip(axes, ((before, "no friction"), (after, "with friction")), strict=True):
+            angle, left, sign = (np.concatenate(items) for items in zip(*parts, strict=True))
+            for j, ax in enumerate(row):
+                title = f"{joints[j]}, {which}"
+                plotting.by_direction(angle[:, j], left[:, j], sign[:, j], ax, title=title, quantity="not explained [N m]")
+        for ax in axes[0]:
+            ax.set_xlabel("")
+    text = (
+        "Joint torque of the test trials that the model does not explain, after masses and calibration were fitted. Above, without "
+        "friction; below, with dry friction at both joints. A gap between both directions is what friction looks like."
+    )
+    return Drawn("direction", "What is left, by direction of motion", text, figure)
+
+
+def known(rows: Sequence[Mapping[str, Any]], joints: Sequence[str], level: float) -> Drawn:
+    """Draw estimates beside known values."""
+    with plotting.style():
+        drawn = parameters(rows, joints, level)
+    return Drawn("known", "Identified and known", f"{drawn.text} The green line is the value that was simulated.", drawn.figure)
+
+
+def slug(name: str) -> str:
+    """Turn a name into one that every file system takes."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.") or "figure"

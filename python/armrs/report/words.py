@@ -1,0 +1,300 @@
+"""Results in words: what the terminal prints, and the sentences of reports. Each function reads the plain data of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import console, tables
+
+if TYPE_CHECKING:
+    from ..io.markers import PlanarMotion
+
+PASSIVE_MEANING = (
+    "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "
+    "The mean of both directions is its elastic part, half their difference its dissipative part. The mean also holds what is wrong with "
+    "the masses of the model. Of the model only the rigid arm counts: what its springs, friction and other effects would add is in what is "
+    "shown, not taken off it."
+)
+
+DEPENDENCE_MEANING = (
+    "The elastic moment of a joint as a double exponential of its angle (upper and lower: its size at both ends of what was measured), "
+    "a slope, and a coupling: how much it changes with the adjacent angle. The coupling is tested against a model without it, over trials."
+)
+
+WRONG_MASS = (
+    "A mass or centre of mass that is wrong in the model looks like a coupling too: its weight depends on the sum of both angles, and so "
+    "does what is left of it."
+)
+
+
+def name(result: Mapping[str, Any]) -> str:
+    """Return what a result is about."""
+    return str(result["data"]["name"])
+
+
+def is_synthetic(result: Mapping[str, Any]) -> bool:
+    """Tell whether a result rests on simulated data."""
+    return bool(result["data"].get("synthetic"))
+
+
+def verdict(result: Mapping[str, Any]) -> str:
+    """Return a result in a sentence or two."""
+    from ..montecarlo import words as sweep
+    from ..workflows.gap import words as gap
+
+    sentences = {
+        "identify": _identified,
+        "simulate": _simulated,
+        "passive": _passive,
+        "demo": _demo,
+        "gap": gap.verdict,
+        "fmu run": _coupled,
+        "sweep": sweep.verdict,
+    }
+    return sentences[result["verb"]](result)
+
+
+def _identified(result: Mapping[str, Any]) -> str:
+    by = [e["decided_by"] for e in result["parameters"]]
+    counts = [f"{by.count('data')} rest on the measurement", f"{by.count('prior')} on the model as given"]
+    if "bound" in by:
+        counts.append(f"{by.count('bound')} on a physical limit")
+    ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
+    if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
+        ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
+    return (
+        f"The movements determine {result['rank']} of {result['unknowns']} unknowns. "
+        f"Of the {len(by)} parameters listed {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
+    )
+
+
+def _simulated(result: Mapping[str, Any]) -> str:
+    return (
+        f"{result['duration_s']:.4g} s simulated; the force on the arm reaches {result['largest_force_N']:.4g} N. "
+        f"Energy is accounted for to {result['energy']['error_J']:.2g} J."
+    )
+
+
+def _coupled(result: Mapping[str, Any]) -> str:
+    good = {"good": f"{result['duration_s']:.4g} s coupled; {result['why']}."}
+    no_result = f"{result['verdict'].upper()}, no result: {result['why']}."
+    return good.get(result["verdict"], no_result)
+
+
+def _passive(result: Mapping[str, Any]) -> str:
+    if not result["curves"]:
+        return "No joint moved far enough in both directions to tell its passive moment."
+    parts = []
+    for curve in result["curves"]:
+        half = curve["half_width_mean_Nm"]
+        parts.append(f"{curve['joint_name']} {half:.3g} N m ({curve['configuration']})")
+    return f"Half the width of the hysteresis: {'; '.join(parts)}."
+
+
+def _demo(result: Mapping[str, Any]) -> str:
+    return str(result["verdict"])
+
+
+def data_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return what a result rests on."""
+    lines = []
+    for role, meaning in (("fit", "fitted on"), ("test", "only checked on")):
+        part = data[role]
+        if part["trials"]:
+            lines.append(
+                f"{part['trials']} trial{'s' * (part['trials'] > 1)} {meaning}: {part['duration_s']:.0f} s, {part['samples']} samples."
+            )
+    if not data["test"]["trials"]:
+        lines.append("No test trials: nothing was checked on data that the fit has not seen.")
+    lines.append(f"Movements: {', '.join(data['configurations'])}.")
+    held = [word for word, there in (("contact forces", data["forces"]), ("joint torques", data["torques"])) if there]
+    lines.append(f"Measured: angles, {', '.join(held)}.")
+    return lines + [f"Warning: {line}" for line in data["warnings"]]
+
+
+def cannot_tell(result: Mapping[str, Any]) -> list[str]:
+    """Return what the data cannot tell, a line each."""
+    lines = [_trade(line) for line in result["not_separable"]]
+    if result["scale_free"]:
+        lines.append("No torque acted: all values are known up to one common factor, which was taken from the model.")
+    return lines
+
+
+def _trade(line: str) -> str:
+    """Say in a sentence which quantities trade: `m2 and m1*l1 trade 1 : -0.376`."""
+    names, trades, ratio = tables.symbol(line).partition(" trade ")
+    return f"{names} can change together as {ratio}, and nothing that was measured changes." if trades else f"{names}."
+
+
+def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print an identification."""
+    data, joints, level = result["data"], result["data"]["joints"], result["level"]
+    head(result)
+    show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
+    show("Parameters", tables.estimates(result["parameters"], joints, level))
+    show(
+        "Calibration of the sensors, what was believed beforehand being the tolerance declared",
+        tables.estimates(result["calibration"], joints, level),
+    )
+    show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
+    lines = cannot_tell(result)
+    if lines:
+        print("What cannot be told apart")
+        print("\n".join(f"  {line}" for line in lines))
+    if not data["test"]["trials"]:
+        print("No test trials: nothing was checked on data that the fit has not seen.")
+    if "history" in result:
+        show("Over the sessions, what the data decided in the last one", tables.history(result["history"]))
+    files_written(written)
+
+
+def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what the demonstration came to."""
+    print("\n".join(result["story"]))
+    print()
+    show(result["comparison_text"], tables.comparison(result))
+    print(result["missing_text"])
+    print()
+    print(verdict(result))
+    for data in (path.parent for path in written if path.name == "dataset.toml"):
+        print(f"The session is in {data}. Go on with: armrs identify {data} --with coulomb, or armrs gap {data}")
+    files_written(written[-1:])
+
+
+def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what a run came to."""
+    head(result)
+    show("", tables.run(result))
+    for line in result.get("assumed", ()):
+        print(line)
+    files_written(written)
+
+
+def coupled(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what a co-simulation came to."""
+    head(result)
+    show("", tables.coupling(result))
+    show("Connections", tables.connections(result))
+    for name in result["not_connected"]:
+        print(f"not connected: {name}")
+    files_written(written)
+
+
+def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print passive moments."""
+    head(result)
+    show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
+    if result["dependence"]:
+        show("Elastic moment against own and adjacent angle", tables.dependence(result))
+    for line in couplings(result):
+        print(line)
+    for check in result["checks"]:
+        print(check["text"])
+    print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
+    files_written(written)
+
+
+def couplings(result: Mapping[str, Any]) -> list[str]:
+    """Say for each pair of joints whether their elastic moments depend on one another."""
+    found = result.get("couplings", ())
+    lines = [
+        f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: {c['value_Nm_rad']:.3g} ± "
+        f"{c['std_Nm_rad']:.2g} N m/rad from both (p = {c['p_value']:.2g})"
+        for c in found
+    ]
+    return [*lines, WRONG_MASS] if any(c["coupled"] for c in found) else lines
+
+
+def show(title: str, table: tables.Table) -> None:
+    """Print a table under a title, and an empty line; nothing when it has no rows."""
+    if table.rows:
+        if title:
+            print(title)
+        console.table(table.head, table.rows, left=table.left)
+        print()
+
+
+def files_written(written: Sequence[Path]) -> None:
+    """Print the names of files; the last is the one to open."""
+    if written:
+        print("\n".join(str(path) for path in written))
+
+
+def head(result: Mapping[str, Any]) -> None:
+    """Print what a result is about and its verdict."""
+    label = " (synthetic data)" if is_synthetic(result) else ""
+    print(f"{name(result)}{label}: {verdict(result)}")
+    print()
+
+
+def planar(motion: PlanarMotion, points: Sequence[str], file: Path) -> None:
+    """Print what markers show of a planar arm."""
+    plain = motion.to_dict()
+    bends = [None, *(f"{low:.1f} to {high:.1f}" for low, high in plain["flexion_deg"])]
+    rows = [
+        (f"{a} to {b}", length, std, f"{q[0]:.1f} to {q[1]:.1f}", bend)
+        for a, b, length, std, q, bend in zip(
+            points, points[1:], plain["lengths_m"], plain["length_stds_m"], plain["q_range_deg"], bends, strict=False
+        )
+    ]
+    console.table(["segment", "length [m]", "std [m]", "angle in the plane [deg]", "between segments [deg]"], rows)
+    plane = plain["plane"]
+    print(
+        f"\n{'planar' if plane['planar'] else 'not planar'}: the segments leave the plane by {plane['out_of_plane_rms_deg']:.3g}° (rms), "
+        f"{plane['out_of_plane_most_deg']:.3g}° at most; the plane leans {plane['tilt_deg']:.3g}° from the vertical"
+    )
+    print(file)
+
+
+def recorded(result: Mapping[str, Any]) -> None:
+    """Print what the virtual laboratory did."""
+    rows = []
+    for trial in result["trials"]:
+        stop = trial["stop"]
+        end = "complete" if stop is None else f"stopped at {stop['at_s']:.4f} s: {stop['what']} {stop['reason']}"
+        rows.append((trial["configuration"], trial["repeat"], f"{1e3 * trial['tracking_error_rad']:.3g}", end))
+    console.table(["configuration", "repeat", "robot off by [mrad]", "end"], rows)
+    print("\n" + "\n".join(result["files"][:3]))
+
+
+def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print a plan and what it will show."""
+    from ..workflows.plan import Slowed
+
+    other = result.get("compared")
+    rows = []
+    for k, p in enumerate(result["predictions"]):
+        label = p["name"] if p["joint"] is None else f"{p['kind']} {p['joint']} {p['name']}"
+        row = [label, p["value"], p["std"], p["std_of_data"], p["unit"], f"{100 * p['relative']:.2g} %"]
+        rows.append(row if other is None else [*row, f"{100 * other['predictions'][k]['relative']:.2g} %"])
+    head = ["parameter", "value", "std to expect", "std of the data", "unit", "relative"]
+    console.table(head if other is None else [*head, "compared"], rows)
+    print(
+        f"\n{len(result['movements'])} movements, {result['duration_s']:.3g} s with all repeats; force on the arm up to "
+        f"{result['largest_force_N']:.3g} N, joints up to {result['largest_speed_rad_s']:.3g} rad/s, "
+        f"the robot's up to {result['largest_robot_speed_rad_s']:.3g} rad/s and {result['largest_robot_acceleration_rad_s2']:.3g} rad/s²; "
+        f"worst relative deviation {100 * result['worst_relative_std']:.2g} %"
+        + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
+    )
+    for slow in result["slowed"]:
+        print(Slowed(**slow))
+    if result.get("would_show"):
+        from ..workflows.gap.words import limits
+
+        print()
+        show("The smallest effects that `armrs gap` would name on such a session", limits({"would_have_seen": result["would_show"]}))
+    print("\n".join(str(path) for path in written))
+
+
+def reproduced(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what came out for every item of the thesis."""
+    import textwrap
+
+    for part in result["parts"]:
+        for item in part["items"]:
+            print(item["title"])
+            print(textwrap.fill(item["ours"], 110, initial_indent="    ", subsequent_indent="    "))
+    print("\n" + textwrap.fill(result["verdict"], 110))
+    files_written(written[-1:])

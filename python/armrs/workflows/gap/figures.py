@@ -1,0 +1,263 @@
+"""Figures of the gap workflow: before and after, where they disagree, the evidence, and each effect by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...report import plotting
+from ...report.figures import Drawn, slug
+from . import maps
+from .found import GapFound, Missing
+from .reading import channel_names, is_led
+from .shapes import Portrait, portrait, telling_trial
+from .words import place_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+STEPS = {
+    "given": (plotting.GREY, "model as given", 0.9, ":"),
+    "calibrated": (plotting.ORANGE, "calibrated", 1.1, "--"),
+    "amended": (plotting.BLUE, "with the named effects", 1.3, "-"),
+}
+"""The models that are compared: colour, name, width and dash of their lines."""
+
+
+def gap(result: GapFound) -> list[Drawn]:
+    """Draw what the workflow found; `section` of each figure is the part of the report that it belongs to."""
+    drawn: list[Drawn] = []
+    with plotting.style():
+        if any(g.calibrated is not None for g in result.gap.values()):
+            drawn.append(_sizes(result))
+            drawn.append(_before_and_after(result))
+        drawn += _maps(result)
+        if result.ladder:
+            drawn.append(_ladder(result))
+        drawn += [_effect(result, k, e) for k, e in enumerate(result.effects)]
+    return drawn
+
+
+def _steps(result: GapFound) -> list[str]:
+    """Return the models that differ: where nothing was named, the last is the one before it."""
+    together = [e for e in result.effects if e.trial is None]
+    return ["given", "calibrated", "amended"] if together else ["given", "calibrated"]
+
+
+def _shown(name: str) -> tuple[str, float]:
+    """Return how a channel is shown, and its factor: angles in degrees."""
+    quantity, unit = name.rsplit("_", 1)
+    return (f"{quantity} [°]", 180.0 / np.pi) if unit == "rad" else (f"{quantity} [{'N m' if unit == 'Nm' else unit}]", 1.0)
+
+
+def _sizes(result: GapFound) -> Drawn:
+    """Draw the root mean square gap of every channel beside what repeats differ by, a panel for each unit."""
+    units: dict[str, list[str]] = {}
+    for name in result.gap:
+        units.setdefault(_shown(name)[0].split(" ", 1)[1], []).append(name)
+    figure = plotting.figure(4.6 * len(units) + 0.6, 0.42 * max(map(len, units.values())) + 1.5)
+    axes = figure.subplots(1, len(units), squeeze=False)[0]
+    values = {"given": "before", "calibrated": "calibrated", "amended": "after"}
+    for ax, (unit, names) in zip(axes, units.items(), strict=True):
+        for row, name in enumerate(names):
+            factor, own = _shown(name)[1], result.gap[name]
+            there = [getattr(own, values[s]) for s in _steps(result)]
+            seen = [v * factor for v in there if v is not None]
+            ax.hlines(row, min(seen), max(seen), color=plotting.SILVER, lw=2.0, zorder=1)
+            if own.floor is not None:
+                ax.plot(own.floor * factor, row, marker="|", ms=20, mew=2.6, color=plotting.GREEN, ls="", zorder=2)
+            for step, value in zip(_steps(result), there, strict=True):
+                if value is not None:
+                    colour, _, _, _ = STEPS[step]
+                    ax.plot(
+                        value * factor, row, marker="o", ms=8, color=colour, mfc="white" if step == "given" else colour, mew=1.8, zorder=3
+                    )
+        ax.set_yticks(range(len(names)), [_shown(name)[0].split(" ")[0] for name in names])
+        ax.set_ylim(len(names) - 0.4, -0.6)
+        ax.set_xlim(left=0.0)
+        ax.grid(visible=False, axis="y")
+        ax.tick_params(axis="y", length=0)
+        ax.set_xlabel(f"root mean square {unit}")
+    floor = any(g.floor is not None for g in result.gap.values())
+    _legend(figure, _steps(result), floor=floor)
+    text = "Simulated less measured, over all test trials: trials on which nothing was chosen and nothing fitted."
+    if len(_steps(result)) > 2:
+        text += " The step from calibrated to the named effects is what the names are worth."
+    if floor:
+        text += " The green line is what repeats of one movement differ by, and no model can be nearer."
+    return Drawn("gap", "The gap of every channel", text, figure, "gap")
+
+
+def _legend(figure: Any, steps: Sequence[str], *, floor: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=STEPS[s][0], marker="o", ls="", ms=8, mew=1.8, mfc="white" if s == "given" else STEPS[s][0], label=STEPS[s][1])
+        for s in steps
+    ]
+    if floor:
+        handles.append(Line2D([], [], color=plotting.GREEN, marker="|", ls="", mew=2.6, ms=14, label="repeats differ by"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=9)
+
+
+def _before_and_after(result: GapFound) -> Drawn:
+    """Draw the test trial with the largest gap: each channel, and below it what simulation and measurement differ by."""
+    names = channel_names(result.dataset, is_led(result.dataset))
+    shown = telling_trial(result)
+    trial, play = result.dataset.trials[shown], result.raw["trials"][shown]
+    t, columns = trial.t - trial.t[0], 2 if len(names) in (2, 4) else min(len(names), 3)
+    rows = -(-len(names) // columns)
+    figure = plotting.figure(10.4, 3.4 * rows)
+    outer = figure.add_gridspec(rows, columns)
+    for c, name in enumerate(names):
+        label, factor = _shown(name)
+        inner = outer[c // columns, c % columns].subgridspec(2, 1, height_ratios=(1.5, 1.0), hspace=0.04)
+        above = figure.add_subplot(inner[0])
+        below = figure.add_subplot(inner[1], sharex=above)
+        measured = np.where(trial.valid, play["measured"][:, c], np.nan) * factor
+        above.plot(t, measured, color=plotting.SILVER, lw=3.2)
+        for step in _steps(result):
+            if play[step] is None:
+                continue
+            colour, _, width, dash = STEPS[step]
+            above.plot(t, play[step][:, c] * factor, color=colour, lw=width, ls=dash)
+            below.plot(t, play[step][:, c] * factor - measured, color=colour, lw=width - 0.2, ls=dash if step == "given" else "-")
+        below.axhline(0.0, color=plotting.INK, lw=0.8)
+        above.tick_params(labelbottom=False)
+        above.set_title(label)
+        below.set(ylabel="difference", xlabel="time [s]")
+    _time_legend(figure, _steps(result))
+    text = (
+        f"The test trial with the largest gap, {trial.file}. Above, what was measured (broad, grey) and the closed-loop simulation of the "
+        "models; below, simulated less measured."
+    )
+    return Drawn("before-and-after", "Simulated against measured, before and after", text, figure, "gap")
+
+
+def _time_legend(figure: Any, steps: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], color=plotting.SILVER, lw=3.2, label="measured")]
+    handles += [Line2D([], [], color=STEPS[s][0], lw=1.6, ls=STEPS[s][3], label=STEPS[s][1]) for s in steps]
+    figure.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=9)
+
+
+def _maps(result: GapFound) -> list[Drawn]:
+    """Draw the torque that is missing over angle and speed, before and after."""
+    led, plays = is_led(result.dataset), result.raw["trials"]
+    versions = [s for s in _steps(result) if s != "given"]
+    found = {v: [d for d in maps.discrepancies(result.dataset, led, plays, v) if d.trial.role == "fit"] for v in versions}
+    if not all(found.values()):
+        return []
+    joints = [j.name for j in result.dataset.model.joints]
+    figure = plotting.figure(4.4 * len(joints) + 0.4, 2.9 * len(versions) + 0.2)
+    axes = figure.subplots(len(versions), len(joints), squeeze=False, sharex="col", sharey="col")
+    for j, name in enumerate(joints):
+        own = [maps.residual_map(found[v], j) for v in versions]
+        sizes = np.abs(own[0].torque[np.isfinite(own[0].torque)])
+        most = float(np.quantile(sizes, 0.95)) if sizes.size else 1e-9
+        for row, (version, one) in enumerate(zip(versions, own, strict=True)):
+            ax = axes[row, j]
+            look: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
+            edges = np.degrees(one.angle), one.speed
+            ax.pcolormesh(*edges, np.where(one.clear, np.nan, one.torque), alpha=0.22, **look)
+            mesh = ax.pcolormesh(*edges, np.where(one.clear, one.torque, np.nan), **look)
+            ax.axhline(0.0, color=plotting.INK, lw=0.6)
+            ax.grid(visible=False)
+            ax.set_title(f"{name}, {STEPS[version][1]}")
+            ax.set_ylabel("speed [rad/s]" if j == 0 else "")
+        axes[-1, j].set_xlabel("joint angle [°]")
+        bar = figure.colorbar(mesh, ax=list(axes[:, j]), location="right", shrink=0.9, pad=0.02, extend="both")
+        bar.set_label("missing torque [N m]")
+        bar.outline.set_visible(False)
+    text = (
+        "Mean torque over all fit trials by which a joint resists a growing angle more (red) or less (blue) than the model says, by "
+        "angle and speed; above the line the angle grows. Two halves of opposite colour are friction, colours that change from left to"
+        " right are a spring or a weight, colours that deepen away from the line grow with speed. Pale cells are not clear beside what"
+        " trials differ by, empty ones were not visited."
+    )
+    return [Drawn("maps", "Where the torque is missing", text, figure, "where")]
+
+
+def _ladder(result: GapFound) -> Drawn:
+    """Draw what the contenders of each round explained."""
+    count = sum(len(rung.tried) for rung in result.ladder)
+    figure = plotting.figure(9.2, 0.36 * count + 0.45 * len(result.ladder) + 0.9)
+    ax = figure.subplots()
+    y, ticks, labels = 0.0, [], []
+    for number, rung in enumerate(result.ladder, start=1):
+        ax.text(0.0, y, f"round {number}", transform=ax.get_yaxis_transform(), ha="left", va="center", fontsize=9, fontweight="bold")
+        y += 0.85
+        goes_on = min(rung.tried, key=lambda tried, best=rung.before - rung.after: abs(tried.gain - best))  # type: ignore[misc]
+        for tried in rung.tried:
+            ax.barh(y, max(tried.gain, 0.0), height=0.62, color=plotting.BLUE if tried is goes_on else plotting.SILVER)
+            ax.text(max(tried.gain, 0.0), y, f"  {tried.gain:.0f}", va="center", fontsize=9, color=plotting.INK)
+            ticks.append(y)
+            labels.append(" + ".join(place_of(*e) for e in tried.effects))
+            y += 1.0
+        y += 0.35
+    ax.set_yticks(ticks, labels)
+    ax.set_ylim(y - 0.4, -0.7)
+    ax.margins(x=0.12)
+    ax.set_xlim(left=0.0)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel("explained, in units of twice the log-likelihood")
+    text = (
+        "Each round asks the whole catalogue, with segments and calibration refitted; the best few are converged by simulation and "
+        "drawn here. The blue one pays best for its freedom and goes on; what no longer pays then is taken out again, so that fewer "
+        "may be named in the end."
+    )
+    return Drawn("ladder", "The evidence, round by round", text, figure, "evidence")
+
+
+def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
+    """Draw one effect by itself: its law along the movements with its interval, and what it changes in the channels."""
+    seen = portrait(result, effect)
+    rows = np.empty((0, 0)) if seen.changed is None else seen.changed
+    changed = [c for c in range(rows.shape[1]) if np.abs(rows[:, c]).max() > 0]
+    names = channel_names(result.dataset, is_led(result.dataset))
+    panels = int(seen.torque is not None) + len({names[c].rsplit("_", 1)[1] for c in changed})
+    figure = plotting.figure(6.0 if panels < 2 else 10.6, 3.2)
+    axes = list(figure.subplots(1, max(panels, 1), squeeze=False)[0])
+    text = ""
+    if seen.torque is not None:
+        _law(axes.pop(0), seen, seen.torque)
+        text = (
+            f"Left, the torque with which the joint resists along the fit trials against its {seen.against}; the band is the 95 % interval "
+            "of its size. Grey bars are the mean torque that was measured there beyond everything else in the model, and its scatter. "
+        )
+    for unit in dict.fromkeys(names[c].rsplit("_", 1)[1] for c in changed):
+        ax = axes.pop(0)
+        for k, c in enumerate(c for c in changed if names[c].endswith(f"_{unit}")):
+            label, factor = _shown(names[c])
+            ax.plot(seen.t, rows[:, c] * factor, color=plotting.CYCLE[k], ls=plotting.DASHES[k], label=label.split(" ")[0])
+            ax.set_ylabel(f"change {label.split(' ', 1)[1]}")
+        ax.axhline(0.0, color=plotting.INK, lw=0.8)
+        ax.set_xlabel("time [s]")
+        if effect.span is not None:
+            ax.axvspan(*effect.span, color=plotting.YELLOW, alpha=0.18, lw=0)
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=5, columnspacing=1.2, handlelength=1.6)
+    if changed:
+        start = "Right, w" if seen.torque is not None else "W"
+        text += f"{start}hat it changes in the channels of {seen.trial}, simulated with it less without it."
+    if not panels:
+        axes[0].set_axis_off()
+        axes[0].text(0.0, 0.5, "not drawn: it cannot be simulated by itself")
+    label = place_of(effect.kind, effect.joint, effect.channel)
+    return Drawn(f"effect-{number + 1}-{slug(label)}", label[0].upper() + label[1:], text.strip(), figure, "effects")
+
+
+def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:
+    factor, unit = (180.0 / np.pi, "°") if seen.against == "angle" else (1.0, "rad/s" if seen.against == "speed" else "s")
+    x = seen.x * factor
+    there = np.isfinite(seen.data)
+    ax.errorbar(
+        x[there], seen.data[there], seen.scatter[there], fmt="o", ms=4, color=plotting.GREY, ecolor=plotting.SILVER, elinewidth=3, zorder=1
+    )
+    ax.fill_between(x, seen.low, seen.high, color=plotting.BLUE, alpha=0.25, lw=0, zorder=2)
+    ax.plot(x, torque, color=plotting.BLUE, lw=2.0, zorder=3)
+    ax.axhline(0.0, color=plotting.INK, lw=0.8)
+    ax.set(xlabel=f"joint {seen.against} [{unit}]" if seen.against != "time" else "time [s]", ylabel="resisting torque [N m]")

@@ -1,0 +1,352 @@
+"""What the gap workflow returns."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...io.dataset import Dataset
+from ...model import Model
+
+
+@dataclass(frozen=True)
+class Value:
+    """One parameter of a named effect.
+
+    Attributes
+    ----------
+    value : float
+    std : float or None
+        Standard deviation; None for a value that was held.
+    unit : str
+    interval : (float, float) or None
+        The 95 % interval, within what its kind allows.
+    """
+
+    value: float
+    std: float | None
+    unit: str
+    interval: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, value: float, std: float | None, unit: str, limits: tuple[float, float]) -> Value:
+        """Return a value with its interval; `limits` are what its kind allows."""
+        if std is None:
+            return cls(value, None, unit)
+        return cls(value, std, unit, (max(value - 1.96 * std, limits[0]), min(value + 1.96 * std, limits[1])))
+
+
+@dataclass(frozen=True)
+class Separation:
+    """A movement that would tell two explanations apart.
+
+    Attributes
+    ----------
+    waypoints_deg : tuple of tuple of float
+        Joint angles [deg].
+    speed_rad_s, acceleration_rad_s2 : float
+        Largest of any joint.
+    shape : {"trapezoid", "smooth"}
+    now, then : float
+        How many standard deviations apart the two are, everything refitted: by the fit trials alone, and with one such trial more.
+    """
+
+    waypoints_deg: tuple[tuple[float, ...], ...]
+    speed_rad_s: float
+    acceleration_rad_s2: float
+    shape: str
+    now: float
+    then: float
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another effect that would explain what a named one does.
+
+    Attributes
+    ----------
+    kind : str
+    joint, channel
+        Where it acts, as for an effect of a model.
+    why : str
+    worse : float
+        How much worse it explains the data, in units of twice the log-likelihood; a few units decide nothing.
+    likeness : float
+        Squared cosine between what the two would show on these movements: 1 cannot be told apart.
+    separating_movement : str or None
+        A movement that would tell the two apart, in words, and as numbers in `separation`.
+    separation : Separation or None
+    """
+
+    kind: str
+    joint: int | None
+    channel: str | None
+    why: str
+    worse: float
+    likeness: float
+    separating_movement: str | None = None
+    separation: Separation | None = None
+
+
+@dataclass(frozen=True)
+class Missing:
+    """An effect that the model lacks.
+
+    Attributes
+    ----------
+    kind : str
+    joint, channel
+        Where it acts.
+    parameters : dict of Value
+    p_value : float
+        Probability of such a gain by chance, all questions that were asked counted.
+    share : float
+        Share of what can be explained that is lost without it.
+    alternatives : tuple of Alternative
+    trial : str or None
+        Where it was in one trial only, its file; None for what is in all of them.
+    span : (float, float) or None
+        When it acted there [s].
+    """
+
+    kind: str
+    joint: int | None
+    channel: str | None
+    parameters: Mapping[str, Value]
+    p_value: float
+    share: float
+    alternatives: tuple[Alternative, ...] = ()
+    trial: str | None = None
+    span: tuple[float, float] | None = None
+
+    def __str__(self) -> str:
+        place = f" joint {self.joint}" if self.joint else f" {self.channel}" if self.channel else ""
+        values = ", ".join(f"{n} = {v.value:.4g}" + (f" ± {v.std:.2g}" if v.std else "") + f" {v.unit}" for n, v in self.parameters.items())
+        return f"{self.kind}{place}: {values}"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Somewhere that simulation and data disagree.
+
+    Attributes
+    ----------
+    trial : str
+    channel : str
+    t_start, t_end : float
+        [s]
+    joint : int or None
+    condition : str
+        Region of movement: `dq2 > 0`, `dq2 < 0`, `dq2 = 0`.
+    mean : float
+        Mean difference there, in the unit of the channel.
+    z : float
+        The mean in its standard deviations; the correlation of residuals in time is taken into account.
+    """
+
+    trial: str
+    channel: str
+    t_start: float
+    t_end: float
+    joint: int | None
+    condition: str
+    mean: float
+    z: float
+
+
+@dataclass(frozen=True)
+class ChannelGap:
+    """Root mean square difference of simulation and data in one channel, over the test trials.
+
+    Attributes
+    ----------
+    before, calibrated, after : float or None
+        With the model as given, after refitting what the tolerances allow, and with the named effects.
+    floor : float or None
+        What repeats of one movement differ by; None without repeats.
+    """
+
+    before: float | None
+    calibrated: float | None
+    after: float | None
+    floor: float | None
+
+    @property
+    def closed(self) -> float | None:
+        """Share of the calibrated gap above the floor that is gone."""
+        if None in (self.calibrated, self.after) or self.floor is None:
+            return None
+        above = self.calibrated - self.floor  # type: ignore[operator]
+        return None if above <= 0 else (self.calibrated - self.after) / above  # type: ignore[operator]
+
+
+@dataclass(frozen=True)
+class Absorbed:
+    """A small imperfection that was refitted, beside twice the standard deviation that was known of it beforehand.
+
+    For sensors that is the tolerance of the data set, for segments twice their `segment_uncertainty`.
+    """
+
+    name: str
+    value: float
+    promised: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Limit:
+    """An effect that was asked for and not named: the smallest that these data would have shown, and what it would explain.
+
+    Attributes
+    ----------
+    kind : str
+    joint, channel
+        Where it would act.
+    parameter : str
+    at_least : float
+        Smallest size of the parameter that would have been named.
+    unit : str
+    gain, price : float
+        What it would still explain, and what it would have to, in units of twice the log-likelihood.
+    """
+
+    kind: str
+    joint: int | None
+    channel: str | None
+    parameter: str
+    at_least: float
+    unit: str
+    gain: float = 0.0
+    price: float = 0.0
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect alone, to first order.
+
+    Attributes
+    ----------
+    kind : str
+    joint, channel
+        Where it would act.
+    parameters : dict of float
+        What is free in it, as it would be.
+    unit : str
+        Of the first.
+    gain, price : float
+        What it would explain, and what it must explain to be named, in units of twice the log-likelihood.
+    smallest : float
+        Smallest size of the first parameter that would be named.
+    """
+
+    kind: str
+    joint: int | None
+    channel: str | None
+    parameters: Mapping[str, float]
+    unit: str
+    gain: float
+    price: float
+    smallest: float
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Effects that were added together and converged by simulation."""
+
+    effects: tuple[tuple[str, int | None, str | None], ...]
+    gain: float
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One round of the search.
+
+    Attributes
+    ----------
+    tried : tuple of Tried
+        What was converged by simulation, best first; gains in units of twice the log-likelihood.
+    before, after : float
+        Misfit before the round and with the best of them.
+    """
+
+    tried: tuple[Tried, ...]
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class GapFound:
+    """The result of the gap workflow.
+
+    Attributes
+    ----------
+    verdict : {"explained", "nothing_missing", "unexplained"}
+    effects : tuple of Missing
+        What the model lacks, that which explains most first.
+    where : tuple of Place
+        Where the calibrated model and the fit trials disagree, the clearest first.
+    gap : dict of ChannelGap
+        By channel, on the test trials.
+    would_have_seen : tuple of Limit
+    unexplained : float
+        Share of what the calibrated model left beyond noise that is still there.
+    looks_like : str or None
+        Shape of what is left.
+    absorbed : tuple of Absorbed
+    lack : ((float, float), (float, float))
+        Lack of fit, ratio and z, of the calibrated and of the amended model; NaN without repeats.
+    ladder : tuple of Rung
+        Rounds of the search.
+    warnings : tuple of str
+    model : Model
+        The model with the named effects, everything refitted.
+    dataset : Dataset
+    raw : dict
+        What the core returned, with the simulated channels of every trial.
+    """
+
+    verdict: str
+    effects: tuple[Missing, ...]
+    where: tuple[Place, ...]
+    gap: Mapping[str, ChannelGap]
+    would_have_seen: tuple[Limit, ...]
+    unexplained: float
+    looks_like: str | None
+    absorbed: tuple[Absorbed, ...]
+    lack: tuple[tuple[float, float], tuple[float, float]]
+    ladder: tuple[Rung, ...]
+    warnings: tuple[str, ...]
+    model: Model
+    dataset: Dataset
+    raw: Mapping[str, Any] = field(repr=False, default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as it is written to JSON."""
+        return {
+            "verdict": self.verdict,
+            "effects": [_without_none(dataclasses.asdict(e), keep=("joint", "channel")) for e in self.effects],
+            "where": [dataclasses.asdict(w) for w in self.where],
+            "gap": {name: dataclasses.asdict(g) for name, g in self.gap.items()},
+            "would_have_seen": [dataclasses.asdict(w) for w in self.would_have_seen],
+            "unexplained": {"share": self.unexplained, "looks_like": self.looks_like},
+            "calibration": [dataclasses.asdict(a) for a in self.absorbed],
+            "lack_of_fit": {"calibrated": _lack(self.lack[0]), "amended": _lack(self.lack[1])},
+            "ladder": [dataclasses.asdict(r) for r in self.ladder],
+            "warnings": list(self.warnings),
+            "model": "amended.toml",
+        }
+
+
+def _lack(lack: tuple[float, float]) -> dict[str, float | None]:
+    return {"ratio": _finite(lack[0]), "z": _finite(lack[1])}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _without_none(item: dict[str, Any], keep: Sequence[str]) -> dict[str, Any]:
+    return {k: v for k, v in item.items() if v is not None or k in keep}

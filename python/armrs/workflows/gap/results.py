@@ -1,0 +1,73 @@
+"""What the gap workflow found, as plain data and as files."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...catalogue import catalogue
+from ...io import files, tomlfile
+from ...io.dataset import FILE, Dataset
+from ...report.results import data_of, origin, write_result
+from . import figures
+from .found import GapFound
+
+
+def gap_data(result: GapFound, command: str | None = None) -> dict[str, Any]:
+    """Return the result as it is written to JSON: that of `GapFound.to_dict`, what its effects are, and what it rests on."""
+    data = {"verb": "gap", **result.to_dict(), "data": data_of(result.dataset), "made_by": origin(command)}
+    for effect in data["effects"]:
+        kind = catalogue()[effect["kind"]]
+        effect |= {"summary": kind.summary, "formula": kind.formula}
+    for number, alternative in enumerate(_separated(data), start=1):
+        alternative["separation"]["file"] = f"separating-{number}.toml"
+    data["made_by"] |= {"input_sha256": digest(result.dataset), "random_numbers": "none"}
+    return data
+
+
+def _separated(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the alternatives that a movement was found for."""
+    return [a for e in data["effects"] for a in e["alternatives"] if a["separation"] is not None]
+
+
+def _write_movement(separation: Mapping[str, Any], folder: Path) -> Path:
+    """Write a movement as a file for `armrs simulate`."""
+    table = {key: separation[key] for key in ("waypoints_deg", "speed_rad_s", "acceleration_rad_s2", "shape")}
+    table["waypoints_deg"] = [list(row) for row in table["waypoints_deg"]]
+    path = folder / str(separation["file"])
+    files.write_text(path, "\n".join(["[movement]", *tomlfile.lines(table), ""]), kind=".toml")
+    return path
+
+
+def digest(dataset: Dataset) -> str | None:
+    """Return the SHA-256 of a data set's files one after the other: `dataset.toml`, the model, the trials in their order."""
+    if dataset.folder is None or dataset.model_path is None:
+        return None
+    whole = hashlib.sha256()
+    try:
+        for path in (dataset.folder / FILE, dataset.model_path, *(dataset.folder / t.file for t in dataset.trials)):
+            whole.update(path.read_bytes())
+    except OSError:
+        return None
+    return whole.hexdigest()
+
+
+def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path]:
+    """Write `amended.toml`, movements that separate alternatives, `gap.json`, figures and `report.html` below a folder.
+
+    Returns the files, the report last.
+
+    `data` is that of `gap_data`; the list of figures is added to it.
+    """
+    name = "amended.toml"
+    files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
+    drawn = figures.gap(result)
+
+    def write(out: Path) -> list[Path]:
+        result.model.write(out / name)
+        movements = [_write_movement(a["separation"], out) for a in _separated(data)]
+        return [out / name, *movements, *write_result(out, "gap", data, drawn)]
+
+    return files.write_whole(folder, write)

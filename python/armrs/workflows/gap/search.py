@@ -1,0 +1,86 @@
+"""The gap workflow: where simulation and data disagree, which effect is missing, and what adding it gains."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from ... import _armrs, checks
+from ...custom_effects import OwnEffect
+from ...io.dataset import Dataset, load_dataset, naming_trials
+from ...rig import all_effects, core_tolerance, rig
+from ..identify import core_columns
+from . import reading, suspicion
+from .found import GapFound
+
+
+def find_gap(
+    dataset: Dataset | str | os.PathLike[str],
+    *,
+    effects: Sequence[OwnEffect] = (),
+    separate: bool = True,
+    threads: int | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> GapFound:
+    """Find where a model and its data disagree, and which effect is missing.
+
+    Everything is chosen and fitted on the fit trials; the gap is measured on the test trials.
+
+    Parameters
+    ----------
+    dataset : Dataset or path
+    effects : sequence of OwnEffect
+        Kinds of one's own (`armrs.own_effect`) that are asked besides the catalogue.
+    separate : bool
+        Whether movements are looked for that would tell a named effect from its alternatives.
+    threads : int, optional
+        All cores when absent; the result does not depend on it.
+    progress : callable, optional
+        Told what is being done and how far it is, 0 to 1.
+
+    Returns
+    -------
+    GapFound
+
+    Raises
+    ------
+    BadInput
+        For data that cannot be judged: wrong units, swapped channels, a reversed force, trials that are copies.
+    SimulationError
+        When the model as given cannot be simulated on a trial.
+    """
+    from . import separating
+
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    checks.flag("separate", separate)
+    if progress is not None:
+        checks.function("progress", progress)
+    effects = checks.instances("effects", effects, OwnEffect)
+    led = reading.is_led(dataset)
+    settings = core_settings(dataset, led, threads, [e.kind for e in effects])
+    columns = core_trials(dataset)
+    built = rig(dataset.model, all_effects(dataset.model))
+    warnings = suspicion.examine(dataset, led)
+    with naming_trials(dataset.trials):
+        suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
+        raw = _armrs.find_gap(built, columns, settings, progress)
+    result = reading.found(dataset, led, raw, warnings)
+    return separating.separate(result, threads=threads, progress=progress) if separate else result
+
+
+def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
+    """Return the trials for the core."""
+    configurations = sorted({t.configuration for t in dataset.trials})
+    return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
+
+
+def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> dict[str, Any]:
+    """Return what is known beforehand, for the core."""
+    return {
+        "segment_uncertainty": dataset.model.segment_uncertainty,
+        "tolerance": core_tolerance(dataset.tolerance),
+        "led": led,
+        "own": list(own),
+        "threads": (os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),
+    }

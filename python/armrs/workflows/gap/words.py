@@ -1,0 +1,278 @@
+"""The gap workflow in words and tables: for the terminal and for reports alike. They read the plain data of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...report import words as common
+from ...report.tables import Table, number, spread, unit
+from .reading import MISFIT
+
+_FEW = 2
+"""Effects that a verdict describes; of more it only gives the names."""
+_TELLS = 5.0
+"""Standard deviations from which on a movement tells two effects apart."""
+
+
+def place_of(kind: str, joint: int | None, channel: str | None, joints: Sequence[str] = ()) -> str:
+    """Return an effect with its place, in words."""
+    name = f" ({joints[joint - 1]})" if joint and joint <= len(joints) and joints[joint - 1] != f"joint {joint}" else ""
+    place = f" in joint {joint}{name}" if joint else f" of {channel}" if channel else ""
+    return kind.replace("_", " ") + place
+
+
+def effect_name(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
+    """Return a named effect, an alternative or a limit with its place, in words."""
+    return place_of(effect["kind"], effect["joint"], effect["channel"], joints)
+
+
+def _joined(names: Sequence[str], last: str = "and") -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}" if names else ""
+
+
+def size(effect: Mapping[str, Any]) -> str:
+    """Return the size of an effect with its interval."""
+    name, value = next(((n, v) for n, v in effect["parameters"].items() if v["std"] is not None), next(iter(effect["parameters"].items())))
+    text = f"{name} {number(value['value'], value['std'])} {unit(value['unit'])}".rstrip()
+    if value["std"] is None:
+        return text
+    low, high = (number(end, value["std"]) for end in value["interval"])
+    return f"{text} (95 %: {low} to {high})"
+
+
+def chance(effect: Mapping[str, Any]) -> str:
+    """Return the probability that an effect gains so much by chance."""
+    return f"with probability {effect['p_value']:.0e}" if effect["p_value"] > 1e-12 else "with a probability below 1e-12"
+
+
+_UNTESTED = "Without repeats of a movement, whether what is left is noise cannot be tested."
+
+
+def verdict(result: Mapping[str, Any]) -> str:
+    """Return the result in a sentence or two."""
+    joints = result["data"]["joints"]
+    # Of many things the names are enough in a sentence; a table says the rest.
+    many = len(result["effects"]) > _FEW
+    names = [
+        effect_name(e, joints) + ("" if many else f": {e['summary']}, {size(e)}") + (f", in {e['trial']} only" if e.get("trial") else "")
+        for e in result["effects"]
+    ]
+    is_tested = result["lack_of_fit"]["amended"]["z"] is not None
+    if result["verdict"] == "nothing_missing":
+        if not is_tested:
+            return f"No effect was found that these data show. {_UNTESTED}{_judged(result)}"
+        return "Nothing is missing: what is left of these data is what repeats of one movement differ by." + _judged(result)
+    listed = names[0] if len(names) == 1 else "; ".join(names)
+    lacks = f"The model lacks {listed}." if len(names) == 1 else f"The model lacks {len(names)} things: {listed}."
+    if result["verdict"] == "explained":
+        rest = f"With {'it' if len(names) == 1 else 'them'}, {_left(result)}." if is_tested else _UNTESTED
+        return f"{lacks} {rest}{_judged(result)}"
+    rest = "something is missing that the catalogue has no name for"
+    looks = result["unexplained"]["looks_like"]
+    tail = f" {looks[0].upper()}{looks[1:]}." if looks else ""
+    return (f"{lacks} Beyond that, {rest}." if names else f"{rest[0].upper()}{rest[1:]}.") + tail + _judged(result)
+
+
+def _left(result: Mapping[str, Any]) -> str:
+    """Say what is left where effects explain the data."""
+    if result["lack_of_fit"]["amended"]["z"] < MISFIT:
+        return "what is left is noise"
+    share = result["unexplained"]["share"]
+    size = f"{share:.1%}" if share >= 0.001 else "less than 0.1%"
+    return f"{size} of the misfit is left, less than the noise: the laws are not exact"
+
+
+def _judged(result: Mapping[str, Any]) -> str:
+    """Say what the names are worth on the test trials, by the channel that gained most."""
+    seen = {n: g for n, g in result["gap"].items() if None not in (g["calibrated"], g["after"]) and g["calibrated"]}
+    if not seen or not any(not e.get("trial") for e in result["effects"]):
+        return ""
+    # Not by what calibration alone has spoilt.
+    name = max(seen, key=lambda n: min(seen[n]["before"] or seen[n]["calibrated"], seen[n]["calibrated"]) / max(seen[n]["after"], 1e-300))
+    gap = seen[name]
+    quantity, held_in = name.rsplit("_", 1)
+    held_in = {"Nm": "N m"}.get(held_in, held_in)
+    floor = f"; repeats differ by {gap['floor']:.2g}" if gap["floor"] is not None else ""
+    return f" On trials kept apart {quantity} is then off by {gap['after']:.2g} instead of {gap['calibrated']:.2g} {held_in}{floor}."
+
+
+def others(result: Mapping[str, Any]) -> list[str]:
+    """Return what may be there instead, a line for each effect that has alternatives, and what would tell."""
+    lines = []
+    for effect in result["effects"]:
+        listed = [f"{effect_name(a)} ({_how(a)})" for a in effect["alternatives"]]
+        if listed:
+            lines.append(f"Instead of {effect_name(effect)} it may be {_joined(listed, 'or')}.")
+        # What several are told by stands once.
+        told: dict[str, list[str]] = {}
+        for a in effect["alternatives"]:
+            told.setdefault(_separating(a), []).append(effect_name(a))
+        lines += [f"To tell {effect_name(effect)} from {_joined(names, 'or')}: {how}" for how, names in told.items() if how]
+    return lines
+
+
+def _separating(alternative: Mapping[str, Any]) -> str:
+    """Say which movement would tell, and how well; nothing where none was looked for."""
+    separation = alternative.get("separation")
+    if separation is None:
+        return ""
+    now, then = (f"{separation[key]:.2g}" for key in ("now", "then"))
+    if separation["then"] < _TELLS:
+        best = alternative["separating_movement"]
+        return f"none of the movements tried would; the best, {best}, leaves them {then} standard deviations apart (now {now})."
+    return f"{alternative['separating_movement']}; with one such trial they would be {then} standard deviations apart (now {now})."
+
+
+def _how(alternative: Mapping[str, Any]) -> str:
+    worse = alternative.get("worse")
+    if worse is None:
+        return str(alternative["why"])
+    return alternative["why"] + (f", misfit greater by {worse:.2g}" if worse >= 0.1 else ", misfit no greater")
+
+
+def apart(result: Mapping[str, Any]) -> list[str]:
+    """Return what was in one trial only, a line each."""
+    return [
+        f"{effect_name(e)} in {e['trial']}, {e['span'][0]:.2f} to {e['span'][1]:.2f} s ({size(e)}): left out of what is fitted."
+        for e in result["effects"]
+        if e.get("trial") and e.get("span")
+    ]
+
+
+def left(result: Mapping[str, Any]) -> list[str]:
+    """Return what is left beyond noise, in words."""
+    lines = []
+    for which, words in (("calibrated", "The calibrated model"), ("amended", "The model with the named effects")):
+        lack = result["lack_of_fit"][which]
+        if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
+            verdict = "more than noise" if lack["z"] >= MISFIT else "what noise does"
+            lines.append(
+                f"{words} leaves {lack['ratio']:.3g} times the square of what repeats differ by ({lack['z']:+.1f} "
+                f"standard deviations): {verdict}."
+            )
+    if not lines:
+        lines.append(_UNTESTED)
+    if result["unexplained"]["share"]:
+        lines.append(f"{result['unexplained']['share']:.1%} of what was beyond noise is still there.")
+    if result["unexplained"]["looks_like"]:
+        looks = result["unexplained"]["looks_like"]
+        lines.append(f"{looks[0].upper()}{looks[1:]}.")
+    return lines
+
+
+def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print what the workflow found."""
+    common.head(result)
+    common.show("Missing in the model", missing(result))
+    for line in (*others(result), *apart(result)):
+        print(line)
+    common.show("Gap on the test trials, root mean square of simulated less measured", gap(result))
+    common.show("Where the calibrated model and the data disagree most", where(result))
+    if result["verdict"] != "explained":
+        print("\n".join(left(result)) + "\n")
+    if result["verdict"] == "nothing_missing":
+        common.show("The smallest effects that these data would have shown", limits(result))
+    common.files_written(written[-1:])
+
+
+def quick(result: Mapping[str, Any]) -> None:
+    """Print a first look."""
+    label = " (synthetic data)" if common.is_synthetic(result) else ""
+    worth = [s for s in result["suspects"] if s["gain"] > s["price"]]
+    z = result["lack_of_fit"]["calibrated"]["z"]
+    if not worth:
+        said = "nothing alone explains enough to be named"
+    elif len(worth) == 1:
+        said = f"{effect_name(worth[0])} may be missing"
+    else:
+        said = f"{effect_name(worth[0])} explains most of {len(worth)} that may be missing, and several of them may be one"
+    noise = "" if z is None or z != z else f"; the calibrated model leaves {'more than' if z >= MISFIT else 'what is'} noise ({z:+.1f})"
+    print(f"{common.name(result)}{label}, a first look: {said}{noise}.\n")
+    common.show("Gap on the test trials, root mean square of simulated less measured", gap({**result, "effects": []}))
+    common.show("What each would explain alone, to first order", suspects(result))
+    print("Nothing is named yet: `armrs gap` without --quick converges by simulation, looks at several together, and confirms.")
+
+
+def suspects(data: Mapping[str, Any], most: int = 10) -> Table:
+    """Return the effects that would explain most, alone and to first order."""
+    rows = []
+    for s in data["suspects"][:most]:
+        sizes = ", ".join(f"{name} {value:.3g}" for name, value in s["parameters"].items())
+        rows.append([s["kind"], s["joint"] or s["channel"], f"{sizes} {unit(s['unit'])}".rstrip(), f"{s['gain']:.3g}", f"{s['price']:.3g}"])
+    return Table(["effect", "at", "size", "would explain", "would have to"], rows, 3)
+
+
+def missing(data: Mapping[str, Any]) -> Table:
+    """Return the named effects with their estimates."""
+    rows: list[list[object]] = []
+    for effect in data["effects"]:
+        place = effect["joint"] or effect["channel"]
+        fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
+        for k, (name, value) in enumerate((fitted or effect["parameters"]).items()):
+            head = [effect["kind"], place, f"{effect['share']:.0%}"] if k == 0 else ["", "", ""]
+            ends = None
+            if value["std"] is not None:
+                ends = " … ".join(number(end, value["std"]) for end in value["interval"])
+            rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), ends, unit(value["unit"])])
+    return Table(["effect", "at", "share", "parameter", "value", "± std", "95 % interval", "unit"], rows, 4)
+
+
+def gap(data: Mapping[str, Any]) -> Table:
+    """Return the gap of every channel: as given, calibrated, with the named effects, and the floor."""
+    named = any(not e.get("trial") for e in data["effects"])
+    steps = ("before", "calibrated", "after", "floor") if named else ("before", "calibrated", "floor")
+    rows: list[list[object]] = []
+    for name, channel in data["gap"].items():
+        if channel["before"] is None:
+            continue
+        above = None if None in (channel["floor"], channel["calibrated"]) else channel["calibrated"] - channel["floor"]
+        # Of a gap that hardly lies above the floor there is no share worth a number.
+        counts = above is not None and channel["after"] is not None and above > 0.1 * channel["floor"]
+        closed = f"{(channel['calibrated'] - channel['after']) / above:.0%}" if counts else None
+        quantity, held_in = name.rsplit("_", 1)
+        values = [None if channel[step] is None else f"{channel[step]:.3g}" for step in steps]
+        rows.append([f"{quantity} [{'N m' if held_in == 'Nm' else held_in}]", *values, *([closed] if named else [])])
+    head = {"before": "as given", "calibrated": "calibrated", "after": "with the named", "floor": "repeats differ by"}
+    return Table(["channel", *(head[step] for step in steps), *(["closed above that"] if named else [])], rows, 1)
+
+
+def where(data: Mapping[str, Any], most: int = 6) -> Table:
+    """Return where the calibrated model and the data disagree most."""
+    rows = [
+        [w["trial"], w["condition"], f"{w['t_start']:.3g} to {w['t_end']:.3g}", f"{w['mean']:+.3g}", f"{w['z']:+.1f}"]
+        for w in data["where"][:most]
+    ]
+    return Table(["trial", "where", "time [s]", "missing torque [N m]", "standard deviations"], rows, 2)
+
+
+def limits(data: Mapping[str, Any]) -> Table:
+    """Return the smallest effects that would have been seen, one row for each kind and its joints side by side."""
+    most = max([w["joint"] or 0 for w in data["would_have_seen"]], default=0)
+    rows: dict[tuple[str, str, str], list[object]] = {}
+    for w in data["would_have_seen"]:
+        key = (w["kind"], w["parameter"], w["unit"])
+        cells = rows.setdefault(key, [None] * (most + 2))
+        at = w["joint"] - 1 if w["joint"] else most + ({"Fy": 0, "Fz": 1}.get(w["channel"], 0) if w["channel"] else 0)
+        cells[at] = f"{w['at_least']:.2g}"
+    head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole or Fy", "Fz"]
+    return Table(head, [[kind, parameter, unit(held_in), *cells] for (kind, parameter, held_in), cells in rows.items()], 3)
+
+
+def nearest(data: Mapping[str, Any], most: int = 8) -> Table:
+    """Return what came nearest to being named and was not."""
+    asked = sorted((w for w in data["would_have_seen"] if w.get("price")), key=lambda w: w["price"] - w["gain"])
+    rows = [[w["kind"], w["joint"] or w["channel"], f"{w['gain']:.3g}", f"{w['price']:.3g}"] for w in asked[:most]]
+    return Table(["effect", "at", "would explain", "would have to"], rows, 2)
+
+
+def calibration(data: Mapping[str, Any]) -> Table:
+    """Return what the calibration absorbed, beside what was promised."""
+    rows = [
+        [a["name"], f"{a['value']:+.3g}", f"± {a['promised']:.3g}", unit(a["unit"]), "beyond" if abs(a["value"]) > a["promised"] else None]
+        for a in data["calibration"]
+    ]
+    beyond = any(row[-1] for row in rows)
+    head = ["what", "refitted by", "known beforehand to", "unit", "but"]
+    return Table(head if beyond else head[:-1], rows if beyond else [row[:-1] for row in rows], 1)

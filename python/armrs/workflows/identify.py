@@ -1,0 +1,511 @@
+"""Identification of body segment and joint parameters from a data set."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import _armrs, checks
+from ..catalogue import catalogue
+from ..errors import BadInput, Text, unknown_name
+from ..io.dataset import Dataset, Tolerance, load_dataset, naming_trials
+from ..io.plausibility import refuse_implausible
+from ..io.trial import Trial
+from ..model import Effect, Joint, Model, Segment
+from ..rig import all_effects, core_tolerance, rig
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One estimated quantity.
+
+    Attributes
+    ----------
+    name : str
+        Parameter of a segment (`m2`, `m2*l2`, `l2`, `I2`) or of an effect (`torque`), or a combination of parameters.
+    joint : int or None
+        Joint or segment, from 1.
+    kind : str
+        "segment", "combination", "calibration", or the kind of effect.
+    value, std : float
+        Estimate and standard deviation, in `unit`.
+    unit : str
+    interval : (float, float)
+    decided_by : {"data", "prior", "bound"}
+        What the value rests on. A prior's value is an assumption that the data left open, not a measurement.
+    caveat : str or None
+        Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
+    """
+
+    name: str
+    joint: int | None
+    kind: str
+    value: float
+    std: float
+    unit: str
+    interval: tuple[float, float]
+    decided_by: str
+    caveat: str | None = None
+
+    def __str__(self) -> str:
+        own = self.kind in ("segment", "combination", "calibration")
+        name = self.name if own else f"{self.kind} {self.name}"
+        return f"{name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """How a fitted model explains one trial, after the common low-pass.
+
+    Attributes
+    ----------
+    trial : Trial
+    t : ndarray, shape (m,)
+        Times of the samples that were used [s].
+    measured, fitted : ndarray, shape (m, n_joints)
+        Joint torques that the measurement asks for, and those of the fitted model [N m].
+    """
+
+    trial: Trial
+    t: np.ndarray
+    measured: np.ndarray
+    fitted: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """The result of an identification.
+
+    Attributes
+    ----------
+    method : {"joint", "cascade"}
+    status : str
+        How the solver ended: "solved", "almostsolved".
+    rank, unknowns : int
+        How many combinations of the unknowns the data determine.
+    parameters : tuple of Estimate
+    combinations : tuple of Estimate
+        The base parameters: what a planar chain can show at all.
+    calibration : tuple of Estimate
+        Small imperfections of the measurement that were refitted within the declared tolerance.
+    contradictions : tuple of str
+        What in the result cannot be true of this arm and these sensors: a mass at its limit, a calibration far beyond its tolerance,
+        a torque that is not described at all. Then no number is to be trusted.
+    misfits : tuple of str
+        Joints whose torque the fitted model does not describe well, and speeds that are noise. Intervals hold only where the model's
+        structure is right.
+    left_out : tuple of str
+        What of the model the method does not take into account, or finds nothing about in these movements.
+    trades : tuple of str
+        Which unknowns the movements cannot tell apart, in words.
+    scale_free : bool
+        No torque acted: all parameters are known up to one common factor, which was taken from the model.
+    level : float
+        Probability of the intervals.
+    cutoff : float
+        Cutoff of the zero-phase low-pass that motion and torque share, -3 dB of both passes [Hz].
+    residual_rms : dict
+        Role -> channel -> root mean square of the torque residual after the low-pass [N m].
+    residual_rms_by_configuration : dict
+        The same, role -> configuration -> channel.
+    explained : tuple of Explained
+    model : Model
+        The model with the estimates.
+    """
+
+    method: str
+    status: str
+    rank: int
+    unknowns: int
+    parameters: tuple[Estimate, ...]
+    combinations: tuple[Estimate, ...]
+    calibration: tuple[Estimate, ...]
+    contradictions: tuple[str, ...]
+    misfits: tuple[str, ...]
+    left_out: tuple[str, ...]
+    trades: tuple[str, ...]
+    scale_free: bool
+    level: float
+    cutoff: float
+    residual_rms: dict[str, dict[str, float]]
+    residual_rms_by_configuration: dict[str, dict[str, dict[str, float]]]
+    explained: tuple[Explained, ...]
+    model: Model
+    dataset: Dataset
+
+    def __repr__(self) -> str:
+        known = f"{self.rank} of {self.unknowns} unknowns determined"
+        return f"Identified({self.dataset.name!r}, {self.method} method, {self.status}: {known}; {'; '.join(map(str, self.combinations))})"
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the solver got there, the result is possible, and nothing is known against what the data decided."""
+        doubtful = any(e.caveat for e in (*self.parameters, *self.combinations))
+        return self.status == "solved" and not self.contradictions and not doubtful
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user has to know besides the numbers, a line each."""
+        return (*self.contradictions, *self.misfits, *self.left_out)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as it is written to JSON; the model stands in a file of its own."""
+        return {
+            "method": self.method,
+            "status": self.status,
+            "rank": self.rank,
+            "unknowns": self.unknowns,
+            "parameters": [dataclasses.asdict(e) for e in self.parameters],
+            "combinations": [dataclasses.asdict(e) for e in self.combinations],
+            "calibration": [dataclasses.asdict(e) for e in self.calibration],
+            "warnings": list(self.warnings),
+            "not_separable": list(self.trades),
+            "scale_free": self.scale_free,
+            "level": self.level,
+            "cutoff_Hz": self.cutoff,
+            "residual_rms": self.residual_rms,
+            "residual_rms_by_configuration": self.residual_rms_by_configuration,
+            "model": "identified.toml",
+        }
+
+
+def identify(
+    dataset: Dataset | str | os.PathLike[str],
+    *,
+    method: str = "joint",
+    with_effects: Sequence[str] | str = (),
+    cutoff: float | None = None,
+    motion: str = "auto",
+    level: float = 0.95,
+) -> Identified:
+    """Identify segment and joint parameters on the fit trials of a data set.
+
+    Parameters
+    ----------
+    dataset : Dataset or path
+    method : {"joint", "cascade"}
+        All joints at once with physical constraints, or the thesis' order wrist, elbow, shoulder.
+    with_effects : sequence of str, or names separated by commas
+        Kinds of joint effects that are fitted at every joint besides those of the model.
+    cutoff : float, optional
+        Cutoff of the common low-pass [Hz]; chosen from the data when absent.
+    motion : {"auto", "measured", "simulated"}
+        Where the speeds and accelerations come from: simulated along the robot's path where it is known.
+    level : float
+        Probability of the intervals.
+
+    Raises
+    ------
+    BadInput
+        For an unknown effect or method, and data that cannot be used.
+    IdentificationError
+        When no solution exists.
+    """
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    if dataset.added:
+        raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
+    checks.choice("method", method, ("joint", "cascade"))
+    checks.choice("motion", motion, ("auto", "measured", "simulated"))
+    kinds = checks.texts("with_effects", with_effects, "kinds of effects")
+    checks.number("level", level, **LEVELS)
+    slowest = min(trial.rate for trial in dataset.trials)
+    if cutoff is not None and checks.number("cutoff", cutoff, above=0.0, unit="Hz") >= 0.4 * slowest:
+        raise BadInput("cutoff", Text(f"{cutoff:g} Hz"), f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
+    model = dataset.model
+    if method == "cascade":
+        cascade_can(kinds, motion)
+    effects, fitted = effects_of(model, kinds)
+    if not model.segment_uncertainty and not any(fitted):
+        raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
+    settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
+    for trial in dataset.trials:
+        if trial.force_on_arm is None and trial.tau is None:
+            raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
+    refuse_implausible(dataset)
+    configurations = sorted({t.configuration for t in dataset.trials})
+    columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
+    with naming_trials(dataset.trials):
+        raw = _armrs.identify(rig(model, effects), columns, settings)
+    explained = tuple(
+        Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
+        for trial, e in zip(dataset.trials, raw["explained"], strict=True)
+    )
+    noisy = _noisy_speeds(raw["speed_noise"], raw["speed_noise_allowed"])
+    parameters, combinations, calibration = (
+        _estimates(raw[name], NOISY_SPEED if noisy else None) for name in ("parameters", "combinations", "calibration")
+    )
+    # Without a load there is no torque that a residual could be a part of.
+    shares = [] if raw["scale_free"] else _residual_shares(explained)
+    return Identified(
+        method=method,
+        status=raw["status"],
+        rank=raw["rank"],
+        unknowns=raw["unknowns"],
+        parameters=parameters,
+        combinations=combinations,
+        calibration=calibration,
+        contradictions=(
+            *_contradictions(parameters),
+            *_beyond_tolerance(calibration, settings["tolerance"], _BEYOND, np.inf),
+            *_misfits(shares, _NO_FIT, np.inf),
+        ),
+        misfits=(
+            *_misfits(shares, _POOR, _NO_FIT),
+            *_beyond_segment(model, parameters),
+            *(
+                f"{line}: what the model lacks may be in it"
+                for line in _beyond_tolerance(calibration, settings["tolerance"], _FAR, _BEYOND)
+            ),
+            *noisy,
+        ),
+        left_out=(*_left_out(method, effects), *_unmoved(method, parameters)),
+        trades=tuple(raw["trades"]),
+        scale_free=raw["scale_free"],
+        level=level,
+        cutoff=raw["cutoff"],
+        residual_rms=_residuals(explained),
+        residual_rms_by_configuration=_residuals_by_configuration(explained),
+        explained=explained,
+        model=_identified_model(model, raw, effects),
+        dataset=dataset,
+    )
+
+
+LEVELS: dict[str, Any] = {"least": 0.5, "most": 0.999999}
+"""Probabilities that intervals may have."""
+_IN_CASCADE = ("coulomb", "constant_moment")
+"""Effects that the cascade finds; others it holds at what the model says."""
+
+
+def cascade_can(with_effects: Sequence[str], motion: str) -> None:
+    """Refuse what the cascade would silently leave out."""
+    for kind in with_effects:
+        if kind in _joint_kinds() and kind not in _IN_CASCADE:
+            raise BadInput("with_effects", kind, f"{' or '.join(_IN_CASCADE)} for the cascade, or the joint method")
+    if motion == "simulated":
+        raise BadInput("motion", motion, "measured for the cascade, or the joint method")
+
+
+def _left_out(method: str, effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Return what the method leaves out of the model, a line each."""
+    rotors = [e.joint for e in effects if e.kind == "motor_inertia"] if method == "cascade" else []
+    return tuple(f"the cascade takes no inertia into account, and so not the motor_inertia of joint {joint}" for joint in rotors)
+
+
+def _unmoved(method: str, parameters: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return the joints of whose dry friction the cascade finds nothing, a line each."""
+    joints = [e.joint for e in parameters if method == "cascade" and e.kind == "coulomb" and e.decided_by == "prior"]
+    return tuple(
+        f"joint {joint} never moves steadily in one direction: the cascade cannot identify its dry friction, nor use its torque"
+        for joint in joints
+    )
+
+
+def effects_of(model: Model, with_effects: Sequence[str]) -> tuple[list[Effect], list[bool]]:
+    """Return the effects of a model with those wanted besides, and which of them are fitted."""
+    effects = [*all_effects(model), *_added(model, checks.texts("with_effects", with_effects, "kinds of effects"))]
+    return effects, [e.kind in _joint_kinds() for e in effects]
+
+
+def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dict[str, Any]:
+    """Return what the core has to know besides the data; method and level are the usual ones."""
+    return {
+        "method": "joint",
+        "fitted": fitted,
+        "segment_uncertainty": model.segment_uncertainty,
+        "tolerance": core_tolerance(tolerance),
+        "cutoff": None,
+        "motion": "auto",
+        "level": 0.95,
+    }
+
+
+_FAR = 2.0
+"""A calibration this many times its tolerance, four standard deviations of what was believed beforehand, stands for something else."""
+_BEYOND = 5.0
+"""A calibration this many times its tolerance is no calibration."""
+_POOR = 0.2
+"""A residual above this share of the variation of a torque is a poor fit."""
+_NO_FIT = 0.5
+"""And above this, none."""
+_ROUNDING = 1e-12
+"""An inertia below this part of mass · length² is a difference of equal numbers; so is what of a length is beyond another."""
+
+
+def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return what no arm can be, a line each."""
+    return tuple(
+        f"{e.name} was driven to its lower limit: does force_on name the right side, and does the robot fit?"
+        for e in parameters
+        if e.kind == "segment" and e.decided_by == "bound" and e.name.startswith("m") and abs(e.value) <= 1e-2 * abs(e.interval[1])
+    )
+
+
+def _beyond_segment(model: Model, parameters: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return the centres of mass that the cascade, which knows no such limit, puts beyond the end of their segment, a line each."""
+    lines = []
+    for e in parameters:
+        length = model.segments[(e.joint or 1) - 1].length
+        if e.kind == "segment" and e.unit == "m" and e.value > length * (1.0 + _ROUNDING):
+            lines.append(
+                f"{e.name} came out as {e.value:.3g} m, beyond the end of its segment of {length:g} m: "
+                "the model written has more mass there instead, of the same moment"
+            )
+    return tuple(lines)
+
+
+def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: dict[str, float], above: float, to: float) -> tuple[str, ...]:
+    """Return the calibrations that came out larger than promised, more than `above` and up to `to` times, a line each."""
+    lines = []
+    for e in calibration:
+        promised = next(tolerance[key] for key in _TOLERANCES if e.name.startswith(key.replace("_", " ")))
+        if above * promised < abs(e.value) <= to * promised:
+            lines.append(f"{e.name} came out as {e.value:.3g} {e.unit}, {abs(e.value) / promised:.1f} times the declared tolerance")
+    return tuple(lines)
+
+
+def _residual_shares(explained: Sequence[Explained]) -> list[float]:
+    """Return how much of the variation of every joint's torque the fitted model leaves, over the fit trials."""
+    measured = np.concatenate([e.measured for e in explained if e.trial.role == "fit"])
+    rest = np.concatenate([e.measured - e.fitted for e in explained if e.trial.role == "fit"])
+    return [float(r / m) if m > 0 else 0.0 for m, r in zip(np.std(measured, axis=0), np.std(rest, axis=0), strict=True)]
+
+
+def _misfits(shares: Sequence[float], above: float, upto: float) -> tuple[str, ...]:
+    """Return the joints that leave a share of their torque between two limits, a line each."""
+    return tuple(
+        f"the residual of joint {j} is {share:.0%} of the variation of its torque: the model does not describe these data"
+        for j, share in enumerate(shares, start=1)
+        if above < share <= upto
+    )
+
+
+NOISY_SPEED = "noisy speed"
+"""Caveat of what the data decided where speeds and accelerations are noise to a good part: friction is then misread, and what it
+leaves or takes goes into masses and calibration."""
+
+
+def _noisy_speeds(shares: Sequence[float], allowed: float) -> tuple[str, ...]:
+    """Return the joints whose speeds are noise to a good part, a line each."""
+    return tuple(
+        f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are biased by "
+        "more than their intervals say, and masses with them; give the robot's angles and a [robot], measured speeds, or a lower cutoff"
+        for j, share in enumerate(shares, start=1)
+        if share > allowed
+    )
+
+
+_TOLERANCES = ("angle_offset", "force_bias", "force_gain", "time_delay", "handle_placement")
+
+
+def _joint_kinds() -> dict[str, Any]:
+    return {name: kind for name, kind in catalogue().items() if kind.where == "joint"}
+
+
+def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
+    """Return an effect of every wanted kind at every joint where the model has none yet."""
+    known = _joint_kinds()
+    present = {(e.kind, e.joint) for e in all_effects(model)}
+    added = []
+    for place, kind in enumerate(kinds):
+        if kind not in known:
+            raise unknown_name("with_effects", kind, known, what="joint effect")
+        if kind in kinds[:place]:
+            raise BadInput("with_effects", Text(f"{kind} twice"), "each kind once")
+        first = known[kind].first_joint
+        if first > model.n_joints:
+            raise BadInput("with_effects", kind, f"an arm of {first} joints or more: it acts over two of them")
+        added += [Effect(kind, j) for j in range(first, model.n_joints + 1) if (kind, j) not in present]
+    return added
+
+
+def core_columns(trial: Trial) -> dict[str, Any]:
+    """Return a trial for the core; gaps are bridged by straight lines and masked by `valid`."""
+
+    def whole(values: np.ndarray | None) -> np.ndarray | None:
+        if values is None:
+            return None
+        table = np.array(values, dtype=float).reshape(len(trial), -1)
+        for column in table.T:
+            bad = ~np.isfinite(column)
+            if bad.any():
+                column[bad] = np.interp(trial.t[bad], trial.t[~bad], column[~bad])
+        return table.reshape(values.shape)
+
+    return {
+        "role": trial.role,
+        "rate": trial.rate,
+        "q": whole(trial.q),
+        "dq": whole(trial.dq),
+        "force_on_arm": whole(trial.force_on_arm),
+        "moment_on_arm": whole(trial.moment_on_arm),
+        "tau": whole(trial.tau),
+        "robot_q": whole(trial.robot_q),
+        "valid": np.array(trial.valid),
+    }
+
+
+def _estimates(items: list[dict[str, Any]], caveat: str | None) -> tuple[Estimate, ...]:
+    """Return estimates; a caveat is one against the data, and so against what they decided alone."""
+    return tuple(
+        Estimate(**{**item, "interval": tuple(item["interval"])}, caveat=caveat if item["decided_by"] == "data" else None) for item in items
+    )
+
+
+def _residuals(explained: Sequence[Explained]) -> dict[str, dict[str, float]]:
+    result: dict[str, dict[str, float]] = {}
+    for role in ("fit", "test"):
+        rows = [e.measured - e.fitted for e in explained if e.trial.role == role and len(e.t)]
+        if rows:
+            rms = np.sqrt(np.mean(np.square(np.concatenate(rows)), axis=0))
+            result[role] = {f"tau{j}_Nm": float(v) for j, v in enumerate(rms, start=1)}
+    return result
+
+
+def _residuals_by_configuration(explained: Sequence[Explained]) -> dict[str, dict[str, dict[str, float]]]:
+    result: dict[str, dict[str, dict[str, float]]] = {}
+    for configuration in dict.fromkeys(e.trial.configuration for e in explained):
+        own = [e for e in explained if e.trial.configuration == configuration]
+        for role, channels in _residuals(own).items():
+            result.setdefault(role, {})[configuration] = channels
+    return result
+
+
+def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) -> Model:
+    """Return the model with estimates; effects that its joints state stay there, the others become effects."""
+    segments = tuple(
+        Segment(old.name, length, mass, min(max(com, 0.0), length), _not_rounding(inertia, mass * length**2), com_normal=normal)
+        for old, (length, mass, com, normal, inertia) in zip(model.segments, raw["segments"], strict=True)
+    )
+    joints = [dataclasses.asdict(j) | {"stiffness": 0.0, "rest": 0.0, "viscosity": 0.0, "coulomb": 0.0} for j in model.joints]
+    listed = []
+    fitted = [Effect(kind, index + 1, parameters=catalogue()[kind].values(values)) for kind, index, values in raw["effects"]]
+    # What an effect did to the segments is in them now.
+    absorbed = {name for name, kind in catalogue().items() if kind.where in ("segment", "hand")}
+    held = [e for e in effects if e.kind not in _joint_kinds() and e.kind not in absorbed]
+    for effect in fitted:
+        joint, values = joints[(effect.joint or 1) - 1], effect.parameters
+        # A joint of a model has no negative spring; a fit may find one, and an effect may say it.
+        if effect.kind == "elastic" and not joint["stiffness"] and values["stiffness"] >= 0.0:
+            joint.update(stiffness=values["stiffness"], rest=values["rest"])
+        elif effect.kind == "viscous" and not joint["viscosity"]:
+            joint["viscosity"] = values["viscosity"]
+        elif effect.kind == "coulomb" and not joint["coulomb"] and "smoothing" not in _changed(effect):
+            joint["coulomb"] = values["torque"]
+        else:
+            listed.append(effect)
+    return model.replace(segments=segments, joints=tuple(Joint(**j) for j in joints), effects=(*listed, *held))
+
+
+def _not_rounding(value: float, scale: float) -> float:
+    """Return a value, or zero where it is what rounding left of a bound at zero."""
+    return value if abs(value) > _ROUNDING * scale else 0.0
+
+
+def _changed(effect: Effect) -> set[str]:
+    return {p.name for p in catalogue()[effect.kind].parameters if effect.parameters.get(p.name, p.default) != p.default}

@@ -1,0 +1,475 @@
+"""Passive joint moments of slow movements: elastic mean and hysteresis (section 3.4 of the thesis)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .. import _armrs, checks
+from ..analysis import joint_coupling, passivity_checks, uncertainty
+from ..errors import BadInput, Text
+from ..io.dataset import Dataset, load_dataset
+from ..io.plausibility import refuse_implausible
+from ..io.trial import FEWEST_SAMPLES, Trial
+from ..rig import arm
+
+DEFAULT_CUTOFF = 1.0
+"""Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
+LEAST_CUTOFF = 1e-3
+"""Nobody moves slower [Hz]."""
+DEFAULT_BINS = 24
+"""Angle bins over the range of a joint in one configuration."""
+LEAST_RANGE = np.radians(2.0)
+"""A joint that moves less than this counts as held [rad]."""
+MOVING = 0.25
+"""A joint moves when its speed is above this part of its usual speed in the trial."""
+MARGIN = 0.43
+"""The low-pass mixes what lies within this time, in periods of its cutoff."""
+APART = np.radians(10.0)
+"""Repeats whose mean angles differ by more are no repeats of one movement [rad]."""
+CARRIED = (0.05, 20.0)
+"""The force carries an arm that is led: its torque along that of the weight, relative to that. Outside of this, unit or side are wrong."""
+LEAST_WEIGHT = 0.5
+"""Torque of the weight from which on that is asked [N m]."""
+RESTING = 0.02
+"""A joint rests when its speed is below this part of its usual speed in the trial."""
+LEVEL = 0.95
+"""Probability of the intervals, and one minus the level of the tests."""
+
+
+_COLUMNS = (
+    "rising", "falling", "elastic", "elastic_std", "elastic_systematic", "half_width", "half_width_std", "half_width_systematic",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class TrialMoments:
+    """Passive moments of one trial; rows are samples, NaN where nothing was measured.
+
+    Attributes
+    ----------
+    trial : Trial
+    q, qd : ndarray, shape (n, n_joints)
+        Low-passed angles and speeds [rad, rad/s].
+    moment : ndarray, shape (n, n_joints)
+        Torque with which each joint resists [N m].
+    inertial : ndarray, shape (n, n_joints)
+        Inertial torques by the model, taken off the moment [N m].
+    direction : ndarray of int, shape (n, n_joints)
+        1 where the angle grows, -1 where it shrinks, 0 at rest.
+    force : ndarray, shape (n, 2), or None
+        Low-passed force on the arm [N].
+    sign : ndarray, shape (n, n_joints)
+        Low-passed sign of the speed: how much of a dissipative moment is left in `moment` near reversals.
+    """
+
+    trial: Trial
+    q: np.ndarray
+    qd: np.ndarray
+    moment: np.ndarray
+    inertial: np.ndarray
+    direction: np.ndarray
+    force: np.ndarray | None
+    sign: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveCurve:
+    """Passive moment of one joint against its angle, over the repeats of one configuration.
+
+    Shapes are (k,). Means and deviations stand at angles that all repeats share, where there are such, and are NaN elsewhere.
+
+    Attributes
+    ----------
+    configuration : str
+    joint : int
+        From 1.
+    repeats : int
+    angle : ndarray
+        Centres of the bins [rad].
+    rising, falling : ndarray
+        Mean moment while the angle grows and shrinks [N m].
+    elastic, elastic_std : ndarray
+        Mean of both directions, and its standard deviation over repeats [N m]; the deviation is NaN for a single repeat.
+    half_width, half_width_std : ndarray
+        Half the difference of both directions: the dissipative part [N m].
+    inertial_share : float
+        Root mean square of the inertial torque that was taken off, relative to that of the moment.
+    elastic_repeats, half_width_repeats : ndarray, shape (repeats, k)
+        The same of every repeat [N m].
+    held : ndarray, shape (repeats, n_joints)
+        Mean angle of every joint in every repeat [rad].
+    elastic_systematic, half_width_systematic : ndarray
+        Standard deviations from the declared uncertainty of masses, lengths, angles and forces, the same error in all repeats [N m].
+    """
+
+    configuration: str
+    joint: int
+    repeats: int
+    angle: np.ndarray
+    rising: np.ndarray
+    falling: np.ndarray
+    elastic: np.ndarray
+    elastic_std: np.ndarray
+    half_width: np.ndarray
+    half_width_std: np.ndarray
+    inertial_share: float
+    elastic_repeats: np.ndarray = field(repr=False)
+    half_width_repeats: np.ndarray = field(repr=False)
+    held: np.ndarray = field(repr=False)
+    elastic_systematic: np.ndarray
+    half_width_systematic: np.ndarray
+
+    def interval(self, part: str) -> tuple[float, float]:
+        """Return the interval of the mean over angles of `elastic` or `half_width`, from the scatter of the repeats [N m].
+
+        Student's t over the repeats, on angles that all of them cover. Errors that are the same in all repeats are not in it.
+        """
+        from scipy.stats import t as student
+
+        repeats = getattr(self, f"{part}_repeats")
+        there = np.isfinite(repeats).all(axis=0)
+        if len(repeats) < 2 or not there.any():
+            return (float("nan"), float("nan"))
+        means = repeats[:, there].mean(axis=1)
+        half = float(student.ppf(0.5 + 0.5 * LEVEL, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)))
+        return (float(means.mean()) - half, float(means.mean()) + half)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data with units in the names."""
+        there = np.isfinite(self.half_width)
+        return {
+            "configuration": self.configuration,
+            "joint": self.joint,
+            "repeats": self.repeats,
+            "inertial_share": self.inertial_share,
+            "half_width_mean_Nm": float(np.mean(self.half_width[there])),
+            "elastic_mean_Nm": float(np.mean(self.elastic[there])),
+            "elastic_std_most_Nm": float(np.max(self.elastic_std[np.isfinite(self.elastic_std)], initial=0.0)),
+            "half_width_interval_Nm": list(self.interval("half_width")),
+            "elastic_interval_Nm": list(self.interval("elastic")),
+            "held_deg": np.degrees(self.held.mean(axis=0)),
+            "angle_deg": np.degrees(self.angle),
+            **{f"{n}_Nm": getattr(self, n) for n in _COLUMNS},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveMoments:
+    """Passive joint moments of a data set.
+
+    Attributes
+    ----------
+    trials : tuple of TrialMoments
+    curves : tuple of PassiveCurve
+        One for every configuration and joint that moved in both directions.
+    cutoff : float
+        Cutoff of the low-pass [Hz].
+    warnings : tuple of str
+    dataset : Dataset
+    dependence : tuple of Dependence
+        For every joint that moved while an adjacent one was held at different angles: the elastic moment as a function of both.
+    couplings : tuple of Coupling
+        For every pair of joints that were each moved while the other was held: what both say of their coupling.
+    checks : tuple of Check
+        Whether the muscles were silent and the movement slow.
+    """
+
+    trials: tuple[TrialMoments, ...]
+    curves: tuple[PassiveCurve, ...]
+    cutoff: float
+    warnings: tuple[str, ...]
+    dataset: Dataset = field(repr=False)
+    couplings: tuple[joint_coupling.Coupling, ...] = ()
+    dependence: tuple[joint_coupling.Dependence, ...] = ()
+    checks: tuple[passivity_checks.Check, ...] = ()
+
+    def __repr__(self) -> str:
+        parts = [f"joint {c.joint} in {c.configuration!r}: ±{np.nanmean(c.half_width):.3g} N m" for c in self.curves]
+        return f"PassiveMoments({self.dataset.name!r}; {'; '.join(parts) or 'no joint moved in both directions'})"
+
+
+def passive_moments(
+    dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEFAULT_CUTOFF, bins: int = DEFAULT_BINS
+) -> PassiveMoments:
+    """Compute the passive moment of every joint in slow movements, and its elastic and dissipative parts.
+
+    `tau_p = J(q)^T F_on_arm - G(q) - B(q) qdd - C(q, qd) qd`, plus joint torques where they were measured: equation 3.18 of the thesis
+    with the force on the arm. The thesis neglects inertial torques; here they are taken off by the model, and a check says where they are
+    not small. Only the rigid arm of the model counts, with what was worn, and none of its effects.
+
+    Parameters
+    ----------
+    dataset : Dataset or path
+    cutoff : float
+        Cutoff of the zero-phase low-pass of angles and forces, -3 dB of both passes [Hz].
+    bins : int
+        Angle bins over the range of each joint in each configuration.
+
+    Returns
+    -------
+    PassiveMoments
+
+    Raises
+    ------
+    BadInput
+        For settings out of range, and a trial with neither forces nor joint torques.
+    """
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    bins = checks.whole("bins", bins, least=2, most=1000)
+    cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
+    refuse_implausible(dataset, robot_matters=False)
+    trials = tuple(_of_trial(dataset, trial, cutoff) for trial in dataset.trials)
+    curves, warnings = [], []
+    for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
+        repeats = [m for m in trials if m.trial.configuration == configuration]
+        lost = []
+        for joint in range(dataset.model.n_joints):
+            curve = _curve(dataset, repeats, joint, bins)
+            if curve is not None:
+                curves.append(curve)
+            elif any(_moves(m.q[:, joint]) for m in repeats):
+                lost.append(f"{joint + 1}")
+        if lost:
+            warnings.append(
+                f"{configuration}: joint{'s' * (len(lost) > 1)} {', '.join(lost)} moved, but not long enough in both directions over the "
+                f"same angles for a low-pass at {cutoff:g} Hz: left out"
+            )
+        warnings += _doubtful(dataset, repeats)
+    slow = [(c.configuration, c.joint, c.inertial_share) for c in curves]
+    assumptions = (passivity_checks.muscles_silent(dataset.trials), passivity_checks.slow_enough(slow))
+    if assumptions[0].passed is False:
+        warnings.append(assumptions[0].text)
+    fitted = _dependence(curves)
+    both = tuple(
+        joint_coupling.together(one, other)
+        for one in fitted
+        for other in fitted
+        if (one.joint, one.adjacent) == (other.adjacent, other.joint) and one.joint < other.joint
+    )
+    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, both, fitted, assumptions)
+
+
+def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
+    if trial.force_on_arm is None and trial.tau is None:
+        raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
+    chain, n = arm(dataset.model_of(trial.configuration)), dataset.model.n_joints
+    q, qd, moment, inertial, sign = (np.full((len(trial), n), np.nan) for _ in range(5))
+    seen = None if trial.force_on_arm is None else np.full((len(trial), 2), np.nan)
+    for piece in trial.pieces():
+        if piece.stop - piece.start < FEWEST_SAMPLES:
+            continue
+        angle, speed, acceleration = _armrs.smooth(np.ascontiguousarray(trial.q[piece]), trial.rate, cutoff)
+        gravity = chain.gravity(angle)
+        torque = -gravity
+        if trial.force_on_arm is not None:
+            force = _armrs.smooth(np.ascontiguousarray(trial.force_on_arm[piece]), trial.rate, cutoff)[0]
+            torque = torque + chain.static_torque(angle, force)
+            if seen is not None:
+                seen[piece] = force
+        if trial.moment_on_arm is not None:  # it turns every joint alike
+            torque = torque + _armrs.smooth(np.ascontiguousarray(trial.moment_on_arm[piece, None]), trial.rate, cutoff)[0]
+        if trial.tau is not None:
+            torque = torque + _armrs.smooth(np.ascontiguousarray(trial.tau[piece]), trial.rate, cutoff)[0]
+        inertial[piece] = chain.inverse_dynamics(angle, speed, acceleration) - gravity
+        q[piece], qd[piece], moment[piece] = angle, speed, torque - inertial[piece]
+        usual = RESTING * np.percentile(np.abs(speed), 90.0, axis=0)
+        moving = np.where(np.abs(speed) > usual, np.sign(speed), 0.0)
+        sign[piece] = _armrs.smooth(np.ascontiguousarray(moving), trial.rate, cutoff)[0]
+    return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)), seen, sign)
+
+
+def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
+    """Tell in which direction each joint moves; one that is held rests, whatever its noise.
+
+    `margin` samples beside every reversal count as rest: there the low-pass mixes both directions.
+    """
+    result = np.zeros(q.shape, dtype=int)
+    for j in range(q.shape[1]):
+        there = np.isfinite(qd[:, j])
+        if not _moves(q[:, j]):
+            continue
+        least = MOVING * np.percentile(np.abs(qd[there, j]), 90.0)
+        signs = np.where(there & (np.abs(qd[:, j]) > least), np.sign(qd[:, j]), 0.0)
+        for sign in (-1, 1):
+            result[_deep_inside(signs == sign, margin), j] = sign
+    return result
+
+
+def _moves(angle: np.ndarray) -> bool:
+    there = np.isfinite(angle)
+    return bool(there.any() and np.ptp(angle[there]) >= LEAST_RANGE)
+
+
+def _deep_inside(own: np.ndarray, margin: int) -> np.ndarray:
+    """Return the samples that have `margin` of their like on both sides."""
+    window = 2 * margin + 1
+    return np.convolve(own, np.ones(window), mode="same") > window - 0.5 if window <= len(own) else np.zeros(len(own), dtype=bool)
+
+
+def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCurve | None:
+    moving = [m.direction[:, joint] != 0 for m in repeats]
+    samples = [m.q[keep, joint] for m, keep in zip(repeats, moving, strict=True)]
+    angles = np.concatenate(samples)
+    if angles.size == 0:
+        return None
+    edges = np.linspace(angles.min(), angles.max(), bins + 1)
+    rising, falling = (np.array([_at_centres(m, joint, sign, edges) for m in repeats]) for sign in (1, -1))
+    # A friction that turns with the speed went through the same low-pass as its sign did.
+    ups, downs = (np.array([_binned(m, m.sign[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
+    half_width = (rising - falling) / (ups - downs)
+    elastic = 0.5 * (rising + falling - half_width * (ups + downs))
+    if not np.isfinite(elastic).any():
+        return None
+    # A mean over other repeats at the next angle would jump by what differs between them.
+    shared = np.isfinite(elastic[np.isfinite(elastic).any(axis=1)]).all(axis=0)
+    kept = np.where(shared, 0.0, np.nan) if shared.any() else np.zeros(bins)
+    systematic = _systematic(dataset, repeats, joint, edges)
+    moved = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
+    inertial, moment = (np.concatenate(part) for part in zip(*moved, strict=True))
+    return PassiveCurve(
+        configuration=repeats[0].trial.configuration,
+        joint=joint + 1,
+        repeats=int(np.isfinite(elastic).any(axis=1).sum()),
+        angle=0.5 * (edges[1:] + edges[:-1]),
+        rising=_mean(rising) + kept,
+        falling=_mean(falling) + kept,
+        elastic=_mean(elastic) + kept,
+        elastic_std=_deviation(elastic) + kept,
+        half_width=_mean(half_width) + kept,
+        half_width_std=_deviation(half_width) + kept,
+        inertial_share=float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2))),
+        elastic_repeats=elastic,
+        half_width_repeats=half_width,
+        held=np.array([_mean(m.q) for m in repeats]),
+        elastic_systematic=systematic[0],
+        half_width_systematic=systematic[1],
+    )
+
+
+def _systematic(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return deviations of elastic mean and half width from errors that all samples of all repeats share; NaN where there are none."""
+    deviations = uncertainty.Deviations.of(dataset)
+    parts = [_shifts(dataset, m, joint, edges, deviations) for m in repeats]
+    rising, falling = (np.array([_mean(np.array(errors)) for errors in zip(*(part[k] for part in parts), strict=True)]) for k in (0, 1))
+    return uncertainty.by_jacobian(0.5 * (rising + falling)), uncertainty.by_jacobian(0.5 * (rising - falling))
+
+
+def _shifts(
+    dataset: Dataset, moments: TrialMoments, joint: int, edges: np.ndarray, deviations: uncertainty.Deviations
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what each shared error of its size does to the moment of a repeat, by direction, each (n_errors, n_bins)."""
+    model = dataset.model_of(moments.trial.configuration)
+    there = np.isfinite(moments.q).all(axis=1) & (moments.direction[:, joint] != 0)
+    values = np.full((len(deviations.vector(model.n_joints)), len(moments.q)), np.nan)
+    if there.any():
+        force = None if moments.force is None else moments.force[there]
+        values[:, there] = uncertainty.sensitivity(model, moments.q[there], force, deviations)[:, :, joint]
+    rising, falling = (np.array([_binned(moments, row, joint, sign, edges) for row in values]) for sign in (1, -1))
+    return rising, falling
+
+
+def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependence, ...]:
+    """Fit every joint that moved in several configurations against the joint next to it, the one before where there are two."""
+    found = []
+    for joint in sorted({c.joint for c in curves}):
+        own = [c for c in curves if c.joint == joint and _led_by(c)]
+        n = own[0].held.shape[1] if own else 1
+        adjacent = joint - 1 if joint > 1 else joint + 1
+        if not own or n == 1:
+            continue
+        courses = []
+        for curve in own:
+            for elastic, held in zip(curve.elastic_repeats, curve.held, strict=True):
+                there = np.isfinite(elastic)
+                if there.sum() >= 4:
+                    courses.append(
+                        joint_coupling.Course(curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration)
+                    )
+        fitted = joint_coupling.fit(courses, joint, adjacent, LEVEL)
+        if fitted is not None:
+            found.append(fitted)
+    return tuple(found)
+
+
+def _led_by(curve: PassiveCurve) -> bool:
+    """Whether the joint moves far enough to tell a shape."""
+    return bool(np.ptp(curve.angle) > joint_coupling.LEAST_HELD)
+
+
+def _binned(moments: TrialMoments, values: np.ndarray, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
+    """Return the mean of values, one a sample, in each angle bin of one direction; NaN where there are no samples."""
+    own = moments.direction[:, joint] == sign
+    place = np.clip(np.searchsorted(edges, moments.q[own, joint], side="right") - 1, 0, len(edges) - 2)
+    count = np.bincount(place, minlength=len(edges) - 1)
+    total = np.bincount(place, weights=values[own], minlength=len(edges) - 1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _at_centres(moments: TrialMoments, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
+    """Return the moment at the middle of each angle bin in one direction; NaN where there are no samples.
+
+    Where a movement turns, its bins are filled on one side only, and by another part for every repeat and direction: the mean of their
+    samples belongs to the mean of their angles, and is moved from there along the slope between bins.
+    """
+    mean, angle = (_binned(moments, values[:, joint], joint, sign, edges) for values in (moments.moment, moments.q))
+    there = np.isfinite(mean)
+    if there.sum() >= 2:
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        mean[there] += np.gradient(mean[there], angle[there]) * (middle - angle)[there]
+    return mean
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    """Return the mean over repeats of those that have samples."""
+    there = np.isfinite(values)
+    count = there.sum(axis=0)
+    return np.where(count > 0, np.where(there, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+
+
+def _deviation(values: np.ndarray) -> np.ndarray:
+    """Return the standard deviation over repeats; NaN where fewer than two have samples."""
+    there = np.isfinite(values)
+    count = there.sum(axis=0)
+    square = np.where(there, values - _mean(values), 0.0) ** 2
+    return np.where(count > 1, np.sqrt(square.sum(axis=0) / np.maximum(count - 1, 1)), np.nan)
+
+
+def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
+    """Return what is odd in the trials of one configuration, a line each: none of it proves an error, and all of it spoils the means."""
+    lines = []
+    telling = [m for m in repeats if m.direction.any()]
+    for m in repeats:
+        there = np.isfinite(m.q).all(axis=1)
+        # Where no repeat tells, it is the movement and not a sensor, and that its joints are left out says so.
+        if telling and not m.direction.any():
+            lines.append(
+                f"{m.trial.file}: no joint moves long enough in it to tell its direction: it counts nowhere (unit, or a dead sensor?)"
+            )
+        if m.force is None or not there.any():
+            continue
+        weight = arm(dataset.model_of(m.trial.configuration)).gravity(m.q[there])
+        share = float(np.sum((m.moment + m.inertial)[there] * weight) / max(np.sum(weight**2), 1e-300)) + 1.0
+        if np.mean(np.sum(weight**2, axis=1)) > LEAST_WEIGHT**2 and not CARRIED[0] <= share <= CARRIED[1]:
+            lines.append(
+                f"{m.trial.file}: the force carries {100 * share:.2g} % of the arm's weight: is it in N, and force_on the right side?"
+            )
+    places = np.array([_mean(m.q) for m in repeats])
+    for j, at in enumerate(places[np.isfinite(places).all(axis=1)].T, start=1):
+        if at.size and np.ptp(at) > APART:
+            where = f"{repeats[0].trial.configuration}: its repeats have joint {j} up to {np.degrees(np.ptp(at)):.3g}° apart"
+            lines.append(f"{where}: another unit, swapped columns, or two configurations?")
+    return lines
+
+
+def _not_slow(curves: Sequence[PassiveCurve]) -> tuple[str, ...]:
+    return tuple(
+        f"{c.configuration}: not slow for joint {c.joint}: inertial torques are {100 * c.inertial_share:.0f} % of the passive moment, "
+        f"more than {100 * passivity_checks.SLOW:.0f} %"
+        for c in curves
+        if c.inertial_share > passivity_checks.SLOW
+    )

@@ -1,0 +1,395 @@
+"""The virtual laboratory (thesis figure 3.8): a subject, a robot with its controller, sensors, clocks, and a supervisor that stops it."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import _armrs, checks
+from ..errors import ArmrsError, BadInput, Text
+from ..io import files
+from ..io.dataset import Added, Dataset, write_dataset
+from ..io.markers import Markers, planar_motion
+from ..io.trial import FEWEST_SAMPLES, Trial
+from ..model import Effect, Model
+from ..rig import rig
+from .experiment import Devices, Experiment, Fault, Run, load_experiment
+from .simulate import DEFAULT_DT, Channel, Movement, Sensors, Simulated, driven, simulate
+
+RECORDING_RATE = 500.0
+"""Samples a second of the simulation, from which the devices take theirs [Hz]."""
+GAP = 0.1
+"""Length of a gap of a hidden marker [s]."""
+EMG_REST, EMG_GAIN = 3.0, 20.0
+"""Amplitude of a silent muscle [µV], and what each newton metre of it adds [µV/(N m)]."""
+MUSCULAR = ("voluntary", "stretch_reflex", "tremor")
+BRAKES = ("coulomb", "stribeck", "load_friction")
+_POINTS = ("shoulder", "elbow", "wrist", "handle")
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """What the virtual laboratory measured.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        As it was written, before reading it back.
+    experiment : Experiment
+    trials : tuple of dict
+        For each trial: what the supervisor and the robot did, moments drawn, clocks.
+    files : tuple of Path
+        What was written.
+    """
+
+    dataset: Dataset
+    experiment: Experiment
+    trials: tuple[dict[str, Any], ...]
+    files: tuple[Path, ...]
+
+    @property
+    def stopped(self) -> list[dict[str, Any]]:
+        """The trials that the supervisor stopped; they are not in the data set."""
+        return [trial for trial in self.trials if trial["stop"] is not None]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data with units in the names."""
+        return {
+            "verb": "record",
+            "data": {"name": self.dataset.name, "synthetic": True, "joints": [j.name for j in self.dataset.model.joints]},
+            "trials": list(self.trials),
+            "stopped": len(self.stopped),
+            "lengths_m": [s.length for s in self.dataset.model.segments],
+            "files": [os.fspath(path) for path in self.files],
+        }
+
+
+def record(
+    experiment: Experiment | str | os.PathLike[str], folder: str | os.PathLike[str], *, step: Callable[[int], None] = lambda done: None
+) -> Recorded:
+    """Run an experiment in the virtual laboratory and write a data set.
+
+    Parameters
+    ----------
+    experiment : Experiment or path
+        `EXPERIMENT.toml`.
+    folder : path
+        Gets the data set, the markers in `markers/`, and the truth in `truth/`, which no other verb reads.
+    step : callable
+        Called with 1 after each trial.
+
+    Returns
+    -------
+    Recorded
+
+    Raises
+    ------
+    BadInput
+        For an experiment that cannot be used; nothing is written.
+    ArmrsError
+        When the supervisor stopped every trial to be fitted.
+    """
+    experiment = checks.loaded("experiment", experiment, Experiment, load_experiment)
+    out = files.output_folder(folder)
+    check_required(experiment)
+    measured = measure(experiment, step=step)
+    return Recorded(measured.dataset, experiment, measured.trials, _write(measured, experiment, out))
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A session as the devices saw it, in memory alone.
+
+    Attributes
+    ----------
+    dataset : Dataset
+    trials : tuple of dict
+        As in `Recorded`.
+    markers : dict of str to Markers
+        What the cameras saw, by the file of the trial.
+    """
+
+    dataset: Dataset
+    trials: tuple[dict[str, Any], ...]
+    markers: dict[str, Markers]
+
+
+def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done: None) -> Measured:
+    """Run an experiment without writing anything; errors and `step` are those of `record`, movements are not checked beforehand."""
+    session = _Session(experiment)
+    seen = []
+    for number, run in enumerate(experiment.runs):
+        for repeat in range(1, run.repeats + run.tests + 1):
+            seen.append(session.measure(run, number, repeat))
+            step(1)
+    kept = [(m.trial, m.markers, m.story) for m in seen if m.trial is not None and m.markers is not None]
+    if not any(trial.role == "fit" for trial, _, _ in kept):
+        stop = seen[0].story["stop"]
+        found = f"{stop['what']} {stop['reason']}, {stop['value']:.4g} where {stop['limit']:.4g} is allowed"
+        raise ArmrsError(f"the supervisor stopped every trial to be fitted, the first after {stop['at_s']:.4g} s: {found}")
+    lengths = np.mean([story["lengths_m"] for _, _, story in kept], axis=0)
+    dataset = Dataset(
+        name=experiment.name,
+        model=_with_lengths(experiment.believed, lengths),
+        trials=tuple(trial for trial, _, _ in kept),
+        force_on="robot",
+        sample_rate=experiment.devices.rate_Hz,
+        subject=experiment.subject,
+        tolerance=experiment.tolerance,
+        synthetic=True,
+        added=_added(experiment.runs, {trial.configuration for trial, _, _ in kept}),
+    )
+    return Measured(dataset, tuple(m.story for m in seen), {trial.file: markers for trial, markers, _ in kept})
+
+
+def check_required(experiment: Experiment) -> None:
+    """Refuse movements that ask more of the robot than its supervisor allows."""
+    safety = experiment.safety
+    for number, run in enumerate(experiment.runs, start=1):
+        place = f"[[movement]] {number} ({run.configuration})"
+        try:
+            asked = simulate(experiment.truth, run.movement, rate=RECORDING_RATE).columns
+        except BadInput as error:
+            raise error.within(file=experiment.file, place=place) from None
+        for column, unit, name in (("robot_qd", "rad/s", "speed_rad_s"), ("robot_qdd", "rad/s²", "acceleration_rad_s2")):
+            most, allowed = float(np.abs(asked[column]).max()), getattr(safety, name)
+            if most > allowed:
+                found = Text(f"{most:.3g} {unit} of a joint of the robot")
+                hint = "slower, or away from where the robot is stretched out"
+                raise BadInput(place, found, f"at most [safety] {name} = {allowed:g}", file=experiment.file, hint=hint)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    trial: Trial | None
+    markers: Markers | None
+    story: dict[str, Any]
+
+
+class _Session:
+    """What stays the same from trial to trial."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.experiment = experiment
+        draw = np.random.default_rng([experiment.seed, 1])
+        self.offsets = experiment.devices.marker_offset_m * draw.standard_normal((experiment.truth.n_joints + 1, 2))
+
+    def measure(self, run: Run, number: int, repeat: int) -> _Seen:
+        """Measure one trial; its random numbers depend on seed, movement and repeat alone."""
+        e, devices = self.experiment, self.experiment.devices
+        seed = int(np.random.SeedSequence([e.seed, 2, number, repeat]).generate_state(1, np.uint64)[0] >> 11)
+        draw = np.random.default_rng(seed)
+        moments = e.variation_Nm * draw.standard_normal(e.truth.n_joints)
+        model = _wearing(e.truth, run.worn)
+        extra = tuple(Effect("constant_moment", j, parameters={"moment": m}) for j, m in enumerate(moments, 1) if m)
+        model = model.replace(effects=(*model.effects, *extra))
+        fault = next((f for f in e.faults if (f.configuration, f.repeat) == (run.configuration, repeat)), None)
+        led = self._lead(model, run.movement, fault, seed)
+        story: dict[str, Any] = {
+            "configuration": run.configuration,
+            "repeat": repeat,
+            "seed": seed,
+            "moment_Nm": list(moments),
+            "tracking_error_rad": led["tracking_error"],
+            "stop": _stop(led),
+        }
+        if story["stop"] is not None:
+            return _Seen(None, None, story)
+        every = round(1.0 / (RECORDING_RATE * DEFAULT_DT))
+        path = Trial(
+            "",
+            run.configuration,
+            repeat,
+            "fit",
+            led["time"][::every],
+            np.empty((len(led["time"][::every]), 0)),
+            robot_q=led["robot_q"][::every],
+            valid=np.ones(1, bool),
+        )
+        true = simulate(model, path, rate=RECORDING_RATE, start=run.movement.waypoints[0], sensors=_sensors(devices), seeds=[seed])
+        return self._read(run, repeat, true, (draw, story))
+
+    def _lead(self, model: Model, movement: Movement, fault: Fault | None, seed: int) -> dict[str, Any]:
+        """Let the robot's controller follow the movement; it is programmed with the true lengths."""
+        c, s = self.experiment.controller, self.experiment.safety
+        settings = {"engine": "native", "integrator": "rk4", "dt": DEFAULT_DT, "duration": None, "output_interval": 1.0 / RECORDING_RATE}
+        watch = {
+            "bandwidth": c.bandwidth_rad_s,
+            "damping": c.damping,
+            "torque_limit": c.torque_limit_Nm,
+            "angle_margin": np.radians(s.angle_margin_deg),
+            "speed": s.speed_rad_s,
+            "acceleration": s.acceleration_rad_s2,
+            "force": s.force_N,
+            "fault": None if fault is None else _injected(fault),
+            "seed": seed,
+        }
+        start = {"q": [float(v) for v in movement.waypoints[0]], "qd": None}
+        return _armrs.control(rig(model), driven(movement, "compliant"), settings | start, watch)
+
+    def _read(self, run: Run, repeat: int, true: Simulated, state: tuple[np.random.Generator, dict[str, Any]]) -> _Seen:
+        """Let every device read the run."""
+        draw, story = state
+        devices, model = self.experiment.devices, true.model
+        read = true.readings[0]
+        stamps = read["time"]
+        seen = (1.0 + devices.clock_drift) * stamps + devices.clock_offset_s + devices.clock_jitter_s * draw.standard_normal(len(stamps))
+        q = np.column_stack([np.interp(seen, true.t, column) for column in true.q.T])
+        markers = self._markers(model, stamps, q, draw)
+        motion = planar_motion(markers, markers.names, up="z", forward="y")
+        story["lengths_m"] = list(motion.lengths)
+        story["clock"] = {"offset_s": devices.clock_offset_s, "drift": devices.clock_drift, "jitter_s": devices.clock_jitter_s}
+        trial = Trial(
+            file=f"trials/{run.configuration}_{repeat}.csv",
+            configuration=run.configuration,
+            repeat=repeat,
+            role="fit" if repeat <= run.repeats else "test",
+            t=stamps,
+            q=motion.q,
+            force_on_arm=read["force_on_arm"],
+            moment_on_arm=None if devices.moment_noise_Nm is None else read["moment_on_arm"],
+            robot_q=read["robot_q"],
+            tau=_brakes(true, stamps, devices, draw),
+            emg=_emg(true, stamps, draw) if devices.emg else {},
+        )
+        return _Seen(trial if len(stamps) >= FEWEST_SAMPLES else None, markers, story)
+
+    def _markers(self, model: Model, t: np.ndarray, q: np.ndarray, draw: np.random.Generator) -> Markers:
+        """Return what the cameras see of the joints: positions in x (normal to the plane), y, z [m]."""
+        absolute = np.cumsum(q, axis=1)
+        at = np.tile(np.array(model.base), (len(t), 1))
+        points = [at]
+        for segment, angle in zip(model.segments, absolute.T, strict=True):
+            at = at + segment.length * np.column_stack([np.cos(angle), np.sin(angle)])
+            points.append(at)
+        positions = np.zeros((len(t), len(points), 3))
+        positions[:, :, 1:] = np.stack(points, axis=1) + self.offsets
+        devices = self.experiment.devices
+        positions += devices.marker_noise_m * draw.standard_normal(positions.shape)
+        _hide(positions, devices, draw)
+        return Markers([*_POINTS[: len(points) - 1], _POINTS[-1]], t, positions, up="z")
+
+
+def _hide(positions: np.ndarray, devices: Devices, draw: np.random.Generator) -> None:
+    """Hide markers for a tenth of a second at a time."""
+    length = max(1, round(GAP * devices.rate_Hz))
+    n, markers, _ = positions.shape
+    for k in range(markers):
+        for start in np.flatnonzero(draw.random(n) < devices.marker_gaps / length):
+            positions[start : start + length, k] = np.nan
+
+
+def _sensors(devices: Devices) -> Sensors:
+    return Sensors(
+        rate=devices.rate_Hz,
+        force=Channel(devices.force_noise_N, range=devices.force_range_N, bits=devices.force_bits),
+        moment=Channel(devices.moment_noise_Nm or 0.0),
+        robot=Channel(range=2 * np.pi, bits=24),
+    )
+
+
+def _effects_torque(true: Simulated, kinds: tuple[str, ...]) -> np.ndarray:
+    """Return the torque with which effects of some kinds resist, shape (n, n_joints) [N m]."""
+    total = np.zeros_like(true.q)
+    for column, (kind, joint) in enumerate(true.columns["effects"]):
+        if kind in kinds:
+            total[:, joint] += true.columns["resisting"][:, column]
+    return total
+
+
+def _brakes(true: Simulated, t: np.ndarray, devices: Devices, draw: np.random.Generator) -> np.ndarray | None:
+    if devices.brake_noise_Nm is None:
+        return None
+    torque = -_effects_torque(true, BRAKES)
+    at = np.column_stack([np.interp(t, true.t, column) for column in torque.T])
+    return at + devices.brake_noise_Nm * draw.standard_normal(at.shape)
+
+
+def _emg(true: Simulated, t: np.ndarray, draw: np.random.Generator) -> dict[str, np.ndarray]:
+    pull = -_effects_torque(true, MUSCULAR)
+    return muscle_activity(np.column_stack([np.interp(t, true.t, column) for column in pull.T]), draw)
+
+
+def muscle_activity(pull: np.ndarray, draw: np.random.Generator) -> dict[str, np.ndarray]:
+    """Return the amplitude of a flexor and an extensor of each joint by the names of columns [µV]; silent ones are never at zero.
+
+    Parameters
+    ----------
+    pull : ndarray, shape (n, n_joints)
+        Torque that the muscles of each joint apply, flexion positive [N m].
+    draw : Generator
+        Of the noise.
+    """
+    columns = {}
+    for name, at in zip(_POINTS, pull.T, strict=False):
+        for side, sign in (("flexor", 1.0), ("extensor", -1.0)):
+            rest = EMG_REST * np.abs(1.0 + 0.2 * draw.standard_normal(len(at)))
+            columns[f"emg_{name}_{side}_uV"] = rest + EMG_GAIN * np.maximum(sign * at, 0.0)
+    return columns
+
+
+def _injected(fault: Fault) -> tuple[float, str, int, tuple[float, float]]:
+    size = (fault.delay_s, 0.0) if fault.kind == "late" else fault.force_N
+    return fault.at_s, fault.kind, fault.joint - 1, size
+
+
+def _stop(led: dict[str, Any]) -> dict[str, Any] | None:
+    if led["stop"] is None:
+        return None
+    reason, channel, value, limit, at = led["stop"]
+    quantities = ("angle", "speed", "acceleration", "force")
+    what = (
+        "data" if channel is None else f"{quantities[channel // 2]} {('1', '2')[channel % 2] if channel < 6 else ('Fy', 'Fz')[channel % 2]}"
+    )
+    return {
+        "reason": reason,
+        "what": what,
+        "value": value,
+        "limit": limit,
+        "at_s": at,
+        "periods_after_fault": led["periods_to_stop"],
+        "force_after_fault_N": led["force_after_fault"],
+        "way_after_stop_m": led["way_after_stop"],
+    }
+
+
+def _wearing(model: Model, worn: tuple[Added, ...]) -> Model:
+    for item in worn:
+        model = model.with_mass(item.segment, item.mass, item.at)
+    return model
+
+
+def _with_lengths(model: Model, lengths: np.ndarray) -> Model:
+    """Return a model with lengths as the markers show them."""
+    segments = tuple(
+        dataclasses.replace(s, length=float(a), com=min(s.com, float(a))) for s, a in zip(model.segments, lengths, strict=True)
+    )
+    return model.replace(segments=segments)
+
+
+def _added(runs: tuple[Run, ...], kept: set[str]) -> tuple[Added, ...]:
+    by_item: dict[tuple[int, float, float], list[str]] = {}
+    for run in runs:
+        for item in run.worn:
+            if run.configuration in kept:
+                by_item.setdefault((item.segment, item.mass, item.at), []).append(run.configuration)
+    return tuple(Added(*key, configurations=tuple(names)) for key, names in by_item.items())
+
+
+def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path, ...]:
+    from ..io.opensim import write_trc
+
+    head = "# SYNTHETIC: what was simulated. No verb reads it.\n"
+    truth = out / "truth" / "truth.toml"
+    files.write_text(truth, head + experiment.truth.to_toml(), kind=".toml")
+    files.write_json(
+        out / "truth" / "truth.json", {"experiment": experiment.name, "seed": experiment.seed, "trials": list(measured.trials)}
+    )
+    written = [write_trc(out / "markers" / Path(file).with_suffix(".trc").name, markers) for file, markers in measured.markers.items()]
+    return (write_dataset(measured.dataset, out), truth, truth.with_suffix(".json"), *written)

@@ -1,0 +1,519 @@
+"""The closed-chain experiment: a robot leads the arm, and every quantity is recorded."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .. import _armrs, checks
+from ..errors import BadInput, Text
+from ..io import tomlfile
+from ..io.trial import Trial
+from ..model import Model, load_model
+from ..rig import rig
+
+DEFAULT_DT = 0.25e-3
+"""Step of the simulation [s]."""
+DEFAULT_RATE = 50.0
+"""Samples a second of a recording [Hz]."""
+RUNAWAY = 30.0
+"""Speed of a joint beyond which a run is none of a led arm [rad/s]."""
+PIECE = 16384
+"""Samples of a run that are held, drawn and written at once."""
+_MOST_STEPS = 10**9
+_CHANNELS = ("angle", "force", "moment", "robot", "torque")
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """A desired movement of the arm's joints: straight lines through waypoints, at rest in each.
+
+    Attributes
+    ----------
+    waypoints : ndarray, shape (k, n_joints)
+        Joint angles [rad].
+    speed : float
+        Largest joint speed [rad/s].
+    acceleration : float
+        Largest joint acceleration [rad/s²].
+    pause : float
+        Rest in every waypoint on the way [s].
+    shape : {"trapezoid", "smooth"}
+        Velocity profile: straight ramps as in the thesis, or ramps with continuous acceleration.
+    file : str, optional
+        Where it was read, for refusals.
+    """
+
+    waypoints: np.ndarray
+    speed: float = 0.2
+    acceleration: float = 0.6
+    pause: float = 0.0
+    shape: str = "trapezoid"
+    file: str | None = None
+
+    def __post_init__(self) -> None:
+        points = checks.numbers("waypoints", self.waypoints, "rad")
+        if points.ndim != 2 or len(points) < 2 or not points.size:
+            raise BadInput("waypoints", f"an array of shape {points.shape}", "two or more rows of joint angles")
+        if np.abs(points).max(initial=0.0) > 4 * np.pi:
+            raise BadInput("waypoints", float(np.abs(points).max()), "angles within two turns, in radians", hint="looks like degrees")
+        checks.number("speed", self.speed, above=0.0, unit="rad/s")
+        checks.number("acceleration", self.acceleration, above=0.0, unit="rad/s²")
+        checks.number("pause", self.pause, least=0.0, unit="s")
+        checks.choice("shape", self.shape, ("trapezoid", "smooth"))
+        if self.file is not None:
+            checks.text("file", self.file)
+        points.flags.writeable = False
+        object.__setattr__(self, "waypoints", points)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Noise and limits of one kind of sensor channel.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the noise, in the unit of the channel.
+    correlation_time : float
+        Time in which its correlation falls to 1/e [s]; 0 for white noise.
+    range : float
+        Largest magnitude that is read.
+    bits : int, optional
+        Bits over the whole range.
+    """
+
+    deviation: float = 0.0
+    correlation_time: float = 0.0
+    range: float = np.inf
+    bits: int | None = None
+
+    def __post_init__(self) -> None:
+        checks.number("deviation", self.deviation, least=0.0)
+        checks.number("correlation_time", self.correlation_time, least=0.0, unit="s")
+        checks.extent("range", self.range, above=0.0)
+        if self.bits is not None:
+            checks.whole("bits", self.bits, least=1, most=32)
+
+    def _entry(self) -> tuple[float, float, float, int | None]:
+        return self.deviation, self.correlation_time, self.range, self.bits
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the sensors of a rig do to the truth; the defaults are ideal ones at 50 Hz."""
+
+    rate: float = DEFAULT_RATE
+    angle: Channel = Channel()
+    force: Channel = Channel()
+    moment: Channel = Channel()
+    robot: Channel = Channel()
+    torque: Channel = Channel()
+
+    def __post_init__(self) -> None:
+        checks.number("rate", self.rate, above=0.0, unit="Hz")
+        for kind in _CHANNELS:
+            checks.instance(kind, getattr(self, kind), Channel)
+
+    @classmethod
+    def realistic(cls) -> Sensors:
+        """Sensors of the thesis: cameras of 0.1°, a force sensor of ±110 N and 12 bit with 0.2 N of noise, robot encoders."""
+        return cls(
+            angle=Channel(np.radians(0.1)),
+            force=Channel(0.2, range=110.0, bits=12),
+            robot=Channel(range=2 * np.pi, bits=20),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A recorded run; rows are samples.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+    q, qd, qdd : ndarray, shape (n, n_joints)
+        Joint angles, speeds and accelerations [rad, rad/s, rad/s²].
+    force_on_arm : ndarray, shape (n, 2)
+        Contact force [N].
+    columns : dict of str to ndarray
+        Everything that was recorded: tip, handle, robot angles, every torque by itself, energies and works.
+    readings : tuple of dict
+        What the sensors read, one for each seed asked for.
+    model : Model
+    settings : dict
+        Engine, integrator (of the native engine), step and rate that made it.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    force_on_arm: np.ndarray
+    columns: dict[str, Any] = field(repr=False)
+    readings: tuple[dict[str, Any], ...] = field(repr=False)
+    model: Model = field(repr=False)
+    settings: dict[str, Any] = field(repr=False)
+
+    def __repr__(self) -> str:
+        most = np.max(np.hypot(*self.force_on_arm.T))
+        size = f"{len(self.t)} samples, {self.t[-1]:.6g} s, {self.q.shape[1]} joints"
+        return f"Simulated({size}; force on the arm up to {most:.4g} N; digest {self.digest})"
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the recorded bits; the same on every machine. Computed when it is first asked for."""
+        digest = _armrs.Digest(self.columns["effects"])
+        for name in digested(self.columns):
+            values = self.columns[name]
+            digest.column(name, 0 if values is None else values.size)
+            if values is not None:
+                digest.values(values)
+        return digest.value()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is hardly a movement of an arm, a line each."""
+        return runaway(self.pieces())
+
+    @property
+    def samples(self) -> int:
+        """How many were recorded."""
+        return len(self.t)
+
+    def pieces(self, samples: int = PIECE) -> Iterator[Simulated]:
+        """Give the samples in order, so many at a time."""
+        for first in range(0, len(self.t), samples):
+            part = slice(first, first + samples)
+            yield self.with_columns(
+                {name: values[part] if isinstance(values, np.ndarray) else values for name, values in self.columns.items()}
+            )
+
+    def with_columns(self, columns: dict[str, Any]) -> Simulated:
+        """Return the run with other samples."""
+        return dataclasses.replace(
+            self,
+            t=columns["time"],
+            q=columns["q"],
+            qd=columns["qd"],
+            qdd=columns["qdd"],
+            force_on_arm=columns["force_on_arm"],
+            columns=columns,
+        )
+
+
+def digested(columns: Mapping[str, Any]) -> list[str]:
+    """Return the names of the columns that a digest stands for, in its order."""
+    return [name for name in columns if name not in ("effects", "energy_error")]
+
+
+def runaway(pieces: Iterable[Simulated]) -> tuple[str, ...]:
+    """Return a line where a joint turns faster than a led arm does."""
+    fastest, first = 0.0, None
+    for piece in pieces:
+        speed = np.abs(piece.qd).max(axis=1)
+        fastest = max(fastest, float(speed.max()))
+        if first is None and fastest > RUNAWAY:
+            first = piece.t[np.argmax(speed > RUNAWAY)]
+    if first is None:
+        return ()
+    return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)
+
+
+def simulate(
+    model: Model | str | os.PathLike[str],
+    drive: Movement | Trial | None = None,
+    *,
+    engine: str = "native",
+    integrator: str | None = None,
+    dt: float = DEFAULT_DT,
+    rate: float = DEFAULT_RATE,
+    duration: float | None = None,
+    coupling: str = "compliant",
+    start: np.ndarray | None = None,
+    start_speed: np.ndarray | None = None,
+    sensors: Sensors | None = None,
+    seeds: Sequence[int] = (),
+) -> Simulated:
+    """Simulate an arm that a robot leads, that motors move, or that swings freely.
+
+    Parameters
+    ----------
+    model : Model or path
+    drive : Movement, Trial or None
+        The desired movement; a measured trial, whose robot angles (or else joint torques) drive the arm; or nothing, and it swings.
+    engine : {"native", "rapier"}
+        Minimal coordinates, or rigid bodies and joints in maximal coordinates.
+    integrator : {"rk4", "euler"}, optional
+        Of the native engine: fourth order, taken when absent, or semi-implicit first order.
+    dt : float
+        Step [s].
+    rate : float
+        Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps.
+    duration : float, optional
+        Length of the run [s]; that of the movement or trial when absent.
+    coupling : {"compliant", "rigid"}
+        How the handle holds the tip.
+    start, start_speed : ndarray, shape (n_joints,), optional
+        Angles [rad] and speeds [rad/s] at the start. Where a handle leads: the static equilibrium near these angles.
+    sensors, seeds
+        What sensors read of the run, once for every seed.
+
+    Raises
+    ------
+    BadInput
+        For settings that cannot be used.
+    SimulationError
+        When the run stops early.
+    """
+    asked = _asked(
+        model,
+        drive,
+        engine=engine,
+        integrator=integrator,
+        dt=dt,
+        rate=rate,
+        duration=duration,
+        coupling=coupling,
+        start=(start, start_speed),
+    )
+    checks.instance("sensors", sensors, Sensors, type(None))
+    sensing = None if sensors is None else _sensing(sensors, seeds)
+    with asked.about_drive():
+        raw = _armrs.simulate(rig(asked.model), asked.led, asked.core, sensing)
+    return asked.recorded(raw)
+
+
+def simulate_in_pieces(
+    model: Model,
+    drive: Movement | Trial | None,
+    take: Callable[[Simulated], None],
+    *,
+    samples: int,
+    engine: str = "native",
+    integrator: str | None = None,
+    dt: float = DEFAULT_DT,
+    rate: float = DEFAULT_RATE,
+    duration: float | None = None,
+    coupling: str = "compliant",
+) -> None:
+    """Simulate as `simulate` does, and hand over every so many samples instead of keeping them; `take` gets each piece.
+
+    Raises
+    ------
+    BadInput, SimulationError
+        As `simulate`, and what `take` raises.
+    """
+    asked = _asked(
+        model, drive, engine=engine, integrator=integrator, dt=dt, rate=rate, duration=duration, coupling=coupling, start=(None, None)
+    )
+    with asked.about_drive():
+        _armrs.simulate_in_pieces(rig(model), asked.led, asked.core, samples, lambda raw: take(asked.recorded(raw)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """A run as the core takes it."""
+
+    model: Model
+    drive: Movement | Trial | None
+    led: dict[str, Any]
+    core: dict[str, Any]
+    settings: dict[str, Any]
+
+    @contextlib.contextmanager
+    def about_drive(self) -> Iterator[None]:
+        """Say of a refusal of the core which file it is about."""
+        try:
+            yield
+        except BadInput as error:
+            raise about(self.drive, error, f"; a step is {self.core['dt']:g} s") from None
+
+    def recorded(self, raw: dict[str, Any]) -> Simulated:
+        """Return what the core has recorded."""
+        return Simulated(
+            t=raw["time"],
+            q=raw["q"],
+            qd=raw["qd"],
+            qdd=raw["qdd"],
+            force_on_arm=raw["force_on_arm"],
+            columns={k: v for k, v in raw.items() if k != "readings"},
+            readings=tuple(raw.get("readings", ())),
+            model=self.model,
+            settings=self.settings,
+        )
+
+
+def _asked(
+    model: Model | str | os.PathLike[str],
+    drive: Movement | Trial | None,
+    *,
+    engine: str,
+    integrator: str | None,
+    dt: float,
+    rate: float,
+    duration: float | None,
+    coupling: str,
+    start: tuple[np.ndarray | None, np.ndarray | None],
+) -> _Asked:
+    model = checks.loaded("model", model, Model, load_model)
+    checks.choice("coupling", coupling, ("compliant", "rigid"))
+    checks.choice("engine", engine, ("native", "rapier"))
+    integrator = _integrator(integrator, engine)
+    checks.instance("drive", drive, Movement, Trial, type(None))
+    checks.number("dt", dt, above=0.0, unit="s")
+    checks.number("rate", rate, above=0.0, unit="Hz")
+    steps = 1.0 / (rate * dt)
+    if steps < 1.0 - 1e-6:
+        raise BadInput("dt, rate", _clock(dt, rate), "at least one step from sample to sample")
+    if abs(steps - round(steps)) > 1e-6 * steps:
+        raise BadInput("dt, rate", _clock(dt, rate), f"a whole number of steps from sample to sample, not {steps:.6g}")
+    if duration is not None:
+        _check_duration(duration, dt, rate)
+    led = driven(drive, coupling)
+    if duration is not None and led["times"] is not None and duration > led["times"][-1] + 1e-6 * dt:
+        raise BadInput("duration", duration, f"at most {led['times'][-1]:.10g} s, the length of the trial")
+    if duration is None and led["times"] is not None and rate * led["times"][-1] < 1.0:
+        raise BadInput("rate", rate, f"at least one sample interval in the {led['times'][-1]:.10g} s of the trial")
+    angles, speeds = start
+    if isinstance(drive, Trial) and angles is None:
+        first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
+        angles = drive.q[first]
+        if led["kind"] != "robot" and speeds is None and drive.dq is not None:
+            speeds = drive.dq[first]
+    core = {
+        "engine": engine,
+        "integrator": integrator,
+        "dt": dt,
+        "duration": duration,
+        "output_interval": 1.0 / rate,
+        "q": None if angles is None else checks.numbers("start", angles, "rad").reshape(-1).tolist(),
+        "qd": None if speeds is None else checks.numbers("start_speed", speeds, "rad/s").reshape(-1).tolist(),
+    }
+    settings = {
+        "engine": engine,
+        "integrator": None if engine == "rapier" else integrator,
+        "dt_s": dt,
+        "rate_Hz": rate,
+        "coupling": coupling,
+    }
+    return _Asked(model, drive, led, core, settings)
+
+
+def _integrator(given: str | None, engine: str) -> str:
+    """Return the integrator of a run; rapier has its own, and one that is asked for would be ignored."""
+    if given is None:
+        return "rk4"
+    if engine == "rapier":
+        raise BadInput("integrator", given, "none beside the engine rapier, which has its own")
+    return checks.choice("integrator", given, ("rk4", "euler"))
+
+
+def _clock(dt: float, rate: float) -> Text:
+    """Return step and rate together: which of them is meant to change, a refusal cannot know."""
+    return Text(f"a step of {dt:g} s and {rate:g} Hz")
+
+
+def about(drive: Movement | Trial | None, error: BadInput, more: str = "") -> BadInput:
+    """Return a refusal of the core with the file of the drive, where it is about how that leads the arm; `more` is said of its length."""
+    if drive is None:
+        return error
+    if error.place == "duration":
+        place = f"length of the {type(drive).__name__.lower()} [s]"
+        return BadInput(place, error.found, f"{error.allowed}{more}", file=drive.file, hint=error.hint)
+    return error.within(file=drive.file) if error.place.startswith("handle at ") else error
+
+
+def _check_duration(duration: float, dt: float, rate: float) -> None:
+    """Refuse a length of a run that is no whole number of steps, or holds no sample interval."""
+    checks.number("duration", duration, above=0.0, unit="s")
+    if not 1.0 / rate <= duration < _MOST_STEPS * dt:
+        raise BadInput("duration", duration, f"{1.0 / rate:g} s (one interval between samples) to {_MOST_STEPS * dt:g} s")
+    steps = duration / dt
+    if abs(steps - round(steps)) > 1e-9 * steps:
+        raise BadInput("duration", duration, f"a whole number of steps of {dt:g} s", hint=f"nearest: {round(steps) * dt:.10g} s")
+
+
+def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
+    """Return a drive as the core takes it."""
+    led: dict[str, Any] = {
+        "kind": "free",
+        "values": None,
+        "times": None,
+        "shape": "trapezoid",
+        "speed": 0.0,
+        "acceleration": 0.0,
+        "pause": 0.0,
+        "rigid": coupling == "rigid",
+    }
+    if isinstance(drive, Movement):
+        shared = ("shape", "speed", "acceleration", "pause")
+        led |= {"kind": "movement", "values": np.array(drive.waypoints)} | {name: getattr(drive, name) for name in shared}
+    elif drive is not None:
+        kind, values = ("robot", drive.robot_q) if drive.robot_q is not None else ("torque", drive.tau)
+        if values is None:
+            raise BadInput("columns", "neither robot angles nor joint torques", "qr1_rad and qr2_rad, or tau1_Nm …", file=drive.file)
+        there = np.isfinite(values).all(axis=1)
+        upto = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
+        if not there[:upto].all() or not upto:
+            lost = float(drive.t[int(np.argmin(there))])
+            what = "robot angles" if kind == "robot" else "joint torques"
+            raise BadInput(what, Text(f"none at {lost:g} s"), "samples without a gap: they drive the arm", file=drive.file)
+        led |= {"kind": kind, "values": np.array(values[:upto]), "times": np.array(drive.t[:upto] - drive.t[0])}
+    return led
+
+
+def _sensing(sensors: Sensors, seeds: Sequence[int]) -> dict[str, Any]:
+    checks.instance("seeds", seeds, list, tuple, range, np.ndarray)
+    read = [checks.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
+    return {"rate": sensors.rate, "seeds": read} | {kind: getattr(sensors, kind)._entry() for kind in _CHANNELS}
+
+
+def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
+    """Read a movement file: a TOML table `[movement]` with `waypoints_deg` (or `_rad`), speed, acceleration, pause, shape."""
+    checks.path("path", path)
+    checks.whole("n_joints", n_joints, least=1)
+
+    def made(document: dict[str, Any], _: object) -> Movement:
+        checks.keys("", document, required=["movement"])
+        return dataclasses.replace(movement_of(checks.table("movement", document["movement"]), n_joints), file=os.fspath(path))
+
+    return tomlfile.load(path, made)
+
+
+def movement_of(table: dict[str, Any], n_joints: int) -> Movement:
+    """Return the movement that a table describes."""
+    known = [
+        "waypoints_deg", "waypoints_rad", "speed_rad_s", "speed_deg_s", "acceleration_rad_s2", "acceleration_deg_s2", "pause_s", "shape",
+    ]  # fmt: skip
+    checks.keys("movement", table, optional=known)
+    fields: dict[str, Any] = {}
+    for name in known:
+        if name not in table:
+            continue
+        value = table[name]
+        key, _, unit = name.partition("_")
+        if key == "shape":
+            if value not in ("trapezoid", "smooth"):
+                raise BadInput("movement.shape", value, "trapezoid or smooth")
+            fields[key] = value
+            continue
+        numbers = checks.samples(f"movement.{name}", value)
+        if not np.isfinite(numbers).all() or (key != "waypoints" and numbers.ndim):
+            raise BadInput(f"movement.{name}", value, "finite numbers" if key == "waypoints" else "one finite number")
+        if key in fields:
+            raise BadInput(f"movement.{name}", "a second unit", f"{key} once, in degrees or radians")
+        numbers = np.radians(numbers) if unit.startswith("deg") else numbers
+        fields[key] = numbers if key == "waypoints" else float(numbers)
+    if "waypoints" not in fields:
+        raise BadInput("movement", "no waypoints", "waypoints_deg or waypoints_rad")
+    if fields["waypoints"].ndim != 2 or fields["waypoints"].shape[1] != n_joints:
+        raise BadInput("movement.waypoints", f"an array of shape {fields['waypoints'].shape}", f"rows of {n_joints} angles")
+    return Movement(**fields)
