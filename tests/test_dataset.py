@@ -242,7 +242,7 @@ BROKEN_TRIAL: dict[str, tuple[Callable[[Session], None], str, str]] = {
     "clock set during the recording": (cell(101, "t_s", "1e6"), "line 101, time: found 1000000.0 s after 1.96 s, allowed a recording of which", ""),
     "activity beyond reason": (cell(30, "emg_biceps", "1e300"), "line 30, column emg_biceps: found 1e+300, allowed -1e+12 to 1e+12", ""),
     "time in ms": (lines_changed(lambda lines: [lines[0], *(str(20 * k) + x[x.index(",") :] for k, x in enumerate(lines[1:]))]),
-                   "time: found 20 s between samples, allowed at least one sample a second", "(milliseconds?)"),
+                   "time: found 20 s between samples, allowed less than 0.5 s", "(milliseconds?)"),
     "degrees": (cell(30, "q1_rad", "145.0"), "line 30, column q1_rad: found 145.0, allowed -25.1327 to 25.1327 rad", "(looks like degrees)"),
     "robot in degrees": (cell(30, "qr1_rad", "-145.0"), "line 30, column qr1_rad: found -145.0", "(looks like degrees)"),
     "millinewtons": (cell(30, "Fy_N", "25000"), "line 30, column Fy_N: found 25000.0, allowed -10000 to 10000 N", "(looks like millinewtons)"),

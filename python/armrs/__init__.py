@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from .io.motions import convert_markers as convert_markers
     from .io.motions import convert_motion as convert_motion
     from .io.motions import read_markers as read_markers
+    from .io.multibody import ExportedModel as ExportedModel
+    from .io.multibody import export_model as export_model
+    from .io.multibody import import_model as import_model
     from .io.trial import Trial as Trial
     from .model import Contact as Contact
     from .model import Effect as Effect
@@ -52,6 +55,8 @@ if TYPE_CHECKING:
     from .report.pages import write_report as write_report
     from .workflows import demo as demo
     from .workflows import gap as gap
+    from .workflows.checking import Checked as Checked
+    from .workflows.checking import check_dataset as check_dataset
     from .workflows.demo import Demonstration as Demonstration
     from .workflows.demo import run_demo as run_demo
     from .workflows.gap import GapFound as GapFound
@@ -59,6 +64,12 @@ if TYPE_CHECKING:
     from .workflows.identify import Estimate as Estimate
     from .workflows.identify import Identified as Identified
     from .workflows.identify import identify as identify
+    from .workflows.importing import Imported as Imported
+    from .workflows.importing import import_recordings as import_recordings
+    from .workflows.initialise import Expected as Expected
+    from .workflows.initialise import Worn as Worn
+    from .workflows.initialise import initialise as initialise
+    from .workflows.initialise import segment_expectations as segment_expectations
     from .workflows.passive import PassiveCurve as PassiveCurve
     from .workflows.passive import PassiveMoments as PassiveMoments
     from .workflows.passive import passive_moments as passive_moments
@@ -82,6 +93,10 @@ _HOMES = {
     "catalogue": ("Parameter",),
     "io.conversion": ("convert",),
     "io.dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
+    "io.multibody": ("ExportedModel", "export_model", "import_model"),
+    "workflows.checking": ("Checked", "check_dataset"),
+    "workflows.importing": ("Imported", "import_recordings"),
+    "workflows.initialise": ("Expected", "Worn", "initialise", "segment_expectations"),
     "workflows.demo": ("Demonstration", "run_demo"),
     "workflows.gap": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),

@@ -74,6 +74,27 @@ class BadInput(ArmrsError, ValueError):
         return f"{text} ({one_line(self.hint)})" if self.hint else text
 
 
+class BadInputs(BadInput):
+    """Several inputs that cannot be used as they are; the command line prints a line for each.
+
+    Attributes
+    ----------
+    problems : tuple of BadInput
+    """
+
+    problems: tuple[BadInput, ...]
+
+    @classmethod
+    def of(cls, problems: Iterable[BadInput]) -> BadInput:
+        """Return one refusal for all problems, which is the problem itself where there is but one."""
+        listed = tuple(problems)
+        if len(listed) == 1:
+            return listed[0]
+        made = cls(f"{len(listed)} problems", Text("the first: " + str(listed[0])), "none")
+        made.problems = listed
+        return made
+
+
 class IdentificationError(ArmrsError):
     """The data cannot answer what the identification asks."""
 

@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use arm_core::Measured;
-use arm_core::estimator::{Decision, Estimator, Fault, Sample, SampleStatus, Settings};
+use arm_core::estimator::{Decision, Estimator, Fault, Heed, Sample, Settings};
 
 use crate::arm::armrs_arm;
 use crate::compensation::write_carry;
@@ -75,17 +75,17 @@ pub enum armrs_heed {
     ARMRS_UNEXPECTED = 7,
 }
 
-impl From<SampleStatus> for armrs_heed {
-    fn from(heed: SampleStatus) -> Self {
+impl From<Heed> for armrs_heed {
+    fn from(heed: Heed) -> Self {
         match heed {
-            SampleStatus::Taken => Self::ARMRS_TAKEN,
-            SampleStatus::Resting => Self::ARMRS_RESTING,
-            SampleStatus::Settling => Self::ARMRS_SETTLING,
-            SampleStatus::Refused(Fault::Missing) => Self::ARMRS_MISSING,
-            SampleStatus::Refused(Fault::NotFinite) => Self::ARMRS_BAD_VALUE,
-            SampleStatus::Refused(Fault::Spike) => Self::ARMRS_SPIKE,
-            SampleStatus::Refused(Fault::Frozen) => Self::ARMRS_FROZEN,
-            SampleStatus::Refused(Fault::Unexpected) => Self::ARMRS_UNEXPECTED,
+            Heed::Taken => Self::ARMRS_TAKEN,
+            Heed::Resting => Self::ARMRS_RESTING,
+            Heed::Settling => Self::ARMRS_SETTLING,
+            Heed::Refused(Fault::Missing) => Self::ARMRS_MISSING,
+            Heed::Refused(Fault::NotFinite) => Self::ARMRS_BAD_VALUE,
+            Heed::Refused(Fault::Spike) => Self::ARMRS_SPIKE,
+            Heed::Refused(Fault::Frozen) => Self::ARMRS_FROZEN,
+            Heed::Refused(Fault::Unexpected) => Self::ARMRS_UNEXPECTED,
         }
     }
 }

@@ -16,17 +16,21 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import ArmrsError, BadInput, one_line
+from ..errors import ArmrsError, BadInput, BadInputs, one_line
 from . import fmu
 from .analysis import gap, identify, passive
 from .built_in import demo, reproduce
 from .data import convert, effects, report
 from .experiments import plan, record, simulate, sweep
+from .own_data import check, import_, init
 
 _VERBS: dict[Callable[..., Any], str] = {
     effects: "Print the catalogue of effects.",
     convert: "Convert between file formats; markers to angles.",
     demo: "Do the main job on built-in data.",
+    init: "Write a first data set and model of a person.",
+    import_: "Turn own recordings into a data set.",
+    check: "Find every problem of a data set.",
     identify: "Identify segments and joints, with intervals.",
     gap: "Find and name what a model misses.",
     simulate: "Simulate a robot that leads the arm.",
@@ -67,7 +71,7 @@ def _root(
 
 
 for _verb, _line in _VERBS.items():
-    app.command(short_help=_line)(_verb)
+    app.command(_verb.__name__.rstrip("_"), short_help=_line)(_verb)
 app.add_typer(fmu.app, short_help="Export the arm for other tools; look at a unit, check it.")
 
 
@@ -82,6 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except typer.Exit as end:
         return end.exit_code
+    except BadInputs as errors:
+        return [_refuse(str(_of_option(error))) for error in errors.problems][-1]
     except BadInput as error:
         return _refuse(str(_of_option(error)))
     except ArmrsError as error:

@@ -17,12 +17,20 @@ from .common import JsonFile, OutFolder, listed, present, writable
 
 
 class TableFormat(str, enum.Enum):
-    """Formats of tables over time."""
+    """Formats of tables over time, and of models."""
 
     csv = "csv"
     parquet = "parquet"
     mot = "mot"
     sto = "sto"
+    urdf = "urdf"
+    mjcf = "mjcf"
+    osim = "osim"
+    toml = "toml"
+
+
+_MODEL_SUFFIX = {"urdf": ".urdf", "mjcf": ".xml", "osim": ".osim", "toml": ".toml"}
+"""Formats of models, with the suffix of their files."""
 
 
 def effects(
@@ -58,7 +66,11 @@ def effects(
 
 def convert(
     source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="Data set folder, dataset.toml, or one .csv, .parquet, .mot, .sto, .c3d or .trc file.")
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="Data set folder, dataset.toml, one .csv, .parquet, .mot, .sto, .c3d or .trc file, or a model (.toml, .urdf, .xml).",
+        ),
     ],
     out: OutFolder,
     to: Annotated[TableFormat, typer.Option("--to", help="Format to write.")] = TableFormat.parquet,
@@ -82,6 +94,9 @@ def convert(
     from ..io.samples import SUFFIXES
     from ..report import words
 
+    if to.value in _MODEL_SUFFIX:
+        _convert_model(source, out, to.value, json)
+        return
     suffix = _suffix_of(source, (*SUFFIXES, *MOTION_SUFFIXES, *MARKER_SUFFIXES))
     chosen, named = listed(points), listed(coordinates)
     writable(out, json)
@@ -102,6 +117,23 @@ def convert(
     else:
         written = run_conversion(source, out, to=to.value)
     present(lambda: {"files": written}, json, lambda: print("\n".join(os.fspath(path) for path in written)))
+
+
+def _convert_model(source: Path, out: Path, to: str, json: Path | None) -> None:
+    """Write a model in another format: from `model.toml` to URDF, MJCF or OSIM, or from URDF or MJCF to `model.toml`."""
+    from ..io.multibody import export_model, import_model
+
+    writable(out, json)
+    target = out / f"{source.stem}{_MODEL_SUFFIX[to]}"
+    lost: tuple[str, ...] = ()
+    if to == "toml":
+        model = import_model(source)
+        files.not_an_input([target], [source])
+        model.write(target)
+    else:
+        lost = export_model(source, target).lost
+    console.warn(f"{to} cannot hold {line}" for line in lost)
+    present(lambda: {"files": [target], "lost": list(lost)}, json, lambda: print(target))
 
 
 def _suffix_of(source: Path, readable: tuple[str, ...]) -> str:

@@ -6,8 +6,7 @@ import os
 from typing import Any
 
 from ..report import console
-from .archive import archive
-from .description import read_description
+from .description import archive, read_description
 
 
 def about(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -6,7 +6,6 @@ A plane is fitted to the directions of all segments over the whole movement; the
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..errors import ArmrsError, BadInput, Text, unknown_name
+from ..errors import BadInput, Text, unknown_name
+from . import c3d
 
 METRES = {"mm": 1e-3, "m": 1.0, "cm": 1e-2}
 MARKER_SUFFIXES = (".c3d", ".trc")
@@ -24,7 +24,6 @@ PLANAR = math.radians(5.0)
 _LEAST_SPREAD = 1e-3
 """Segments that turn less than this, relative to their length, do not span a plane."""
 _AXES = {"x": 0, "y": 1, "z": 2}
-_BLOCK = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,29 +166,14 @@ def read_c3d(path: Path) -> Markers:
     ArmrsError
         When ezc3d is not installed.
     """
-    try:
-        import ezc3d
-    except ImportError:
-        raise ArmrsError('C3D files need ezc3d: pip install "armrs[files]"') from None
-    _check_c3d(path)
-    try:
-        content = ezc3d.c3d(str(path))
-        group = content["parameters"]["POINT"]
-        names = [str(name).strip() for name in group["LABELS"]["value"]]
-        unit = str(group["UNITS"]["value"][0]).strip() if group["UNITS"]["value"] else ""
-        rate = float(group["RATE"]["value"][0])
-        points = np.asarray(content["data"]["points"], dtype=float)
-    except (OSError, RuntimeError, ValueError, KeyError, IndexError, MemoryError, UnicodeDecodeError) as error:
-        raise BadInput("file", Text(str(error) or "unreadable parameters"), "a whole C3D file") from None
-    if unit not in METRES:
-        raise BadInput("POINT:UNITS", unit or Text("nothing"), " or ".join(METRES))
-    if not (np.isfinite(rate) and rate > 0.0):
-        raise BadInput("POINT:RATE", rate, "a rate above 0 Hz")
-    if points.ndim != 3 or points.shape[1] == 0 or points.shape[2] == 0 or len(names) < points.shape[1]:
-        raise BadInput("file", Text(f"{len(names)} labels and data of shape {points.shape}"), "points with labels and samples")
-    positions = METRES[unit] * np.transpose(points[:3], (2, 1, 0))
-    positions[~np.isfinite(positions).all(axis=2)] = np.nan
-    return Markers(names[: points.shape[1]], np.arange(len(positions)) / rate, positions, up="z")
+    content = c3d.read(path)
+    if content.unit not in METRES:
+        raise BadInput("POINT:UNITS", content.unit or Text("nothing"), " or ".join(METRES))
+    if not content.points.size:
+        raise BadInput(
+            "file", Text(f"{len(content.labels)} labels and data of shape {content.points.shape}"), "points with labels and samples"
+        )
+    return Markers(content.labels, np.arange(len(content.points)) / content.rate, METRES[content.unit] * content.points, up="z")
 
 
 def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = None, forward: str | None = None) -> PlanarMotion:
@@ -285,28 +269,3 @@ def _unwrapped(angle: np.ndarray) -> np.ndarray:
     wrapped = np.arctan2(np.sin(angle[there]), np.cos(angle[there]))
     result[there] = np.unwrap(wrapped)
     return result
-
-
-def _check_c3d(path: Path) -> None:
-    """Refuse a file that is no C3D, or shorter than its header says, before a reader trusts its counts."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(_BLOCK)
-            size = stream.seek(0, 2)
-            if len(head) < _BLOCK or head[1] != 0x50 or head[0] == 0:
-                raise BadInput("file", Text("no C3D mark at its start"), "a C3D file")
-            stream.seek(_BLOCK * (head[0] - 1) + 3)
-            processor = stream.read(1)
-    except OSError as error:
-        raise BadInput("file", Text(error.strerror or "unreadable"), "a file that can be read") from None
-    if processor not in (b"\x54", b"\x55", b"\x56"):
-        raise BadInput("file", Text("no parameters where the header says"), "a whole C3D file")
-    if processor != b"\x54":  # other byte orders are left to the reader
-        return
-    points, analog, first, last, _, scale, start = struct.unpack_from("<5HfH", head, 2)
-    frames = last - first + 1
-    needed = _BLOCK * (start - 1) + frames * (points * 4 + analog) * (4 if scale < 0 else 2)
-    if points == 0 or frames <= 0:
-        raise BadInput("header", Text(f"{points} points, {max(frames, 0)} frames"), "points with samples")
-    if last != 0xFFFF and size < needed:
-        raise BadInput("file", Text(f"{size} bytes"), f"{needed} bytes, as its header says", hint="the file is cut off")

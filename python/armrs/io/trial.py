@@ -19,6 +19,8 @@ BRIDGED = 0.05
 """A larger share of bridged samples is said."""
 SAME_RATE = 0.01
 """Time stamps that depart from the stated rate by more than this are said."""
+SLOWEST = 0.5
+"""Samples that are as far apart [s] show no movement of an arm; a recording in milliseconds at 1 kHz has 1."""
 _TURN = 2.0 * np.pi
 
 
@@ -271,8 +273,8 @@ def _check_time(t: np.ndarray, samples: Samples) -> None:
         found = Text(f"{float(t[row + 1])!r} s {word} {float(t[row])!r} s" if word == "after" else f"{float(t[row])!r} s twice")
         raise BadInput(f"{samples.place_of(row + 1)}, time", found, "time stamps that increase strictly")
     step = resample.usual_step(t)
-    if step > 1.0:
-        raise BadInput("time", Text(f"{step:g} s between samples"), "at least one sample a second", hint=columns.TIME.hint)
+    if step >= SLOWEST:
+        raise BadInput("time", Text(f"{step:g} s between samples"), f"less than {SLOWEST:g} s", hint=columns.TIME.hint)
     if t[-1] - t[0] > 10.0 * step * len(t):
         row = int(np.argmax(np.diff(t)))
         found = Text(f"{float(t[row + 1])!r} s after {float(t[row])!r} s")

@@ -24,7 +24,7 @@ use window::Window;
 
 use core::array::from_fn;
 
-use crate::compensation::GravityCompensation;
+use crate::compensation::Carry;
 use crate::effect::Motion;
 use crate::equation::{Equation, Measured, Prior};
 use crate::scalar::Real;
@@ -66,7 +66,7 @@ pub struct Sample<T, const N: usize> {
 
 /// What became of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SampleStatus {
+pub enum Heed {
     /// It counts.
     Taken,
     /// No joint moves: it says nothing.
@@ -237,10 +237,10 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     ///
     /// With their standard deviation from the covariance of all unknowns. Give a motion without speed for the weight and
     /// the passive moments alone.
-    pub fn carry(&self, motion: &Motion<T, N>) -> GravityCompensation<T, N> {
+    pub fn carry(&self, motion: &Motion<T, N>) -> Carry<T, N> {
         let rows = self.equation.carrying(motion, &self.memory);
         let excess = self.excess();
-        GravityCompensation {
+        Carry {
             torque: rows.torque(&self.values()),
             sd: joints(from_fn(|j| {
                 excess * self.information.deviation(&rows.columns[j])
@@ -252,7 +252,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     ///
     /// Filters the sample; then either builds a row from it or does one piece of the work that the last window left, so that
     /// no period takes much longer than another. A long cutoff period needs few rows: see [`Settings::cutoff`].
-    pub fn update(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
+    pub fn update(&mut self, sample: Option<&Sample<T, N>>) -> Heed {
         let sensed = self.sense(sample);
         self.since_row = self.since_row.saturating_add(1);
         let due = self.since_row >= self.tuning.stride && sensed.is_ok();
@@ -266,7 +266,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             Ok((motion, measured)) => return self.learn(&motion, &measured, due),
             Err(heed) => heed,
         };
-        if fault == SampleStatus::Refused(Fault::Frozen) {
+        if fault == Heed::Refused(Fault::Frozen) {
             // What was read since it froze is not to be trusted either.
             self.window = Window::EMPTY;
             if let Work::Wait(_) = self.work {
@@ -281,7 +281,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     fn sense(
         &mut self,
         sample: Option<&Sample<T, N>>,
-    ) -> Result<(Motion<T, N>, Measured<T, N>), SampleStatus> {
+    ) -> Result<(Motion<T, N>, Measured<T, N>), Heed> {
         // A lead that comes or goes is another sensor.
         if !self.running || sample.is_some_and(|s| s.lead.is_some() != self.led) {
             return Err(self.start(sample));
@@ -332,19 +332,19 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.equation
             .advance(&motion, &mut self.memory, self.tuning.period);
         if let Some(fault) = fault {
-            return Err(SampleStatus::Refused(fault));
+            return Err(Heed::Refused(fault));
         }
         if self.settling > 0 {
             self.settling -= 1;
-            return Err(SampleStatus::Settling);
+            return Err(Heed::Settling);
         }
         Ok((motion, measured))
     }
 
     /// Restarts all filters at a sample.
-    fn start(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
+    fn start(&mut self, sample: Option<&Sample<T, N>>) -> Heed {
         let Some(sample) = sample else {
-            return SampleStatus::Refused(Fault::Missing);
+            return Heed::Refused(Fault::Missing);
         };
         let mut good = true;
         for (kind, channels) in self.joints.iter_mut().enumerate() {
@@ -356,41 +356,36 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             good &= channel.restart(of_hand(sample, c));
         }
         if !good {
-            return SampleStatus::Refused(Fault::NotFinite);
+            return Heed::Refused(Fault::NotFinite);
         }
         self.running = true;
         self.led = sample.lead.is_some();
         self.moving = false;
         self.settling = self.tuning.settling;
         self.window = Window::EMPTY;
-        SampleStatus::Settling
+        Heed::Settling
     }
 
     /// Adds a sample to the window, where one is due.
     ///
     /// At rest it is added as well, for to leave out slow samples would favour one side of every reversal; what counts is
     /// whether the arm moved at any time in the window.
-    fn learn(
-        &mut self,
-        motion: &Motion<T, N>,
-        measured: &Measured<T, N>,
-        due: bool,
-    ) -> SampleStatus {
+    fn learn(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>, due: bool) -> Heed {
         let heed = if due {
             self.since_row = 0;
             self.weigh(motion, measured)
         } else {
-            SampleStatus::Taken
+            Heed::Taken
         };
         self.window.moved |= self.moving;
         self.age();
         match heed {
-            SampleStatus::Taken if !self.moving => SampleStatus::Resting,
+            Heed::Taken if !self.moving => Heed::Resting,
             other => other,
         }
     }
 
-    fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> SampleStatus {
+    fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> Heed {
         let (rows, acting) = self.equation.needed(motion, &self.memory, measured);
         let expected = rows.torque(&self.values());
         let rest: [T; N] = from_fn(|j| (acting[j] - expected[j]).abs());
@@ -403,13 +398,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             usual[j] += (rest[j].min(most) - usual[j]) * T::of(1.0 / USUAL);
         }
         if !expected {
-            return SampleStatus::Refused(Fault::Unexpected);
+            return Heed::Refused(Fault::Unexpected);
         }
         for j in 0..N {
             self.window
                 .add(j, &rows.columns[j], acting[j] - rows.known[j]);
         }
-        SampleStatus::Taken
+        Heed::Taken
     }
 
     /// One period more in the window; a full one is handed on.

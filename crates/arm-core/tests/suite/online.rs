@@ -3,7 +3,7 @@
 use core::array::from_fn;
 
 use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
-use arm_core::estimator::{Decision, Estimator, Fault, Sample, SampleStatus, Settings};
+use arm_core::estimator::{Decision, Estimator, Fault, Heed, Sample, Settings};
 use arm_core::{
     Compensation, Equation, Invalid, Joints, Measured, Pose, Prior, gravity, inverse_dynamics,
     models, static_torque,
@@ -256,36 +256,33 @@ fn bad_samples_are_named() {
     let mut online = started(&strict);
     let equation = *online.equation();
     let at = |k: i32| sample(&equation, f64::from(k) * 1e-3);
-    assert_eq!(online.update(None), SampleStatus::Refused(Fault::Missing));
-    assert_eq!(online.update(Some(&at(0))), SampleStatus::Settling);
+    assert_eq!(online.update(None), Heed::Refused(Fault::Missing));
+    assert_eq!(online.update(Some(&at(0))), Heed::Settling);
     for k in 1..2000 {
         online.update(Some(&at(k)));
     }
-    assert_eq!(online.update(Some(&at(2000))), SampleStatus::Taken);
-    assert_eq!(online.update(None), SampleStatus::Refused(Fault::Missing));
+    assert_eq!(online.update(Some(&at(2000))), Heed::Taken);
+    assert_eq!(online.update(None), Heed::Refused(Fault::Missing));
     let mut s = at(2002);
     s.measured.force_on_arm[1] = f64::NAN;
-    assert_eq!(
-        online.update(Some(&s)),
-        SampleStatus::Refused(Fault::NotFinite)
-    );
+    assert_eq!(online.update(Some(&s)), Heed::Refused(Fault::NotFinite));
     s = at(2003);
     s.q[1] += 1.0;
-    assert_eq!(online.update(Some(&s)), SampleStatus::Refused(Fault::Spike));
-    assert_eq!(online.update(Some(&at(2004))), SampleStatus::Taken);
+    assert_eq!(online.update(Some(&s)), Heed::Refused(Fault::Spike));
+    assert_eq!(online.update(Some(&at(2004))), Heed::Taken);
     let held = at(2005);
-    let mut last = SampleStatus::Taken;
+    let mut last = Heed::Taken;
     for k in 2005..2020 {
         s = at(k);
         s.measured.torque[2] = held.measured.torque[2];
         last = online.update(Some(&s));
     }
-    assert_eq!(last, SampleStatus::Refused(Fault::Frozen));
+    assert_eq!(last, Heed::Refused(Fault::Frozen));
     // After a long gap the filters settle anew.
     for _ in 0..100 {
         online.update(None);
     }
-    assert_eq!(online.update(Some(&at(2120))), SampleStatus::Settling);
+    assert_eq!(online.update(Some(&at(2120))), Heed::Settling);
 }
 
 #[test]

@@ -1,0 +1,202 @@
+"""Verbs for own data: a first data set of a person, recordings into a data set, every problem of a data set."""
+
+from __future__ import annotations
+
+import enum
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import BadInput, BadInputs, Text
+from ..report import console
+from .common import JsonFile, OutFolder, Source, listed, present, writable
+
+if TYPE_CHECKING:
+    from ..workflows.initialise import Worn
+
+
+class Sex(str, enum.Enum):
+    """As the tables of the literature distinguish it."""
+
+    male = "male"
+    female = "female"
+
+
+class Reference(str, enum.Enum):
+    """What raw angles are counted against."""
+
+    relative = "relative"
+    absolute = "absolute"
+
+
+class Zero(str, enum.Enum):
+    """Where the first segment points at angle zero."""
+
+    horizontal = "horizontal"
+    hanging = "hanging"
+
+
+class Side(str, enum.Enum):
+    """What raw forces act on."""
+
+    robot = "robot"
+    arm = "arm"
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the data set; made when it does not exist.")],
+    body_mass: Annotated[float, typer.Option("--body-mass-kg", help="Body mass [kg].")],
+    height: Annotated[float, typer.Option("--height-m", help="Height [m].")],
+    sex: Annotated[Sex, typer.Option(help="As the tables of the literature distinguish it.")],
+    lengths: Annotated[
+        str,
+        typer.Option(
+            "--lengths-m", metavar="L,L[,L]", help="Measured lengths of upper arm, forearm and hand [m]; ? is scaled with height."
+        ),
+    ] = "?,?,?",
+    handle: Annotated[float, typer.Option("--handle-kg", help="Mass of the handle in the hand [kg].")] = 0.0,
+    orthosis: Annotated[
+        str, typer.Option(metavar="SEGMENT:KG[@M],…", help="Masses worn on segments: number, mass [kg], place from the joint [m].")
+    ] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+    json: JsonFile = None,
+) -> None:
+    """Write a commented data set and model of a person from body mass, height, sex and lengths.
+
+    Masses, centres of mass and inertias come from the literature (de Leva 1996). Joint laws are left unknown: identify and gap find them.
+    """
+    from ..workflows.initialise import Worn, initialise
+
+    worn = [_worn(part) for part in listed(orthosis)]
+    measured = [_length(part) for part in listed(lengths)]
+    if handle:
+        worn.append(Worn(len(measured), handle))
+    writable(folder, json)
+    done = initialise(folder, body_mass=body_mass, height=height, sex=sex.value, lengths=measured, worn=worn, replace=force)
+
+    def human() -> None:
+        print(f"Wrote {done.folder / 'model.toml'} and {done.folder / 'dataset.toml'}. Assumed:")
+        for line in done.assumed:
+            print(f"  {line}")
+        print(f"Next: armrs import RAW… --model {done.folder / 'model.toml'} -o SESSION")
+
+    present(done.to_dict, json, human)
+
+
+def _length(text: str) -> float | None:
+    if text == "?":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise BadInput("--lengths-m", text, "a length in metres, or ? for one that is scaled with height") from None
+
+
+def _worn(text: str) -> Worn:
+    from ..workflows.initialise import Worn
+
+    segment, _, rest = text.partition(":")
+    mass, at, place = rest.partition("@")
+    try:
+        return Worn(int(segment), float(mass), float(place) if at else None)
+    except ValueError:
+        raise BadInput("--orthosis", text, "SEGMENT:KG or SEGMENT:KG@M, such as 2:0.35@0.12") from None
+
+
+def import_(
+    sources: Annotated[list[Path], typer.Argument(metavar="RAW…", help="Recordings, folders of them, or one import.toml.")],
+    model: Annotated[Path, typer.Option(metavar="MODEL", help="model.toml of the arm, as armrs init writes it.")],
+    out: OutFolder,
+    columns: Annotated[
+        str, typer.Option("--map", metavar="t=NAME,q1=NAME,Fy=-NAME,…", help="Columns whose names do not say it; a minus turns the sign.")
+    ] = "",
+    angles: Annotated[Reference | None, typer.Option(help="Angles against the segment before, or a fixed direction.")] = None,
+    zero: Annotated[Zero | None, typer.Option(help="Where the first segment points at zero.")] = None,
+    clockwise: Annotated[str | None, typer.Option(metavar="1,2,…|none", help="Joints whose angle is clockwise positive.")] = None,
+    force_on: Annotated[Side | None, typer.Option("--force-on", help="What the recorded force acts on.")] = None,
+    points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints in C3D and TRC, first joint to handle.")] = "",
+    json: JsonFile = None,
+) -> None:
+    """Turn own recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO) into a data set.
+
+    Separators, decimal commas, encodings, units and columns are recognised. How angles are counted and what the force acts on are read off
+    the static balance of the arm, unless you say them. Every decision is printed and kept in import.toml, which repeats the import.
+    """
+    from ..workflows.importing import import_recordings
+
+    writable(out, json)
+    joints = None if clockwise is None else [_joint(part) for part in listed(clockwise) if part != "none"]
+    files = [path for source in sources for path in _files(source)]
+    options = {
+        "angles": angles and angles.value, "zero": zero and zero.value, "clockwise": joints,
+        "force_on": force_on and force_on.value, "points": listed(points),
+    }  # fmt: skip
+    try:
+        done = import_recordings(files, out, model=model, columns_map=columns, **options)  # type: ignore[arg-type]
+    except BadInput as error:
+        answers = _asked(error) if sys.stdin.isatty() and sys.stderr.isatty() else ""
+        if not answers:
+            raise
+        done = import_recordings(files, out, model=model, columns_map=",".join(filter(None, [columns, answers])), **options)  # type: ignore[arg-type]
+
+    def human() -> None:
+        for note in done.notes:
+            print(f"  {note}")
+        count = len(done.recipe.trials)
+        print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}. Next: armrs check {done.folder}")
+
+    present(done.to_dict, json, human)
+
+
+def _joint(text: str) -> int:
+    if not text.isdigit():
+        raise BadInput("--clockwise", text, "numbers of joints, or none")
+    return int(text)
+
+
+def _files(source: Path) -> list[Path]:
+    """Return a file, or the recordings in a folder, in the order of their names."""
+    from ..io.raw import SUFFIXES
+
+    if not source.is_dir():
+        return [source]
+    found = sorted(path for path in source.iterdir() if path.suffix.lower() in (*SUFFIXES, ".trc") and path.is_file())
+    if not found:
+        raise BadInput("RAW", Text("a folder without recordings"), f"files of {', '.join((*SUFFIXES, '.trc'))}", file=source)
+    return found
+
+
+def _asked(error: BadInput) -> str:
+    """Ask for the columns that were not found; returns them as `--map` has them, or nothing."""
+    problems = error.problems if isinstance(error, BadInputs) else (error,)
+    answers = []
+    for problem in problems:
+        found = str(problem.found)
+        if not found.startswith("no column for "):
+            return ""
+        symbol = found.removeprefix("no column for ")
+        print(f"{problem}", file=sys.stderr)
+        answers.append(f"{symbol}={typer.prompt(f'Which column is {symbol}', err=True)}")
+    return ",".join(answers)
+
+
+def check(dataset: Source, json: JsonFile = None) -> int:
+    """Find every problem of a data set at once, and say what each verb will be able to tell.
+
+    Ends with 1 when something must be mended before a verb can use the data.
+    """
+    from ..workflows.checking import check_dataset
+
+    done = check_dataset(dataset)
+
+    def human() -> None:
+        for problem in done.problems:
+            print(f"{problem.level}: {problem}")
+        if done.problems:
+            print()
+        console.table(("verb", "can", "why"), [(v.verb, "yes" if v.able else "no", v.why) for v in done.verbs], left=3)
+
+    present(done.to_dict, json, human)
+    return 1 if done.errors else 0

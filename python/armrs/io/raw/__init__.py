@@ -1,0 +1,50 @@
+"""Recordings as laboratories have them: any table, workbook or motion file becomes named columns with units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ...errors import BadInput, Text
+from . import matlab, motion, text, workbook
+from .table import RawColumn as RawColumn
+from .table import RawTable as RawTable
+
+_READERS: dict[tuple[str, ...], Callable[[Path], RawTable | list[RawTable]]] = {
+    text.SUFFIXES: text.read_text_table,
+    workbook.SUFFIXES: workbook.read_workbook,
+    matlab.SUFFIXES: matlab.read_matlab,
+    motion.PARQUET_SUFFIXES: motion.read_parquet,
+    motion.MOTION_SUFFIXES: motion.read_motion_table,
+    motion.C3D_SUFFIXES: motion.read_c3d_tables,
+}
+"""By suffix. A new format is one module and one line here."""
+
+SUFFIXES = tuple(suffix for suffixes in _READERS for suffix in suffixes)
+
+
+def read_raw(path: Path) -> list[RawTable]:
+    """Read every table of a recording.
+
+    Parameters
+    ----------
+    path : Path
+        By its suffix: text (`.csv`, `.txt`, `.tsv`, `.dat`, `.asc`), Excel, MATLAB, Parquet, OpenSim motion (`.mot`, `.sto`) or C3D.
+
+    Raises
+    ------
+    BadInput
+        Names the file, and what was expected in it.
+    """
+    for suffixes, read in _READERS.items():
+        if path.suffix.lower() in suffixes:
+            if not path.is_file():
+                raise BadInput("file", Text("no such file" if not path.exists() else "no regular file"), "a file that exists", file=path)
+            try:
+                found = read(path)
+            except BadInput as error:
+                raise error.within(file=error.file or path) from None
+            except (OSError, ValueError) as error:
+                raise BadInput("file", Text(str(error).splitlines()[0]), "a file that can be read", file=path) from None
+            return found if isinstance(found, list) else [found]
+    raise BadInput("file", Text(f"suffix {path.suffix!r}"), f"one of {', '.join(SUFFIXES)}", file=path)

@@ -1,0 +1,72 @@
+"""Tables that already have names and time: Parquet, OpenSim motion files, and the analog channels of C3D files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from .. import c3d
+from ..opensim import read_motion
+from .table import RawTable, column
+
+PARQUET_SUFFIXES = (".parquet",)
+MOTION_SUFFIXES = (".mot", ".sto")
+C3D_SUFFIXES = (".c3d",)
+_NO_ANGLE = re.compile(r"force|moment|torque|emg|_[vp][xyz]$|_t[xyz]$|_f[xyz]$", flags=re.IGNORECASE)
+"""Names of columns that the header's unit of angles does not concern."""
+
+
+def read_parquet(path: Path) -> RawTable:
+    """Read the numeric columns of a Parquet file."""
+    import pyarrow as pa
+
+    from ..samples import parquet_table
+
+    table = parquet_table(path)
+    columns, dropped = [], []
+    for name in table.column_names:
+        kind = table.schema.field(name).type
+        if pa.types.is_floating(kind) or pa.types.is_integer(kind):
+            values = table.column(name).cast(pa.float64()).to_numpy()
+            columns.append(column(name, np.ascontiguousarray(values, dtype=np.float64)))
+        else:
+            dropped.append(name)
+    notes = (f"left out, since they hold no numbers: {', '.join(dropped)}",) if dropped else ()
+    return RawTable(path, path.stem, tuple(columns), notes)
+
+
+def read_motion_table(path: Path) -> RawTable:
+    """Read an OpenSim MOT or STO file; its header says whether angles are in degrees."""
+    motion = read_motion(path)
+    unit = {True: "deg", False: "rad", None: ""}[motion.in_degrees]
+    notes = (f"angles in {unit}, as the header says",) if unit else ()
+    columns = [column("time", motion.t, "s")]
+    columns += [column(name, motion.values[:, k], "" if _NO_ANGLE.search(name) else unit) for k, name in enumerate(motion.names)]
+    return RawTable(path, path.stem, tuple(columns), notes)
+
+
+def read_c3d_tables(path: Path) -> RawTable:
+    """Read points and analog channels of a C3D file on the clock of the analog channels, or of the points where there are none.
+
+    A point `WRIST` becomes the columns `WRIST.x`, `WRIST.y`, `WRIST.z`. Points have fewer samples: their cells between frames are empty.
+    """
+    content = c3d.read(path)
+    frames = len(content.points)
+    ratio = max(1, round(content.analog_rate / content.rate)) if len(content.analog) else 1
+    n = len(content.analog) or frames
+    rate = content.analog_rate if len(content.analog) else content.rate
+    columns = [column("time", np.arange(n) / rate, "s")]
+    for k, label in enumerate(content.labels):
+        for axis, name in enumerate("xyz"):
+            values = np.full(n, np.nan)
+            values[: ratio * frames : ratio] = content.points[: -(-n // ratio), k, axis]
+            columns.append(column(f"{label}.{name}", values, content.unit))
+    for k, label in enumerate(content.analog_labels[: content.analog.shape[1] if content.analog.size else 0]):
+        stated = content.analog_units[k] if k < len(content.analog_units) else ""
+        columns.append(column(label, np.ascontiguousarray(content.analog[:, k]), stated))
+    notes = (
+        f"{len(content.labels)} points at {content.rate:g} Hz, {len(content.analog_labels)} analog channels at {content.analog_rate:g} Hz",
+    )
+    return RawTable(path, path.stem, tuple(columns), notes)

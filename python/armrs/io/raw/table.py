@@ -1,0 +1,76 @@
+"""One raw table: columns as the file names them, nothing interpreted but numbers and units."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+_IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>]\s*$")
+_AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
+_AFTER_LAST = re.compile(r"^(?P<name>.*[^_\s/])[_\s/](?P<unit>[^_\s]+)$")
+
+
+@dataclass(frozen=True, eq=False)
+class RawColumn:
+    """One column.
+
+    Attributes
+    ----------
+    name : str
+        As in the file, with its unit.
+    label : str
+        The name without its unit.
+    unit : str
+        As in the file; empty where none is stated.
+    values : ndarray, shape (n_rows,)
+        float64; NaN where the cell is empty.
+    """
+
+    name: str
+    label: str
+    unit: str
+    values: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class RawTable:
+    """The numeric columns of one recording.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    title : str
+        The file's name without its suffix; the sheet is appended where a workbook has several.
+    columns : tuple of RawColumn
+    notes : tuple of str
+        What the reader decided: encoding, separator, decimal mark, columns left out.
+    """
+
+    path: Path
+    title: str
+    columns: tuple[RawColumn, ...]
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def n_rows(self) -> int:
+        """Number of samples."""
+        return len(self.columns[0].values) if self.columns else 0
+
+
+def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
+    """Return a column; without `unit`, the unit is split off its name where one is recognised."""
+    from .units import UNITS
+
+    text = " ".join(name.split())
+    if unit:
+        return RawColumn(name, text, unit, values)
+    if match := _IN_BRACKETS.match(text):
+        return RawColumn(name, match["name"], match["unit"].strip(), values)
+    for pattern in (_AFTER_IN, _AFTER_LAST):
+        if (match := pattern.match(text)) and match["unit"].lower() in UNITS:
+            return RawColumn(name, match["name"], match["unit"], values)
+    return RawColumn(name, text, "", values)

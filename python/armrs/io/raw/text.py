@@ -1,0 +1,178 @@
+"""Text tables of any program: encodings, separators, decimal commas, comment lines, rows of units, columns of remarks."""
+
+from __future__ import annotations
+
+import codecs
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import BadInput, Text
+from .table import RawColumn, RawTable, column
+from .units import unit
+
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+_COMMENT = ("#", "%", "//", '"#')
+_SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", " ": "blanks"}
+_PROBED = 400
+"""Lines in which header, separator and decimal mark are looked for."""
+_FEWEST = 3
+"""Rows of numbers that make a table."""
+_MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "#NV", "-", "--", "null", "None", "inf", "-inf"]
+_NUMBER = {".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"), ",": re.compile(r"[-+]?(\d+,?\d*|,\d+)([eE][-+]?\d+)?")}
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """How a text is divided into cells, and where its numbers begin."""
+
+    separator: str
+    decimal: str
+    first: int
+    """Index of the first line of numbers."""
+    cells: int
+    score: float
+
+
+def read_text_table(path: Path) -> RawTable:
+    """Read a text table.
+
+    Raises
+    ------
+    BadInput
+        When no block of numbers is found. Without the file's name in it; the caller adds it.
+    """
+    content, encoding = _decoded(path.read_bytes())
+    # Form feeds and other separators of str.splitlines may stand in a remark.
+    lines = [line for line in re.split(r"\r\n|\r|\n", content) if line.strip()]
+    lines = [line for index, line in enumerate(lines) if not (index and _is_comment(line))]
+    layout = _layout(lines[:_PROBED])
+    if layout is None:
+        raise BadInput("file", Text("no block of rows with at least two numbers each"), "a table with one row a sample")
+    names, units = _header(lines, layout)
+    columns, dropped = _columns(lines[layout.first :], names, units, layout)
+    notes = [f"text in {encoding}, cells between {_SEPARATORS[layout.separator]}, decimal {'comma' if layout.decimal == ',' else 'point'}"]
+    if dropped:
+        notes.append(f"left out, since they hold no numbers: {', '.join(dropped)}")
+    return RawTable(path, path.stem, tuple(columns), tuple(notes))
+
+
+def _decoded(raw: bytes) -> tuple[str, str]:
+    for mark, name, encoding in (
+        (codecs.BOM_UTF8, "UTF-8", "utf-8-sig"), (codecs.BOM_UTF16_LE, "UTF-16", "utf-16"), (codecs.BOM_UTF16_BE, "UTF-16", "utf-16"),
+    ):  # fmt: skip
+        if raw.startswith(mark):
+            try:
+                return raw.decode(encoding), name
+            except UnicodeDecodeError:
+                raise BadInput("file", Text(f"a mark of {name}, and bytes that are not"), "text in one encoding") from None
+    try:
+        content, name = raw.decode("utf-8"), "UTF-8"
+    except UnicodeDecodeError:
+        content, name = raw.decode("cp1252", errors="replace"), "Windows-1252"
+    if "\0" in content:
+        raise BadInput("file", Text("binary data"), "a text table")
+    return content, name
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith(_COMMENT)
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Return the cells of a line without blanks and quotes around them."""
+    if separator == " ":
+        return line.split()
+    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    return bool(_NUMBER[decimal].fullmatch(cell))
+
+
+def _layout(lines: list[str]) -> _Layout | None:
+    """Return the division into cells that makes the longest and widest block of numbers."""
+    found = []
+    for separator in _SEPARATORS:
+        for decimal in ",.":
+            if separator == decimal:
+                continue
+            block = _block(lines, separator, decimal)
+            if block is not None:
+                found.append(block)
+    return max(found, key=lambda b: b.score, default=None)
+
+
+def _block(lines: list[str], separator: str, decimal: str) -> _Layout | None:
+    rows = [split(line, separator) for line in lines]
+    numbers = [sum(_is_number(cell, decimal) for cell in row) for row in rows]
+    best: _Layout | None = None
+    start = 0
+    while start < len(rows):
+        end = start
+        while end < len(rows) and len(rows[end]) == len(rows[start]) and numbers[end] >= 2:
+            end += 1
+        if end - start >= _FEWEST:
+            # A remark that stands in a column is a cell, not a reason for another division.
+            share = sum(numbers[start:end]) / sum(len(row) for row in rows[start:end])
+            score = (end - start) * share + 1e-3 * len(rows[start])
+            if best is None or score > best.score:
+                best = _Layout(separator, decimal, start, len(rows[start]), score)
+        start = max(end, start + 1)
+    return best
+
+
+def _header(lines: list[str], layout: _Layout) -> tuple[list[str], list[str]]:
+    """Return names and units of the columns from the lines above the numbers."""
+    above = [split(line.lstrip("#%/ "), layout.separator) for line in lines[: layout.first]]
+    rows = [row for row in above if len(row) == layout.cells and any(row)]
+    units = [""] * layout.cells
+    if len(rows) > 1 and _is_units(rows[-1]):
+        units = [cell.strip("[]() ") for cell in rows.pop()]
+    elif len(rows) > 1 and rows[-1] == rows[-2]:
+        rows.pop()
+    names = rows[-1] if rows else [""] * layout.cells
+    return [name or f"column {k}" for k, name in enumerate(names, start=1)], units
+
+
+def _is_units(row: list[str]) -> bool:
+    cells = [cell.strip("[]() ") for cell in row if cell.strip("[]() ")]
+    return bool(cells) and sum(unit(cell) is not None for cell in cells) >= 0.5 * len(cells)
+
+
+def _columns(lines: list[str], names: list[str], units: list[str], layout: _Layout) -> tuple[list[RawColumn], list[str]]:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    separator = layout.separator
+    if separator == " ":
+        lines, separator = ["\t".join(line.split()) for line in lines], "\t"
+    places = [f"c{k}" for k in range(len(names))]
+    skipped: list[int] = []
+
+    def odd(row: csv.InvalidRow) -> str:
+        skipped.append(row.number or 0)
+        return "skip"
+
+    data = csv.read_csv(
+        io.BytesIO("\n".join(lines).encode("utf-8")),
+        read_options=csv.ReadOptions(column_names=places, use_threads=False),
+        parse_options=csv.ParseOptions(delimiter=separator, invalid_row_handler=odd),
+        convert_options=csv.ConvertOptions(
+            decimal_point=layout.decimal, null_values=_MISSING, strings_can_be_null=True, quoted_strings_can_be_null=True
+        ),
+    )
+    if len(skipped) > 0.01 * len(lines):
+        found = Text(f"{len(skipped)} of {len(lines)} rows with another number of cells")
+        raise BadInput("file", found, f"{len(names)} cells in every row")
+    columns, dropped = [], []
+    for place, name, stated in zip(places, names, units, strict=True):
+        values = data.column(place)
+        if pa.types.is_floating(values.type) or pa.types.is_integer(values.type):
+            columns.append(column(name, np.ascontiguousarray(values.to_numpy(), dtype=np.float64), stated))
+        elif not pa.types.is_null(values.type):
+            dropped.append(name)
+    return columns, dropped

@@ -1,0 +1,107 @@
+"""Excel workbooks: each sheet with a table of numbers is a recording."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import ArmrsError, BadInput, Text
+from .table import RawTable, column
+from .units import unit
+
+SUFFIXES = (".xlsx", ".xlsm")
+_FEWEST = 3
+
+
+def read_workbook(path: Path) -> list[RawTable]:
+    """Read the sheets of a workbook that hold a table; a sheet without one is left out, and said.
+
+    Raises
+    ------
+    BadInput
+        When it is no workbook, or no sheet holds a table. Without the file's name in it.
+    ArmrsError
+        When openpyxl, of the extra `files`, is missing.
+    """
+    try:
+        import openpyxl
+    except ImportError:
+        raise ArmrsError('Excel files need openpyxl: pip install "armrs[files]"') from None
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        sheets = {sheet.title: [list(row) for row in sheet.iter_rows(values_only=True)] for sheet in book.worksheets}
+        book.close()
+    except Exception as error:  # openpyxl raises what zip, XML and its own parts raise
+        raise BadInput("file", Text(f"no readable workbook ({error})"), "an Excel workbook (.xlsx)") from None
+    tables = {title: table for title, rows in sheets.items() if (table := _table(path, title, rows)) is not None}
+    if not tables:
+        raise BadInput("file", Text(f"no table of numbers in {', '.join(sheets)}"), "a sheet with one row a sample")
+    if len(tables) == 1:
+        (only,) = tables.values()
+        return [RawTable(path, path.stem, only.columns, only.notes)]
+    return list(tables.values())
+
+
+def _table(path: Path, title: str, rows: list[list[Any]]) -> RawTable | None:
+    """Return the table of a sheet: the longest run of rows with two numbers or more, and the words above it."""
+    numeric = [sum(isinstance(cell, (int, float)) and not isinstance(cell, bool) for cell in row) >= 2 for row in rows]
+    start, end = _longest(numeric)
+    if end - start < _FEWEST:
+        return None
+    width = max(len(row) for row in rows[start:end])
+    above = [row for row in rows[:start] if sum(isinstance(cell, str) and bool(cell.strip()) for cell in row) >= 2]
+    units = [""] * width
+    if len(above) > 1 and _is_units(above[-1]):
+        units = _words(above.pop(), width)
+    names = _words(above[-1], width) if above else [""] * width
+    columns, dropped = [], []
+    for k, name in enumerate(names):
+        cells = [row[k] if k < len(row) else None for row in rows[start:end]]
+        values = np.array([_number(cell) for cell in cells])
+        label = name or f"column {k + 1}"
+        if np.isfinite(values).any():
+            columns.append(column(label, values, units[k].strip("[]() ")))
+        elif any(cell is not None for cell in cells):
+            dropped.append(label)
+    notes = [f"sheet {title!r}"]
+    if dropped:
+        notes.append(f"left out, since they hold no numbers: {', '.join(dropped)}")
+    return RawTable(path, f"{path.stem} {title}", tuple(columns), tuple(notes))
+
+
+def _words(row: list[Any], width: int) -> list[str]:
+    return [str(row[k]).strip() if k < len(row) and row[k] is not None else "" for k in range(width)]
+
+
+def _is_units(row: list[Any]) -> bool:
+    cells = [str(cell).strip("[]() ") for cell in row if cell is not None and str(cell).strip("[]() ")]
+    return bool(cells) and sum(unit(cell) is not None for cell in cells) >= 0.5 * len(cells)
+
+
+def _number(cell: Any) -> float:
+    if isinstance(cell, bool) or cell is None:
+        return np.nan
+    if isinstance(cell, (int, float)):
+        return float(cell)
+    if isinstance(cell, datetime.time):
+        return 3600.0 * cell.hour + 60.0 * cell.minute + cell.second + 1e-6 * cell.microsecond
+    if isinstance(cell, str):
+        # A workbook of one language opened in another leaves numbers as text.
+        try:
+            return float(cell.strip().replace(",", "."))
+        except ValueError:
+            return np.nan
+    return np.nan
+
+
+def _longest(flags: list[bool]) -> tuple[int, int]:
+    best = (0, 0)
+    start = 0
+    for index, flag in enumerate([*flags, False]):
+        if not flag:
+            best = max(best, (start, index), key=lambda run: run[1] - run[0])
+            start = index + 1
+    return best

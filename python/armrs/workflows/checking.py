@@ -1,0 +1,231 @@
+"""Every problem of a data set at once, and what each verb will be able to tell from it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ArmrsError, BadInput, BadInputs, Text
+from ..io import plausibility
+from ..io.dataset import Dataset, Description, Entry, describe
+from ..io.trial import Reading, Trial, read_trial
+from ..model import Model, load_model
+from .gap import suspicion
+from .importing import conventions
+
+_SLOW = 0.3
+"""Joint speed up to which a movement counts as slow enough for passive moments [rad/s]."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something wrong, or worth knowing.
+
+    Attributes
+    ----------
+    level : {"error", "warning"}
+        An error keeps at least one verb from using the data.
+    text : str
+        File, place, found and allowed.
+    next_step : str
+        What to do about it.
+    """
+
+    level: str
+    text: str
+    next_step: str = ""
+
+    def __str__(self) -> str:
+        return self.text + (f" -> {self.next_step}" if self.next_step else "")
+
+
+@dataclass(frozen=True)
+class Ability:
+    """Whether a verb can use the data, and why."""
+
+    verb: str
+    able: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class Checked:
+    """The result of `check_dataset`."""
+
+    problems: tuple[Problem, ...]
+    verbs: tuple[Ability, ...]
+
+    @property
+    def errors(self) -> tuple[Problem, ...]:
+        """Problems that keep a verb from using the data."""
+        return tuple(p for p in self.problems if p.level == "error")
+
+    def __repr__(self) -> str:
+        warnings = len(self.problems) - len(self.errors)
+        able = ", ".join(v.verb for v in self.verbs if v.able) or "no verb"
+        return f"Checked({len(self.errors)} errors, {warnings} warnings; usable by {able})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain data."""
+        return {"verb": "check", "problems": [dict(vars(p)) for p in self.problems], "verbs": [dict(vars(v)) for v in self.verbs]}
+
+
+def check_dataset(source: str | os.PathLike[str]) -> Checked:
+    """Find every problem of a data set.
+
+    Parameters
+    ----------
+    source : path
+        The folder, or its `dataset.toml`.
+
+    Returns
+    -------
+    Checked
+
+    Examples
+    --------
+    >>> import armrs, tempfile
+    >>> armrs.check_dataset(tempfile.gettempdir() + "/no such folder").errors[0].text.endswith("or that file")
+    True
+    """
+    problems: list[Problem] = []
+    description = _caught(lambda: describe(source), problems)
+    if description is None:
+        return Checked(
+            tuple(problems), tuple(Ability(verb, False, "the data set cannot be read") for verb in ("identify", "passive", "gap"))
+        )
+    model = _caught(lambda: load_model(description.model_path), problems)
+    trials = _trials(description, model, problems)
+    if model is None or not trials:
+        why = "no model" if model is None else "no trial can be read"
+        return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
+    problems += [Problem("warning", line) for line in model.warnings]
+    dataset = Dataset(description.name, model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
+    problems += [Problem("warning", line) for line in plausibility.still_angles(dataset.trials)]
+    _plausible(dataset, problems)
+    _balanced(dataset, problems)
+    blocked = any(p.level == "error" for p in problems)
+    return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked))
+
+
+def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
+    """Return what `read` returns, or None with its refusal among the problems."""
+    try:
+        return read()
+    except BadInputs as error:
+        problems += [Problem("error", str(p)) for p in error.problems]
+    except BadInput as error:
+        problems.append(Problem("error", str(error)))
+    except ArmrsError as error:
+        problems.append(Problem("error", str(error)))
+    return None
+
+
+def _trials(description: Description, model: Model | None, problems: list[Problem]) -> list[Trial]:
+    trials = []
+    for entry in description.entries:
+        path = description.trial_path(entry)
+        joints = model.n_joints if model is not None else 1
+
+        def read(path: Any = path, entry: Any = entry, joints: int = joints) -> Any:
+            try:
+                return read_trial(path, n_joints=joints, force_on=description.force_on, sample_rate=description.sample_rate, **vars(entry))
+            except BadInput as error:
+                raise error.within(file=path) from None
+
+        reading = _caught(read, problems)
+        if reading is not None and model is not None:
+            problems += [Problem("warning", f"{path}: {line}") for line in reading.warnings]
+            trials.append(reading.trial)
+    return trials
+
+
+def _read(path: Path, joints: int, description: Description, entry: Entry) -> Reading | None:
+    try:
+        return read_trial(path, n_joints=joints, force_on=description.force_on, sample_rate=description.sample_rate, **vars(entry))
+    except BadInput as error:
+        raise error.within(file=path) from None
+
+
+def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
+    """Ask each trial by itself, so that one dead sensor does not hide another."""
+    for trial in dataset.trials:
+        one = dataset.replace(trials=(trial,))
+        _caught(partial(plausibility.refuse_implausible, one), problems)
+    led = _is_led(dataset)
+    try:
+        problems += [Problem("warning", line) for line in suspicion.examine(dataset, led)]
+    except BadInput as error:
+        text = str(error)
+        if all(p.text != text for p in problems):
+            problems.append(Problem("error", text))
+
+
+def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
+    """Compare the convention in which the arm balances with that of armrs: all trials together, and each where they disagree."""
+    trials = [t for t in dataset.trials if t.force_on_arm is not None and _alive(t)]
+    if not trials:
+        return
+    together = _imbalance(dataset.model, trials)
+    if together is None:
+        return
+    each = [(t, _imbalance(dataset.model, [t])) for t in trials]
+    wrong = [(t, problem) for t, problem in each if problem is not None]
+    if not wrong or len(wrong) == len(trials):
+        problems.append(together)
+    else:
+        problems += [Problem(p.level, f"{t.file}: {p.text}", p.next_step) for t, p in wrong]
+
+
+def _imbalance(model: Model, trials: list[Trial]) -> Problem | None:
+    """Return what is wrong with the conventions of trials, if anything is."""
+    refused: list[BadInput] = []
+    recordings = [(t.t, t.q, -t.force_on_arm) for t in trials if t.force_on_arm is not None]
+    found = conventions.decide(model, recordings, {}, refused)
+    if refused:
+        return Problem("warning", str(refused[0]), "compare with a photograph of one posture")
+    if (found.reference, found.zero, found.signs, found.force_on) == ("relative", "horizontal", (1,) * model.n_joints, "robot"):
+        return None
+    # The forces were turned to act on the robot, so the other side means that force_on says the wrong one.
+    words = found.words().split(";")[0] + ("" if found.force_on == "robot" else ", forces on the other side than force_on says")
+    text = BadInput("angles and forces", Text(f"an arm that balances only if read as {words}"), "the conventions of armrs")
+    return Problem("error", f"{text} ({found.why})", "armrs import converts recordings")
+
+
+def _alive(trial: Trial) -> bool:
+    return trial.force_on_arm is not None and all(plausibility.constant(values) is None for values in trial.force_on_arm.T)
+
+
+def _is_led(dataset: Dataset) -> bool:
+    whole = all(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials)
+    return dataset.model.robot is not None and whole
+
+
+def _abilities(dataset: Dataset, blocked: bool) -> tuple[Ability, ...]:
+    if blocked:
+        return tuple(Ability(verb, False, "mend the errors above first") for verb in ("identify", "passive", "gap"))
+    efforts = [t for t in dataset.fit_trials if t.force_on_arm is not None or t.tau is not None]
+    slow = sorted({t.configuration for t in efforts if _speed(t) <= _SLOW})
+    repeats = len(dataset.fit_trials) > len({t.configuration for t in dataset.fit_trials})
+    lacking = [] if repeats else ["repeats to read the noise off"]
+    lacking += [] if dataset.test_trials else ['trials with role = "test" to measure the gap on']
+    how = (
+        "in the closed chain with the robot" if _is_led(dataset) else "by joint torques, since robot angles, forces or [robot] are missing"
+    )
+    return (
+        Ability("identify", bool(efforts), f"{len(efforts)} fit trials with forces or torques" if efforts else "no forces and no torques"),
+        Ability("passive", bool(slow), f"slow movements: {', '.join(slow)}" if slow else f"no movement slower than {_SLOW:g} rad/s"),
+        Ability("gap", bool(efforts), f"{how}{'; without ' + ' and '.join(lacking) if lacking else ''}"),
+    )
+
+
+def _speed(trial: Trial) -> float:
+    """Return the joint speed that 95 % of the samples stay below [rad/s]."""
+    speeds = np.abs(np.gradient(trial.q, trial.t, axis=0))
+    return float(np.nanquantile(speeds, 0.95))

@@ -1,0 +1,4 @@
+"""Own recordings into a data set."""
+
+from .run import Imported as Imported
+from .run import import_recordings as import_recordings

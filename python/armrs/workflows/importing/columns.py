@@ -1,0 +1,208 @@
+"""Which raw column is which quantity, from its name and unit in the languages that laboratories use, and why."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...errors import BadInput, Text, unknown_name
+from ...io.raw import RawColumn, RawTable
+from ...io.raw.units import unit
+from .recipe import Channel
+
+_TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed"}
+_JOINTS = (
+    {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral"},
+    {"elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec"},
+    {"wrist", "handgelenk", "poignet", "muneca", "polso", "zapestje"},
+)
+_ROBOT = {"robot", "roboter", "rob", "manipulator", "actuator"}
+_SPEED = {"velocity", "speed", "geschwindigkeit", "vitesse", "omega", "vel", "dq", "qd", "velocidad"}
+_ACCELERATION = {"acceleration", "beschleunigung", "accel", "acc", "ddq", "qdd"}
+_TORQUE = {"torque", "moment", "drehmoment", "tau", "couple", "trq"}
+_FORCE = {"force", "kraft", "f", "forza", "fuerza", "sila"}
+_ANGLE = {"angle", "winkel", "theta", "phi", "q", "joint", "gelenk", "flexion", "ang", "position", "pos", "j"}
+_AXES = {"x": "x", "y": "y", "z": "z", "horizontal": "y", "forward": "y", "vertical": "z", "vertikal": "z", "up": "z"}
+_MUSCLES = {"biceps", "triceps", "brachialis", "brachioradialis", "deltoid", "deltoideus", "pectoralis", "trapezius"}
+_CANONICAL = re.compile(r"(qr|dq|tau|q)(\d)|f([xyz])|m([xyz])")
+_DIMENSION = {"t": "time", "q": "angle", "qr": "angle", "dq": "speed", "tau": "moment", "F": "force", "Mx": "moment"}
+_DEGREES_FROM = 7.0
+"""An angle whose unit is not stated and that exceeds this [rad] is in degrees: no joint turns by more than a turn."""
+_RATES = (4.0, 20000.0)
+"""Sample rates that recordings have [Hz]."""
+_DEFAULT_UNIT = {"angle": "rad", "speed": "rad/s", "force": "N", "moment": "Nm"}
+
+
+def dimension_of(symbol: str) -> str:
+    """Return what a symbol measures: `time`, `angle`, `speed`, `force`, `moment`, or nothing for EMG."""
+    stem = symbol[:1] if symbol[:1] in ("F", "t") and not symbol.startswith("tau") else symbol.rstrip("0123456789")
+    return _DIMENSION.get(stem, "")
+
+
+def words(text: str) -> list[str]:
+    """Return the words of a label in lower case without accents; digits are words of their own."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
+    return re.findall(r"[a-z]+|\d+", plain)
+
+
+def _mentions(tokens: Sequence[str], names: set[str]) -> bool:
+    """Whether a word is one of the names, or a compound with a long one in it (Schulterwinkel)."""
+    return any(token in names or any(len(name) >= 5 and name in token for name in names) for token in tokens)
+
+
+def symbol_of(column: RawColumn) -> str | None:
+    """Return the symbol that a column's name and unit say, or None.
+
+    >>> import numpy as np
+    >>> from armrs.io.raw.table import column
+    >>> symbol_of(column("Ellbogen [°]", np.zeros(3)))
+    'q2'
+    """
+    tokens = words(column.label)
+    known = unit(column.unit) if column.unit else None
+    dimension = known.dimension if known else None
+    if not tokens:
+        return None
+    joined = "".join(tokens)
+    if dimension in (None, "time") and (joined in _TIME or tokens[0] in _TIME):
+        return "t"
+    if tokens[0].startswith("emg") or _mentions(tokens, _MUSCLES) or dimension == "voltage":
+        return "emg_" + "_".join(token for token in tokens if token != "emg") if len(tokens) > 1 or tokens[0] != "emg" else "emg_1"
+    if match := _CANONICAL.fullmatch(joined):
+        if match[3]:
+            return f"F{match[3]}"
+        if match[4]:
+            return f"M{match[4]}"
+        return f"{match[1]}{match[2]}"
+    if _mentions(tokens, _ACCELERATION):
+        return None
+    return _force(tokens, dimension) or _joint(tokens, dimension)
+
+
+def _force(tokens: Sequence[str], dimension: str | None) -> str | None:
+    is_force = dimension == "force" or (dimension is None and _mentions(tokens, _FORCE - {"f"}))
+    axis = next((_AXES[token] for token in reversed(tokens) if token in _AXES), None)
+    fused = next((token for token in tokens if re.fullmatch(r"f[xyz]", token)), None)
+    if fused and dimension in (None, "force"):
+        return f"F{fused[1]}"
+    if is_force and axis:
+        return f"F{axis}"
+    return None
+
+
+def _joint(tokens: Sequence[str], dimension: str | None) -> str | None:
+    number = next((k for k, names in enumerate(_JOINTS, start=1) if _mentions(tokens, names)), None)
+    if number is None and _mentions(tokens, _ANGLE | _SPEED | _TORQUE | _ROBOT):
+        number = next((int(token) for token in tokens if token.isdigit()), None)
+    if number is None:
+        return None
+    if _mentions(tokens, _ROBOT):
+        return f"qr{number}" if dimension in (None, "angle") and not _mentions(tokens, _SPEED | _TORQUE) else None
+    if dimension == "moment" or (dimension is None and _mentions(tokens, _TORQUE)):
+        return f"tau{number}"
+    if dimension == "speed" or (dimension is None and _mentions(tokens, _SPEED)):
+        return f"dq{number}"
+    return f"q{number}" if dimension in (None, "angle") else None
+
+
+def parse_map(text: str) -> dict[str, tuple[str, int]]:
+    """Return the columns and signs that `--map t=…,q1=…,Fy=-…` names, by symbol.
+
+    Raises
+    ------
+    BadInput
+        For a part that is not `SYMBOL=COLUMN`.
+    """
+    found: dict[str, tuple[str, int]] = {}
+    for part in re.split(r",(?=\s*(?:t|q\d|qr\d|dq\d|tau\d|F[yz]|Mx|emg_\w+)\s*=)", text):
+        if not part.strip():
+            continue
+        symbol, equals, name = (piece.strip() for piece in part.partition("="))
+        if not equals or not name or not (dimension_of(symbol) or symbol.startswith("emg_")):
+            raise BadInput("--map", part.strip(), "SYMBOL=COLUMN with t, q1 …, Fy, Fz, Mx, tau1 …, qr1, qr2, dq1 … or emg_NAME")
+        found[symbol] = (name[1:].strip(), -1) if name.startswith("-") else (name, 1)
+    return found
+
+
+def guess(tables: Sequence[RawTable], given: Mapping[str, tuple[str, int]], problems: list[BadInput]) -> list[Channel]:
+    """Return the channels of recordings that share their columns; what cannot be decided is added to `problems`.
+
+    Parameters
+    ----------
+    tables : sequence of RawTable
+        The first one's columns are looked at; units that are not stated are read off the values of all.
+    given : mapping of symbol to (column, sign)
+        From `parse_map`; these are taken as they are.
+    problems : list of BadInput
+    """
+    table = tables[0]
+    by_name = {c.name: c for c in table.columns} | {c.label: c for c in table.columns}
+    chosen: dict[str, tuple[RawColumn, int, str]] = {}
+    for symbol, (name, sign) in given.items():
+        if name in by_name:
+            chosen[symbol] = (by_name[name], sign, "as --map says")
+        else:
+            problems.append(unknown_name("--map", name, [c.name for c in table.columns], what="column").within(file=table.path))
+    taken = {id(c) for c, _, _ in chosen.values()}
+    named: dict[str, list[RawColumn]] = {}
+    for c in table.columns:
+        said = None if id(c) in taken else symbol_of(c)
+        if said and said not in chosen:
+            named.setdefault(said, []).append(c)
+    for symbol, columns in named.items():
+        if len(columns) > 1 and not symbol.startswith("emg_"):
+            found = Text(" and ".join(repr(c.name) for c in columns))
+            problems.append(
+                BadInput("columns", found, f"one column for {symbol}", file=table.path, hint=f"--map '{symbol}={columns[0].name}'")
+            )
+        chosen[symbol] = (columns[0], 1, f"by its name {columns[0].name!r}")
+    return [
+        channel for symbol, (c, sign, why) in chosen.items() if (channel := _channel(symbol, c, sign, why, tables, problems)) is not None
+    ]
+
+
+def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequence[RawTable], problems: list[BadInput]) -> Channel | None:
+    dimension = dimension_of(symbol)
+    if not dimension:
+        return Channel(symbol, column.name, column.unit, sign, why)
+    stated = unit(column.unit) if column.unit else None
+    if stated is not None and stated.dimension != dimension:
+        place = f"column {column.name!r}"
+        problems.append(BadInput(place, column.unit, f"a unit of {dimension} for {symbol}", file=tables[0].path))
+        return None
+    values = [c.values for table in tables for c in table.columns if c.name == column.name]
+    if symbol == "t":
+        return _time(column, stated.text if stated else "", values[0], why, tables[0], problems)
+    if stated is not None:
+        return Channel(symbol, column.name, stated.text, sign, why)
+    if dimension == "angle":
+        most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
+        in_degrees = most > _DEGREES_FROM
+        reason = f"no unit stated; up to {most:.3g}, so in {'degrees' if in_degrees else 'radians'}"
+        return Channel(symbol, column.name, "deg" if in_degrees else "rad", sign, f"{why}; {reason}")
+    return Channel(symbol, column.name, _DEFAULT_UNIT[dimension], sign, f"{why}; no unit stated, so {_DEFAULT_UNIT[dimension]}")
+
+
+def _time(column: RawColumn, stated: str, values: np.ndarray, why: str, table: RawTable, problems: list[BadInput]) -> Channel | None:
+    """Return the time, in the unit in which the rate is one that recordings have."""
+    steps = np.diff(values[np.isfinite(values)])
+    step = float(np.median(steps)) if steps.size else 0.0
+    if step <= 0.0:
+        problems.append(
+            BadInput(f"column {column.name!r}", Text("time that does not increase"), "time stamps that increase", file=table.path)
+        )
+        return None
+    plausible = [text for text, factor in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)) if _RATES[0] <= 1.0 / (factor * step) <= _RATES[1]]
+    if stated in plausible or (stated and not plausible):
+        return Channel("t", column.name, stated, 1, f"{why}; in {stated} as stated")
+    if not plausible:
+        found = Text(f"{step:g} between samples")
+        problems.append(BadInput(f"column {column.name!r}", found, f"{_RATES[0]:g} to {_RATES[1]:g} samples a second", file=table.path))
+        return None
+    # Steps of one are samples of a millisecond far oftener than of a microsecond.
+    chosen = plausible[0]
+    contradicts = f", although its header says {stated}" if stated else ""
+    return Channel("t", column.name, chosen, 1, f"{why}; steps of {step:g}, so in {chosen}{contradicts}")

@@ -1,0 +1,190 @@
+"""What an import decided, as `import.toml` keeps it: which column is what, in which unit and convention, and which file is which trial."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ... import checks
+from ...errors import BadInput
+from ...io import tomlfile
+
+FILE = "import.toml"
+REFERENCES = ("relative", "absolute")
+ZEROS = ("horizontal", "hanging")
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Where one measured quantity comes from.
+
+    Attributes
+    ----------
+    symbol : str
+        `t`, `q1`, `Fy`, `tau1`, `qr1`, `dq1`, `emg_NAME`, as in the columns of a data set without the unit.
+    column : str
+        Name in the raw file.
+    unit : str
+        Of the raw values; empty for EMG without one.
+    sign : {1, -1}
+    why : str
+        The reason for this choice.
+    """
+
+    symbol: str
+    column: str
+    unit: str
+    sign: int = 1
+    why: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How the raw angles are counted, and what the raw forces act on.
+
+    Attributes
+    ----------
+    reference : {"relative", "absolute"}
+        Against the segment before, or against a fixed direction.
+    zero : {"horizontal", "hanging"}
+        Direction of the first segment (of every segment, for absolute angles) at zero: forward, or straight down.
+    signs : tuple of {1, -1}
+        By joint; -1 where clockwise is positive.
+    force_on : {"robot", "arm"} or None
+        None without forces.
+    why : str
+    """
+
+    reference: str = "relative"
+    zero: str = "horizontal"
+    signs: tuple[int, ...] = ()
+    force_on: str | None = "robot"
+    why: str = field(default="", compare=False)
+
+    def words(self) -> str:
+        """Return the convention in words."""
+        flipped = [f"q{j}" for j, sign in enumerate(self.signs, start=1) if sign < 0]
+        turn = "counter-clockwise positive" if not flipped else f"clockwise positive in {', '.join(flipped)}"
+        zero = "zero pointing forward" if self.zero == "horizontal" else "zero hanging down"
+        reference = "relative to the segment before" if self.reference == "relative" else "absolute"
+        force = "" if self.force_on is None else f"; forces on the {self.force_on}"
+        return f"angles {reference}, {zero}, {turn}{force}"
+
+
+@dataclass(frozen=True)
+class RawTrial:
+    """One trial of the data set to be.
+
+    Attributes
+    ----------
+    file : str
+        The raw file, relative to `import.toml` or absolute.
+    table : str
+        Title of the table in it.
+    configuration : str
+    repeat : int
+    role : {"fit", "test"}
+    force_file : str, optional
+        A further raw file, with the forces.
+    force_shift : float
+        Added to the time of the forces [s].
+    """
+
+    file: str
+    table: str
+    configuration: str
+    repeat: int
+    role: str
+    force_file: str | None = None
+    force_shift: float = 0.0
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that turns raw files into a data set."""
+
+    channels: tuple[Channel, ...]
+    convention: Convention
+    trials: tuple[RawTrial, ...]
+    points: tuple[str, ...] = ()
+
+    def to_toml(self) -> str:
+        """Return the text of `import.toml`."""
+        c = self.convention
+        blocks = ["# Written by armrs import. `armrs import import.toml -o DIR` repeats it without questions."]
+        angles = {
+            "reference": c.reference,
+            "zero": c.zero,
+            "signs": list(c.signs),
+            "force_on": c.force_on,
+            "points": list(self.points) or None,
+        }
+        blocks.append("\n".join([*_reason(c.why), "[convention]", *tomlfile.lines(angles)]))
+        for channel in self.channels:
+            table = {"symbol": channel.symbol, "column": channel.column, "unit": channel.unit, "sign": channel.sign}
+            blocks.append("\n".join([*_reason(channel.why), "[[channel]]", *tomlfile.lines(table)]))
+        for trial in self.trials:
+            shift = trial.force_shift if trial.force_file else None
+            blocks.append("\n".join(["[[trial]]", *tomlfile.lines({**vars(trial), "force_shift": shift})]))
+        return "\n\n".join(blocks) + "\n"
+
+
+def _reason(why: str) -> list[str]:
+    return [f"# {' '.join(why.split())}"] if why else []
+
+
+def load_recipe(path: Path) -> Recipe:
+    """Read `import.toml`.
+
+    Raises
+    ------
+    BadInput
+        Names the file, the table and the key.
+    """
+    return tomlfile.load(path, lambda document, _: _recipe(document))
+
+
+def _recipe(document: Mapping[str, Any]) -> Recipe:
+    checks.keys("", document, required=["convention", "channel", "trial"], optional=[])
+    angles = checks.table("[convention]", document["convention"])
+    checks.keys("[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points"])
+    convention = Convention(
+        checks.choice("[convention], reference", angles["reference"], REFERENCES),
+        checks.choice("[convention], zero", angles["zero"], ZEROS),
+        tuple(_sign("[convention], signs", sign) for sign in angles["signs"]),
+        None if "force_on" not in angles else checks.choice("[convention], force_on", angles["force_on"], ("robot", "arm")),
+    )
+    channels = tuple(_channel(f"[[channel]] {k}", table) for k, table in enumerate(checks.tables("channel", document["channel"]), 1))
+    trials = tuple(_trial(f"[[trial]] {k}", table) for k, table in enumerate(checks.tables("trial", document["trial"]), 1))
+    return Recipe(channels, convention, trials, tuple(checks.instances("[convention], points", angles.get("points", []), str)))
+
+
+def _sign(place: str, value: object) -> int:
+    if value not in (1, -1) or isinstance(value, bool):
+        raise BadInput(place, value, "1 or -1")
+    return -1 if value == -1 else 1
+
+
+def _channel(place: str, table: Mapping[str, Any]) -> Channel:
+    checks.keys(place, table, required=["symbol", "column", "unit"], optional=["sign"])
+    text = {key: table[key] for key in ("symbol", "column", "unit")}
+    for key, value in text.items():
+        checks.instance(f"{place}, {key}", value, str)
+    return Channel(**text, sign=_sign(f"{place}, sign", table.get("sign", 1)))
+
+
+def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
+    checks.keys(place, table, required=["file", "table", "configuration", "repeat", "role"], optional=["force_file", "force_shift"])
+    for key in ("file", "table", "configuration"):
+        checks.text(f"{place}, {key}", table[key])
+    return RawTrial(
+        table["file"],
+        table["table"],
+        table["configuration"],
+        checks.whole(f"{place}, repeat", table["repeat"], least=1),
+        checks.choice(f"{place}, role", table["role"], ("fit", "test")),
+        table.get("force_file"),
+        checks.number(f"{place}, force_shift", table.get("force_shift", 0.0), unit="s"),
+    )

@@ -1,0 +1,398 @@
+"""Own recordings into a data set: read, guess what is what, decide conventions, write; every decision is kept in `import.toml`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import checks
+from ...errors import BadInput, BadInputs, Text
+from ...io import files, tomlfile
+from ...io.markers import MARKER_SUFFIXES, planar_motion
+from ...io.motions import read_markers
+from ...io.raw import RawColumn, RawTable, read_raw
+from ...io.raw.units import unit
+from ...io.samples import write_samples
+from ...model import Model, load_model
+from . import clock, columns, conventions, trials
+from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
+
+_SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
+_FORWARD_AND_UP = {("x", "y"): ("x", "y"), ("x", "z"): ("x", "z"), ("y", "z"): ("y", "z"), ("x", "y", "z"): ("y", "z")}
+"""Axes of a force sensor -> the one forward and the one up. Of three, the first is taken to point sideways."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """An imported data set.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it was written.
+    recipe : Recipe
+        What was decided; `import.toml` holds it.
+    notes : tuple of str
+        Decisions and their reasons, a line each.
+    """
+
+    folder: Path
+    recipe: Recipe
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain data."""
+        return {
+            "verb": "import",
+            "folder": os.fspath(self.folder),
+            "convention": {**vars(self.recipe.convention), "signs": list(self.recipe.convention.signs)},
+            "channels": [dict(vars(c)) for c in self.recipe.channels],
+            "trials": [dict(vars(t)) for t in self.recipe.trials],
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class _Read:
+    """A trial with its raw tables."""
+
+    trial: RawTrial
+    table: RawTable
+    forces: RawTable | None
+
+
+def import_recordings(
+    sources: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    model: Model | str | os.PathLike[str],
+    columns_map: str = "",
+    angles: str | None = None,
+    zero: str | None = None,
+    clockwise: Sequence[int] | None = None,
+    force_on: str | None = None,
+    points: Sequence[str] = (),
+) -> Imported:
+    """Turn own recordings into a data set.
+
+    Parameters
+    ----------
+    sources : sequence of path
+        Recordings (CSV and other text, Excel, Parquet, MATLAB, MOT, STO, TRC, C3D), or one `import.toml`, which repeats an earlier import.
+    out : path
+        Folder of the data set.
+    model : Model or path
+        Literature values as `armrs init` writes them are enough: conventions are read off the static balance.
+    columns_map : str
+        `t=COLUMN,q1=COLUMN,Fy=-COLUMN,…` for columns whose names do not say what they are; a minus turns the sign.
+    angles : {"relative", "absolute"}, optional
+    zero : {"horizontal", "hanging"}, optional
+        Direction of the first segment at zero.
+    clockwise : sequence of int, optional
+        Joints whose angle is clockwise positive; an empty one says that none is.
+    force_on : {"robot", "arm"}, optional
+        What the recorded force acts on.
+        The four above are read off the data where they are not given.
+    points : sequence of str
+        Markers of the joints, shoulder to handle, for C3D and TRC files.
+
+    Returns
+    -------
+    Imported
+
+    Raises
+    ------
+    BadInput
+        With every problem that was found (`BadInputs.problems`); nothing is written then.
+    """
+    paths = [checks.path("sources", source) for source in sources]
+    loaded = model if isinstance(model, Model) else load_model(model)
+    if len(paths) == 1 and paths[0].suffix.lower() == ".toml":
+        recipe = load_recipe(paths[0])
+        reads = _reread(recipe, paths[0].parent)
+        notes = [f"as {paths[0]} says"]
+    else:
+        given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
+        recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points))
+    folder = _write(Path(out), loaded, recipe, reads)
+    return Imported(folder, recipe, tuple(notes))
+
+
+def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None, force_on: str | None, n_joints: int) -> dict[str, object]:
+    given: dict[str, object] = {}
+    if angles is not None:
+        given["reference"] = checks.choice("angles", angles, ("relative", "absolute"))
+    if zero is not None:
+        given["zero"] = checks.choice("zero", zero, ("horizontal", "hanging"))
+    if clockwise is not None:
+        numbers = [checks.whole("clockwise", j, least=1, most=n_joints) for j in clockwise]
+        given["signs"] = tuple(-1 if j in numbers else 1 for j in range(1, n_joints + 1))
+    if force_on is not None:
+        given["force_on"] = checks.choice("force_on", force_on, ("robot", "arm"))
+    return given
+
+
+def _tables(paths: Sequence[Path], points: tuple[str, ...], problems: list[BadInput]) -> list[RawTable]:
+    tables: list[RawTable] = []
+    for path in paths:
+        try:
+            tables += _read(path, points)
+        except BadInput as error:  # noqa: PERF203 (every file is asked)
+            problems.append(error)
+    return tables
+
+
+def _read(path: Path, points: tuple[str, ...]) -> list[RawTable]:
+    """Return the tables of a file; markers become angles where `points` names those of the joints."""
+    if path.suffix.lower() not in MARKER_SUFFIXES or not points:
+        if path.suffix.lower() == ".trc":
+            raise BadInput("--points", Text("nothing"), "the markers of the joints, shoulder to handle", file=path)
+        return read_raw(path)
+    markers = read_markers(path)
+    motion = planar_motion(markers, points)
+    found = [RawColumn("time", "time", "s", markers.t)]
+    found += [RawColumn(f"q{j}", f"q{j}", "rad", np.ascontiguousarray(q)) for j, q in enumerate(motion.q.T, start=1)]
+    if path.suffix.lower() == ".c3d":
+        (raw,) = read_raw(path)
+        (time,) = (c for c in raw.columns if c.name == "time")
+        analog = [c for c in raw.columns if c is not time and not c.name.endswith((".x", ".y", ".z"))]
+        found += [RawColumn(c.name, c.label, c.unit, np.interp(markers.t, time.values, c.values)) for c in analog]
+    return [RawTable(path, path.stem, tuple(found), (f"angles from the markers {', '.join(points)}", *motion.warnings()))]
+
+
+def _decided(
+    paths: Sequence[Path], model: Model, mapped: Mapping[str, tuple[str, int]], given: Mapping[str, object], points: tuple[str, ...]
+) -> tuple[Recipe, list[_Read], list[str]]:
+    """Return what all files say together; every problem is collected before any is raised."""
+    problems: list[BadInput] = []
+    tables = _tables(paths, points, problems)
+    mapped_tables = [_renamed(table, mapped) for table in tables]
+    named, left, roles = trials.arrange(mapped_tables)
+    if not named and not problems:
+        found = Text(f"columns {', '.join(repr(c.name) for c in tables[0].columns[:12])}")
+        problems.append(BadInput("columns", found, "an angle of every joint", file=tables[0].path, hint="--map q1=COLUMN,q2=COLUMN"))
+    problems += [BadInput("file", Text("neither angles nor forces of a trial"), "a recording", file=t.path) for t in left]
+    if not named:
+        raise BadInputs.of(problems)
+    channels = columns.guess([n.table for n in named], _present(mapped, named[0].table), problems)
+    force_tables = [n.forces for n in named if n.forces is not None]
+    if force_tables:
+        own = columns.guess(force_tables, _present(mapped, force_tables[0]), problems)
+        channels = [
+            *channels,
+            *(c for c in own if c.symbol[0] in "FM"),
+            *(replace(c, symbol="t of forces") for c in own if c.symbol == "t"),
+        ]
+    channels, axes = _plane(channels)
+    _complete(channels, model.n_joints, named[0].table, problems)
+    if problems:
+        raise BadInputs.of(problems)
+    reads = [_aligned(n, channels, problems) for n in named]
+    recorded = [_arrays(read, channels, model.n_joints) for read in reads]
+    if recorded[0][2] is not None:
+        together = [(t, q, f) for t, q, f in recorded if f is not None]
+        convention = conventions.decide(model, together, given, problems)
+    else:
+        signs = given.get("signs", (1,) * model.n_joints)
+        why = "no contact force: nothing tells how angles are counted, so they are taken as armrs counts them"
+        convention = Convention(str(given.get("reference", "relative")), str(given.get("zero", "horizontal")), signs, None, why)  # type: ignore[arg-type]
+    if problems:
+        raise BadInputs.of(problems)
+    reads = [_refined(read, channels, convention, model) for read in reads]
+    recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points)
+    notes = [*dict.fromkeys(note for t in tables for note in t.notes), *axes]
+    notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
+    notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
+    shifted = [f"{r.trial.force_file}: forces shifted by {r.trial.force_shift:+.3f} s" for r in reads if r.trial.force_file]
+    return recipe, reads, [*notes, *shifted]
+
+
+def _renamed(table: RawTable, mapped: Mapping[str, tuple[str, int]]) -> RawTable:
+    """Return a table whose mapped columns carry their symbols as labels, so that they are recognised everywhere."""
+    symbols = {name: symbol for symbol, (name, _) in mapped.items()}
+    renamed = tuple(replace(c, label=symbols.get(c.name, symbols.get(c.label, c.label))) for c in table.columns)
+    return replace(table, columns=renamed)
+
+
+def _present(mapped: Mapping[str, tuple[str, int]], table: RawTable) -> dict[str, tuple[str, int]]:
+    """Return what is mapped to columns of this table, by their full names."""
+    labels = {c.label: c.name for c in table.columns}
+    names = {c.name for c in table.columns}
+    found = {}
+    for symbol, (name, sign) in mapped.items():
+        full = labels.get(symbol, name)
+        if full in names:
+            found[symbol] = (full, sign)
+    return found
+
+
+def _plane(channels: list[Channel]) -> tuple[list[Channel], list[str]]:
+    """Return the channels with the force named in the plane of armrs: y forward, z up."""
+    axes = tuple(sorted(c.symbol[1] for c in channels if c.symbol in ("Fx", "Fy", "Fz")))
+    if axes not in _FORWARD_AND_UP or any(c.why.startswith("as --map") for c in channels if c.symbol in ("Fy", "Fz")):
+        return [c for c in channels if c.symbol not in ("Fx", "My", "Mz")], []
+    forward, up = _FORWARD_AND_UP[axes]
+    names = {f"F{forward}": "Fy", f"F{up}": "Fz"}
+    kept = [
+        replace(c, symbol=names.get(c.symbol, c.symbol))
+        for c in channels
+        if c.symbol in names or c.symbol[0] not in "FM" or c.symbol == "Mx"
+    ]
+    if (forward, up) == ("y", "z"):
+        return kept, []
+    return kept, [f"force axes: {forward} is taken as forward, {up} as up"]
+
+
+def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, problems: list[BadInput]) -> None:
+    symbols = {c.symbol for c in channels}
+    offered = ", ".join(repr(c.name) for c in table.columns)
+    needed = ["t", *(f"q{j}" for j in range(1, n_joints + 1))]
+    if symbols & {"Fy", "Fz"} or not any(s.startswith("tau") for s in symbols):
+        needed += ["Fy", "Fz"]
+    for symbol in needed:
+        if symbol not in symbols and f"no column for {symbol}" not in [str(p.found) for p in problems]:
+            why = f"a column for it; there are {offered}"
+            problems.append(BadInput("columns", Text(f"no column for {symbol}"), why, file=table.path, hint=f"--map {symbol}=COLUMN"))
+    for c in channels:
+        number = c.symbol.removeprefix("q")
+        if number.isdigit() and int(number) > n_joints:
+            found, allowed = Text(f"an angle of joint {number} ({c.column!r})"), f"{n_joints} joints, as the model has"
+            problems.append(BadInput("columns", found, allowed, file=table.path))
+
+
+def _aligned(named: trials.Named, channels: Sequence[Channel], problems: list[BadInput]) -> _Read:
+    trial = RawTrial(os.fspath(named.table.path), named.table.title, named.configuration, named.repeat, named.role)
+    if named.forces is None:
+        return _Read(trial, named.table, None)
+    q = np.column_stack([_values(named.table, c) for c in channels if c.symbol.startswith("q") and c.symbol[1:].isdigit()])
+    force = np.column_stack([_values(named.forces, _by(channels, s)) for s in ("Fy", "Fz")])
+    try:
+        shift = clock.align(_values(named.table, _by(channels, "t")), q, _values(named.forces, _by(channels, "t of forces")), force).seconds
+    except BadInput as error:
+        problems.append(error.within(file=named.forces.path))
+        shift = 0.0
+    return _Read(replace(trial, force_file=os.fspath(named.forces.path), force_shift=shift), named.table, named.forces)
+
+
+def _refined(read: _Read, channels: Sequence[Channel], convention: Convention, model: Model) -> _Read:
+    """Return a trial whose forces are on the clock of the angles as exactly as the equation of motion tells."""
+    if read.forces is None:
+        return read
+    t, raw, _ = _arrays(read, channels, model.n_joints)
+    force = np.column_stack([_values(read.forces, _by(channels, s)) for s in ("Fy", "Fz")])
+    on_arm = force if convention.force_on == "arm" else -force
+    q = conventions.to_model_angles(raw, convention)
+    shift = clock.refine(model, t, q, _values(read.forces, _by(channels, "t of forces")), on_arm, read.trial.force_shift)
+    return replace(read, trial=replace(read.trial, force_shift=shift))
+
+
+def _by(channels: Sequence[Channel], symbol: str) -> Channel:
+    return next(c for c in channels if c.symbol == symbol)
+
+
+def _values(table: RawTable, channel: Channel) -> np.ndarray:
+    """Return a channel in SI units with its sign."""
+    found = next((c for c in table.columns if c.name == channel.column), None)
+    if found is None:
+        raise BadInput("columns", Text(f"no column {channel.column!r}"), f"the column of {channel.symbol}", file=table.path)
+    known = unit(channel.unit) if channel.unit else None
+    factor = channel.sign * (known.factor if known and not channel.symbol.startswith("emg_") else 1.0)
+    return found.values if factor == 1.0 else found.values * factor
+
+
+def _arrays(read: _Read, channels: Sequence[Channel], n_joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Return time, raw angles and raw force of a trial."""
+    t = _values(read.table, _by(channels, "t"))
+    q = np.column_stack([_values(read.table, _by(channels, f"q{j}")) for j in range(1, n_joints + 1)])
+    if not any(c.symbol == "Fy" for c in channels):
+        return t, q, None
+    return t, q, np.column_stack([_on_clock(read, t, channels, s) for s in ("Fy", "Fz")])
+
+
+def _on_clock(read: _Read, t: np.ndarray, channels: Sequence[Channel], symbol: str) -> np.ndarray:
+    channel = _by(channels, symbol)
+    if read.forces is None or symbol[0] not in "FM":
+        return _values(read.table, channel)
+    clock_of_forces = _values(read.forces, _by(channels, "t of forces")) + read.trial.force_shift
+    values = _values(read.forces, channel)
+    good = np.isfinite(values)
+    return np.interp(t, clock_of_forces[good], values[good], left=np.nan, right=np.nan)
+
+
+def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
+    """Return the trials of a recipe with their tables."""
+    problems: list[BadInput] = []
+    reads = []
+    for trial in recipe.trials:
+        try:
+            table = next((t for t in _read(folder / trial.file, recipe.points) if t.title == trial.table), None)
+            if table is None:
+                raise BadInput("table", trial.table, "the title of a table in it", file=trial.file)
+            reads.append(_Read(trial, table, _read(folder / trial.force_file, ())[0] if trial.force_file else None))
+        except BadInput as error:  # noqa: PERF203 (every file is asked)
+            problems.append(error)
+    if problems:
+        raise BadInputs.of(problems)
+    return reads
+
+
+def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read]) -> Path:
+    """Write the data set whole or not at all, with `import.toml` in it."""
+    folder = files.output_folder(out)
+    kept = replace(recipe, trials=tuple(_seen_from(folder, read.trial) for read in reads))
+
+    def write(part: Path) -> list[Path]:
+        written = []
+        entries = []
+        for read in reads:
+            name = f"trials/{read.trial.configuration}_{read.trial.repeat}.csv"
+            table = _si_columns(read, recipe, model.n_joints)
+            (part / name).parent.mkdir(exist_ok=True)
+            write_samples(part / name, list(table), list(table.values()))
+            written.append(part / name)
+            entries.append({"file": name, "configuration": read.trial.configuration, "repeat": read.trial.repeat, "role": read.trial.role})
+        model.write(part / "model.toml")
+        head = {"name": folder.resolve().name, "model": "model.toml", "force_on": recipe.convention.force_on}
+        blocks = ["\n".join(tomlfile.lines(head)), *("\n".join(["[[trial]]", *tomlfile.lines(e)]) for e in entries)]
+        files.write_text(part / "dataset.toml", "\n\n".join(blocks) + "\n", kind=".toml")
+        files.write_text(part / FILE, kept.to_toml(), kind=".toml")
+        return [*written, part / "model.toml", part / "dataset.toml", part / FILE]
+
+    files.write_whole(folder, write)
+    return folder
+
+
+def _seen_from(folder: Path, trial: RawTrial) -> RawTrial:
+    """Return a trial whose files are named relative to the folder that `import.toml` is in."""
+    here = folder.resolve()
+    force_file = None if trial.force_file is None else os.path.relpath(Path(trial.force_file).resolve(), here)
+    return replace(trial, file=os.path.relpath(Path(trial.file).resolve(), here), force_file=force_file)
+
+
+def _si_columns(read: _Read, recipe: Recipe, n_joints: int) -> dict[str, np.ndarray]:
+    """Return the columns of a trial file: SI units, the angles of armrs, the sign of `force_on`."""
+    t, q, force = _arrays(read, recipe.channels, n_joints)
+    angles = conventions.to_model_angles(q, recipe.convention)
+    table = {"t_s": t} | {f"q{j}_rad": np.ascontiguousarray(angles[:, j - 1]) for j in range(1, n_joints + 1)}
+    if force is not None:
+        table |= {"Fy_N": np.ascontiguousarray(force[:, 0]), "Fz_N": np.ascontiguousarray(force[:, 1])}
+    if any(c.symbol == "dq1" for c in recipe.channels):
+        raw = np.column_stack([_values(read.table, _by(recipe.channels, f"dq{j}")) for j in range(1, n_joints + 1)])
+        speeds = conventions.to_model_speeds(raw, recipe.convention)
+        table |= {f"dq{j}_rad_s": np.ascontiguousarray(speeds[:, j - 1]) for j in range(1, n_joints + 1)}
+    for channel in recipe.channels:
+        symbol = channel.symbol
+        if symbol in ("t", "t of forces", "Fy", "Fz") or (symbol[0] == "q" and symbol[1:].isdigit()):
+            continue
+        values = _on_clock(read, t, recipe.channels, symbol)
+        if symbol.startswith("dq"):
+            continue
+        if symbol.startswith("tau"):
+            values = values * recipe.convention.signs[int(symbol[-1]) - 1]
+        table[symbol if symbol.startswith("emg_") else f"{symbol}_{_SI[columns.dimension_of(symbol)]}"] = values
+    return table

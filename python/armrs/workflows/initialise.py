@@ -1,0 +1,239 @@
+"""A first data set and model of a person, from what a tape measure and a scale tell."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import _armrs, checks
+from ..errors import BadInput, Text
+from ..io import files
+from ..model import Joint, Model, Segment
+
+SEGMENTS = ("upper arm", "forearm", "hand")
+JOINTS = ("shoulder", "elbow", "wrist")
+UNCERTAINTY = 0.10
+"""Relative standard deviation of masses, centres of mass and inertias from body mass and height: between people of one build, after de Leva
+(1996) and Zatsiorsky and Seluyanov (1983)."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What the literature expects of one segment.
+
+    Attributes
+    ----------
+    name : str
+    length : float
+        Measured, or scaled with height [m].
+    mass, com, inertia : (float, float)
+        Mean and standard deviation among people: [kg], from the proximal joint [m], about the centre of mass [kg m²].
+    """
+
+    name: str
+    length: float
+    mass: tuple[float, float]
+    com: tuple[float, float]
+    inertia: tuple[float, float]
+
+    def segment(self) -> Segment:
+        """Return the segment with the expected values."""
+        return Segment(self.name, self.length, self.mass[0], self.com[0], self.inertia[0])
+
+
+@dataclass(frozen=True)
+class Worn:
+    """A mass that moves with a segment, such as a part of an orthosis or the handle in the hand.
+
+    Attributes
+    ----------
+    segment : int
+        From 1.
+    mass : float
+        [kg]
+    at : float, optional
+        From the segment's proximal joint [m]; its end when absent.
+    """
+
+    segment: int
+    mass: float
+    at: float | None = None
+
+
+@dataclass(frozen=True)
+class Initialised:
+    """What `armrs init` wrote, and what it assumed.
+
+    Attributes
+    ----------
+    folder : Path
+    model : Model
+    assumed : tuple of str
+        A line each.
+    """
+
+    folder: Path
+    model: Model
+    assumed: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain data."""
+        segments = [{n: getattr(s, n) for n in ("name", "length", "mass", "com", "inertia")} for s in self.model.segments]
+        return {"verb": "init", "folder": os.fspath(self.folder), "segments": segments, "assumed": list(self.assumed)}
+
+
+def segment_expectations(
+    body_mass: float, height: float, sex: str, lengths: Sequence[float | None] = (None, None, None)
+) -> tuple[Expected, ...]:
+    """Return what the literature expects of upper arm, forearm and hand.
+
+    Parameters
+    ----------
+    body_mass : float
+        [kg]
+    height : float
+        [m]
+    sex : {"male", "female"}
+    lengths : sequence of (float or None)
+        Measured lengths of one to three segments, proximal first [m]; None is scaled with height.
+
+    Returns
+    -------
+    tuple of Expected
+        One for each of `lengths`.
+
+    Notes
+    -----
+    Means: de Leva (1996), J. Biomech. 29, table 4. Standard deviations: regressions of Zatsiorsky and Seluyanov (1983, 1985).
+
+    Examples
+    --------
+    >>> import armrs
+    >>> round(armrs.segment_expectations(78.0, 1.80, "male", [0.322])[0].mass[0], 3)
+    2.114
+    """
+    body_mass = checks.number("body_mass", body_mass, least=1.0, most=500.0, unit="kg")
+    height = checks.number("height", height, least=0.3, most=3.0, unit="m", hint="centimetres?")
+    checks.choice("sex", sex, ("male", "female"))
+    if not 1 <= len(lengths) <= len(SEGMENTS):
+        raise BadInput("lengths", Text(f"{len(lengths)} lengths"), f"1 to {len(SEGMENTS)}: {', '.join(SEGMENTS)}")
+    for k, length in enumerate(lengths, start=1):
+        if length is not None:
+            checks.number(f"lengths, {k}", length, above=0.0, most=1.0, unit="m", hint="centimetres or millimetres?")
+    return tuple(Expected(**item) for item in _armrs.literature(body_mass, height, sex, list(lengths)))
+
+
+def initialise(
+    folder: str | os.PathLike[str],
+    *,
+    body_mass: float,
+    height: float,
+    sex: str,
+    lengths: Sequence[float | None] = (None, None, None),
+    worn: Sequence[Worn] = (),
+    replace: bool = False,
+) -> Initialised:
+    """Write a commented `dataset.toml` and `model.toml` of a person whose arm is not known yet.
+
+    Parameters
+    ----------
+    folder : path
+        Made when it does not exist.
+    body_mass, height, sex, lengths
+        As in `segment_expectations`; the number of lengths is that of the segments.
+    worn : sequence of Worn
+        Handle and parts of an orthosis; they become part of their segments.
+    replace : bool
+        Whether existing files may be replaced.
+
+    Returns
+    -------
+    Initialised
+
+    Raises
+    ------
+    BadInput
+        For values that no person has, and for a folder that holds a data set already.
+
+    Notes
+    -----
+    No joint has a law: stiffness, damping and friction are unknown, and belong to what `identify` and `gap` find.
+    """
+    target = files.output_folder(folder)
+    for name in ("dataset.toml", "model.toml"):
+        if (target / name).exists() and not replace:
+            raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)
+    expected = segment_expectations(body_mass, height, sex, lengths)
+    segments = tuple(e.segment() for e in expected)
+    model = Model(segments, tuple(Joint(name) for name in JOINTS[: len(segments)]), segment_uncertainty=UNCERTAINTY)
+    for item in worn:
+        model = model.with_mass(item.segment, item.mass, item.at)
+    assumed = _assumed(expected, lengths, worn)
+
+    def write(part: Path) -> list[Path]:
+        files.write_text(part / "model.toml", _model_text(model, assumed), kind=".toml")
+        files.write_text(part / "dataset.toml", _dataset_text(target, body_mass, height, sex), kind=".toml")
+        return [part / "model.toml", part / "dataset.toml"]
+
+    files.write_whole(target, write)
+    return Initialised(target, model, assumed)
+
+
+def _assumed(expected: Sequence[Expected], lengths: Sequence[float | None], worn: Sequence[Worn]) -> tuple[str, ...]:
+    lines = []
+    for e, measured in zip(expected, lengths, strict=True):
+        source = "measured" if measured is not None else "scaled with height"
+        lines.append(
+            f"{e.name}: length {e.length:.3f} m ({source}), mass {e.mass[0]:.3f} ± {e.mass[1]:.3f} kg, "
+            f"centre of mass {e.com[0]:.3f} ± {e.com[1]:.3f} m from its joint"
+        )
+    lines += [f"{SEGMENTS[w.segment - 1]}: {w.mass:g} kg worn at {'its end' if w.at is None else f'{w.at:g} m'}" for w in worn]
+    lines.append(f"masses, centres of mass and inertias are uncertain by {100 * UNCERTAINTY:.0f} % (one standard deviation)")
+    lines.append("the hand is counted to the third knuckle; the grip is neutral (thumb up)")
+    lines.append("joint laws are unknown: stiffness, damping and friction are left to be identified")
+    return tuple(lines)
+
+
+def _model_text(model: Model, assumed: Sequence[str]) -> str:
+    head = "".join(f"# {line}\n" for line in ("Literature values (de Leva 1996), as a first guess:", *assumed))
+    tail = """
+# The robot that leads the hand, for simulation and for the gap: two links, lengths and base in metres.
+# [robot]
+# lengths = [0.45, 0.45]
+# base = [1.05, -0.10]
+# elbow = "up"
+"""
+    return head + model.to_toml() + tail
+
+
+def _dataset_text(folder: Path, body_mass: float, height: float, sex: str) -> str:
+    return f"""# A data set: one folder, one model, one file for each trial. `armrs check` says what is missing or wrong.
+name = "{folder.resolve().name}"
+model = "model.toml"
+force_on = "robot"              # what the recorded force acts on: "robot" (the arm pushes the handle) or "arm"
+# sample_rate = 50.0            # Hz, where time stamps are uneven
+
+[subject]
+body_mass = {body_mass!r}
+height = {height!r}
+sex = "{sex}"
+
+# What the calibration promises, each as one standard deviation; the values shown are the defaults.
+# [tolerance]
+# angle_offset_deg = 0.3
+# force_bias_N = 0.2
+# force_gain = 0.01
+# time_delay_s = 0.005
+# handle_placement_m = 0.001
+
+# One table for each trial: columns t_s, q1_rad …, Fy_N, Fz_N; repeats of a movement carry one configuration.
+# `armrs import RAW… --model {folder.name}/model.toml -o DIR` writes all of this from your own recordings.
+[[trial]]
+file = "trials/slow_1.csv"
+configuration = "slow"
+repeat = 1
+role = "fit"                    # nothing is ever fitted on a "test" trial
+"""

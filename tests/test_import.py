@@ -1,0 +1,291 @@
+"""Recordings as laboratories have them become the same data set as the true one; hopeless ones are refused with all their problems at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.errors import BadInput, BadInputs
+
+SEGMENTS = (armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165), armrs.Segment("forearm", 0.264, 1.264, 0.121, 0.0074))
+JOINTS = (armrs.Joint("shoulder", stiffness=0.6, rest=-0.9, viscosity=0.15), armrs.Joint("elbow", stiffness=0.4, rest=0.7, viscosity=0.1))
+ROBOT = armrs.Robot((0.45, 0.45), (1.05, -0.10))
+TRUE = armrs.Model(SEGMENTS, JOINTS, robot=ROBOT)
+KNOWN = armrs.Model(SEGMENTS, (armrs.Joint("shoulder"), armrs.Joint("elbow")))
+"""What a laboratory knows: no joint law."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One trial in SI units and the conventions of armrs."""
+
+    t: np.ndarray
+    q: np.ndarray
+    force_on_robot: np.ndarray
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """A led arm at 100 Hz, rounded to what files hold: 0.1 ms, 1e-6 rad, 1e-5 N."""
+    points = np.radians([[-60, 40], [-25, 75], [-70, 90], [-40, 30], [-60, 40]])
+    run = armrs.simulate(TRUE, armrs.Movement(points, speed=0.5, acceleration=2.0), rate=100.0)
+    return Recording(np.round(run.t, 4), np.round(run.q, 6), np.round(-run.force_on_arm, 5))
+
+
+def table(r: Recording, *, names: list[str], t: float = 1.0, angle: float = 1.0, force: float = 1.0) -> tuple[list[str], np.ndarray]:
+    """Return names and values with factors on time, angles and forces."""
+    return names, np.column_stack([r.t * t, r.q * angle, r.force_on_robot * force])
+
+
+def write_text(
+    path: Path, names: list[str], values: np.ndarray, *, sep: str = ",", decimal: str = ".", encoding: str = "utf-8", above: str = ""
+) -> Path:
+    rows = [sep.join(f"{x:.9g}".replace(".", decimal) if np.isfinite(x) else "" for x in row) for row in values]
+    path.write_bytes((above + sep.join(names) + "\n" + "\n".join(rows) + "\n").encode(encoding))
+    return path
+
+
+SI = ["t_s", "q1_rad", "q2_rad", "Fy_N", "Fz_N"]
+DEGREE = 180.0 / np.pi
+Writer = Callable[[Recording, Path], Path]
+
+
+def german_spreadsheet(r: Recording, folder: Path) -> Path:
+    names = ["Zeit [ms]", "Schulter [°]", "Ellbogen [°]", "Kraft y [N]", "Kraft z [N]", "Bemerkung"]
+    _, values = table(r, names=names, t=1e3, angle=DEGREE)
+    lines = [";".join([*(f"{x:.9g}".replace(".", ",") for x in row), "ruhig" if k % 50 == 0 else ""]) for k, row in enumerate(values)]
+    path = folder / "langsam_1.csv"
+    path.write_bytes((";".join(names) + "\r\n" + "\r\n".join(lines) + "\r\n").encode("cp1252"))
+    return path
+
+
+def us_excel(r: Recording, folder: Path) -> Path:
+    return _excel(
+        folder / "slow_1.xlsx", *table(r, names=["Time (s)", "Shoulder (deg)", "Elbow (deg)", "Force Y (N)", "Force Z (N)"], angle=DEGREE)
+    )
+
+
+def german_excel(r: Recording, folder: Path) -> Path:
+    names, values = table(r, names=["Zeit", "Schulterwinkel", "Ellbogenwinkel", "Kraft y", "Kraft z"], t=1e3, angle=DEGREE)
+    return _excel(folder / "langsam_1.xlsx", names, values, units=["ms", "°", "°", "N", "N"], above=["Proband 7", "rechter Arm"])
+
+
+def _excel(path: Path, names: list[str], values: np.ndarray, units: list[str] | None = None, above: list[str] | None = None) -> Path:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for line in above or []:
+        book.active.append([line])
+    book.active.append(names)
+    if units:
+        book.active.append(units)
+    for row in values.tolist():
+        book.active.append(row)
+    book.save(path)
+    return path
+
+
+def matlab_5(r: Recording, folder: Path) -> Path:
+    from scipy.io import savemat
+
+    savemat(folder / "slow_1.mat", {"t": r.t, "q": r.q, "Fy": r.force_on_robot[:, 0], "Fz": r.force_on_robot[:, 1], "subject": "S1"})
+    return folder / "slow_1.mat"
+
+
+def matlab_7_3(r: Recording, folder: Path) -> Path:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "slow_1.mat", "w", userblock_size=512) as file:
+        for name, value in (("t", r.t[None]), ("q", r.q.T), ("Fy", r.force_on_robot[None, :, 0]), ("Fz", r.force_on_robot[None, :, 1])):
+            file[name] = np.ascontiguousarray(value)
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    return folder / "slow_1.mat"
+
+
+def c3d_with_analogs(r: Recording, folder: Path) -> Path:
+    """Markers at 100 Hz and the force on analog channels at 200 Hz, as ezc3d writes them."""
+    ezc3d = pytest.importorskip("ezc3d")
+    absolute = np.cumsum(r.q, axis=1)
+    elbow = np.stack([0.322 * np.cos(absolute[:, 0]), 0.322 * np.sin(absolute[:, 0])])
+    hand = elbow + np.stack([0.264 * np.cos(absolute[:, 1]), 0.264 * np.sin(absolute[:, 1])])
+    points = np.zeros((4, 3, len(r.t)))
+    points[0, 1], points[2, 1] = elbow
+    points[0, 2], points[2, 2] = hand
+    points[3] = 1.0
+    content = ezc3d.c3d()
+    content["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+    content["parameters"]["POINT"]["LABELS"]["value"] = ["SHO", "ELB", "HAND"]
+    content["parameters"]["POINT"]["UNITS"]["value"] = ["m"]
+    content["data"]["points"] = points
+    twice = np.arange(2 * len(r.t)) / 200.0
+    content["parameters"]["ANALOG"]["RATE"]["value"] = [200.0]
+    content["parameters"]["ANALOG"]["LABELS"]["value"] = ["Force Y", "Force Z"]
+    content["parameters"]["ANALOG"]["UNITS"]["value"] = ["N", "N"]
+    content["data"]["analogs"] = np.stack([np.interp(twice, r.t, f) for f in r.force_on_robot.T])[None]
+    content.write(str(folder / "slow_1.c3d"))
+    return folder / "slow_1.c3d"
+
+
+def motion_file(r: Recording, folder: Path) -> Path:
+    path = folder / "slow_1.sto"
+    names, values = table(r, names=["time", "shoulder", "elbow", "force_y", "force_z"])
+    head = f"slow\nversion=1\nnRows={len(values)}\nnColumns={len(names)}\ninDegrees=no\nendheader\n"
+    return write_text(path, names, values, sep="\t", above=head)
+
+
+def parquet(r: Recording, folder: Path) -> Path:
+    from armrs.io.samples import write_samples
+
+    names, values = table(r, names=SI)
+    write_samples(folder / "slow_1.parquet", names, list(values.T))
+    return folder / "slow_1.parquet"
+
+
+def text(name: str = "slow_1.csv", names: list[str] = SI, **options: object) -> Writer:
+    factors = {key: options.pop(key) for key in ("t", "angle", "force") if key in options}
+    return lambda r, folder: write_text(folder / name, *table(r, names=names, **factors), **options)  # type: ignore[arg-type]
+
+
+def turned(change: Callable[[np.ndarray], np.ndarray]) -> Writer:
+    def write(r: Recording, folder: Path) -> Path:
+        return write_text(folder / "slow_1.csv", SI, np.column_stack([r.t, change(r.q), r.force_on_robot]))
+
+    return write
+
+
+def hanging(q: np.ndarray) -> np.ndarray:
+    return q + np.array([0.5 * np.pi, 0.0])
+
+
+def with_gaps(r: Recording, folder: Path) -> Path:
+    names, values = table(r, names=SI)
+    values = values.copy()
+    values[200:206, 1] = np.nan
+    return write_text(folder / "slow_1.csv", names, values)
+
+
+def force_on_its_own_clock(r: Recording, folder: Path) -> Path:
+    """The force device runs at 250 Hz and started 1.3 s earlier."""
+    write_text(folder / "slow_1.csv", ["time [s]", "shoulder [rad]", "elbow [rad]"], np.column_stack([r.t, r.q]))
+    clock = np.arange(0.0, r.t[-1] + 2.0, 0.004)
+    force = np.column_stack([np.interp(clock - 1.3, r.t, f) for f in r.force_on_robot.T])
+    write_text(folder / "slow_1_force.csv", ["time [s]", "Fy [N]", "Fz [N]"], np.column_stack([clock, force]))
+    return folder
+
+
+CASES: dict[str, tuple[Writer, dict[str, object], float]] = {
+    "si": (text(), {}, 0.0),
+    "German spreadsheet": (german_spreadsheet, {}, 1e-7),
+    "US Excel": (us_excel, {}, 1e-12),
+    "German Excel with a row of units": (german_excel, {}, 1e-12),
+    "MATLAB 5": (matlab_5, {}, 0.0),
+    "MATLAB 7.3": (matlab_7_3, {}, 0.0),
+    "C3D with analogs": (c3d_with_analogs, {"points": ("SHO", "ELB", "HAND")}, 3e-6),
+    "OpenSim storage": (motion_file, {}, 0.0),
+    "Parquet": (parquet, {}, 0.0),
+    "tabs": (text("slow_1.txt", sep="\t"), {}, 0.0),
+    "blanks": (text("slow_1.dat", sep=" "), {}, 0.0),
+    "milliseconds without a unit": (text(names=["time", "q1", "q2", "Fy", "Fz"], t=1e3), {}, 0.0),
+    "microseconds": (text(names=["t [µs]", "q1", "q2", "Fy", "Fz"], t=1e6), {}, 0.0),
+    "degrees without a unit": (text(names=["t", "shoulder", "elbow", "Fy", "Fz"], angle=DEGREE), {}, 1e-7),
+    "kilonewtons": (text(names=["t_s", "q1_rad", "q2_rad", "Fy [kN]", "Fz [kN]"], force=1e-3), {}, 1e-7),
+    "comment rows": (text(above="# subject 7\n# right arm, 2026-03-14\n\n"), {}, 0.0),
+    "UTF-16": (text(encoding="utf-16"), {}, 0.0),
+    "Latin-1 names": (text(names=["Zeit (s)", "Schulter (rad)", "Ellbogen (rad)", "Kraft_y", "Kraft_z"], encoding="latin-1"), {}, 0.0),
+    "gaps": (with_gaps, {}, 0.0),
+    "mirrored": (turned(lambda q: -q), {}, 1e-9),
+    "absolute": (turned(lambda q: np.cumsum(q, axis=1)), {}, 1e-9),
+    "from the vertical": (turned(hanging), {}, 1e-8),
+    "mirrored and from the vertical": (turned(lambda q: -hanging(q)), {}, 1e-8),
+    "force on its own clock": (force_on_its_own_clock, {}, 2e-2),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_recording_becomes_the_true_data_set(case: str, recording: Recording, tmp_path: Path) -> None:
+    write, options, rounding = CASES[case]
+    raw = tmp_path / "raw"
+    raw.mkdir()
+    path = write(recording, raw)
+    sources = sorted(path.iterdir()) if path.is_dir() else [path]
+    done = armrs.import_recordings(sources, tmp_path / "session", model=KNOWN, **options)  # type: ignore[arg-type]
+    (trial,) = armrs.load_dataset(done.folder).trials
+    same = np.isfinite(trial.force_on_arm).all(axis=1)
+    assert same.mean() > 0.9
+    n = len(trial.t)
+    assert np.abs(trial.t - recording.t[:n]).max() <= 1e-9
+    assert np.abs(trial.q - recording.q[:n])[same].max() <= rounding + (1e-3 if case == "gaps" else 0.0)
+    worst = np.abs(trial.force_on_arm + recording.force_on_robot[:n])[same].max()
+    assert worst <= max(rounding, 1e-9) * np.abs(recording.force_on_robot).max()
+    assert trial.configuration in ("slow", "langsam") and trial.repeat == 1
+
+
+def test_import_toml_repeats_an_import(recording: Recording, tmp_path: Path) -> None:
+    raw = german_spreadsheet(recording, tmp_path)
+    first = armrs.import_recordings([raw], tmp_path / "a", model=KNOWN)
+    second = armrs.import_recordings([first.folder / "import.toml"], tmp_path / "b", model=KNOWN)
+    for name in ("trials/langsam_1.csv", "dataset.toml"):
+        a, b = ((folder / name).read_text().replace('"a"', "").replace('"b"', "") for folder in (first.folder, second.folder))
+        assert a == b
+    assert 'column = "Zeit [ms]"' in (first.folder / "import.toml").read_text()
+
+
+def test_the_last_of_three_repeats_is_kept_as_test(recording: Recording, tmp_path: Path) -> None:
+    names, values = table(recording, names=SI)
+    noise = np.random.default_rng(7)
+    files = [
+        write_text(tmp_path / f"slow_{k}.csv", names, values + 1e-4 * noise.standard_normal(values.shape) * [0, 1, 1, 1, 1])
+        for k in (1, 2, 3)
+    ]
+    done = armrs.import_recordings(files, tmp_path / "session", model=KNOWN)
+    assert [(t.repeat, t.role) for t in done.recipe.trials] == [(1, "fit"), (2, "fit"), (3, "test")]
+
+
+HOPELESS: dict[str, tuple[Writer, str]] = {
+    "no angles": (text(names=["t_s", "a", "b", "Fy_N", "Fz_N"]), "an angle of every joint"),
+    "no time": (text(names=["frame", "q1_rad", "q2_rad", "Fy_N", "Fz_N"]), "no column for t"),
+    "one force": (text(names=["t_s", "q1_rad", "q2_rad", "Fy_N", "other"]), "no column for Fz"),
+    "an angle in newtons": (text(names=["t_s", "q1 [N]", "q2_rad", "Fy_N", "Fz_N"]), "a unit of angle for q1"),
+    "two shoulders": (text(names=["t_s", "shoulder_rad", "shoulder [rad]", "Fy_N", "Fz_N"]), "one column for q1"),
+    "words": (lambda r, folder: _written(folder / "slow_1.csv", b"hello\nworld\n"), "no block of rows"),
+    "a picture": (lambda r, folder: _written(folder / "slow_1.csv", b"\x89PNG\r\n\x1a\n\0\0\0" * 20), "binary data"),
+    "no workbook": (lambda r, folder: _written(folder / "slow_1.xlsx", b"PK\x03\x04 broken"), "no readable workbook"),
+    "no MATLAB file": (lambda r, folder: _written(folder / "slow_1.mat", b"MATLAB 5.0 " + b"x" * 600), "MATLAB"),
+    "forces of noise": (
+        lambda r, folder: write_text(
+            folder / "slow_1.csv", SI, np.column_stack([r.t, r.q, np.random.default_rng(3).standard_normal((len(r.t), 2))])
+        ),
+        "unexplained",
+    ),
+}
+
+
+def _written(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("case", HOPELESS)
+def test_a_hopeless_recording_is_refused_and_nothing_written(case: str, recording: Recording, tmp_path: Path) -> None:
+    if case == "no workbook":
+        pytest.importorskip("openpyxl")
+    write, words = HOPELESS[case]
+    path = write(recording, tmp_path)
+    with pytest.raises(BadInput) as refused:
+        armrs.import_recordings([path], tmp_path / "session", model=KNOWN)
+    listed = refused.value.problems if isinstance(refused.value, BadInputs) else (refused.value,)
+    assert any(words in str(problem) for problem in listed), [str(p) for p in listed]
+    assert all(str(path) in str(p) or "angles and forces" in str(p) for p in listed)
+    assert not (tmp_path / "session").exists()
+
+
+def test_all_problems_are_said_at_once(recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = text(names=["frame", "q1 [N]", "q2_rad", "Fy_N", "other"])(recording, tmp_path)
+    KNOWN.write(tmp_path / "model.toml")
+    assert cli.main(["import", str(path), "--model", str(tmp_path / "model.toml"), "-o", str(tmp_path / "session")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) >= 3 and all(line.startswith("armrs: ") for line in lines)

@@ -1,0 +1,170 @@
+"""URDF and MJCF come back as they went, and the exported arm moves in MuJoCo, Pinocchio and OpenSim as it does here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.rig import arm, rig
+
+SEGMENTS = (
+    armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165),
+    armrs.Segment("forearm", 0.264, 1.264, 0.121, 0.0074, com_normal=0.01),
+    armrs.Segment("hand", 0.093, 0.753, 0.071, 0.0016),
+)
+JOINTS = (
+    armrs.Joint("shoulder", stiffness=1.2, rest=-0.7, viscosity=0.25),
+    armrs.Joint("elbow", stiffness=0.8, rest=0.6, viscosity=0.2),
+    armrs.Joint("wrist", stiffness=0.5, viscosity=0.1),
+)
+SMOOTH = armrs.Model(SEGMENTS, JOINTS, base=(0.1, 0.4))
+"""What every format with springs holds."""
+RICH = armrs.Model(
+    SEGMENTS,
+    (*JOINTS[:2], armrs.Joint("wrist", viscosity=0.1, coulomb=0.05)),
+    effects=(armrs.Effect("motor_inertia", 1, parameters={"inertia": 0.02}), armrs.Effect("biarticular", 2, parameters={"stiffness": 0.7, "ratio": 0.8, "rest": 0.3})),
+)  # fmt: skip
+DAMPED = armrs.Model(SEGMENTS, tuple(armrs.Joint(j.name, viscosity=j.viscosity) for j in JOINTS))
+START = np.array([-0.9, 0.5, 0.2])
+STEP, STEPS = 5e-4, 4000
+
+
+def swing(model: armrs.Model) -> np.ndarray:
+    """A free swing of 2 s by the kernels of armrs and fourth-order Runge-Kutta, shape (STEPS + 1, n) [rad]."""
+    kernels, resisting = arm(model), rig(model)
+
+    def rate(state: np.ndarray) -> np.ndarray:
+        q, qd = state[None, :3], state[None, 3:]
+        torque = -resisting.resisting(q, qd, np.zeros((1, 3)), 1.0).reshape(1, -1)
+        joints = [0, 0, 1, 1, 2, 2] if torque.shape[1] == 6 else [0, 1, 2]
+        total = np.zeros((1, 3))
+        for j, value in zip(joints, torque[0], strict=True):
+            total[0, j] += value
+        return np.concatenate([qd[0], kernels.forward_dynamics(q, qd, total)[0]])
+
+    states = [np.concatenate([START, np.zeros(3)])]
+    for _ in range(STEPS):
+        x = states[-1]
+        a = rate(x)
+        b = rate(x + 0.5 * STEP * a)
+        c = rate(x + 0.5 * STEP * b)
+        d = rate(x + STEP * c)
+        states.append(x + STEP / 6.0 * (a + 2.0 * b + 2.0 * c + d))
+    return np.array(states)[:, :3]
+
+
+def test_mujoco_moves_the_exported_arm_as_we_do(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    done = armrs.export_model(SMOOTH, tmp_path / "arm.xml")
+    assert done.lost == ()
+    model = mujoco.MjModel.from_xml_path(str(done.path))
+    data = mujoco.MjData(model)
+    data.qpos[:] = START
+    angles = [START]
+    for _ in range(STEPS):
+        mujoco.mj_step(model, data)
+        angles.append(data.qpos.copy())
+    assert np.abs(np.array(angles) - swing(SMOOTH)).max() < 1e-6
+
+
+def test_pinocchio_moves_the_exported_arm_as_we_do(tmp_path: Path) -> None:
+    pin = pytest.importorskip("pinocchio")
+    done = armrs.export_model(DAMPED, tmp_path / "arm.urdf")
+    model = pin.buildModelFromUrdf(str(done.path))
+    model.gravity.linear = np.array([0.0, 0.0, -9.81])
+    data = model.createData()
+    damping = np.array([j.viscosity for j in DAMPED.joints])
+    # Pinocchio reads continuous joints as cosine and sine; their speeds are ours.
+    q = np.array([f(a) for a in START for f in (np.cos, np.sin)])
+    angles, qd = START.copy(), np.zeros(3)
+    expected = swing(DAMPED)
+
+    def rate(x: np.ndarray) -> np.ndarray:
+        at = np.array([f(a) for a in x[:3] for f in (np.cos, np.sin)])
+        return np.concatenate([x[3:], pin.aba(model, data, at, x[3:], -damping * x[3:])])
+
+    x = np.concatenate([angles, qd])
+    assert len(q) == model.nq
+    worst = 0.0
+    for k in range(STEPS):
+        a = rate(x)
+        b = rate(x + 0.5 * STEP * a)
+        c = rate(x + 0.5 * STEP * b)
+        d = rate(x + STEP * c)
+        x = x + STEP / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        worst = max(worst, float(np.abs(x[:3] - expected[k + 1]).max()))
+    assert worst < 1e-6
+
+
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_what_a_format_holds_comes_back_to_the_bit(suffix: str, tmp_path: Path) -> None:
+    model = RICH if suffix == ".xml" else armrs.Model(SEGMENTS, (*DAMPED.joints[:2], RICH.joints[2]), base=(0.1, 0.4))
+    again = armrs.import_model(armrs.export_model(model, tmp_path / f"arm{suffix}").path)
+    assert again.segments == model.segments
+    assert again.joints == model.joints
+    assert sorted(again.effects, key=str) == sorted(model.effects, key=str)
+    assert again.base == model.base
+
+
+def test_what_a_format_cannot_hold_is_listed(tmp_path: Path) -> None:
+    with_robot = RICH.replace(robot=armrs.Robot((0.45, 0.45), (1.05, -0.1)))
+    lost = armrs.export_model(with_robot, tmp_path / "arm.urdf").lost
+    for words in ("stiffness 1.2 N m/rad", "rotor inertia 0.02", "biarticular of joint 2", "the robot", "gravity"):
+        assert any(words in line for line in lost), words
+    lost = armrs.export_model(with_robot, tmp_path / "arm.osim").lost
+    for words in ("dry friction 0.05", "rotor inertia", "biarticular"):
+        assert any(words in line for line in lost), words
+
+
+def edited(change: Callable[[str], str]) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        path = armrs.export_model(DAMPED, folder / "arm.urdf").path
+        path.write_text(change(path.read_text()))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: "<!DOCTYPE x [<!ENTITY a 'b'>]>" + s.split("?>")[1], "document type"),
+        (lambda s: s.replace('xyz="1 0 0"', 'xyz="0 1 0"', 1), "1 0 0"),
+        (lambda s: s.replace('type="continuous"', 'type="prismatic"', 1), "continuous or revolute"),
+        (lambda s: s.replace("<robot", "<sdf", 1).replace("</robot", "</sdf"), "<robot>"),
+        (lambda s: s.replace('value="2.114"', 'value="heavy"'), "finite number"),
+        (lambda s: s[: len(s) // 2], "well-formed"),
+    ],
+)
+def test_a_chain_that_is_not_planar_is_refused_by_name(change: Callable[[str], str], words: str, tmp_path: Path) -> None:
+    with pytest.raises(armrs.BadInput, match=words):
+        armrs.import_model(edited(change)(tmp_path))
+
+
+def test_opensim_balances_the_exported_arm_as_we_do(tmp_path: Path) -> None:
+    """Accelerations from rest at three postures; OpenSim is no dependency, so this runs where it is installed."""
+    opensim = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
+    model = opensim.Model(str(armrs.export_model(SMOOTH, tmp_path / "arm.osim").path))
+    state = model.initSystem()
+    kernels, resisting = arm(SMOOTH), rig(SMOOTH)
+    for q in (START, START + 0.5, -START):
+        for k, name in enumerate(("shoulder", "elbow", "wrist")):
+            model.getCoordinateSet().get(name).setValue(state, float(q[k]), False)
+        model.realizeAcceleration(state)
+        found = [model.getCoordinateSet().get(n).getAccelerationValue(state) for n in ("shoulder", "elbow", "wrist")]
+        torque = -resisting.resisting(q[None], np.zeros((1, 3)), np.zeros((1, 3)), 1.0).reshape(3, 2).sum(axis=1)
+        assert found == pytest.approx(kernels.forward_dynamics(q[None], np.zeros((1, 3)), torque[None])[0], rel=1e-9)
+
+
+def test_the_command_converts_models_both_ways(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    RICH.write(tmp_path / "arm.toml")
+    assert cli.main(["convert", str(tmp_path / "arm.toml"), "--to", "mjcf", "-o", str(tmp_path / "out")]) == 0
+    assert "dry friction" in capsys.readouterr().err
+    assert cli.main(["convert", str(tmp_path / "out" / "arm.xml"), "--to", "toml", "-o", str(tmp_path / "back")]) == 0
+    assert armrs.load_model(tmp_path / "back" / "arm.toml").joints == RICH.joints
+    assert cli.main(["convert", str(tmp_path / "out" / "arm.xml"), "--to", "osim", "-o", str(tmp_path / "back")]) == 2
