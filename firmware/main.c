@@ -93,7 +93,7 @@ static int set_up(void) {
   effects[9].parameters[3] = (armrs_real)1.7;
   effects[9].parameters[4] = (armrs_real)0.5;
   bad |= effect(&effects[10], "biarticular", 2, 0, 0);
-  if (bad || armrs_arm_init(&arm, &segments, &base, &gravity, effects, 11) != ARMRS_OK) return 1;
+  if (bad || armrs_arm_init(&arm, segments, base, gravity, effects, 11, 0) != ARMRS_OK) return 1;
 
   static const armrs_real degrees[WAYPOINTS][ARMRS_JOINTS] = {
       {-68, 40, 0}, {-40, 60, 5}, {-60, 95, 0}, {-25, 55, 5}, {-70, 70, 0}, {-35, 90, 5}, {-68, 40, 0},
@@ -105,34 +105,29 @@ static int set_up(void) {
     limits[j].acceleration = (armrs_real)4;
     for (size_t w = 0; w < WAYPOINTS; w++) waypoints[w][j] = degrees[w][j] * DEGREE;
   }
-  const armrs_real (*first)[ARMRS_JOINTS] = (const armrs_real (*)[ARMRS_JOINTS])waypoints;
-  if (armrs_path_init(&path, first, WAYPOINTS, (const armrs_limits (*)[ARMRS_JOINTS])&limits, (armrs_real)0.1, 1) !=
-      ARMRS_OK)
-    return 1;
+  if (armrs_path_init(&path, waypoints[0], WAYPOINTS, limits, (armrs_real)0.1, 1, 0) != ARMRS_OK) return 1;
 
   static const armrs_real lengths[2] = {(armrs_real)0.45, (armrs_real)0.45};
   static const armrs_real robot_base[2] = {(armrs_real)1.05, (armrs_real)-0.10};
-  if (armrs_robot_init(&robot, &lengths, &robot_base, 1) != ARMRS_OK) return 1;
+  if (armrs_robot_init(&robot, lengths, robot_base, 1, 0) != ARMRS_OK) return 1;
 
   armrs_settings settings;
-  if (armrs_estimator_settings(&settings, PERIOD) != ARMRS_OK) return 1;
+  if (armrs_estimator_settings(&settings, &arm, PERIOD) != ARMRS_OK) return 1;
   settings.cutoff = (armrs_real)10;
-  settings.fastest = (armrs_real)20;
-  settings.steepest = (armrs_real)5000;
   settings.forgetting = (armrs_real)120;
   for (size_t j = 0; j < ARMRS_JOINTS; j++) settings.noise[j] = (armrs_real)0.03;
-  if (armrs_estimator_init(&estimator, &arm, (armrs_real)0.1, &settings) != ARMRS_OK) return 1;
+  if (armrs_estimator_init(&estimator, &arm, (armrs_real)0.1, &settings, 0) != ARMRS_OK) return 1;
 
   /* Angles, speeds, forces, power into the arm. */
   armrs_channel channels[9];
   for (size_t j = 0; j < ARMRS_JOINTS; j++) {
-    channels[j] = (armrs_channel){ARMRS_ANGLE, (armrs_real)-2, (armrs_real)2, 50000};
-    channels[3 + j] = (armrs_channel){ARMRS_SPEED, (armrs_real)-3, (armrs_real)3, 0};
+    channels[j] = (armrs_channel){ARMRS_ANGLE, (armrs_real)-2, (armrs_real)2, (armrs_real)10, (armrs_real)0.02, 50000};
+    channels[3 + j] = (armrs_channel){ARMRS_SPEED, (armrs_real)-3, (armrs_real)3, 0, 0, 0};
   }
-  channels[6] = (armrs_channel){ARMRS_FORCE, (armrs_real)-100, (armrs_real)100, 0};
+  channels[6] = (armrs_channel){ARMRS_FORCE, (armrs_real)-100, (armrs_real)100, 0, (armrs_real)10, 0};
   channels[7] = channels[6];
-  channels[8] = (armrs_channel){ARMRS_POWER, (armrs_real)-60, (armrs_real)60, 0};
-  return armrs_monitor_init(&monitor, channels, 9, 2 * PERIOD_US) != ARMRS_OK;
+  channels[8] = (armrs_channel){ARMRS_POWER, (armrs_real)-60, (armrs_real)60, 0, 0, 0};
+  return armrs_monitor_init(&monitor, channels, 9, 2 * PERIOD_US, 2 * PERIOD_US, 0) != ARMRS_OK;
 }
 
 /* ---- one control period */
@@ -158,8 +153,8 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   armrs_real handle[2], robot_q[2], rows[2][ARMRS_JOINTS];
   armrs_status status = armrs_path_at(&path, (armrs_real)k * PERIOD, &wanted);
   if (status == ARMRS_OK)
-    status = armrs_kinematics(&arm, (const armrs_real (*)[ARMRS_JOINTS])&wanted.q, &handle, &rows);
-  if (status == ARMRS_OK) status = armrs_robot_angles(&robot, (const armrs_real (*)[2])&handle, &robot_q);
+    status = armrs_kinematics(&arm, wanted.q, handle, rows);
+  if (status == ARMRS_OK) status = armrs_robot_angles(&robot, handle, robot_q);
   if (status != ARMRS_OK) return status;
   count(0, &since);
 
@@ -167,7 +162,7 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   armrs_load load;
   memset(&load, 0, sizeof load);
   for (size_t c = 0; c < 2; c++) load.force_on_arm[c] = (armrs_real)sensor->force[c] * ((armrs_real)220 / 4096);
-  status = armrs_inverse_dynamics(&arm, &wanted, &load, (armrs_real (*)[ARMRS_JOINTS])needed);
+  status = armrs_inverse_dynamics(&arm, &wanted, &load, needed);
   if (status != ARMRS_OK) return status;
   count(1, &since);
 
@@ -211,8 +206,7 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   /* What carries it there? */
   armrs_motion still = wanted;
   for (size_t j = 0; j < ARMRS_JOINTS; j++) still.qd[j] = still.qdd[j] = 0;
-  status = armrs_estimator_carry(&estimator, &still, (armrs_real (*)[ARMRS_JOINTS])torque,
-                                 (armrs_real (*)[ARMRS_JOINTS])sd);
+  status = armrs_estimator_carry(&estimator, &still, torque, sd);
   count(4, &since);
   count(6, &begin);
   digest_values(robot_q, 2);

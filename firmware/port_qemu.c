@@ -68,7 +68,11 @@ static void fault(void) {
   stop(1);
 }
 
-__attribute__((section(".vectors"), used)) static const void *const vectors[] = {
-    stack_end, (const void *)reset, (const void *)fault, (const void *)fault,
-    (const void *)fault, (const void *)fault, (const void *)fault,
+typedef union {
+  const void *stack;
+  void (*run)(void);
+} vector;
+
+__attribute__((section(".vectors"), used)) static const vector vectors[] = {
+    {.stack = stack_end}, {.run = reset}, {.run = fault}, {.run = fault}, {.run = fault}, {.run = fault}, {.run = fault},
 };

@@ -3,7 +3,7 @@
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
 
-use arm_core::effect::{Effect, KINDS, Kind, Motion, resisting_torque};
+use arm_core::effect::{ActsOn, Effect, KINDS, Kind, Motion, applied, resisting_torque};
 use arm_core::{
     Chain, Equation, Load, Pose, Segment, forward_dynamics, gravity, inverse_dynamics, jacobian,
     joint_force, static_torque, tip,
@@ -12,7 +12,8 @@ use arm_core::{
 use crate::held::{Held, held};
 use crate::motion::{armrs_motion, array, joints};
 use crate::status::{
-    ARMRS_NULL, ARMRS_OUT_OF_RANGE, ARMRS_UNKNOWN, armrs_status, ended, finite, given, place,
+    ARMRS_CANNOT_ACT, ARMRS_IMPLAUSIBLE, ARMRS_NULL, ARMRS_OUT_OF_RANGE, ARMRS_UNKNOWN, Refusal,
+    armrs_problem, armrs_status, ended, finite, given, numbers, place, places, told,
 };
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_real};
 
@@ -79,7 +80,8 @@ pub struct Kept {
 
 held!(armrs_arm holds Kept, b"arm  0.1");
 
-/// The effect of the catalogue with a name such as "coulomb", at a joint counted from zero, with its default values.
+/// The effect of the catalogue with a name such as "coulomb", at a joint (or segment) counted from zero, with its default
+/// values. ARMRS_CANNOT_ACT for those of the rig and the sensors, ARMRS_UNKNOWN for a name that does not exist.
 ///
 /// # Safety
 /// `name` is null or a string that ends with zero; `effect` is null or points to an effect.
@@ -101,6 +103,9 @@ pub unsafe extern "C" fn armrs_effect_named(
         let (number, kind) = found
             .find(|(_, kind)| kind.info().kind.as_bytes() == name)
             .ok_or(ARMRS_UNKNOWN)?;
+        if matches!(kind.acts_on(), ActsOn::Rig | ActsOn::Sensors) {
+            return Err(ARMRS_CANNOT_ACT);
+        }
         *effect = armrs_effect {
             kind: number as u32,
             joint,
@@ -113,50 +118,145 @@ pub unsafe extern "C" fn armrs_effect_named(
 
 /// Makes an arm that hangs at `base` [m] under `gravity` [m/s^2], usually {0, -9.81}.
 ///
-/// `effects`: `count` of them, at most ARMRS_EFFECTS; those that act in joints. Their states start at zero.
+/// `segments`: ARMRS_JOINTS of them, proximal first. `effects`: `count` of them, at most ARMRS_EFFECTS. Those that act on the
+/// arm itself (added_mass, gravity_moment, inertia, segment_length, motor_inertia, gravity_tilt) become part of it; those of
+/// the joints stay effects, and their states start at zero. Those of the rig and of the sensors are refused with
+/// ARMRS_CANNOT_ACT. An arm that cannot be is ARMRS_IMPLAUSIBLE: a segment longer than 3 m or heavier than 200 kg, a centre of
+/// mass more than a quarter of the length beyond its segment, a radius of gyration above twice the length, gravity above
+/// 30 m/s^2. `problem`, if not null, says what was refused.
 ///
+/// cbindgen:ptrs-as-arrays=[[segments; ARMRS_JOINTS], [base; 2], [gravity; 2]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_arm_init(
     arm: *mut armrs_arm,
-    segments: *const [armrs_segment; ARMRS_JOINTS],
-    base: *const [armrs_real; 2],
-    gravity: *const [armrs_real; 2],
+    segments: *const armrs_segment,
+    base: *const armrs_real,
+    gravity: *const armrs_real,
     effects: *const armrs_effect,
     count: usize,
+    problem: *mut armrs_problem,
 ) -> armrs_status {
     let run = || {
+        // SAFETY: as promised by the caller; an array has the alignment of its elements.
+        let (arm, segments) = unsafe {
+            (
+                place(arm)?,
+                given(segments.cast::<[armrs_segment; ARMRS_JOINTS]>())?,
+            )
+        };
         // SAFETY: as promised by the caller.
-        let (arm, segments) = unsafe { (place(arm)?, given(segments)?) };
-        // SAFETY: as promised by the caller.
-        let (base, gravity) = unsafe { (given(base)?, given(gravity)?) };
+        let (base, gravity) = unsafe { (numbers(base)?, numbers(gravity)?) };
         let segments = segments.map(|s| Segment {
             length: s.length,
             mass: s.mass,
             com: s.com,
             inertia: s.inertia,
         });
-        let mut kept = [off(); ARMRS_EFFECTS];
         if count > ARMRS_EFFECTS {
-            return Err(ARMRS_OUT_OF_RANGE);
+            let limits = [count as armrs_real, 0.0, ARMRS_EFFECTS as armrs_real];
+            return Err(
+                Refusal::named(ARMRS_OUT_OF_RANGE, ["number of effects", ""], 0).numbers(limits),
+            );
         }
-        for (i, effect) in kept.iter_mut().take(count).enumerate() {
-            // SAFETY: there are `count` effects.
-            let from = unsafe { given(effects.wrapping_add(i))? };
-            let kind = *KINDS.get(from.kind as usize).ok_or(ARMRS_UNKNOWN)?;
-            *effect = Effect {
-                parameters: from.parameters,
-                ..Effect::new(kind, from.joint as usize)
-            };
+        // SAFETY: there are `count` effects.
+        let mut kept = unsafe { taken(effects, count)? };
+        let bare = Chain::new(segments, *base, *gravity)?;
+        let chain = applied(&bare, &kept).map_err(|(index, why)| {
+            let kind = kept.get(index).map_or("", |e| e.kind.info().kind);
+            Refusal::of_effect(why, kind, index)
+        })?;
+        plausible(&chain)?;
+        // What is now part of the arm must not act twice.
+        for effect in kept.iter_mut().filter(|e| e.kind.acts_on() == ActsOn::Arm) {
+            *effect = off();
         }
         arm.keep(&Kept {
-            equation: Equation::new(Chain::new(segments, *base, *gravity)?, kept)?,
+            equation: Equation::new(chain, kept)?,
             memory: [0.0; ARMRS_EFFECTS],
         });
         Ok(())
     };
-    ended(run())
+    // SAFETY: as promised by the caller.
+    unsafe { told(run(), problem) }
+}
+
+/// The effects of a list, and none in the other places.
+///
+/// # Safety
+/// There are `count` effects behind the pointer, at most ARMRS_EFFECTS, or it is null.
+unsafe fn taken(
+    effects: *const armrs_effect,
+    count: usize,
+) -> Result<[Effect<armrs_real>; ARMRS_EFFECTS], Refusal> {
+    let mut kept = [off(); ARMRS_EFFECTS];
+    for (i, effect) in kept.iter_mut().take(count).enumerate() {
+        // SAFETY: as promised by the caller.
+        let from = unsafe { given(effects.wrapping_add(i))? };
+        let unknown = || Refusal::named(ARMRS_UNKNOWN, ["number of the kind", ""], i);
+        let kind = *KINDS.get(from.kind as usize).ok_or_else(unknown)?;
+        *effect = Effect {
+            parameters: from.parameters,
+            ..Effect::new(kind, from.joint as usize)
+        };
+    }
+    Ok(kept)
+}
+
+/// Longest segment [m], and heaviest [kg].
+const LARGEST: [f64; 2] = [3.0, 200.0];
+/// How far beyond its segment a centre of mass may lie, in lengths: a hand's grip is nearer than its fingers.
+const BEYOND: f64 = 0.25;
+/// Largest radius of gyration, in lengths.
+const WIDEST: f64 = 2.0;
+/// Strongest gravity [m/s^2].
+const STRONGEST: f64 = 30.0;
+
+/// Whether an arm can be one of a person or of a machine that a person is led by; units that were confused make it none.
+#[inline(never)]
+fn plausible(chain: &Chain<armrs_real, ARMRS_JOINTS>) -> Result<(), Refusal> {
+    let within = |name, index, found: armrs_real, min: armrs_real, max: armrs_real| {
+        if found >= min && found <= max {
+            return Ok(());
+        }
+        Err(Refusal::named(ARMRS_IMPLAUSIBLE, [name, ""], index).numbers([found, min, max]))
+    };
+    let [longest, heaviest] = LARGEST.map(|v| v as armrs_real);
+    let beyond = BEYOND as armrs_real;
+    for (index, s) in chain.segments().iter().enumerate() {
+        within("length of segment", index, s.length, 0.0, longest)?;
+        within("mass of segment", index, s.mass, 0.0, heaviest)?;
+        let (min, max) = (-beyond * s.length, (1.0 + beyond) * s.length);
+        within(
+            "centre of mass of segment, along",
+            index,
+            s.com[0],
+            min,
+            max,
+        )?;
+        let side = (1.0 + beyond) * s.length;
+        within(
+            "centre of mass of segment, normal",
+            index,
+            s.com[1],
+            -side,
+            side,
+        )?;
+        let reach = WIDEST as armrs_real * s.length;
+        within(
+            "inertia of segment",
+            index,
+            s.inertia,
+            0.0,
+            s.mass * reach * reach,
+        )?;
+    }
+    let strongest = STRONGEST as armrs_real;
+    for (index, &g) in chain.gravity().iter().enumerate() {
+        within("gravity component", index, g, -strongest, strongest)?;
+    }
+    Ok(())
 }
 
 /// A place without an effect.
@@ -198,30 +298,36 @@ pub unsafe extern "C" fn armrs_arm_advance(
 /// Where the tip is at joint angles: `point` is its position [m], `rows` the derivative of that to the angles, row y, then row z
 /// [m/rad]. Either may be null.
 ///
+/// cbindgen:ptrs-as-arrays=[[q; ARMRS_JOINTS], [point; 2]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_kinematics(
     arm: *const armrs_arm,
-    q: *const [armrs_real; ARMRS_JOINTS],
-    point: *mut [armrs_real; 2],
-    rows: *mut [[armrs_real; ARMRS_JOINTS]; 2],
+    q: *const armrs_real,
+    point: *mut armrs_real,
+    rows: *mut [armrs_real; ARMRS_JOINTS],
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (arm, q) = unsafe { (given(arm)?, given(q)?) };
+        let (arm, q) = unsafe { (given(arm)?, numbers(q)?) };
         let (chain, pose) = (
             arm.inner()?.equation.chain(),
             Pose::new(&joints(&finite(*q)?)),
         );
-        // SAFETY: as promised by the caller.
-        if let Some(point) = unsafe { point.as_mut() } {
-            *point = tip(chain, &pose);
+        let position = finite(tip(chain, &pose))?;
+        let found = jacobian(chain, &pose);
+        let derivative = [0, 1].map(|row| core::array::from_fn(|j| found[(row, j)]));
+        for row in derivative {
+            finite(row)?;
         }
         // SAFETY: as promised by the caller.
-        if let Some(rows) = unsafe { rows.as_mut() } {
-            let found = jacobian(chain, &pose);
-            *rows = [0, 1].map(|row| core::array::from_fn(|j| found[(row, j)]));
+        if let Ok(point) = unsafe { places(point) } {
+            *point = position;
+        }
+        // SAFETY: as promised by the caller.
+        if let Ok(rows) = unsafe { place(rows.cast::<[[armrs_real; ARMRS_JOINTS]; 2]>()) } {
+            *rows = derivative;
         }
         Ok(())
     };
@@ -230,17 +336,18 @@ pub unsafe extern "C" fn armrs_kinematics(
 
 /// Torques that hold the arm still against gravity [N m].
 ///
+/// cbindgen:ptrs-as-arrays=[[q; ARMRS_JOINTS], [torque; ARMRS_JOINTS]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_gravity(
     arm: *const armrs_arm,
-    q: *const [armrs_real; ARMRS_JOINTS],
-    torque: *mut [armrs_real; ARMRS_JOINTS],
+    q: *const armrs_real,
+    torque: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (arm, q, torque) = unsafe { (given(arm)?, given(q)?, place(torque)?) };
+        let (arm, q, torque) = unsafe { (given(arm)?, numbers(q)?, places(torque)?) };
         let found = gravity(arm.inner()?.equation.chain(), &Pose::new(&joints(q)));
         *torque = finite(array(&found))?;
         Ok(())
@@ -251,20 +358,21 @@ pub unsafe extern "C" fn armrs_gravity(
 /// Torques with which the effects resist a motion [N m]. `force_on_arm`: at the tip, for friction that grows with the load;
 /// null for none.
 ///
+/// cbindgen:ptrs-as-arrays=[[force_on_arm; 2], [torque; ARMRS_JOINTS]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_resistance(
     arm: *const armrs_arm,
     motion: *const armrs_motion,
-    force_on_arm: *const [armrs_real; 2],
-    torque: *mut [armrs_real; ARMRS_JOINTS],
+    force_on_arm: *const armrs_real,
+    torque: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (arm, motion, torque) = unsafe { (given(arm)?, given(motion)?, place(torque)?) };
+        let (arm, motion, torque) = unsafe { (given(arm)?, given(motion)?, places(torque)?) };
         // SAFETY: as promised by the caller.
-        let force = unsafe { force_on_arm.as_ref() }
+        let force = unsafe { numbers(force_on_arm) }
             .copied()
             .unwrap_or_default();
         let seen = motion.core()?;
@@ -293,6 +401,7 @@ fn resistance(
 /// Torques that motors would need for a motion under a load [N m]: inertia, gravity and effects, less what the load's force
 /// and moment do. The load's own torques are not counted.
 ///
+/// cbindgen:ptrs-as-arrays=[[torque; ARMRS_JOINTS]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
@@ -300,13 +409,13 @@ pub unsafe extern "C" fn armrs_inverse_dynamics(
     arm: *const armrs_arm,
     motion: *const armrs_motion,
     load: *const armrs_load,
-    torque: *mut [armrs_real; ARMRS_JOINTS],
+    torque: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
         let (arm, motion) = unsafe { (given(arm)?.inner()?, given(motion)?) };
         // SAFETY: as promised by the caller.
-        let (load, torque) = unsafe { (given(load)?, place(torque)?) };
+        let (load, torque) = unsafe { (given(load)?, places::<ARMRS_JOINTS>(torque)?) };
         let (chain, seen) = (arm.equation.chain(), motion.core()?);
         let pose = Pose::new(&seen.q);
         let moving = inverse_dynamics(chain, &pose, &seen.qd, &seen.qdd);
@@ -322,6 +431,7 @@ pub unsafe extern "C" fn armrs_inverse_dynamics(
 
 /// Accelerations of the joints under a load, effects included [rad/s^2]; those in `motion` are not read.
 ///
+/// cbindgen:ptrs-as-arrays=[[acceleration; ARMRS_JOINTS]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
@@ -329,13 +439,13 @@ pub unsafe extern "C" fn armrs_forward_dynamics(
     arm: *const armrs_arm,
     motion: *const armrs_motion,
     load: *const armrs_load,
-    acceleration: *mut [armrs_real; ARMRS_JOINTS],
+    acceleration: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
         let (arm, motion) = unsafe { (given(arm)?.inner()?, given(motion)?) };
         // SAFETY: as promised by the caller.
-        let (load, acceleration) = unsafe { (given(load)?, place(acceleration)?) };
+        let (load, acceleration) = unsafe { (given(load)?, places(acceleration)?) };
         let seen = motion.still().core()?;
         let pose = Pose::new(&seen.q);
         let resisting = resistance(arm, &pose, &seen, load.force_on_arm);

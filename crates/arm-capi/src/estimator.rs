@@ -3,16 +3,18 @@
 use core::mem::MaybeUninit;
 
 use arm_core::Measured;
-use arm_core::estimator::{Decision, Estimator, Fault, Heed, Sample, Settings};
+use arm_core::estimator::{Decision, Estimator, Fault, Sample, SampleStatus, Settings};
 
 use crate::arm::armrs_arm;
 use crate::compensation::write_carry;
 use crate::held::{Held, held};
 use crate::motion::{armrs_motion, joints};
-use crate::status::{ARMRS_OUT_OF_RANGE, armrs_status, ended, given, place};
+use crate::status::{
+    ARMRS_OUT_OF_RANGE, armrs_problem, armrs_status, ended, finite, given, place, places, told,
+};
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, ARMRS_UNKNOWNS, armrs_load, armrs_real};
 
-/// How an estimator works; `armrs_estimator_settings` fills it. Infinite values switch a check off.
+/// How an estimator works; `armrs_estimator_settings` fills it for an arm, with every guard on. Infinite values switch one off.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct armrs_settings {
@@ -26,14 +28,23 @@ pub struct armrs_settings {
     pub noise: [armrs_real; ARMRS_JOINTS],
     /// Speed below which a joint counts as at rest [rad/s].
     pub dead_band: armrs_real,
+    /// Smallest and largest angle of each joint [rad]; beyond it a sample is refused.
+    pub range: [[armrs_real; 2]; ARMRS_JOINTS],
     /// Fastest that a joint can move [rad/s].
     pub fastest: armrs_real,
     /// Fastest that a force [N/s] or torque [N m/s] can change.
     pub steepest: armrs_real,
+    /// Largest force at the hand [N].
+    pub largest_force: armrs_real,
+    /// Largest torque in a joint and moment at the hand [N m].
+    pub largest_torque: armrs_real,
     /// Unexplained torques beyond this many times the usual ones are not learned from.
     pub gate: armrs_real,
     /// How long a sensor may show the same bits while the arm moves [s].
     pub frozen_after: armrs_real,
+    /// Farthest that the torque which carries the arm may be from that of the arm given to `armrs_estimator_init`, by joint
+    /// [N m]; beyond it `armrs_estimator_carry` is ARMRS_UNTRUSTED.
+    pub envelope: [armrs_real; ARMRS_JOINTS],
     /// Time in which what was learned fades while the arm moves [s].
     pub forgetting: armrs_real,
 }
@@ -54,9 +65,9 @@ pub struct armrs_sample {
 }
 
 /// What became of a sample.
-#[repr(C)]
+#[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum armrs_heed {
+pub enum armrs_sample_status {
     /// It counts.
     ARMRS_TAKEN = 0,
     /// No joint moves: it says nothing.
@@ -73,25 +84,31 @@ pub enum armrs_heed {
     ARMRS_FROZEN = 6,
     /// Torques that what has been learned so far does not explain.
     ARMRS_UNEXPECTED = 7,
+    /// A value that the arm cannot have: an angle outside its range (a turn off, degrees), a load that it does not bear.
+    ARMRS_NOT_POSSIBLE = 8,
+    /// The estimator's own state was not finite; it started anew.
+    ARMRS_RESTARTED = 9,
 }
 
-impl From<Heed> for armrs_heed {
-    fn from(heed: Heed) -> Self {
+impl From<SampleStatus> for armrs_sample_status {
+    fn from(heed: SampleStatus) -> Self {
         match heed {
-            Heed::Taken => Self::ARMRS_TAKEN,
-            Heed::Resting => Self::ARMRS_RESTING,
-            Heed::Settling => Self::ARMRS_SETTLING,
-            Heed::Refused(Fault::Missing) => Self::ARMRS_MISSING,
-            Heed::Refused(Fault::NotFinite) => Self::ARMRS_BAD_VALUE,
-            Heed::Refused(Fault::Spike) => Self::ARMRS_SPIKE,
-            Heed::Refused(Fault::Frozen) => Self::ARMRS_FROZEN,
-            Heed::Refused(Fault::Unexpected) => Self::ARMRS_UNEXPECTED,
+            SampleStatus::Taken => Self::ARMRS_TAKEN,
+            SampleStatus::Resting => Self::ARMRS_RESTING,
+            SampleStatus::Settling => Self::ARMRS_SETTLING,
+            SampleStatus::Refused(Fault::Missing) => Self::ARMRS_MISSING,
+            SampleStatus::Refused(Fault::NotFinite) => Self::ARMRS_BAD_VALUE,
+            SampleStatus::Refused(Fault::Spike) => Self::ARMRS_SPIKE,
+            SampleStatus::Refused(Fault::Frozen) => Self::ARMRS_FROZEN,
+            SampleStatus::Refused(Fault::Unexpected) => Self::ARMRS_UNEXPECTED,
+            SampleStatus::Refused(Fault::Implausible) => Self::ARMRS_NOT_POSSIBLE,
+            SampleStatus::Refused(Fault::Restarted) => Self::ARMRS_RESTARTED,
         }
     }
 }
 
 /// What a value rests on.
-#[repr(C)]
+#[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum armrs_decision {
     /// The data.
@@ -114,6 +131,22 @@ pub struct armrs_estimate {
     pub decided_by: armrs_decision,
 }
 
+/// How well an estimator does.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct armrs_health {
+    /// What became of the last sample.
+    pub last: armrs_sample_status,
+    /// How often the estimator's state was not finite, and was started anew.
+    pub restarts: u32,
+    /// How much larger the standard deviations are than the declared noise would make them; at least 1.
+    pub excess: armrs_real,
+    /// Usual size of the torque that the estimate does not explain, by joint [N m].
+    pub residual: [armrs_real; ARMRS_JOINTS],
+    /// Time since a sample was last learned from [s].
+    pub age: armrs_real,
+}
+
 /// An estimator and all that it has learned.
 #[repr(C)]
 pub struct armrs_estimator {
@@ -132,45 +165,51 @@ type Core = Estimator<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 
 held!(armrs_estimator holds Core, b"estim0.1");
 
-/// Settings of C from those of the core, and back: the fields have the same names.
-macro_rules! with_fields_of {
-    ($to:ident, $from:ident) => {
-        $to {
-            period: $from.period,
-            cutoff: $from.cutoff,
-            window: $from.window,
-            noise: $from.noise,
-            dead_band: $from.dead_band,
-            fastest: $from.fastest,
-            steepest: $from.steepest,
-            gate: $from.gate,
-            frozen_after: $from.frozen_after,
-            forgetting: $from.forgetting,
-        }
-    };
+/// Copies settings from C to the core, or back: the fields have the same names.
+macro_rules! copy_settings {
+    ($to:expr, $from:expr) => {{
+        let (to, from) = (&mut $to, &$from);
+        to.period = from.period;
+        to.cutoff = from.cutoff;
+        to.window = from.window;
+        to.noise = from.noise;
+        to.dead_band = from.dead_band;
+        to.range = from.range;
+        to.fastest = from.fastest;
+        to.steepest = from.steepest;
+        to.largest_force = from.largest_force;
+        to.largest_torque = from.largest_torque;
+        to.gate = from.gate;
+        to.frozen_after = from.frozen_after;
+        to.envelope = from.envelope;
+        to.forgetting = from.forgetting;
+    }};
 }
 
-/// Fills settings for a control period [s]: movements to 3 Hz, only what is not finite is refused.
+/// Fills settings for an arm and a control period [s]: movements to 3 Hz, joints within half a turn and below 20 rad/s, loads
+/// below ten times the arm's weight, sensors not frozen for half a second, a support within half of each joint's largest
+/// weight torque of the expected one.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_estimator_settings(
     settings: *mut armrs_settings,
+    arm: *const armrs_arm,
     period: armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let settings = unsafe { place(settings)? };
-        let s = Settings::<armrs_real, ARMRS_JOINTS>::new(period);
-        *settings = with_fields_of!(armrs_settings, s);
+        let (settings, arm) = unsafe { (place(settings)?, given(arm)?) };
+        let found = Settings::new(arm.inner()?.equation.chain(), period);
+        copy_settings!(*settings, found);
         Ok(())
     };
     ended(run())
 }
 
 /// Makes an estimator that starts from an arm: base parameters as of the arm, uncertain by `uncertainty` of masses, centres of
-/// mass and inertias; effects as given, their linear parameters otherwise open.
+/// mass and inertias; effects as given, their linear parameters otherwise open. `problem`, if not null, says what was refused.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
@@ -180,17 +219,20 @@ pub unsafe extern "C" fn armrs_estimator_init(
     arm: *const armrs_arm,
     uncertainty: armrs_real,
     settings: *const armrs_settings,
+    problem: *mut armrs_problem,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
         let (estimator, arm, s) = unsafe { (place(estimator)?, given(arm)?, given(settings)?) };
         let equation = arm.inner()?.equation;
-        let settings = with_fields_of!(Settings, s);
+        let mut settings = Settings::new(equation.chain(), s.period);
+        copy_settings!(settings, *s);
         let priors = equation.priors(uncertainty);
         estimator.keep(&Estimator::new(equation, priors, &settings)?);
         Ok(())
     };
-    ended(run())
+    // SAFETY: as promised by the caller.
+    unsafe { told(run(), problem) }
 }
 
 /// One control period; `sample` is null where one is missing. `heed`, if not null, says what became of it.
@@ -201,7 +243,7 @@ pub unsafe extern "C" fn armrs_estimator_init(
 pub unsafe extern "C" fn armrs_estimator_update(
     estimator: *mut armrs_estimator,
     sample: *const armrs_sample,
-    heed: *mut armrs_heed,
+    heed: *mut armrs_sample_status,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
@@ -256,24 +298,51 @@ pub unsafe extern "C" fn armrs_estimator_get(
 }
 
 /// Torques that carry the arm: its weight, and what its effects resist with at the speeds of `motion`; accelerations are not
-/// read. `sd`, if not null: their standard deviations [N m].
+/// read. `sd`, if not null: their standard deviations [N m]. ARMRS_UNTRUSTED where they leave the `envelope` of the settings.
 ///
+/// cbindgen:ptrs-as-arrays=[[torque; ARMRS_JOINTS], [sd; ARMRS_JOINTS]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_estimator_carry(
     estimator: *const armrs_estimator,
     motion: *const armrs_motion,
-    torque: *mut [armrs_real; ARMRS_JOINTS],
-    sd: *mut [armrs_real; ARMRS_JOINTS],
+    torque: *mut armrs_real,
+    sd: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
         let (estimator, motion) = unsafe { (given(estimator)?, given(motion)?) };
         // SAFETY: as promised by the caller.
-        let (torque, sd) = unsafe { (place(torque)?, sd.as_mut()) };
+        let (torque, sd) = unsafe { (places(torque)?, places(sd).ok()) };
         let carry = estimator.inner()?.carry(&motion.still().core()?);
         write_carry(&carry, torque, sd)
+    };
+    ended(run())
+}
+
+/// How well an estimator does: limit the support, or end it, by `age`, `residual` and `excess`.
+///
+/// # Safety
+/// The pointers are null or point to what is said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armrs_estimator_health(
+    estimator: *const armrs_estimator,
+    health: *mut armrs_health,
+) -> armrs_status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        let (estimator, health) = unsafe { (given(estimator)?, place(health)?) };
+        let found = estimator.inner()?.health();
+        let [excess, age] = finite([found.excess, found.age])?;
+        *health = armrs_health {
+            last: found.last.into(),
+            restarts: found.restarts,
+            excess,
+            residual: finite(found.residual)?,
+            age,
+        };
+        Ok(())
     };
     ended(run())
 }

@@ -19,6 +19,7 @@ mod held;
 mod monitor;
 mod motion;
 mod robot;
+mod seal;
 mod status;
 
 pub use arm::*;
@@ -27,7 +28,8 @@ pub use estimator::*;
 pub use monitor::*;
 pub use motion::*;
 pub use robot::*;
-pub use status::armrs_status;
+pub use seal::*;
+pub use status::{ARMRS_WHAT, armrs_problem, armrs_status};
 
 /// The number that the library computes with.
 #[cfg(not(feature = "single"))]
@@ -51,6 +53,37 @@ pub const ARMRS_UNKNOWNS: usize = 18;
 pub const ARMRS_CHANNELS: usize = 16;
 /// Most waypoints of a path.
 pub const ARMRS_WAYPOINTS: usize = 16;
+
+/// Declares the symbol that the header's `_init` macros refer to: of another precision, number of joints or version of the
+/// interface it has another name, and a program does not link.
+macro_rules! abi {
+    ($($name:ident when $condition:meta;)*) => {$(
+        /// The version of the interface. cbindgen:ignore
+        #[cfg($condition)]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $name() -> u32 {
+            2
+        }
+    )*};
+}
+abi! {
+    armrs_abi_2_double_three_joints when not(any(feature = "single", feature = "two-joints"));
+    armrs_abi_2_single_three_joints when all(feature = "single", not(feature = "two-joints"));
+    armrs_abi_2_double_two_joints when all(not(feature = "single"), feature = "two-joints");
+    armrs_abi_2_single_two_joints when all(feature = "single", feature = "two-joints");
+}
+
+/// Sizes that the header asserts as well.
+const _: () = {
+    use core::mem::size_of;
+    const REAL: usize = size_of::<armrs_real>();
+    assert!(size_of::<armrs_segment>() == 5 * REAL);
+    assert!(size_of::<armrs_effect>() == 8 + 6 * REAL);
+    assert!(size_of::<armrs_motion>() == (1 + 3 * ARMRS_JOINTS) * REAL);
+    assert!(size_of::<armrs_load>() == (3 + ARMRS_JOINTS) * REAL);
+    assert!(size_of::<armrs_status>() == 4 && size_of::<armrs_sample_status>() == 4);
+    assert!(size_of::<armrs_decision>() == 4 && size_of::<armrs_reason>() == 4);
+};
 
 /// Where no operating system ends a program there is nothing to unwind to. The function called here exists nowhere: if any
 /// panic can be reached, the firmware does not link, and that is the proof that none can.

@@ -2,14 +2,17 @@
 
 use core::mem::MaybeUninit;
 
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason};
+use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason, Times};
 
 use crate::held::{Held, held};
-use crate::status::{ARMRS_OUT_OF_RANGE, ARMRS_STOPPED, armrs_status, ended, given, place};
+use crate::status::{
+    ARMRS_OUT_OF_RANGE, ARMRS_STOPPED, Refusal, armrs_problem, armrs_status, ended, given, place,
+    told,
+};
 use crate::{ARMRS_CHANNELS, armrs_real};
 
 /// What a channel measures.
-#[repr(C)]
+#[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum armrs_quantity {
     /// Angle [rad].
@@ -34,6 +37,10 @@ pub struct armrs_channel {
     pub min: armrs_real,
     /// Largest value allowed; may be infinite.
     pub max: armrs_real,
+    /// Fastest change from one sample to the next [unit/s]; 0 for any.
+    pub fastest: armrs_real,
+    /// Farthest jump from one sample to the next, however long that took; 0 for any.
+    pub farthest: armrs_real,
     /// How long the value may stay the same to the last bit while motion is commanded [us]; 0 for ever.
     pub frozen_after: u64,
 }
@@ -53,7 +60,7 @@ pub struct armrs_observation {
 }
 
 /// Why a device was stopped.
-#[repr(C)]
+#[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum armrs_reason {
     /// A value beyond its limit.
@@ -66,6 +73,12 @@ pub enum armrs_reason {
     ARMRS_REASON_LATE = 3,
     /// A clock or a time stamp that ran backwards.
     ARMRS_REASON_CLOCK = 4,
+    /// A value that changed too fast or too far; `value` and `limit` are that change.
+    ARMRS_REASON_JUMP = 5,
+    /// Too long since the last check; `value` and `limit` are times [s].
+    ARMRS_REASON_STALLED = 6,
+    /// A limit that changed in memory.
+    ARMRS_REASON_MEMORY = 7,
 }
 
 /// The first thing that was not allowed.
@@ -92,14 +105,15 @@ pub struct armrs_monitor {
 }
 
 /// Size of an `armrs_monitor`.
-pub const ARMRS_MONITOR_WORDS: usize = 144;
+pub const ARMRS_MONITOR_WORDS: usize = 176;
 
 type Core = Monitor<armrs_real, ARMRS_CHANNELS>;
 
 held!(armrs_monitor holds Core, b"monit0.1");
 
-/// Makes a monitor of `count` channels, at most ARMRS_CHANNELS; the others are not watched, but their values must be finite.
-/// `oldest`: greatest age of the data that is allowed [us].
+/// Makes a monitor of `count` channels, 1 to ARMRS_CHANNELS; the others are not watched, but their values must be finite.
+/// `oldest`: greatest age of the data that is allowed [us]. `period`: longest time from one check to the next [us], usually two
+/// control periods. `problem`, if not null, says what was refused.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
@@ -109,33 +123,43 @@ pub unsafe extern "C" fn armrs_monitor_init(
     channels: *const armrs_channel,
     count: usize,
     oldest: u64,
+    period: u64,
+    problem: *mut armrs_problem,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
         let monitor = unsafe { place(monitor)? };
-        if count > ARMRS_CHANNELS {
-            return Err(ARMRS_OUT_OF_RANGE);
+        if count == 0 || count > ARMRS_CHANNELS {
+            let limits = [count as armrs_real, 1.0, ARMRS_CHANNELS as armrs_real];
+            let refusal = Refusal::named(ARMRS_OUT_OF_RANGE, ["number of channels", ""], 0);
+            return Err(refusal.numbers(limits));
         }
         let open = Channel::magnitude(Quantity::Force, armrs_real::INFINITY);
         let mut kept = [open; ARMRS_CHANNELS];
         for (i, channel) in kept.iter_mut().take(count).enumerate() {
             // SAFETY: there are `count` channels.
             let given = unsafe { given(channels.wrapping_add(i))? };
-            *channel = Channel {
-                quantity: quantity(given.quantity)?,
-                min: given.min,
-                max: given.max,
-                frozen_after: (given.frozen_after > 0).then_some(given.frozen_after),
+            let any = |change: armrs_real| {
+                if change == 0.0 {
+                    armrs_real::INFINITY
+                } else {
+                    change
+                }
             };
+            *channel = Channel::range(quantity(given.quantity, i)?, given.min, given.max)
+                .fastest(any(given.fastest))
+                .farthest(any(given.farthest));
+            channel.frozen_after = (given.frozen_after > 0).then_some(given.frozen_after);
         }
-        monitor.keep(&Monitor::new(kept, oldest)?);
+        monitor.keep(&Monitor::new(kept, Times { oldest, period })?);
         Ok(())
     };
-    ended(run())
+    // SAFETY: as promised by the caller.
+    unsafe { told(run(), problem) }
 }
 
 /// A number from outside may be no quantity at all, so that it is not taken as the enum.
-fn quantity(number: u32) -> Result<Quantity, armrs_status> {
+fn quantity(number: u32, channel: usize) -> Result<Quantity, Refusal> {
     const ALL: [(armrs_quantity, Quantity); 5] = [
         (armrs_quantity::ARMRS_ANGLE, Quantity::Angle),
         (armrs_quantity::ARMRS_SPEED, Quantity::Speed),
@@ -144,7 +168,9 @@ fn quantity(number: u32) -> Result<Quantity, armrs_status> {
         (armrs_quantity::ARMRS_POWER, Quantity::Power),
     ];
     let found = ALL.iter().find(|(c, _)| *c as u32 == number);
-    found.map(|(_, core)| *core).ok_or(ARMRS_OUT_OF_RANGE)
+    let limits = [number as armrs_real, 0.0, 4.0];
+    let refusal = Refusal::named(ARMRS_OUT_OF_RANGE, ["quantity of channel", ""], channel);
+    found.map(|(_, core)| *core).ok_or(refusal.numbers(limits))
 }
 
 /// Looks at one control period. ARMRS_STOPPED from the first fault on until `armrs_monitor_reset`; `stop`, if not null, then
@@ -179,6 +205,9 @@ pub unsafe extern "C" fn armrs_monitor_check(
                     Reason::Frozen => armrs_reason::ARMRS_REASON_FROZEN,
                     Reason::Late => armrs_reason::ARMRS_REASON_LATE,
                     Reason::Clock => armrs_reason::ARMRS_REASON_CLOCK,
+                    Reason::Jump => armrs_reason::ARMRS_REASON_JUMP,
+                    Reason::Stalled => armrs_reason::ARMRS_REASON_STALLED,
+                    Reason::Memory => armrs_reason::ARMRS_REASON_MEMORY,
                 },
                 channel: found.channel.unwrap_or(ARMRS_CHANNELS) as u32,
                 value: found.value,

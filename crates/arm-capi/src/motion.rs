@@ -1,13 +1,15 @@
 //! Movements: a sample of one, and paths through waypoints.
 
-use core::ffi::c_int;
 use core::mem::MaybeUninit;
 
 use arm_core::effect::Motion;
 use arm_core::{Joints, Limits, Path, Route, Shape};
 
 use crate::held::{Held, held};
-use crate::status::{ARMRS_OUT_OF_RANGE, armrs_status, ended, finite, given, place};
+use crate::status::{
+    ARMRS_OUT_OF_RANGE, Refusal, armrs_problem, armrs_status, ended, finite, given, numbers, place,
+    told,
+};
 use crate::{ARMRS_JOINTS, ARMRS_WAYPOINTS, armrs_real};
 
 /// Motion of the joints at one instant.
@@ -78,30 +80,52 @@ type Core = Route<armrs_real, ARMRS_JOINTS, ARMRS_WAYPOINTS>;
 
 held!(armrs_path holds Core, b"path 0.1");
 
+/// Farthest angle of a waypoint [rad]: a hundred turns.
+const FARTHEST: armrs_real = 628.0;
+
 /// Makes a path.
 ///
-/// `waypoints`: `count` times ARMRS_JOINTS angles [rad], 1 to ARMRS_WAYPOINTS of them. `limits`: one for each joint.
+/// `waypoints`: `count` times ARMRS_JOINTS angles [rad], waypoint by waypoint, 1 to ARMRS_WAYPOINTS of them. `limits`: one for each joint.
 /// `pause`: time at rest in each waypoint between [s]. `smooth`: 0 for trapezoidal speed, else continuous acceleration.
+/// Angles lie within 628 rad. `problem`, if not null, says what was refused.
 ///
+/// cbindgen:ptrs-as-arrays=[[limits; ARMRS_JOINTS]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_path_init(
     path: *mut armrs_path,
-    waypoints: *const [armrs_real; ARMRS_JOINTS],
+    waypoints: *const armrs_real,
     count: usize,
-    limits: *const [armrs_limits; ARMRS_JOINTS],
+    limits: *const armrs_limits,
     pause: armrs_real,
-    smooth: c_int,
+    smooth: u32,
+    problem: *mut armrs_problem,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (path, limits) = unsafe { (place(path)?, given(limits)?) };
+        let (path, limits) = unsafe {
+            (
+                place(path)?,
+                given(limits.cast::<[armrs_limits; ARMRS_JOINTS]>())?,
+            )
+        };
         let mut points = [joints(&[0.0; ARMRS_JOINTS]); ARMRS_WAYPOINTS];
-        let used = points.get_mut(..count).ok_or(ARMRS_OUT_OF_RANGE)?;
+        let allowed = [count as armrs_real, 1.0, ARMRS_WAYPOINTS as armrs_real];
+        let many = || Refusal::named(ARMRS_OUT_OF_RANGE, ["number of waypoints", ""], 0);
+        let used = points
+            .get_mut(..count)
+            .ok_or_else(|| many().numbers(allowed))?;
         for (i, point) in used.iter_mut().enumerate() {
             // SAFETY: there are `count` waypoints.
-            *point = joints(unsafe { given(waypoints.wrapping_add(i))? });
+            *point = joints(unsafe { numbers(waypoints.wrapping_add(i * ARMRS_JOINTS))? });
+            // What no speed could reach in a time that can be told.
+            let far = point.iter().find(|q| q.abs() > FARTHEST);
+            if let Some(&q) = far {
+                let numbers = [q, -FARTHEST, FARTHEST];
+                let refusal = Refusal::named(ARMRS_OUT_OF_RANGE, ["angle of waypoint", ""], i);
+                return Err(refusal.numbers(numbers));
+            }
         }
         let limits = limits.map(|l| Limits {
             speed: l.speed,
@@ -112,10 +136,13 @@ pub unsafe extern "C" fn armrs_path_init(
         } else {
             Shape::Smooth
         };
-        path.keep(&Route::new(&Path::new(shape, used, limits, pause)?)?);
+        let route: Core = Route::new(&Path::new(shape, used, limits, pause)?)?;
+        finite([route.duration()])?;
+        path.keep(&route);
         Ok(())
     };
-    ended(run())
+    // SAFETY: as promised by the caller.
+    unsafe { told(run(), problem) }
 }
 
 /// Time from the first to the last waypoint [s].
@@ -153,9 +180,9 @@ pub unsafe extern "C" fn armrs_path_at(
         let found = path.inner()?.at(time);
         *motion = armrs_motion {
             time,
-            q: array(&found.q),
-            qd: array(&found.qd),
-            qdd: array(&found.qdd),
+            q: finite(array(&found.q))?,
+            qd: finite(array(&found.qd))?,
+            qdd: finite(array(&found.qdd))?,
         };
         Ok(())
     };

@@ -1,13 +1,14 @@
 //! The two-link robot that leads the hand.
 
-use core::ffi::c_int;
 use core::mem::MaybeUninit;
 
 use arm_core::{Elbow, Joints, Robot};
 
 use crate::armrs_real;
 use crate::held::{Held, held};
-use crate::status::{armrs_status, ended, finite, given, place};
+use crate::status::{
+    armrs_problem, armrs_status, ended, finite, given, numbers, place, places, told,
+};
 
 /// A robot of two links.
 #[repr(C)]
@@ -24,18 +25,20 @@ held!(armrs_robot holds Robot<armrs_real>, b"robot0.1");
 /// Makes a robot from two lengths and the position of its first joint [m]; `elbow_up`: on which side the elbow is, seen on
 /// the line from base to handle.
 ///
+/// cbindgen:ptrs-as-arrays=[[lengths; 2], [base; 2]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_robot_init(
     robot: *mut armrs_robot,
-    lengths: *const [armrs_real; 2],
-    base: *const [armrs_real; 2],
-    elbow_up: c_int,
+    lengths: *const armrs_real,
+    base: *const armrs_real,
+    elbow_up: u32,
+    problem: *mut armrs_problem,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (robot, lengths, base) = unsafe { (place(robot)?, given(lengths)?, given(base)?) };
+        let (robot, lengths, base) = unsafe { (place(robot)?, numbers(lengths)?, numbers(base)?) };
         let elbow = if elbow_up == 0 {
             Elbow::Down
         } else {
@@ -44,22 +47,24 @@ pub unsafe extern "C" fn armrs_robot_init(
         robot.keep(&Robot::new(*lengths, *base, elbow)?);
         Ok(())
     };
-    ended(run())
+    // SAFETY: as promised by the caller.
+    unsafe { told(run(), problem) }
 }
 
 /// Position of the handle at two joint angles [m].
 ///
+/// cbindgen:ptrs-as-arrays=[[q; 2], [handle; 2]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_robot_handle(
     robot: *const armrs_robot,
-    q: *const [armrs_real; 2],
-    handle: *mut [armrs_real; 2],
+    q: *const armrs_real,
+    handle: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (robot, q, handle) = unsafe { (given(robot)?, given(q)?, place(handle)?) };
+        let (robot, q, handle) = unsafe { (given(robot)?, numbers::<2>(q)?, places(handle)?) };
         *handle = finite(robot.inner()?.handle(&Joints::<_, 2>::new(q[0], q[1])))?;
         Ok(())
     };
@@ -68,17 +73,18 @@ pub unsafe extern "C" fn armrs_robot_handle(
 
 /// Joint angles that hold the handle at a point [rad].
 ///
+/// cbindgen:ptrs-as-arrays=[[handle; 2], [q; 2]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_robot_angles(
     robot: *const armrs_robot,
-    handle: *const [armrs_real; 2],
-    q: *mut [armrs_real; 2],
+    handle: *const armrs_real,
+    q: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (robot, handle, q) = unsafe { (given(robot)?, given(handle)?, place(q)?) };
+        let (robot, handle, q) = unsafe { (given(robot)?, numbers(handle)?, places(q)?) };
         *q = finite(robot.inner()?.angles(*handle)?.into())?;
         Ok(())
     };
@@ -87,20 +93,21 @@ pub unsafe extern "C" fn armrs_robot_angles(
 
 /// Joint speeds that move the handle [rad/s]. ARMRS_NOT_FINITE at full stretch, where there are none.
 ///
+/// cbindgen:ptrs-as-arrays=[[q; 2], [velocity; 2], [speeds; 2]]
 /// # Safety
 /// The pointers are null or point to what is said.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armrs_robot_speeds(
     robot: *const armrs_robot,
-    q: *const [armrs_real; 2],
-    velocity: *const [armrs_real; 2],
-    speeds: *mut [armrs_real; 2],
+    q: *const armrs_real,
+    velocity: *const armrs_real,
+    speeds: *mut armrs_real,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (robot, q) = unsafe { (given(robot)?, given(q)?) };
+        let (robot, q) = unsafe { (given(robot)?, numbers::<2>(q)?) };
         // SAFETY: as promised by the caller.
-        let (velocity, speeds) = unsafe { (given(velocity)?, place(speeds)?) };
+        let (velocity, speeds) = unsafe { (numbers(velocity)?, places(speeds)?) };
         let q = Joints::<_, 2>::new(q[0], q[1]);
         *speeds = finite(robot.inner()?.speeds(&q, *velocity).into())?;
         Ok(())

@@ -14,6 +14,8 @@ pub struct Carry<T, const N: usize> {
     pub torque: Joints<T, N>,
     /// Its standard deviation \[N m\].
     pub sd: Joints<T, N>,
+    /// Whether it lies within the envelope about the torque of the arm that was expected.
+    pub within: bool,
 }
 
 /// An arm that was identified: the unknowns of an [`Equation`] and the covariance of their errors.
@@ -89,6 +91,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
             sum.sqrt()
         };
         Carry {
+            within: true,
             torque: rows.torque(&self.values),
             sd: joints(from_fn(|j| deviation(&rows.columns[j]))),
         }

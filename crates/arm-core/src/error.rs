@@ -35,6 +35,11 @@ pub enum Invalid {
         /// Longest reach \[m\].
         max: f64,
     },
+    /// An effect that cannot act where it was put.
+    CannotAct {
+        /// Name of its kind.
+        kind: &'static str,
+    },
     /// A name that the catalogue does not hold.
     Unknown {
         /// What kind of name it is.
@@ -88,6 +93,9 @@ impl fmt::Display for Invalid {
                     Shown(min),
                     Shown(max)
                 )
+            }
+            Self::CannotAct { kind } => {
+                write!(f, "`{kind}` does not act on the arm itself")
             }
             Self::Unknown { name } => write!(f, "unknown {name}"),
         }

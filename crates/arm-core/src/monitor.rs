@@ -1,5 +1,7 @@
 //! The safety monitor: stops a device at the first value that is not allowed, and stays stopped.
 
+use core::array::from_fn;
+
 use crate::scalar::Real;
 use crate::{Invalid, check};
 
@@ -33,6 +35,7 @@ impl Quantity {
 
 /// What one channel must not do.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Channel<T> {
     /// What it measures.
     pub quantity: Quantity,
@@ -40,17 +43,24 @@ pub struct Channel<T> {
     pub min: T,
     /// Largest value allowed.
     pub max: T,
+    /// Fastest change allowed between two samples, in the unit of the quantity by second; infinite for any.
+    pub fastest: T,
+    /// Farthest that the value may jump from one sample to the next, however long that took; infinite for any.
+    pub farthest: T,
     /// How long the value may stay the same to the last bit while motion is commanded \[µs\]; `None` for ever.
     pub frozen_after: Option<u64>,
 }
 
 impl<T: Real> Channel<T> {
     /// A channel with a range, never taken as frozen.
-    pub const fn range(quantity: Quantity, min: T, max: T) -> Self {
+    pub fn range(quantity: Quantity, min: T, max: T) -> Self {
+        let infinite = T::of(f64::INFINITY);
         Self {
             quantity,
             min,
             max,
+            fastest: infinite,
+            farthest: infinite,
             frozen_after: None,
         }
     }
@@ -58,6 +68,16 @@ impl<T: Real> Channel<T> {
     /// A channel whose magnitude is limited.
     pub fn magnitude(quantity: Quantity, max: T) -> Self {
         Self::range(quantity, -max, max)
+    }
+
+    /// The same channel, stopped when it changes faster than this, by second.
+    pub const fn fastest(self, fastest: T) -> Self {
+        Self { fastest, ..self }
+    }
+
+    /// The same channel, stopped when it jumps farther than this from one sample to the next.
+    pub const fn farthest(self, farthest: T) -> Self {
+        Self { farthest, ..self }
     }
 
     /// The same channel, stopped when it freezes for longer than this \[µs\].
@@ -97,6 +117,12 @@ pub enum Reason {
     Late,
     /// A clock or a time stamp that ran backwards, or data from the future; value and limit are ages \[s\].
     Clock,
+    /// A value that changed too fast or too far; value and limit are that change, by second or as it is.
+    Jump,
+    /// A control loop that stood still: too long since the last check; value and limit are times \[s\].
+    Stalled,
+    /// A limit that changed in memory.
+    Memory,
 }
 
 impl Reason {
@@ -108,6 +134,9 @@ impl Reason {
             Self::Frozen => "frozen",
             Self::Late => "late data",
             Self::Clock => "clock runs backwards",
+            Self::Jump => "jump",
+            Self::Stalled => "control loop stalled",
+            Self::Memory => "limits changed in memory",
         }
     }
 }
@@ -127,15 +156,24 @@ pub struct Stop<T> {
     pub at: u64,
 }
 
+/// Longest times of a control loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Times {
+    /// Greatest age of the data that is allowed \[µs\], usually one or two control periods.
+    pub oldest: u64,
+    /// Longest time from one check to the next \[µs\], usually two control periods.
+    pub period: u64,
+}
+
 /// Watches `C` channels in fixed time and memory.
 ///
 /// A fault is reported in the control period in which it is seen: a value beyond its limit at once, late or frozen data in
 /// the first period after the time allowed. The first stop is kept, whatever comes after it, until [`Monitor::reset`].
 ///
 /// ```
-/// use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason};
+/// use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason, Times};
 /// let channels = [Channel::range(Quantity::Angle, -1.5, 0.5).frozen_after(50_000)];
-/// let mut monitor = Monitor::new(channels, 2_000)?;
+/// let mut monitor = Monitor::new(channels, Times { oldest: 2_000, period: 2_000 })?;
 /// let mut seen = Observation { now: 1_000, stamp: 1_000, values: [0.2], moving: [true] };
 /// assert!(monitor.check(&seen).is_ok());
 /// seen = Observation { now: 2_000, stamp: 2_000, values: [0.6], ..seen };
@@ -146,7 +184,11 @@ pub struct Stop<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor<T, const C: usize> {
     channels: [Channel<T>; C],
-    oldest: u64,
+    times: Times,
+    /// Sum over the words of the limits of each channel, and the channel that is next compared with it. A single bit that
+    /// flips is seen for certain.
+    sums: [u32; C],
+    next: usize,
     last: Option<Seen<T, C>>,
     stop: Option<Stop<T>>,
 }
@@ -164,17 +206,23 @@ struct Seen<T, const C: usize> {
 impl<T: Real, const C: usize> Monitor<T, C> {
     /// A monitor that has not stopped.
     ///
-    /// * `oldest` - greatest age of the data that is allowed \[µs\], usually one or two control periods
-    ///
     /// # Errors
-    /// [`Invalid`] for a limit that is NaN, and a range that is empty. An infinite limit is none.
-    pub fn new(channels: [Channel<T>; C], oldest: u64) -> Result<Self, Invalid> {
+    /// [`Invalid`] for no channel, a limit that is NaN, a range that is empty, a change that is not positive, and times of zero.
+    /// An infinite limit is none.
+    pub fn new(channels: [Channel<T>; C], times: Times) -> Result<Self, Invalid> {
+        at_least_one("number of channels", C as u64)?;
+        at_least_one("longest period", times.period)?;
         for (index, channel) in channels.iter().enumerate() {
             check::ordered("limit of channel", index, [channel.min, channel.max])?;
+            for change in [channel.fastest, channel.farthest] {
+                check::ordered("change of channel", index, [T::of(check::SMALLEST), change])?;
+            }
         }
         Ok(Self {
+            sums: from_fn(|i| sum_of(&channels[i], &times)),
+            next: 0,
             channels,
-            oldest,
+            times,
             last: None,
             stop: None,
         })
@@ -209,9 +257,27 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     }
 
     fn fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+        let memory = self.memory_fault(seen);
+        if memory.is_some() {
+            return memory;
+        }
         let clock = self.clock_fault(seen);
         let value = self.value_fault(seen);
         clock.or(value)
+    }
+
+    /// A limit that is not what it was. One channel in each period.
+    fn memory_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+        let index = self.next;
+        self.next = if index + 1 < C { index + 1 } else { 0 };
+        let found = self.channels.get(index).map(|c| sum_of(c, &self.times));
+        (found != self.sums.get(index).copied()).then_some(Stop {
+            reason: Reason::Memory,
+            channel: Some(index),
+            value: T::ZERO,
+            limit: T::ZERO,
+            at: seen.now,
+        })
     }
 
     fn clock_fault(&self, seen: &Observation<T, C>) -> Option<Stop<T>> {
@@ -219,7 +285,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
             reason,
             channel: None,
             value: age,
-            limit: seconds(self.oldest),
+            limit: seconds(self.times.oldest),
             at: seen.now,
         };
         if seen.stamp > seen.now {
@@ -231,7 +297,15 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         {
             return Some(stop(Reason::Clock, seconds(age)));
         }
-        (age > self.oldest).then(|| stop(Reason::Late, seconds(age)))
+        if let Some(last) = &self.last
+            && seen.now - last.now > self.times.period
+        {
+            return Some(Stop {
+                limit: seconds(self.times.period),
+                ..stop(Reason::Stalled, seconds(seen.now - last.now))
+            });
+        }
+        (age > self.times.oldest).then(|| stop(Reason::Late, seconds(age)))
     }
 
     /// Remembers the observation and finds the first channel that is not as allowed. Repeats of one sample count as one.
@@ -243,19 +317,27 @@ impl<T: Real, const C: usize> Monitor<T, C> {
             values: seen.values,
             unchanged: [seen.stamp; C],
         });
+        // Between samples, not between checks: the same sample twice is no change.
+        let passed: T = seconds(seen.stamp.saturating_sub(last.stamp));
         (last.now, last.stamp) = (seen.now, seen.stamp);
         let mut found = None;
         for index in 0..C {
             let (channel, value) = (&self.channels[index], seen.values[index]);
+            let moved = (value - last.values[index]).abs();
+            let before = last.values[index];
+            last.values[index] = value;
             let fault = if !value.is_finite() {
                 Some((Reason::NotFinite, value, channel.min))
             } else if value > channel.max {
                 Some((Reason::Limit, value, channel.max))
             } else if value < channel.min {
                 Some((Reason::Limit, value, channel.min))
+            } else if moved > channel.farthest {
+                Some((Reason::Jump, moved, channel.farthest))
+            } else if moved > channel.fastest * passed && moved > T::ZERO {
+                Some((Reason::Jump, moved / passed, channel.fastest))
             } else if let Some(limit) = channel.frozen_after {
-                let same = !first && seen.moving[index] && value == last.values[index];
-                last.values[index] = value;
+                let same = !first && seen.moving[index] && value == before;
                 if !same {
                     last.unchanged[index] = seen.stamp;
                 }
@@ -278,6 +360,36 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         }
         found
     }
+}
+
+/// What must not change in memory: the limits of a channel, and the times.
+fn sum_of<T: Real>(channel: &Channel<T>, times: &Times) -> u32 {
+    let limits = [channel.min, channel.max, channel.fastest, channel.farthest];
+    let sum = added(added(0, times.oldest), times.period);
+    let sum = limits
+        .iter()
+        .fold(sum, |sum, limit| added(sum, limit.bits()));
+    added(sum, channel.frozen_after.unwrap_or(u64::MAX))
+}
+
+/// A sum over words in which their order counts.
+#[inline]
+fn added(sum: u32, bits: u64) -> u32 {
+    let low = sum.rotate_left(1).wrapping_add(bits as u32);
+    low.rotate_left(1).wrapping_add((bits >> 32) as u32)
+}
+
+fn at_least_one(name: &'static str, found: u64) -> Result<(), Invalid> {
+    if found > 0 {
+        return Ok(());
+    }
+    Err(Invalid::OutOfRange {
+        name,
+        index: 0,
+        found: 0.0,
+        min: 1.0,
+        max: f64::INFINITY,
+    })
 }
 
 fn seconds<T: Real>(microseconds: u64) -> T {

@@ -99,6 +99,8 @@ pub trait Scalar:
 pub trait Real: Scalar + PartialOrd {
     /// The same number in double precision.
     fn to_f64(self) -> f64;
+    /// Its bits.
+    fn bits(self) -> u64;
     /// The nearest number to a count.
     fn of_count(count: u64) -> Self;
     /// Its whole part; zero for what is negative or no number, the largest count for what is larger.
@@ -106,6 +108,10 @@ pub trait Real: Scalar + PartialOrd {
 }
 
 impl Real for f64 {
+    #[inline]
+    fn bits(self) -> u64 {
+        self.to_bits()
+    }
     #[inline]
     fn to_f64(self) -> f64 {
         self
@@ -124,6 +130,10 @@ impl Real for f32 {
     #[inline]
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+    #[inline]
+    fn bits(self) -> u64 {
+        u64::from(self.to_bits())
     }
     #[inline]
     fn of_count(count: u64) -> Self {

@@ -4,7 +4,7 @@
 //! period the supervisor looks first; then the controller follows the required angles by acceleration fed forward and
 //! proportional, derivative and integral feedback; then robot and arm move on through their contact.
 
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Stop};
+use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Stop, Times};
 use arm_core::{Joints, Plane, Robot};
 
 use crate::noise::Normal;
@@ -451,7 +451,7 @@ impl Supervisor {
             force,
         ];
         Ok(Self {
-            monitor: Monitor::new(channels, period)?,
+            monitor: Monitor::new(channels, Times { oldest: period, period: 2 * period })?,
             period: controller.period,
             encoder_step: encoder_step(controller),
             seen: [required[0].q; 2],

@@ -100,10 +100,8 @@ fn estimation<T: Real>(
         Effect::new(e.kind, e.index).with(&e.parameters.map(T::of))
     });
     let equation = Equation::<T, 2, 10, 6>::new(model.chain.cast(), effects)?;
-    let settings = Settings {
-        forgetting: T::of(30.0),
-        ..Settings::new(T::of(2e-3))
-    };
+    let mut settings = Settings::new(equation.chain(), T::of(2e-3));
+    settings.forgetting = T::of(30.0);
     let mut estimator = Estimator::new(equation, equation.priors(T::of(0.1)), &settings)?;
     let cast = |q: &Joints<f64, 2>| Joints::<T, 2>::from([T::of(q[0]), T::of(q[1])]);
     let mut values = Vec::new();

@@ -1,5 +1,7 @@
 //! The C interface called as C calls it: results as of the core, refusals without a crash. Runs under Miri as well.
 
+mod guards;
+
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
@@ -21,6 +23,8 @@ const CHANNEL: armrs_channel = armrs_channel {
     quantity: 0,
     min: -1.0,
     max: 1.0,
+    fastest: 0.0,
+    farthest: 0.0,
     frozen_after: 0,
 };
 
@@ -45,11 +49,12 @@ fn arm_with(effects: &[armrs_effect]) -> Option<armrs_arm> {
     let status = unsafe {
         armrs_arm_init(
             &mut arm,
-            &ARM,
-            &[0.0; 2],
-            &[0.0, -9.81],
+            ARM.as_ptr(),
+            [0.0; 2].as_ptr(),
+            [0.0, -9.81].as_ptr(),
             effects.as_ptr(),
             effects.len(),
+            null_mut(),
         )
     };
     (status == ARMRS_OK).then_some(arm)
@@ -78,9 +83,12 @@ fn an_arm_level_and_at_rest_needs_what_the_head_says() {
     let level = [0.0; ARMRS_JOINTS];
     // SAFETY: all pointers are good.
     unsafe {
-        assert_eq!(armrs_gravity(&arm, &level, &mut torque), ARMRS_OK);
         assert_eq!(
-            armrs_kinematics(&arm, &level, &mut tip, &mut rows),
+            armrs_gravity(&arm, level.as_ptr(), torque.as_mut_ptr()),
+            ARMRS_OK
+        );
+        assert_eq!(
+            armrs_kinematics(&arm, level.as_ptr(), tip.as_mut_ptr(), rows.as_mut_ptr()),
             ARMRS_OK
         );
     }
@@ -106,16 +114,16 @@ fn forward_dynamics_undoes_inverse_dynamics() {
     // SAFETY: all pointers are good.
     unsafe {
         assert_eq!(
-            armrs_inverse_dynamics(&arm, &motion, &load, &mut torque),
+            armrs_inverse_dynamics(&arm, &motion, &load, torque.as_mut_ptr()),
             ARMRS_OK
         );
         load.torque = torque;
         assert_eq!(
-            armrs_forward_dynamics(&arm, &motion, &load, &mut found),
+            armrs_forward_dynamics(&arm, &motion, &load, found.as_mut_ptr()),
             ARMRS_OK
         );
         assert_eq!(
-            armrs_resistance(&arm, &motion, null(), &mut resisting),
+            armrs_resistance(&arm, &motion, null(), resisting.as_mut_ptr()),
             ARMRS_OK
         );
     }
@@ -147,27 +155,44 @@ fn a_path_ends_where_it_should() {
             armrs_path_duration(&path, &mut duration),
             ARMRS_NOT_INITIALISED
         );
-        let status = armrs_path_init(&mut path, waypoints.as_ptr(), 3, &LIMITS, 0.1, 1);
+        let status = armrs_path_init(
+            &mut path,
+            waypoints.as_ptr().cast(),
+            3,
+            LIMITS.as_ptr(),
+            0.1,
+            1,
+            null_mut(),
+        );
         assert_eq!(status, ARMRS_OK);
         assert_eq!(armrs_path_duration(&path, &mut duration), ARMRS_OK);
         assert_eq!(armrs_path_at(&path, duration + 1.0, &mut motion), ARMRS_OK);
         assert_eq!(
             armrs_path_init(
                 &mut path,
-                waypoints.as_ptr(),
+                waypoints.as_ptr().cast(),
                 ARMRS_WAYPOINTS + 1,
-                &LIMITS,
+                LIMITS.as_ptr(),
                 0.1,
-                1
+                1,
+                null_mut()
             ),
             ARMRS_OUT_OF_RANGE
         );
         assert_eq!(
-            armrs_path_init(&mut path, null(), 2, &LIMITS, 0.1, 1),
+            armrs_path_init(&mut path, null(), 2, LIMITS.as_ptr(), 0.1, 1, null_mut()),
             ARMRS_NULL
         );
         assert_eq!(
-            armrs_path_init(&mut path, waypoints.as_ptr(), 0, &LIMITS, 0.1, 1),
+            armrs_path_init(
+                &mut path,
+                waypoints.as_ptr().cast(),
+                0,
+                LIMITS.as_ptr(),
+                0.1,
+                1,
+                null_mut()
+            ),
             ARMRS_OUT_OF_RANGE
         );
     }
@@ -182,21 +207,33 @@ fn a_robot_reaches_and_says_when_not() {
     // SAFETY: all pointers are good.
     unsafe {
         assert_eq!(
-            armrs_robot_init(&mut robot, &[0.45; 2], &[1.05, -0.1], 1),
+            armrs_robot_init(
+                &mut robot,
+                [0.45; 2].as_ptr(),
+                [1.05, -0.1].as_ptr(),
+                1,
+                null_mut()
+            ),
             ARMRS_OK
         );
-        assert_eq!(armrs_robot_angles(&robot, &[0.5, 0.2], &mut q), ARMRS_OK);
-        assert_eq!(armrs_robot_handle(&robot, &q, &mut handle), ARMRS_OK);
         assert_eq!(
-            armrs_robot_speeds(&robot, &q, &[0.1, 0.0], &mut speeds),
+            armrs_robot_angles(&robot, [0.5, 0.2].as_ptr(), q.as_mut_ptr()),
             ARMRS_OK
         );
         assert_eq!(
-            armrs_robot_angles(&robot, &[-5.0, 0.2], &mut q),
+            armrs_robot_handle(&robot, q.as_ptr(), handle.as_mut_ptr()),
+            ARMRS_OK
+        );
+        assert_eq!(
+            armrs_robot_speeds(&robot, q.as_ptr(), [0.1, 0.0].as_ptr(), speeds.as_mut_ptr()),
+            ARMRS_OK
+        );
+        assert_eq!(
+            armrs_robot_angles(&robot, [-5.0, 0.2].as_ptr(), q.as_mut_ptr()),
             ARMRS_OUT_OF_REACH
         );
         assert_eq!(
-            armrs_robot_angles(&robot, &[armrs_real::NAN, 0.2], &mut q),
+            armrs_robot_angles(&robot, [armrs_real::NAN, 0.2].as_ptr(), q.as_mut_ptr()),
             ARMRS_NOT_FINITE
         );
     }
@@ -208,7 +245,7 @@ fn a_robot_reaches_and_says_when_not() {
 fn an_estimator_learns_and_a_compensation_carries() {
     let arm = arm();
     let (mut estimator, mut settings) = (empty::<armrs_estimator>(), empty::<armrs_settings>());
-    let (mut heed, mut estimate) = (armrs_heed::ARMRS_TAKEN, empty::<armrs_estimate>());
+    let (mut heed, mut estimate) = (armrs_sample_status::ARMRS_TAKEN, empty::<armrs_estimate>());
     let (mut torque, mut sd) = ([0.0; ARMRS_JOINTS], [0.0; ARMRS_JOINTS]);
     let mut motion = moving();
     // SAFETY: all pointers are good.
@@ -217,16 +254,19 @@ fn an_estimator_learns_and_a_compensation_carries() {
             armrs_estimator_update(&mut estimator, null(), null_mut()),
             ARMRS_NOT_INITIALISED
         );
-        assert_eq!(armrs_estimator_settings(&mut settings, 0.004), ARMRS_OK);
         assert_eq!(
-            armrs_estimator_init(&mut estimator, &arm, 0.1, &settings),
+            armrs_estimator_settings(&mut settings, &arm, 0.004),
+            ARMRS_OK
+        );
+        assert_eq!(
+            armrs_estimator_init(&mut estimator, &arm, 0.1, &settings, null_mut()),
             ARMRS_OK
         );
         assert_eq!(
             armrs_estimator_update(&mut estimator, null(), &mut heed),
             ARMRS_OK
         );
-        assert_eq!(heed, armrs_heed::ARMRS_MISSING);
+        assert_eq!(heed, armrs_sample_status::ARMRS_MISSING);
         for k in 0..100 {
             motion.q = [-0.4 + 0.002 * k as armrs_real; ARMRS_JOINTS];
             motion.qdd = [0.0; ARMRS_JOINTS];
@@ -236,13 +276,18 @@ fn an_estimator_learns_and_a_compensation_carries() {
                 led: 0,
                 load: Default::default(),
             };
-            armrs_inverse_dynamics(&arm, &motion, &Default::default(), &mut sample.load.torque);
+            armrs_inverse_dynamics(
+                &arm,
+                &motion,
+                &Default::default(),
+                sample.load.torque.as_mut_ptr(),
+            );
             assert_eq!(
                 armrs_estimator_update(&mut estimator, &sample, &mut heed),
                 ARMRS_OK
             );
         }
-        assert_eq!(heed, armrs_heed::ARMRS_TAKEN);
+        assert_eq!(heed, armrs_sample_status::ARMRS_TAKEN);
         assert_eq!(
             armrs_estimator_get(&estimator, 2 * ARMRS_JOINTS + 1, &mut estimate),
             ARMRS_OK
@@ -253,7 +298,7 @@ fn an_estimator_learns_and_a_compensation_carries() {
         );
         motion.qd = [0.0; ARMRS_JOINTS];
         assert_eq!(
-            armrs_estimator_carry(&estimator, &motion, &mut torque, &mut sd),
+            armrs_estimator_carry(&estimator, &motion, torque.as_mut_ptr(), sd.as_mut_ptr()),
             ARMRS_OK
         );
     }
@@ -261,7 +306,7 @@ fn an_estimator_learns_and_a_compensation_carries() {
     let mut weight = [0.0; ARMRS_JOINTS];
     // SAFETY: all pointers are good.
     unsafe {
-        armrs_gravity(&arm, &motion.q, &mut weight);
+        armrs_gravity(&arm, motion.q.as_ptr(), weight.as_mut_ptr());
         let mut compensation = empty::<armrs_compensation>();
         let (mut values, mut covariance) = (
             [0.0; ARMRS_UNKNOWNS],
@@ -271,16 +316,28 @@ fn an_estimator_learns_and_a_compensation_carries() {
             *value = 1.2 * (0.15 + 0.3 * (ARMRS_JOINTS - 1 - j) as armrs_real);
         }
         assert_eq!(
-            armrs_compensation_init(&mut compensation, &arm, &values, &covariance),
+            armrs_compensation_init(
+                &mut compensation,
+                &arm,
+                values.as_ptr(),
+                covariance.as_ptr().cast(),
+                null_mut()
+            ),
             ARMRS_OK
         );
         assert_eq!(
-            armrs_compensation_carry(&compensation, &motion, &mut torque, &mut sd),
+            armrs_compensation_carry(&compensation, &motion, torque.as_mut_ptr(), sd.as_mut_ptr()),
             ARMRS_OK
         );
         covariance[3][3] = -1.0;
         assert_eq!(
-            armrs_compensation_init(&mut compensation, &arm, &values, &covariance),
+            armrs_compensation_init(
+                &mut compensation,
+                &arm,
+                values.as_ptr(),
+                covariance.as_ptr().cast(),
+                null_mut()
+            ),
             ARMRS_OUT_OF_RANGE
         );
     }
@@ -303,7 +360,7 @@ fn a_monitor_stops_until_reset() {
             ARMRS_NOT_INITIALISED
         );
         assert_eq!(
-            armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000),
+            armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000, 2000, null_mut()),
             ARMRS_OK
         );
         assert_eq!(
@@ -336,7 +393,7 @@ fn a_monitor_stops_until_reset() {
             ..CHANNEL
         };
         assert_eq!(
-            armrs_monitor_init(&mut monitor, &odd, 1, 1000),
+            armrs_monitor_init(&mut monitor, &odd, 1, 1000, 2000, null_mut()),
             ARMRS_OUT_OF_RANGE
         );
     }
@@ -349,34 +406,74 @@ fn what_cannot_be_is_refused() {
     // SAFETY: the pointers are good, or null.
     unsafe {
         assert_eq!(
-            armrs_gravity(&made, &[0.0; ARMRS_JOINTS], &mut torque),
+            armrs_gravity(&made, [0.0; ARMRS_JOINTS].as_ptr(), torque.as_mut_ptr()),
             ARMRS_NOT_INITIALISED
         );
         assert_eq!(
-            armrs_gravity(null(), &[0.0; ARMRS_JOINTS], &mut torque),
+            armrs_gravity(null(), [0.0; ARMRS_JOINTS].as_ptr(), torque.as_mut_ptr()),
             ARMRS_NULL
         );
         assert_eq!(
-            armrs_arm_init(&mut made, null(), &base, &gravity, null(), 0),
+            armrs_arm_init(
+                &mut made,
+                null(),
+                base.as_ptr(),
+                gravity.as_ptr(),
+                null(),
+                0,
+                null_mut()
+            ),
             ARMRS_NULL
         );
         assert_eq!(
-            armrs_arm_init(&mut made, &ARM, &base, &gravity, null(), 1),
+            armrs_arm_init(
+                &mut made,
+                ARM.as_ptr(),
+                base.as_ptr(),
+                gravity.as_ptr(),
+                null(),
+                1,
+                null_mut()
+            ),
             ARMRS_NULL
         );
         assert_eq!(
-            armrs_arm_init(&mut made, &ARM, &base, &gravity, null(), 13),
+            armrs_arm_init(
+                &mut made,
+                ARM.as_ptr(),
+                base.as_ptr(),
+                gravity.as_ptr(),
+                null(),
+                13,
+                null_mut()
+            ),
             ARMRS_OUT_OF_RANGE
         );
         let mut bad = ARM;
         bad[1].mass = -1.0;
         assert_eq!(
-            armrs_arm_init(&mut made, &bad, &base, &gravity, null(), 0),
+            armrs_arm_init(
+                &mut made,
+                bad.as_ptr(),
+                base.as_ptr(),
+                gravity.as_ptr(),
+                null(),
+                0,
+                null_mut()
+            ),
             ARMRS_OUT_OF_RANGE
         );
         bad[1].mass = armrs_real::NAN;
         assert_eq!(
-            armrs_arm_init(&mut made, &bad, &base, &gravity, null(), 0),
+            armrs_arm_init(
+                &mut made,
+                bad.as_ptr(),
+                base.as_ptr(),
+                gravity.as_ptr(),
+                null(),
+                0,
+                null_mut()
+            ),
             ARMRS_NOT_FINITE
         );
         let mut effect: armrs_effect = empty();
@@ -387,12 +484,28 @@ fn what_cannot_be_is_refused() {
         assert_eq!(armrs_effect_named(null(), 0, &mut effect), ARMRS_NULL);
         effect = named(c"coulomb", 7);
         assert_eq!(
-            armrs_arm_init(&mut made, &ARM, &base, &gravity, &effect, 1),
+            armrs_arm_init(
+                &mut made,
+                ARM.as_ptr(),
+                base.as_ptr(),
+                gravity.as_ptr(),
+                &effect,
+                1,
+                null_mut()
+            ),
             ARMRS_OUT_OF_RANGE
         );
         effect.kind = 1_000_000;
         assert_eq!(
-            armrs_arm_init(&mut made, &ARM, &base, &gravity, &effect, 1),
+            armrs_arm_init(
+                &mut made,
+                ARM.as_ptr(),
+                base.as_ptr(),
+                gravity.as_ptr(),
+                &effect,
+                1,
+                null_mut()
+            ),
             ARMRS_UNKNOWN
         );
     }
@@ -441,24 +554,32 @@ fn a_motion_that_is_not_finite_gives_no_torque() {
             // SAFETY: all pointers are good.
             unsafe {
                 assert_eq!(
-                    armrs_inverse_dynamics(arm, &motion, &load, &mut out),
+                    armrs_inverse_dynamics(arm, &motion, &load, out.as_mut_ptr()),
                     ARMRS_NOT_FINITE,
                     "{at} {bad}"
                 );
-                let status = armrs_resistance(arm, &motion, null(), &mut out);
+                let status = armrs_resistance(arm, &motion, null(), out.as_mut_ptr());
                 assert_eq!(status, ARMRS_NOT_FINITE, "{at} {bad}");
                 if accelerates {
                     continue;
                 }
                 assert_eq!(
-                    armrs_forward_dynamics(arm, &motion, &load, &mut out),
+                    armrs_forward_dynamics(arm, &motion, &load, out.as_mut_ptr()),
                     ARMRS_NOT_FINITE,
                     "{at} {bad}"
                 );
                 if at <= ARMRS_JOINTS {
-                    assert_eq!(armrs_gravity(arm, &motion.q, &mut out), ARMRS_NOT_FINITE);
+                    assert_eq!(
+                        armrs_gravity(arm, motion.q.as_ptr(), out.as_mut_ptr()),
+                        ARMRS_NOT_FINITE
+                    );
                     let (mut tip, mut rows) = ([42.0; 2], [UNTOUCHED; 2]);
-                    let status = armrs_kinematics(arm, &motion.q, &mut tip, &mut rows);
+                    let status = armrs_kinematics(
+                        arm,
+                        motion.q.as_ptr(),
+                        tip.as_mut_ptr(),
+                        rows.as_mut_ptr(),
+                    );
                     assert_eq!(status, ARMRS_NOT_FINITE);
                     assert_eq!((tip, rows), ([42.0; 2], [UNTOUCHED; 2]));
                 }
@@ -475,10 +596,10 @@ fn a_motion_that_is_not_finite_gives_no_torque() {
             let mut out = UNTOUCHED;
             // SAFETY: all pointers are good.
             unsafe {
-                let status = armrs_forward_dynamics(arm, &moving(), &load, &mut out);
+                let status = armrs_forward_dynamics(arm, &moving(), &load, out.as_mut_ptr());
                 assert_eq!(status, ARMRS_NOT_FINITE);
                 if at >= ARMRS_JOINTS {
-                    let status = armrs_inverse_dynamics(arm, &moving(), &load, &mut out);
+                    let status = armrs_inverse_dynamics(arm, &moving(), &load, out.as_mut_ptr());
                     assert_eq!(status, ARMRS_NOT_FINITE);
                 }
             }
@@ -494,7 +615,7 @@ fn a_motion_that_is_not_finite_stays_in_no_memory() {
         unsafe {
             let mut before = UNTOUCHED;
             assert_eq!(armrs_arm_advance(&mut arm, &moving(), 0.001), ARMRS_OK);
-            armrs_resistance(&arm, &moving(), null(), &mut before);
+            armrs_resistance(&arm, &moving(), null(), before.as_mut_ptr());
             for bad in NO_NUMBERS {
                 for at in 0..=3 * ARMRS_JOINTS {
                     let status = armrs_arm_advance(&mut arm, &replaced(at, bad), 0.001);
@@ -509,7 +630,7 @@ fn a_motion_that_is_not_finite_stays_in_no_memory() {
             assert_eq!(status, ARMRS_OUT_OF_RANGE);
             let mut after = UNTOUCHED;
             assert_eq!(
-                armrs_resistance(&arm, &moving(), null(), &mut after),
+                armrs_resistance(&arm, &moving(), null(), after.as_mut_ptr()),
                 ARMRS_OK
             );
             assert_eq!(before, after);
@@ -528,9 +649,9 @@ fn what_carries_an_arm_is_finite_or_nothing() {
     );
     // SAFETY: all pointers are good.
     unsafe {
-        armrs_estimator_settings(&mut settings, 0.004);
+        armrs_estimator_settings(&mut settings, &arm, 0.004);
         for bad in NO_NUMBERS {
-            let status = armrs_estimator_init(&mut estimator, &arm, bad, &settings);
+            let status = armrs_estimator_init(&mut estimator, &arm, bad, &settings, null_mut());
             assert_ne!(status, ARMRS_OK, "uncertainty {bad}");
             let mut broken = settings;
             for at in 0..7 {
@@ -544,7 +665,7 @@ fn what_carries_an_arm_is_finite_or_nothing() {
                     _ => (true, &mut broken.dead_band),
                 };
                 *place = bad;
-                let status = armrs_estimator_init(&mut estimator, &arm, 0.1, &broken);
+                let status = armrs_estimator_init(&mut estimator, &arm, 0.1, &broken, null_mut());
                 if !(infinite_is_none && bad > 0.0) {
                     assert_ne!(status, ARMRS_OK, "setting {at} {bad}");
                 }
@@ -552,28 +673,55 @@ fn what_carries_an_arm_is_finite_or_nothing() {
             }
             let mut odd = values;
             odd[1] = bad;
-            let status = armrs_compensation_init(&mut compensation, &arm, &odd, &covariance);
+            let status = armrs_compensation_init(
+                &mut compensation,
+                &arm,
+                odd.as_ptr(),
+                covariance.as_ptr().cast(),
+                null_mut(),
+            );
             assert_ne!(status, ARMRS_OK);
             let mut wide = covariance;
             wide[1][0] = bad;
-            let status = armrs_compensation_init(&mut compensation, &arm, &values, &wide);
+            let status = armrs_compensation_init(
+                &mut compensation,
+                &arm,
+                values.as_ptr(),
+                wide.as_ptr().cast(),
+                null_mut(),
+            );
             assert_ne!(status, ARMRS_OK);
         }
         assert_eq!(
-            armrs_estimator_init(&mut estimator, &arm, 0.1, &settings),
+            armrs_estimator_init(&mut estimator, &arm, 0.1, &settings, null_mut()),
             ARMRS_OK
         );
         assert_eq!(
-            armrs_compensation_init(&mut compensation, &arm, &values, &covariance),
+            armrs_compensation_init(
+                &mut compensation,
+                &arm,
+                values.as_ptr(),
+                covariance.as_ptr().cast(),
+                null_mut()
+            ),
             ARMRS_OK
         );
         for bad in NO_NUMBERS {
             for at in 1..=2 * ARMRS_JOINTS {
                 let motion = replaced(at, bad);
                 let (mut torque, mut sd) = (UNTOUCHED, UNTOUCHED);
-                let by_estimate = armrs_estimator_carry(&estimator, &motion, &mut torque, &mut sd);
-                let by_values =
-                    armrs_compensation_carry(&compensation, &motion, &mut torque, &mut sd);
+                let by_estimate = armrs_estimator_carry(
+                    &estimator,
+                    &motion,
+                    torque.as_mut_ptr(),
+                    sd.as_mut_ptr(),
+                );
+                let by_values = armrs_compensation_carry(
+                    &compensation,
+                    &motion,
+                    torque.as_mut_ptr(),
+                    sd.as_mut_ptr(),
+                );
                 assert_eq!(
                     (by_estimate, by_values),
                     (ARMRS_NOT_FINITE, ARMRS_NOT_FINITE),
@@ -599,40 +747,92 @@ fn paths_robots_and_monitors_take_numbers_only() {
             let mut slow = LIMITS;
             slow[0].speed = bad;
             assert_ne!(
-                armrs_path_init(&mut path, way.as_ptr(), 2, &slow, 0.0, 1),
+                armrs_path_init(
+                    &mut path,
+                    way.as_ptr().cast(),
+                    2,
+                    slow.as_ptr(),
+                    0.0,
+                    1,
+                    null_mut()
+                ),
                 ARMRS_OK,
                 "{bad}"
             );
             slow = LIMITS;
             slow[0].acceleration = bad;
             assert_ne!(
-                armrs_path_init(&mut path, way.as_ptr(), 2, &slow, 0.0, 1),
+                armrs_path_init(
+                    &mut path,
+                    way.as_ptr().cast(),
+                    2,
+                    slow.as_ptr(),
+                    0.0,
+                    1,
+                    null_mut()
+                ),
                 ARMRS_OK,
                 "{bad}"
             );
             assert_ne!(
-                armrs_path_init(&mut path, way.as_ptr(), 2, &LIMITS, bad, 1),
+                armrs_path_init(
+                    &mut path,
+                    way.as_ptr().cast(),
+                    2,
+                    LIMITS.as_ptr(),
+                    bad,
+                    1,
+                    null_mut()
+                ),
                 ARMRS_OK,
                 "{bad}"
             );
             assert_ne!(
-                armrs_robot_init(&mut robot, &[0.45, bad], &[1.05, -0.1], 1),
+                armrs_robot_init(
+                    &mut robot,
+                    [0.45, bad].as_ptr(),
+                    [1.05, -0.1].as_ptr(),
+                    1,
+                    null_mut()
+                ),
                 ARMRS_OK
             );
         }
         assert_eq!(
-            armrs_path_init(&mut path, way.as_ptr(), 2, &LIMITS, 0.0, 1),
+            armrs_path_init(
+                &mut path,
+                way.as_ptr().cast(),
+                2,
+                LIMITS.as_ptr(),
+                0.0,
+                1,
+                null_mut()
+            ),
             ARMRS_OK
         );
         assert_eq!(
-            armrs_robot_init(&mut robot, &[0.45; 2], &[1.05, -0.1], 1),
+            armrs_robot_init(
+                &mut robot,
+                [0.45; 2].as_ptr(),
+                [1.05, -0.1].as_ptr(),
+                1,
+                null_mut()
+            ),
             ARMRS_OK
         );
         for bad in NO_NUMBERS {
             let mut away = way;
             away[1][0] = bad;
             assert_ne!(
-                armrs_path_init(&mut path, away.as_ptr(), 2, &LIMITS, 0.0, 1),
+                armrs_path_init(
+                    &mut path,
+                    away.as_ptr().cast(),
+                    2,
+                    LIMITS.as_ptr(),
+                    0.0,
+                    1,
+                    null_mut()
+                ),
                 ARMRS_OK
             );
             let mut motion = moving();
@@ -640,30 +840,38 @@ fn paths_robots_and_monitors_take_numbers_only() {
             assert_eq!(motion, moving());
             let mut out = [42.0; 2];
             assert_eq!(
-                armrs_robot_handle(&robot, &[0.1, bad], &mut out),
+                armrs_robot_handle(&robot, [0.1, bad].as_ptr(), out.as_mut_ptr()),
                 ARMRS_NOT_FINITE
             );
             assert_eq!(
-                armrs_robot_angles(&robot, &[0.5, bad], &mut out),
+                armrs_robot_angles(&robot, [0.5, bad].as_ptr(), out.as_mut_ptr()),
                 ARMRS_NOT_FINITE
             );
             for (q, velocity) in [([bad, 1.0], [0.1; 2]), ([0.1, 1.0], [bad, 0.1])] {
                 assert_eq!(
-                    armrs_robot_speeds(&robot, &q, &velocity, &mut out),
+                    armrs_robot_speeds(&robot, q.as_ptr(), velocity.as_ptr(), out.as_mut_ptr()),
                     ARMRS_NOT_FINITE
                 );
             }
             assert_eq!(
-                armrs_robot_speeds(&robot, &[0.3, 0.0], &[0.1; 2], &mut out),
+                armrs_robot_speeds(
+                    &robot,
+                    [0.3, 0.0].as_ptr(),
+                    [0.1; 2].as_ptr(),
+                    out.as_mut_ptr()
+                ),
                 ARMRS_NOT_FINITE,
                 "at full stretch"
             );
             assert_eq!(out, [42.0; 2]);
             let (none, mut odd) = (armrs_real::NAN, CHANNEL);
             odd.max = none;
-            assert_ne!(armrs_monitor_init(&mut monitor, &odd, 1, 1000), ARMRS_OK);
+            assert_ne!(
+                armrs_monitor_init(&mut monitor, &odd, 1, 1000, 2000, null_mut()),
+                ARMRS_OK
+            );
             assert_eq!(
-                armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000),
+                armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000, 2000, null_mut()),
                 ARMRS_OK
             );
             for place in [0, ARMRS_CHANNELS - 1] {

@@ -144,6 +144,32 @@ pub struct Local<T> {
     pub memory: T,
 }
 
+/// What an effect acts on, and so who can apply it: a controller that knows only the arm applies the first two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ActsOn {
+    /// The joints, with a torque that depends on the motion.
+    Joints,
+    /// The arm itself: its masses, lengths, rotors, or the direction of gravity. [`Law::alter`] makes it part of the chain.
+    Arm,
+    /// The rig around the arm: its base, the contact, the robot.
+    Rig,
+    /// What the sensors read.
+    Sensors,
+}
+
+impl ActsOn {
+    /// What an effect at a place acts on unless its law says otherwise.
+    const fn at(place: Place) -> Self {
+        match place {
+            Place::Joint => Self::Joints,
+            Place::Segment | Place::Hand | Place::Frame => Self::Arm,
+            Place::Contact => Self::Rig,
+            Place::AngleSensor | Place::ForceSensor | Place::Sensors => Self::Sensors,
+        }
+    }
+}
+
 /// The behaviour of one kind of effect. What a kind does not do stays at its default, which is nothing.
 pub trait Law {
     /// Name, parameters, formula and reference.
@@ -152,6 +178,8 @@ pub trait Law {
     const CROSSES: bool = false;
     /// Whether it looks at [`Local::joint_force`].
     const FEELS_FORCE: bool = false;
+    /// What it acts on.
+    const ACTS_ON: ActsOn = ActsOn::at(Self::INFO.place);
     /// How a search asks for it.
     const PROBE: Probe = Probe::FIRST;
 

@@ -13,13 +13,13 @@ mod law;
 mod own;
 mod probe;
 
-pub use law::{Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+pub use law::{ActsOn, Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
 pub use own::Own;
 #[cfg(feature = "own")]
 pub use own::OwnLaw;
 pub use probe::{Nature, Probe, Promise, Question, Values};
 
-use crate::{Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
+use crate::{Chain, Contact, Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
 
 /// Declares the kinds: their modules, the enum, and the dispatch to each [`Law`].
 macro_rules! catalogue {
@@ -41,7 +41,7 @@ macro_rules! catalogue {
         impl Kind {
             /// Name, parameters, formula and reference.
             pub fn info(self) -> &'static Info {
-                match self { $(Self::$law => &<$module::$law as Law>::INFO,)* Self::Own(own) => own.info() }
+                match self { $(Self::$law => const { &listed(<$module::$law as Law>::INFO) },)* Self::Own(own) => own.info() }
             }
         }
 
@@ -49,6 +49,10 @@ macro_rules! catalogue {
             /// How a search asks for it.
             pub fn probe(self) -> Probe {
                 match self { $(Self::$law => <$module::$law as Law>::PROBE,)* Self::Own(own) => own.probe() }
+            }
+            /// What it acts on.
+            pub const fn acts_on(self) -> ActsOn {
+                match self { $(Self::$law => <$module::$law as Law>::ACTS_ON,)* Self::Own(_) => ActsOn::Joints }
             }
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {
@@ -163,6 +167,19 @@ catalogue! {
     force_misalignment::ForceMisalignment,
     angle_offset::AngleOffset,
     time_delay::TimeDelay,
+}
+
+/// An entry of the catalogue, its prose only where that is wanted.
+const fn listed(info: Info) -> Info {
+    if cfg!(feature = "prose") {
+        return info;
+    }
+    Info {
+        summary: "",
+        formula: "",
+        reference: "",
+        ..info
+    }
 }
 
 impl Kind {
@@ -316,6 +333,33 @@ impl<T: Scalar, const N: usize> Motion<T, N> {
             memory,
         }
     }
+}
+
+/// The arm with all that effects change of it: masses, lengths, rotors, the direction of gravity. Torques in joints are left.
+///
+/// # Errors
+/// The index of the first effect that is refused, and why: a value outside its bounds, an arm that cannot be, or one that
+/// acts on the rig or the sensors, which an arm alone does not have ([`Invalid::CannotAct`]).
+pub fn applied<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    effects: &[Effect<T>],
+) -> Result<Chain<T, N>, (usize, Invalid)> {
+    let mut setup = Setup::new(chain, Contact::new([T::ZERO; 2], [T::ZERO; 2]));
+    for (index, effect) in effects.iter().enumerate().filter(|(_, e)| e.on) {
+        effect.validate(N).map_err(|why| (index, why))?;
+        match effect.kind.acts_on() {
+            ActsOn::Joints => {}
+            ActsOn::Arm => {
+                effect.alter(&mut setup);
+                setup.chain().map_err(|why| (index, why))?;
+            }
+            ActsOn::Rig | ActsOn::Sensors => {
+                let kind = effect.kind.info().kind;
+                return Err((index, Invalid::CannotAct { kind }));
+            }
+        }
+    }
+    setup.chain().map_err(|why| (0, why))
 }
 
 /// Sum of what all effects resist with, shoulder first \[N m\].

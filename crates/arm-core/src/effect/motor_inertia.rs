@@ -1,4 +1,4 @@
-use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::law::{ActsOn, Info, Law, Local, Parameter, Parameters, Place, leading};
 use super::probe::{Probe, Question};
 use crate::{Scalar, Setup};
 
@@ -18,6 +18,7 @@ impl Law for MotorInertia {
         parameters: &[Parameter::linear("inertia", "kg m²", 0.0, 10.0, 0.0)],
         memory: false,
     };
+    const ACTS_ON: ActsOn = ActsOn::Arm;
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]);
 
     fn gradient<T: Scalar>(_p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {

@@ -1,4 +1,4 @@
-use super::law::{Info, Law, Parameter, Parameters, Place};
+use super::law::{ActsOn, Info, Law, Parameter, Parameters, Place};
 use super::probe::{Probe, Question, Values};
 use crate::{Scalar, Setup};
 
@@ -21,6 +21,7 @@ impl Law for ShoulderMotion {
         ],
         memory: false,
     };
+    const ACTS_ON: ActsOn = ActsOn::Rig;
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1])
         .shaped(&[(2, Values::Middle)])
         .stepping(1e-5)]);

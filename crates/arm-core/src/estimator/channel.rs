@@ -15,6 +15,10 @@ pub enum Fault {
     Frozen,
     /// Torques that what has been learned so far does not explain.
     Unexpected,
+    /// A value that the arm cannot have: an angle outside its range (a turn off, degrees), a load that it does not bear.
+    Implausible,
+    /// The estimator's own state was not finite; it started anew from what was known before.
+    Restarted,
 }
 
 /// A second-order low-pass of two integrators (trapezoidal state-variable filter: Zavalishin 2012, chapter 4), with the

@@ -24,12 +24,20 @@ impl<T: Real, const P: usize> Information<T, P> {
             d: [T::ZERO; P],
             z: [T::ZERO; P],
         };
-        let places = new.d.iter_mut().zip(&mut new.z);
+        new.restart(values);
+        new
+    }
+
+    /// The same, in place.
+    pub fn restart(&mut self, values: impl Iterator<Item = (T, T)>) {
+        for row in &mut self.u {
+            row.fill(T::ZERO);
+        }
+        let places = self.d.iter_mut().zip(&mut self.z);
         for ((d, z), (mean, sd)) in places.zip(values) {
             *d = T::ONE / sd.squared();
             *z = mean;
         }
-        new
     }
 
     /// Takes in `row · x = value`, which has a weight: one over its variance.

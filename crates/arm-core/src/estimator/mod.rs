@@ -66,7 +66,7 @@ pub struct Sample<T, const N: usize> {
 
 /// What became of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heed {
+pub enum SampleStatus {
     /// It counts.
     Taken,
     /// No joint moves: it says nothing.
@@ -75,6 +75,22 @@ pub enum Heed {
     Settling,
     /// It was refused.
     Refused(Fault),
+}
+
+/// How well an estimator does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Health<T, const N: usize> {
+    /// What became of the last sample.
+    pub last: SampleStatus,
+    /// See [`Estimator::excess`].
+    pub excess: T,
+    /// Usual size of the torque that the estimate does not explain, by joint \[N m\].
+    pub residual: [T; N],
+    /// Time since a sample was last learned from \[s\].
+    pub age: T,
+    /// How often its state was not finite, and was started anew.
+    pub restarts: u32,
 }
 
 /// What is known of one unknown.
@@ -89,6 +105,14 @@ pub struct Estimate<T> {
 }
 
 impl<T: Real> Estimate<T> {
+    fn of_prior(p: &Prior<T>) -> Self {
+        Self {
+            value: p.mean.max(p.min).min(p.max),
+            sd: p.sd,
+            decided_by: Decision::Prior,
+        }
+    }
+
     /// The interval of so many standard deviations, cut at the bounds.
     pub fn interval(&self, deviations: T, prior: &Prior<T>) -> [T; 2] {
         [-deviations, deviations].map(|k| (self.value + k * self.sd).max(prior.min).min(prior.max))
@@ -143,7 +167,13 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     since_row: u32,
     memory: [T; E],
     /// Usual size of the torque that the estimate does not explain \[N m\].
-    usual: Option<[T; N]>,
+    usual: [T; N],
+    /// Periods since a sample was last learned from; how often the state was not finite; what became of the last sample.
+    age: u32,
+    restarts: u32,
+    /// A restart that the next sample's status tells.
+    restarted: bool,
+    last: SampleStatus,
     window: Window<T, N, P>,
     full: Window<T, N, P>,
     work: Work,
@@ -175,11 +205,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
         let tuning = Tuning::new(settings, P)?;
         let information = Information::independent(priors.iter().map(|p| (p.mean, p.sd)));
-        let estimates = priors.map(|p| Estimate {
-            value: p.mean.max(p.min).min(p.max),
-            sd: p.sd,
-            decided_by: Decision::Prior,
-        });
+        let estimates = priors.map(|p| Estimate::of_prior(&p));
         Ok(Self {
             equation,
             priors,
@@ -192,7 +218,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             moving: false,
             since_row: 0,
             memory: [T::ZERO; E],
-            usual: None,
+            usual: tuning.noise,
+            age: 0,
+            restarts: 0,
+            restarted: false,
+            last: SampleStatus::Settling,
             window: Window::EMPTY,
             full: Window::EMPTY,
             work: Work::Idle,
@@ -233,6 +263,17 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         (square.max(T::ONE) * (T::ONE + alike) / (T::ONE - alike)).sqrt()
     }
 
+    /// How well it does.
+    pub fn health(&self) -> Health<T, N> {
+        Health {
+            last: self.last,
+            excess: self.excess(),
+            residual: self.usual,
+            age: T::of_count(u64::from(self.age)) * self.tuning.period,
+            restarts: self.restarts,
+        }
+    }
+
     /// The torques that carry the arm at rest, or with what its effects resist with at the speeds of `motion`.
     ///
     /// With their standard deviation from the covariance of all unknowns. Give a motion without speed for the weight and
@@ -240,8 +281,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     pub fn carry(&self, motion: &Motion<T, N>) -> Carry<T, N> {
         let rows = self.equation.carrying(motion, &self.memory);
         let excess = self.excess();
+        let torque = rows.torque(&self.values());
+        let expected = rows.torque(&self.priors.map(|p| p.mean));
+        let far = |j: usize| (torque[j] - expected[j]).abs();
         Carry {
-            torque: rows.torque(&self.values()),
+            // Not a number is not within.
+            within: (0..N).all(|j| far(j) <= self.tuning.envelope[j]),
+            torque,
             sd: joints(from_fn(|j| {
                 excess * self.information.deviation(&rows.columns[j])
             })),
@@ -252,7 +298,19 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     ///
     /// Filters the sample; then either builds a row from it or does one piece of the work that the last window left, so that
     /// no period takes much longer than another. A long cutoff period needs few rows: see [`Settings::cutoff`].
-    pub fn update(&mut self, sample: Option<&Sample<T, N>>) -> Heed {
+    pub fn update(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
+        self.age = self.age.saturating_add(1);
+        let status = self.step(sample);
+        self.last = if self.restarted {
+            SampleStatus::Refused(Fault::Restarted)
+        } else {
+            status
+        };
+        self.restarted = false;
+        self.last
+    }
+
+    fn step(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
         let sensed = self.sense(sample);
         self.since_row = self.since_row.saturating_add(1);
         let due = self.since_row >= self.tuning.stride && sensed.is_ok();
@@ -266,7 +324,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             Ok((motion, measured)) => return self.learn(&motion, &measured, due),
             Err(heed) => heed,
         };
-        if fault == Heed::Refused(Fault::Frozen) {
+        if fault == SampleStatus::Refused(Fault::Frozen) {
             // What was read since it froze is not to be trusted either.
             self.window = Window::EMPTY;
             if let Work::Wait(_) = self.work {
@@ -281,13 +339,16 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     fn sense(
         &mut self,
         sample: Option<&Sample<T, N>>,
-    ) -> Result<(Motion<T, N>, Measured<T, N>), Heed> {
+    ) -> Result<(Motion<T, N>, Measured<T, N>), SampleStatus> {
         // A lead that comes or goes is another sensor.
         if !self.running || sample.is_some_and(|s| s.lead.is_some() != self.led) {
             return Err(self.start(sample));
         }
         let frozen_after = self.moving.then_some(self.tuning.frozen_after);
-        let mut fault = None;
+        // What the arm cannot have is bridged like what is not there.
+        let implausible = sample.is_some_and(|s| !self.tuning.plausible(s));
+        let sample = sample.filter(|_| !implausible);
+        let mut fault = implausible.then_some(Fault::Implausible);
         let [turn, load] = self.tuning.farthest;
         let mut pass = |channel: &mut Channel<T>, value: Option<T>, farthest: T| {
             let found = channel.fault(value, farthest, frozen_after);
@@ -331,21 +392,53 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.moving = motion.qd.iter().any(|qd| qd.abs() > self.tuning.dead_band);
         self.equation
             .advance(&motion, &mut self.memory, self.tuning.period);
+        if !self.finite(&motion, &measured) {
+            self.restart();
+            return Err(SampleStatus::Refused(Fault::Restarted));
+        }
         if let Some(fault) = fault {
-            return Err(Heed::Refused(fault));
+            return Err(SampleStatus::Refused(fault));
         }
         if self.settling > 0 {
             self.settling -= 1;
-            return Err(Heed::Settling);
+            return Err(SampleStatus::Settling);
         }
         Ok((motion, measured))
     }
 
+    /// Whether nothing that is filtered has become NaN or infinite.
+    fn finite(&self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> bool {
+        // A sum is not finite where one of its terms is not, and is taken faster than a look at each.
+        let mut sum = measured.moment_on_arm + measured.force_on_arm[0] + measured.force_on_arm[1];
+        for j in 0..N {
+            sum += motion.q[j] + motion.qd[j] + motion.qdd[j] + measured.torque[j] + self.usual[j];
+        }
+        self.memory
+            .iter()
+            .fold(sum, |sum, &state| sum + state)
+            .is_finite()
+    }
+
+    /// Starts anew what a value that is not finite has spoiled: filters, states of effects, and what is usual.
+    #[cold]
+    #[inline(never)]
+    fn restart(&mut self) {
+        self.running = false;
+        self.memory = [T::ZERO; E];
+        self.usual = self.tuning.noise;
+        self.window = Window::EMPTY;
+        self.restarts = self.restarts.saturating_add(1);
+        self.restarted = true;
+    }
+
     /// Restarts all filters at a sample.
-    fn start(&mut self, sample: Option<&Sample<T, N>>) -> Heed {
+    fn start(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
         let Some(sample) = sample else {
-            return Heed::Refused(Fault::Missing);
+            return SampleStatus::Refused(Fault::Missing);
         };
+        if sample.finite() && !self.tuning.plausible(sample) {
+            return SampleStatus::Refused(Fault::Implausible);
+        }
         let mut good = true;
         for (kind, channels) in self.joints.iter_mut().enumerate() {
             for (j, channel) in channels.iter_mut().enumerate() {
@@ -356,55 +449,68 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             good &= channel.restart(of_hand(sample, c));
         }
         if !good {
-            return Heed::Refused(Fault::NotFinite);
+            return SampleStatus::Refused(Fault::NotFinite);
         }
         self.running = true;
         self.led = sample.lead.is_some();
         self.moving = false;
         self.settling = self.tuning.settling;
         self.window = Window::EMPTY;
-        Heed::Settling
+        SampleStatus::Settling
     }
 
     /// Adds a sample to the window, where one is due.
     ///
     /// At rest it is added as well, for to leave out slow samples would favour one side of every reversal; what counts is
     /// whether the arm moved at any time in the window.
-    fn learn(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>, due: bool) -> Heed {
+    fn learn(
+        &mut self,
+        motion: &Motion<T, N>,
+        measured: &Measured<T, N>,
+        due: bool,
+    ) -> SampleStatus {
         let heed = if due {
             self.since_row = 0;
             self.weigh(motion, measured)
         } else {
-            Heed::Taken
+            SampleStatus::Taken
         };
         self.window.moved |= self.moving;
         self.age();
         match heed {
-            Heed::Taken if !self.moving => Heed::Resting,
+            SampleStatus::Taken if !self.moving => SampleStatus::Resting,
             other => other,
         }
     }
 
-    fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> Heed {
+    fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> SampleStatus {
         let (rows, acting) = self.equation.needed(motion, &self.memory, measured);
         let expected = rows.torque(&self.values());
         let rest: [T; N] = from_fn(|j| (acting[j] - expected[j]).abs());
-        let usual = self.usual.get_or_insert(rest);
-        let mut expected = true;
+        // What is still uncertain may show at any time; correlations would only lessen it.
+        let doubt = |j: usize| {
+            let pairs = rows.columns[j].iter().zip(&self.estimates);
+            pairs.fold(T::ZERO, |sum, (&c, e)| sum + (c * e.sd).squared())
+        };
+        let gate = self.tuning.gate.squared();
+        let within = |j: usize| {
+            let size = self.usual[j].max(self.tuning.noise[j]);
+            rest[j] <= self.tuning.gate * size
+                || rest[j].squared() <= gate * (size.squared() + doubt(j))
+        };
+        if !(0..N).all(within) {
+            // What is refused has no say in what is usual: else a fault that lasts would open the gate for itself.
+            return SampleStatus::Refused(Fault::Unexpected);
+        }
         for j in 0..N {
-            let most = self.tuning.gate * usual[j].max(self.tuning.noise[j]);
-            expected &= rest[j] <= most;
-            // What is refused counts as much as what could just be taken: a change that lasts is soon believed.
-            usual[j] += (rest[j].min(most) - usual[j]) * T::of(1.0 / USUAL);
+            self.usual[j] += (rest[j] - self.usual[j]) * T::of(1.0 / USUAL);
         }
-        if !expected {
-            return Heed::Refused(Fault::Unexpected);
-        }
+        self.age = 0;
         for j in 0..N {
             self.window
                 .add(j, &rows.columns[j], acting[j] - rows.known[j]);
         }
-        Heed::Taken
+        SampleStatus::Taken
     }
 
     /// One period more in the window; a full one is handed on.
@@ -495,14 +601,31 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             }
             return Work::Solve;
         }
+        if !values.iter().all(|value| value.is_finite()) {
+            return self.forget_all();
+        }
         for i in 0..P {
             let prior = &self.priors[i];
-            if values[i].is_finite() {
-                self.estimates[i].value = values[i].max(prior.min).min(prior.max);
-            }
+            self.estimates[i].value = values[i].max(prior.min).min(prior.max);
         }
         self.look_back();
         Work::Deviation(0)
+    }
+
+    /// Starts anew from the priors: what was learned holds a value that is not finite.
+    #[cold]
+    #[inline(never)]
+    fn forget_all(&mut self) -> Work {
+        self.information
+            .restart(self.priors.iter().map(|p| (p.mean, p.sd)));
+        for (estimate, prior) in self.estimates.iter_mut().zip(&self.priors) {
+            *estimate = Estimate::of_prior(prior);
+        }
+        self.residual = [T::ZERO; 2];
+        self.last_residual = [None; N];
+        self.windows = T::ZERO;
+        self.restart();
+        Work::Idle
     }
 
     /// Counts what the new values leave of the window.
@@ -549,6 +672,36 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 Decision::Prior
             };
         }
+    }
+}
+
+impl<T: Real, const N: usize> Sample<T, N> {
+    fn finite(&self) -> bool {
+        let leads = self.lead.iter().flatten();
+        let angles = self.q.iter().chain(leads).chain(&self.measured.torque);
+        let mut all = angles.chain(&self.measured.force_on_arm);
+        all.all(|v| v.is_finite()) && self.measured.moment_on_arm.is_finite()
+    }
+}
+
+impl<T: Real, const N: usize> Tuning<T, N> {
+    /// Whether the arm can have these values. What is NaN is judged elsewhere.
+    fn plausible(&self, sample: &Sample<T, N>) -> bool {
+        let mut good = true;
+        for (j, [min, max]) in self.range.iter().enumerate() {
+            for angles in core::iter::once(&sample.q).chain(&sample.lead) {
+                good &= !(angles[j] < *min || angles[j] > *max);
+            }
+        }
+        let [force, torque] = self.largest;
+        let measured = &sample.measured;
+        let forces = measured.force_on_arm.iter().map(|f| (f.abs(), force));
+        let torques = measured
+            .torque
+            .iter()
+            .chain(core::iter::once(&measured.moment_on_arm));
+        let mut all = forces.chain(torques.map(|t| (t.abs(), torque)));
+        good && !all.any(|(found, most)| found > most)
     }
 }
 

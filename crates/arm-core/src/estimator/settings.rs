@@ -1,12 +1,13 @@
 //! How an estimator works, and what follows from it for one control period.
 
 use super::channel::Cutoff;
-use crate::Invalid;
-use crate::check::{SMALLEST, at_least_zero, finite, positive};
+use crate::check::{SMALLEST, at_least_zero, finite, ordered, positive};
 use crate::scalar::Real;
+use crate::{Chain, Invalid};
 
-/// How an estimator works.
+/// How an estimator works. Made by [`Settings::new`]; every guard has a finite value that fits the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings<T, const N: usize> {
     /// Control period \[s\].
     pub period: T,
@@ -18,32 +19,70 @@ pub struct Settings<T, const N: usize> {
     pub noise: [T; N],
     /// Speed below which a joint counts as at rest; while all rest, nothing is learned and nothing forgotten \[rad/s\].
     pub dead_band: T,
+    /// Smallest and largest angle of each joint \[rad\]; beyond it a sample is refused.
+    pub range: [[T; 2]; N],
     /// Fastest that a joint can move \[rad/s\]; an angle that jumps farther is a spike. Infinite for no check.
     pub fastest: T,
     /// Fastest that a force \[N/s\] or torque \[N m/s\] can change. Infinite for no check.
     pub steepest: T,
-    /// Torques that the estimate does not explain, in multiples of what it usually leaves, are not learned from.
+    /// Largest force at the hand \[N\]. Infinite for no check.
+    pub largest_force: T,
+    /// Largest torque in a joint and moment at the hand \[N m\]. Infinite for no check.
+    pub largest_torque: T,
+    /// Torques that the estimate does not explain, in multiples of what it usually leaves and of what is not known, are not
+    /// learned from.
     pub gate: T,
     /// How long a sensor may show the same bits while the arm moves \[s\]; infinite for ever.
     pub frozen_after: T,
+    /// Farthest that the torque which carries the arm may be from that of the arm that was expected, by joint \[N m\]. It
+    /// bounds what any error of a sensor can do.
+    pub envelope: [T; N],
     /// Time in which what was learned fades, counted while the arm moves \[s\]; infinite to forget nothing.
     pub forgetting: T,
 }
 
+/// Fastest joint of an arm that is led \[rad/s\].
+const FASTEST: f64 = 20.0;
+/// Half the range of a joint \[rad\]: half a turn, and a little for joints that are defined otherwise. Less than a turn in
+/// all, so that an angle that is a turn off is seen.
+const HALF_RANGE: f64 = core::f64::consts::PI - 1e-3;
+/// Weights of the arm by which a load changes in a second, and at least in a period (noise of the sensor).
+const STEEPEST: [f64; 2] = [100.0, 0.05];
+/// Weights of the arm that it bears.
+const STRONGEST: f64 = 10.0;
+/// Share of a joint's own largest weight torque, and of the first joint's, that a support may differ from the expected one.
+const ENVELOPE: [f64; 2] = [0.5, 0.02];
+/// Longest time with the same bits in motion \[s\].
+const FROZEN_AFTER: f64 = 0.5;
+
 impl<T: Real, const N: usize> Settings<T, N> {
-    /// Settings for a control period: movements to 3 Hz, 0.1 N m of noise, nothing forgotten, only gross faults refused.
-    pub fn new(period: T) -> Self {
+    /// Settings for an arm and a control period \[s\]: movements to 3 Hz, 0.1 N m of noise, nothing forgotten; joints within
+    /// half a turn to either side and below 20 rad/s, loads below ten times the arm's weight, a support that differs from the
+    /// expected one by at most half of a joint's largest weight torque.
+    pub fn new(chain: &Chain<T, N>, period: T) -> Self {
         let infinite = T::of(f64::INFINITY);
+        let [y, z] = chain.gravity();
+        let gravity = (y.squared() + z.squared()).sqrt();
+        let weight = chain.segments().iter().fold(T::ZERO, |sum, s| sum + s.mass) * gravity;
+        let level = chain.first_moments().map(|x| x.abs() * gravity);
+        let first = level.first().copied().unwrap_or(T::ZERO);
+        let [per_second, per_period] = STEEPEST.map(T::of);
+        let [own, whole] = ENVELOPE.map(T::of);
+        let half = T::of(HALF_RANGE);
         Self {
             period,
             cutoff: T::of(15.0).min(T::of(0.2) / period),
             window: T::of(0.1).max(T::of(4.0) * period),
             noise: [T::of(0.1); N],
             dead_band: T::of(0.005),
-            fastest: infinite,
-            steepest: infinite,
+            range: [[-half, half]; N],
+            fastest: T::of(FASTEST),
+            steepest: weight * per_second.max(per_period / period),
+            largest_force: weight * T::of(STRONGEST),
+            largest_torque: first * T::of(STRONGEST),
             gate: T::of(8.0),
-            frozen_after: infinite,
+            frozen_after: T::of(FROZEN_AFTER),
+            envelope: level.map(|torque| own * torque + whole * first),
             forgetting: infinite,
         }
     }
@@ -70,8 +109,13 @@ pub(super) struct Tuning<T, const N: usize> {
     pub weight: [T; N],
     pub dead_band: T,
     pub gate: T,
+    /// Range of each angle.
+    pub range: [[T; 2]; N],
+    /// Largest force and torque.
+    pub largest: [T; 2],
     /// Farthest that an angle and a load move in one period.
     pub farthest: [T; 2],
+    pub envelope: [T; N],
     pub frozen_after: u32,
     /// Periods that may be bridged before the filters start anew.
     pub longest_gap: u32,
@@ -118,6 +162,8 @@ impl<T: Real, const N: usize> Tuning<T, N> {
         for (name, value) in [
             ("fastest speed", s.fastest),
             ("steepest force", s.steepest),
+            ("largest force", s.largest_force),
+            ("largest torque", s.largest_torque),
             ("gate", s.gate),
             ("freezing time", s.frozen_after),
             ("time of forgetting", s.forgetting),
@@ -125,6 +171,10 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             in_range(name, value, SMALLEST, f64::INFINITY)?;
         }
         at_least_zero("dead band", 0, s.dead_band)?;
+        for (index, (&range, &envelope)) in s.range.iter().zip(&s.envelope).enumerate() {
+            ordered("range of joint", index, range)?;
+            positive_or_infinite("envelope of joint", index, envelope)?;
+        }
 
         let (sin, cos) = (T::of(core::f64::consts::PI) * cutoff * period).sin_cos();
         let g = sin / cos;
@@ -157,7 +207,10 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             weight: s.noise.map(|noise| T::ONE / noise.squared()),
             dead_band: s.dead_band,
             gate: s.gate,
+            range: s.range,
+            largest: [s.largest_force, s.largest_torque],
             farthest: [s.fastest * s.period, s.steepest * s.period],
+            envelope: s.envelope,
             frozen_after: periods(s.frozen_after / period),
             longest_gap: periods(T::of(LONGEST_GAP) / period).max(2),
             settling: periods(T::of(SETTLING) / (cutoff * period)),
@@ -174,6 +227,26 @@ impl<T: Real, const N: usize> Tuning<T, N> {
 fn periods<T: Real>(count: T) -> u32 {
     let whole = count.whole();
     whole.saturating_add(u32::from(T::of_count(u64::from(whole)) < count))
+}
+
+fn positive_or_infinite<T: Real>(
+    name: &'static str,
+    index: usize,
+    value: T,
+) -> Result<(), Invalid> {
+    match in_range(name, value, SMALLEST, f64::INFINITY) {
+        Err(Invalid::OutOfRange {
+            found, min, max, ..
+        }) => Err(Invalid::OutOfRange {
+            name,
+            index,
+            found,
+            min,
+            max,
+        }),
+        Err(_) => Err(Invalid::NotFinite { name, index }),
+        Ok(()) => Ok(()),
+    }
 }
 
 fn in_range<T: Real>(name: &'static str, found: T, min: f64, max: f64) -> Result<(), Invalid> {

@@ -1,6 +1,6 @@
 //! The safety monitor: every fault is seen within two control periods, and nothing else is.
 
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason, Stop};
+use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason, Stop, Times};
 use arm_core::{Invalid, Joints, Limits, Path, Real, Shape};
 
 use crate::common::Random;
@@ -25,7 +25,14 @@ fn channels<T: Real>() -> [Channel<T>; 5] {
 }
 
 fn monitor<T: Real>() -> Monitor<T, 5> {
-    Monitor::new(channels(), OLDEST).expect("the limits are in order")
+    Monitor::new(
+        channels(),
+        Times {
+            oldest: OLDEST,
+            period: 2 * PERIOD,
+        },
+    )
+    .expect("the limits are in order")
 }
 
 /// Period `k` of a clean run: up and down within all limits, with a little noise so that no value repeats.
@@ -247,9 +254,75 @@ fn the_first_stop_is_kept_until_reset() {
 }
 
 #[test]
+fn a_loop_that_stalls_stops_the_device() {
+    let (periods, stop) = caught::<f64>(2_000, |seen, _, _| {
+        seen.now += 3 * PERIOD;
+        seen.stamp += 3 * PERIOD;
+    })
+    .expect("a stop");
+    assert_eq!(
+        (periods, stop.reason, stop.channel),
+        (1, Reason::Stalled, None)
+    );
+    assert!((stop.value - 4e-3).abs() < 1e-12 && stop.limit == 2e-3);
+}
+
+#[test]
+fn a_value_that_changes_too_fast_or_too_far_stops_the_device() {
+    let check = |channel: Channel<f64>, second: (u64, f64)| {
+        let times = Times {
+            oldest: PERIOD,
+            period: 10 * PERIOD,
+        };
+        let mut monitor = Monitor::new([channel], times).expect("limits");
+        let mut seen = Observation {
+            now: PERIOD,
+            stamp: PERIOD,
+            values: [0.0],
+            moving: [true],
+        };
+        assert_eq!(monitor.check(&seen), Ok(()));
+        (seen.now, seen.stamp, seen.values[0]) = (PERIOD + second.0, PERIOD + second.0, second.1);
+        monitor
+            .check(&seen)
+            .map_err(|stop| (stop.reason, stop.value, stop.limit))
+    };
+    let open = Channel::magnitude(Quantity::Angle, 10.0);
+    assert_eq!(check(open, (PERIOD, 9.0)), Ok(()));
+    let slow = open.fastest(100.0);
+    assert_eq!(check(slow, (PERIOD, 0.09)), Ok(()));
+    assert_eq!(check(slow, (5 * PERIOD, 0.45)), Ok(()));
+    let (reason, value, limit) = check(slow, (PERIOD, 0.2)).expect_err("200 rad/s");
+    assert!((value - 200.0).abs() < 1e-9);
+    assert_eq!((reason, limit), (Reason::Jump, 100.0));
+    let near = open.farthest(0.5);
+    assert_eq!(check(near, (5 * PERIOD, 0.5)), Ok(()));
+    assert_eq!(
+        check(near, (5 * PERIOD, -0.6)),
+        Err((Reason::Jump, 0.6, 0.5))
+    );
+    // A new value under an old time stamp has changed in no time.
+    assert!(check(slow, (0, 0.01)).is_err());
+}
+
+#[test]
+fn a_monitor_without_channels_or_period_is_refused() {
+    let times = |period| Times { oldest: 0, period };
+    assert!(Monitor::<f64, 0>::new([], times(1)).is_err());
+    let channel = Channel::magnitude(Quantity::Angle, 1.0);
+    assert!(Monitor::new([channel], times(0)).is_err());
+    assert!(Monitor::new([channel.fastest(0.0)], times(1)).is_err());
+    assert!(Monitor::new([channel.farthest(f64::NAN)], times(1)).is_err());
+}
+
+#[test]
 fn impossible_limits_are_refused() {
     let refused = |min, max| {
-        Monitor::<f64, 1>::new([Channel::range(Quantity::Angle, min, max)], 0).map(|_| ())
+        let times = Times {
+            oldest: 0,
+            period: 1,
+        };
+        Monitor::<f64, 1>::new([Channel::range(Quantity::Angle, min, max)], times).map(|_| ())
     };
     assert_eq!(refused(f64::NEG_INFINITY, f64::INFINITY), Ok(()));
     let nan = Err(Invalid::NotFinite {

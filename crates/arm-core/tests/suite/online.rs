@@ -3,7 +3,7 @@
 use core::array::from_fn;
 
 use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
-use arm_core::estimator::{Decision, Estimator, Fault, Heed, Sample, Settings};
+use arm_core::estimator::{Decision, Estimator, Fault, Sample, SampleStatus, Settings};
 use arm_core::{
     Compensation, Equation, Invalid, Joints, Measured, Pose, Prior, gravity, inverse_dynamics,
     models, static_torque,
@@ -127,11 +127,10 @@ fn sample(equation: &Equation<f64, 3, 18, 10>, t: f64) -> Sample<f64, 3> {
 }
 
 fn settings() -> Settings<f64, 3> {
-    Settings {
-        cutoff: 40.0,
-        noise: [0.005; 3],
-        ..Settings::new(1e-3)
-    }
+    let mut settings = Settings::new(&models::human_arm(), 1e-3);
+    settings.cutoff = 40.0;
+    settings.noise = [0.005; 3];
+    settings
 }
 
 fn started(settings: &Settings<f64, 3>) -> Estimator<f64, 3, 18, 10> {
@@ -207,10 +206,8 @@ fn what_is_not_moved_is_said_to_be_prior() {
 
 #[test]
 fn forgetting_at_rest_and_in_a_poor_movement_does_not_wind_up() {
-    let forgetting = Settings {
-        forgetting: 5.0,
-        ..settings()
-    };
+    let mut forgetting = settings();
+    forgetting.forgetting = 5.0;
     let mut online = started(&forgetting);
     let equation = *online.equation();
     for k in 0..12_000 {
@@ -247,42 +244,42 @@ fn forgetting_at_rest_and_in_a_poor_movement_does_not_wind_up() {
 
 #[test]
 fn bad_samples_are_named() {
-    let strict = Settings {
-        fastest: 20.0,
-        steepest: 1000.0,
-        frozen_after: 0.01,
-        ..settings()
-    };
+    let mut strict = settings();
+    strict.steepest = 1000.0;
+    strict.frozen_after = 0.01;
     let mut online = started(&strict);
     let equation = *online.equation();
     let at = |k: i32| sample(&equation, f64::from(k) * 1e-3);
-    assert_eq!(online.update(None), Heed::Refused(Fault::Missing));
-    assert_eq!(online.update(Some(&at(0))), Heed::Settling);
+    assert_eq!(online.update(None), SampleStatus::Refused(Fault::Missing));
+    assert_eq!(online.update(Some(&at(0))), SampleStatus::Settling);
     for k in 1..2000 {
         online.update(Some(&at(k)));
     }
-    assert_eq!(online.update(Some(&at(2000))), Heed::Taken);
-    assert_eq!(online.update(None), Heed::Refused(Fault::Missing));
+    assert_eq!(online.update(Some(&at(2000))), SampleStatus::Taken);
+    assert_eq!(online.update(None), SampleStatus::Refused(Fault::Missing));
     let mut s = at(2002);
     s.measured.force_on_arm[1] = f64::NAN;
-    assert_eq!(online.update(Some(&s)), Heed::Refused(Fault::NotFinite));
+    assert_eq!(
+        online.update(Some(&s)),
+        SampleStatus::Refused(Fault::NotFinite)
+    );
     s = at(2003);
     s.q[1] += 1.0;
-    assert_eq!(online.update(Some(&s)), Heed::Refused(Fault::Spike));
-    assert_eq!(online.update(Some(&at(2004))), Heed::Taken);
+    assert_eq!(online.update(Some(&s)), SampleStatus::Refused(Fault::Spike));
+    assert_eq!(online.update(Some(&at(2004))), SampleStatus::Taken);
     let held = at(2005);
-    let mut last = Heed::Taken;
+    let mut last = SampleStatus::Taken;
     for k in 2005..2020 {
         s = at(k);
         s.measured.torque[2] = held.measured.torque[2];
         last = online.update(Some(&s));
     }
-    assert_eq!(last, Heed::Refused(Fault::Frozen));
+    assert_eq!(last, SampleStatus::Refused(Fault::Frozen));
     // After a long gap the filters settle anew.
     for _ in 0..100 {
         online.update(None);
     }
-    assert_eq!(online.update(Some(&at(2120))), Heed::Settling);
+    assert_eq!(online.update(Some(&at(2120))), SampleStatus::Settling);
 }
 
 #[test]

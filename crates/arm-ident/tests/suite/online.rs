@@ -178,12 +178,11 @@ fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
 }
 
 /// What the estimator is told of that rig: 0.02 N m is what is left of a window once the arm is known.
-fn settings<T: Real>(period: f64) -> Settings<T, 2> {
-    Settings {
-        noise: [T::of(0.02); 2],
-        cutoff: T::of(CUTOFF),
-        ..Settings::new(T::of(period))
-    }
+fn settings<T: Real>(chain: &Chain<f64, 2>, period: f64) -> Settings<T, 2> {
+    let mut settings = Settings::new(&chain.cast(), T::of(period));
+    settings.noise = [T::of(0.02); 2];
+    settings.cutoff = T::of(CUTOFF);
+    settings
 }
 
 fn learned<T: Real>(
@@ -231,7 +230,7 @@ fn virtual_arm_comes_to_the_batch_estimate() {
         let (model, trial, lead) = virtual_arm(seed);
         let found =
             identify(&model, std::slice::from_ref(&trial), &Options::default()).expect("a fit");
-        let online = learned(&model, &settings::<f64>(1e-3), &whole(&trial, &lead));
+        let online = learned(&model, &settings::<f64>(&model.chain, 1e-3), &whole(&trial, &lead));
         let off = distances(&found, &online);
         if seed == 0 {
             assert!(off.iter().all(|o| o.abs() <= 1.0), "{off:.2?}");
@@ -242,7 +241,7 @@ fn virtual_arm_comes_to_the_batch_estimate() {
                     .all(|e| e.decided_by == Decision::Data)
             );
             // Single precision comes to the same.
-            let single = learned(&model, &settings::<f32>(1e-3), &whole(&trial, &lead));
+            let single = learned(&model, &settings::<f32>(&model.chain, 1e-3), &whole(&trial, &lead));
             for (a, b) in single.estimates().iter().zip(online.estimates()) {
                 assert!(
                     (f64::from(a.value) - b.value).abs() <= 0.05 * b.sd,
@@ -262,13 +261,10 @@ fn virtual_arm_comes_to_the_batch_estimate() {
 fn faults_of_the_data_do_no_harm() {
     let (model, trial, lead) = virtual_arm(0);
     let clean: Vec<Option<Sample<f64, 2>>> = whole(&trial, &lead);
-    let settings = Settings {
-        fastest: 20.0,
-        steepest: 5e3,
-        frozen_after: 0.02,
-        forgetting: 60.0,
-        ..settings(1e-3)
-    };
+    let mut settings = settings(&model.chain, 1e-3);
+    settings.steepest = 5e3;
+    settings.frozen_after = 0.02;
+    settings.forgetting = 60.0;
     let reference = learned(&model, &settings, &clean);
     type Stream = Vec<Option<Sample<f64, 2>>>;
     let dropped = |mut s: Stream| {
@@ -426,10 +422,8 @@ fn measured_arm_comes_to_the_batch_estimate() {
         return;
     };
     let found = identify(&model, std::slice::from_ref(&trial), &Options::default()).expect("a fit");
-    let settings = Settings {
-        cutoff: 15.0,
-        ..settings(1.0 / 300.0)
-    };
+    let mut settings = settings(&model.chain, 1.0 / 300.0);
+    settings.cutoff = 15.0;
     let online = learned(&model, &settings, &whole(&trial, &None));
     let off = distances(&found, &online);
     assert!(off.iter().all(|o| o.abs() <= 1.0), "{off:.2?}");
