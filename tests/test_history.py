@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import signal
 import sqlite3
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -244,3 +247,27 @@ def test_a_place_that_cannot_be_is_refused(tmp_path: Path) -> None:
         sessions.check(tmp_path / ("a" * 300), 2, "a")
     with pytest.raises(BadInput, match="history: found 3, allowed a path"):
         sessions.check(3, 2, "a")  # type: ignore[arg-type]
+
+
+def test_additions_at_the_same_time_all_stay(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "one.sqlite"
+    dates = [f"2026-03-{day:02d}" for day in range(1, 13)]
+    with ThreadPoolExecutor(max_workers=len(dates)) as pool:
+        list(pool.map(lambda date: sessions.add(file, identified, date), dates))
+    assert set(sessions.read(file)[0].dates) == set(dates)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.parametrize("after", ["executescript", "_insert"])
+def test_a_kill_while_a_history_is_made_leaves_one_that_is_accepted(identified: Identified, tmp_path: Path, after: str) -> None:
+    file = tmp_path / "one.sqlite"
+    child = os.fork()
+    if child == 0:  # the process that is killed in the midst of its transaction
+        connection = sqlite3.connect(file)
+        connection.executescript(f"BEGIN IMMEDIATE; PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA} {sessions._WHOSE}")
+        if after == "_insert":
+            sessions._insert(connection, identified, "2026-03-01")
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    sessions.add(file, identified, "2026-03-02")
+    assert sessions.read(file)[0].dates == ("2026-03-02",)

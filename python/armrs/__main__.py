@@ -1,5 +1,18 @@
-"""`python -m armrs` is the command `armrs`."""
+"""`armrs` and `python -m armrs`: the command line, and an end without a traceback while it still loads."""
 
-from .cli import run
+import sys
 
-run()
+
+def main() -> None:
+    """Run the command line and end the process with its status."""
+    try:
+        from .cli import run
+
+        run()
+    except KeyboardInterrupt as end:
+        print("armrs: interrupted", file=sys.stderr)
+        sys.exit(getattr(end, "status", 130))
+
+
+if __name__ == "__main__":
+    main()

@@ -10,13 +10,16 @@ nothing otherwise.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..errors import ArmrsError, BadInput, BadInputs, one_line
+from ..io import files
 from . import fmu
 from .analysis import gap, identify, passive
 from .built_in import demo, reproduce
@@ -66,7 +69,7 @@ def _root(
 
     Simulate the experiment, identify the arm, and name what the model lacks. SI units and radians unless a name says otherwise.
 
-    Exit status: 0 done, 1 found something that needs you, 2 bad input.
+    Exit status: 0 done, 1 found something that needs you, 2 bad input, 130 interrupted (143 and 129 after SIGTERM and SIGHUP).
     """
 
 
@@ -78,8 +81,8 @@ app.add_typer(fmu.app, short_help="Export the arm for other tools; look at a uni
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    command = typer.main.get_command(app)
     try:
+        command = typer.main.get_command(app)
         # Not `command.main`, which turns some errors into exits of its own.
         with command.make_context("armrs", given or ["--help"], obj=tuple(given)) as context:
             result = command.invoke(context)
@@ -96,18 +99,68 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USAGE as error:
         inside = getattr(error, "ctx", None)
         return _refuse(f"{_usage_text(error)} (see {inside.command_path if inside else 'armrs'} --help)")
+    except Terminated as end:
+        print("armrs: terminated", file=sys.stderr)
+        return end.status
     except (KeyboardInterrupt, typer.Abort):
         print("armrs: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # The reader of our output has seen enough. Standard output is turned away, or its last flush would complain.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader of our output has seen enough.
+        _turn_away_output()
         return 0
+    except MemoryError:
+        print("armrs: not enough memory", file=sys.stderr)
+        return 1
+    except OSError as error:
+        _turn_away_output()
+        print(f"armrs: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
+        return 1
     return result if isinstance(result, int) else 0
+
+
+def _turn_away_output() -> None:
+    """Send what is left of standard output nowhere, or its last flush would complain."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class Terminated(KeyboardInterrupt):
+    """The process was asked to end; work is undone as after Ctrl-C.
+
+    Attributes
+    ----------
+    status : int
+        128 and the number of the signal, as shells count it.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.status = 128 + number
+
+
+def _terminate(number: int, _: Any) -> None:
+    raise Terminated(number)
+
+
+def _prepare_outputs() -> None:
+    """Let every text be printed: to an output that was closed, and on terminals that do not know all characters."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115 (for as long as the process lives)
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
 
 
 def run() -> None:
     """Entry point of the command `armrs`."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        # nohup ignores hang-ups on purpose.
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _terminate)
+    _prepare_outputs()
+    files.sweep_scratch()
     sys.exit(main())
 
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArmrsError, BadInput, Text
+from . import files
 
 LONGEST = 60.0
 """Time that reading a file may take [s]; 100 MB take about 2 s."""
@@ -72,7 +73,7 @@ def read(path: Path) -> C3D:
     if find_spec("ezc3d") is None:
         raise ArmrsError('C3D files need ezc3d: pip install "armrs[files]"')
     _check_header(path)
-    with tempfile.TemporaryDirectory(prefix="armrs-c3d-") as folder:
+    with tempfile.TemporaryDirectory(prefix=files.scratch_prefix("c3d")) as folder:
         out = Path(folder) / "content.npz"
         command = [sys.executable, "-m", "armrs.io.c3d", str(path.resolve()), str(out)]
         try:

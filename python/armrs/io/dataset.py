@@ -6,7 +6,7 @@ import dataclasses
 import math
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -347,6 +347,8 @@ def describe(source: str | os.PathLike[str]) -> Description:
         found = "a trial" if trial else "a folder that holds no data set"
         raise BadInput("file", Text(found), f"the folder of {'its' if trial else 'a'} data set, with {FILE}", file=source, hint=hint)
     path = path / FILE if path.is_dir() else path
+    with suppress(OSError):  # a data set may lie where nothing can be written
+        files.recover(path.parent)
     return tomlfile.load(path, _description)
 
 

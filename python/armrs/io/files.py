@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -15,6 +17,13 @@ from .. import checks
 from ..errors import BadInput, Text
 
 PathLike = str | os.PathLike[str]
+
+_HOST = re.sub(r"\W", "_", os.uname().nodename if hasattr(os, "uname") else os.environ.get("COMPUTERNAME", ""))[:32] or "host"
+_UNFINISHED = re.compile(r"\..*\.(?P<host>\w+)-(?P<process>\d+)\..*\.part")
+"""Names of what a process has not finished writing: it says which process of which machine."""
+_COMPLETE = ".complete"
+"""Suffix of a folder whose files are all written and on their way to their places."""
+_SCRATCH = re.compile(r"armrs-.*?(?P<host>\w+)-(?P<process>\d+)-.*")
 
 
 @contextmanager
@@ -27,7 +36,8 @@ def replacing(path: PathLike) -> Iterator[Path]:
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+        recover(target.parent)
+        handle, name = tempfile.mkstemp(prefix=_unfinished(target.name), suffix=".part", dir=target.parent)
     except (OSError, ValueError) as error:
         raise _unwritable(path, error) from None
     temporary = Path(name)
@@ -89,11 +99,17 @@ def write_whole(folder: PathLike, write: Callable[[Path], list[Path]]) -> list[P
         The files, where they are now.
     """
     target = output_folder(folder)
+    with _alone_in(target):
+        return _write_whole(target, folder, write)
+
+
+def _write_whole(target: Path, folder: PathLike, write: Callable[[Path], list[Path]]) -> list[Path]:
     # Inside or beside, so that moving a file only changes its name.
     near = target if target.exists() else target.resolve().parent
     try:
         near.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{target.resolve().name}.", suffix=".part", dir=near))
+        recover(near)
+        temporary = Path(tempfile.mkdtemp(prefix=_unfinished(target.resolve().name), suffix=".part", dir=near))
     except FileExistsError:
         raise BadInput("file", Text("Not a directory"), "a place that can be written", file=folder) from None
     except (OSError, ValueError) as error:
@@ -101,8 +117,16 @@ def write_whole(folder: PathLike, write: Callable[[Path], list[Path]]) -> list[P
     try:
         written = [path.relative_to(temporary) for path in write(temporary)]
         for name in written:
+            _refuse_links(target, name)
             may_replace(target / name, name.suffix)
-        _move(temporary, target)
+        _flush(temporary)
+        if target.exists():
+            # From here on the new files are the result: a process that ends now is completed by the next one.
+            temporary = temporary.rename(temporary.with_suffix(_COMPLETE))
+            _move(temporary, target)
+        else:
+            temporary.chmod(0o777 & ~_umask())
+            temporary.rename(target)
     except OSError as error:
         raise _unwritable(folder, error) from None
     except BadInput as error:
@@ -110,22 +134,99 @@ def write_whole(folder: PathLike, write: Callable[[Path], list[Path]]) -> list[P
             raise
         raise error.within(file=target / Path(error.file).relative_to(temporary)) from None
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        if temporary.suffix != _COMPLETE:
+            shutil.rmtree(temporary, ignore_errors=True)
     return [target / name for name in written]
 
 
-def _move(temporary: Path, target: Path) -> None:
-    """Bring everything below one folder to another of the same file system."""
-    if not target.exists():
-        temporary.chmod(0o777 & ~_umask())
-        temporary.rename(target)
+@contextmanager
+def _alone_in(target: Path) -> Iterator[None]:
+    """Keep other processes of armrs from writing several files to a folder meanwhile."""
+    if sys.platform == "win32" or not target.is_dir():  # a folder that is new takes its place at once
+        yield
         return
+    import fcntl
+
+    handle = os.open(target, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            found, allowed = Text("another process of armrs that writes to it"), "a folder that nobody writes to"
+            raise BadInput("folder", found, allowed, file=target) from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def recover(folder: Path) -> None:
+    """Finish what processes left in a folder that ended in the midst of writing: complete results move to their places, others go."""
+    for path in folder.glob(".*"):
+        if path.is_symlink() or _at_work(path.with_suffix(".part").name, _UNFINISHED):
+            continue
+        if path.suffix == _COMPLETE:
+            _move(path, folder)
+        elif path.suffix == ".part" and path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        elif path.suffix == ".part":
+            path.unlink(missing_ok=True)
+
+
+def scratch_prefix(what: str) -> str:
+    """Return the beginning of the name of a temporary folder; it says whose it is, so that `sweep_scratch` can remove it later."""
+    return f"armrs-{what}-{_HOST}-{os.getpid()}-"
+
+
+def sweep_scratch() -> None:
+    """Remove temporary folders of processes that ended without doing so."""
+    with suppress(OSError):
+        for path in Path(tempfile.gettempdir()).glob("armrs-*"):
+            if _SCRATCH.fullmatch(path.name) and not _at_work(path.name, _SCRATCH) and path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def _unfinished(name: str) -> str:
+    return f".{name}.{_HOST}-{os.getpid()}."
+
+
+def _at_work(name: str, pattern: re.Pattern[str]) -> bool:
+    """Whether the process that a name tells is still there; one on another machine may be."""
+    match = pattern.fullmatch(name)
+    if match is None or match["host"] != _HOST:
+        return True
+    try:
+        os.kill(int(match["process"]), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _refuse_links(target: Path, name: Path) -> None:
+    """Refuse a place below a folder that lies behind a symbolic link: it may be anywhere."""
+    for part in (*reversed(name.parents), name):
+        if part != Path() and (target / part).is_symlink():
+            raise BadInput("file", Text("a symbolic link"), "a file or folder of its own below the output folder", file=target / part)
+
+
+def _flush(folder: Path) -> None:
+    """Bring the content of all files of a folder to the disk."""
+    for path in folder.rglob("*"):
+        if path.is_file():
+            with path.open("rb+") as written:
+                os.fsync(written.fileno())
+
+
+def _move(temporary: Path, target: Path) -> None:
+    """Bring everything below one folder to another of the same file system, and remove it."""
     for path in sorted(temporary.rglob("*")):
         place = target / path.relative_to(temporary)
         if path.is_dir():
             place.mkdir(exist_ok=True)
         else:
             path.replace(place)
+    shutil.rmtree(temporary, ignore_errors=True)
 
 
 def write_text(path: PathLike, content: str, *, kind: str) -> None:

@@ -19,6 +19,7 @@ from ..errors import BadInput, Text, not_utf8
 from .files import may_replace, replacing
 
 SUFFIXES = (".csv", ".parquet")
+MOST_COLUMNS = 4096
 NUMBER = "a finite number, or an empty cell where the sample is missing"
 
 
@@ -90,6 +91,10 @@ def header_of(path: Path) -> list[str]:
         raw = stream.readline(1_000_000)
     if not raw.strip():
         raise BadInput("line 1", Text("nothing"), "a header with the names of the columns")
+    if b"\r" in raw.rstrip(b"\r\n"):
+        raise BadInput("line 1", Text("line ends of carriage returns alone"), "line feeds; armrs import reads such files")
+    if raw.count(b",") >= MOST_COLUMNS:
+        raise BadInput("line 1", Text(f"{raw.count(b',') + 1} cells"), f"at most {MOST_COLUMNS} columns")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

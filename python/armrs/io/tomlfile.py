@@ -19,18 +19,42 @@ else:
 
 _Made = TypeVar("_Made")
 _LIMIT = 16 * 1024 * 1024
+_DEEPEST = 32
+_DIGITS = 1000
+_QUOTED = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'')
+_LONG_KEY = re.compile(rf'\s*\[{{0,2}}\s*[\w"-]+(\s*\.\s*[\w"-]+){{{_DEEPEST},}}')
+_LONG_NUMBER = re.compile(rf"[\d_]{{{_DIGITS},}}")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the tables of a TOML file, or raise `BadInput` naming file, line and column."""
     content = read_text(path, "a TOML file")
+    _refuse_bombs(content, path)
     try:
         return tomllib.loads(content)
     except tomllib.TOMLDecodeError as error:
         message, _, position = str(error).partition(" (at ")
         place = position.rstrip(")") or "TOML"
         raise BadInput(place, Text(message), "TOML", file=path) from None
+
+
+def _refuse_bombs(content: str, path: str | os.PathLike[str]) -> None:
+    """Refuse what is legal, means nothing here, and keeps a reader busy for minutes: nesting, keys in parts, and numbers without end."""
+    depth = 0
+    for number, line in enumerate(content.splitlines(), start=1):
+        plain = _QUOTED.sub('""', line).partition("#")[0]
+        for c in plain:
+            depth += (c in "[{") - (c in "]}")
+            if depth > _DEEPEST:
+                raise BadInput(
+                    f"line {number}", Text(f"more than {_DEEPEST} brackets within one another"), "TOML as armrs writes it", file=path
+                )
+        depth = max(depth, 0)
+        if _LONG_KEY.match(plain):
+            raise BadInput(f"line {number}", Text(f"a key of more than {_DEEPEST} parts"), "TOML as armrs writes it", file=path)
+        if _LONG_NUMBER.search(plain):
+            raise BadInput(f"line {number}", Text(f"a number of more than {_DIGITS} digits"), "a number", file=path)
 
 
 def load(path: str | os.PathLike[str], make: Callable[[dict[str, Any], Path], _Made]) -> _Made:
@@ -46,14 +70,16 @@ def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> st
     """Return the text of a UTF-8 file of at most `most` bytes, or raise `BadInput`."""
     file = checks.path("file", path)
     try:
-        is_folder, size = file.is_dir(), file.stat().st_size
-        raw = b"" if is_folder or size > most else file.read_bytes()
+        is_folder, is_file, size = file.is_dir(), file.is_file(), file.stat().st_size
+        raw = file.read_bytes() if is_file and size <= most else b""
     except OSError as error:
         raise BadInput("file", Text(error.strerror or "unreadable"), f"{what} that can be read", file=path) from None
     except ValueError:  # a path with a null character
         raise BadInput("file", Text("a name no file can have"), what, file=path) from None
     if is_folder:
         raise BadInput("file", Text("a folder"), what, file=path)
+    if not is_file:
+        raise BadInput("file", Text("a device or a pipe"), f"{what} on a disk", file=path)
     if size > most:
         raise BadInput("file", Text(f"{size} bytes"), f"{what} of at most {most} bytes", file=path)
     try:

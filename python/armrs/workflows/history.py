@@ -24,6 +24,8 @@ APPLICATION = 0x61726D73
 """Mark of our files: "arms" in ASCII."""
 LEVEL = 0.95
 """One minus the probability of calling any parameter changed when none is."""
+LONGEST_WAIT = 60.0
+"""Time for which a history that another process writes is waited for [s]; writing takes some milliseconds."""
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS session (
     id INTEGER PRIMARY KEY, name TEXT NOT NULL, date TEXT NOT NULL, method TEXT NOT NULL, joints INTEGER NOT NULL,
@@ -197,25 +199,34 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
     """
     file, subject = Path(path), subject_of(result.dataset)
     check(file, result.dataset.model.n_joints, subject)
-    made = [folder for folder in file.absolute().parents if not folder.exists()]
-    file.parent.mkdir(parents=True, exist_ok=True)
-    is_new, is_kept = not file.exists(), False
     try:
+        yield _foreseen(file, result, subject, date)
+        # The file is written only now, in one short transaction: the block may take long, and others may add meanwhile.
+        file.parent.mkdir(parents=True, exist_ok=True)
         with closing(_open(file)) as connection:
-            connection.executescript(f"PRAGMA application_id = {APPLICATION}; {_SCHEMA} {_WHOSE}")
-            connection.execute("INSERT INTO subject SELECT ? WHERE NOT EXISTS (SELECT * FROM subject)", (subject,))
-            _insert(connection, result, date)
-            yield _courses(connection, result.method)
-            # Not committed otherwise: what is open when a connection closes is undone.
-            connection.commit()
-            is_kept = True
+            _write(connection, result, subject, date)
     except sqlite3.Error as error:
         raise BadInput("history", Text(str(error)), "a history that can be written", file=file) from None
-    finally:
-        if is_new and not is_kept:
-            file.unlink(missing_ok=True)
-            for folder in made:
-                folder.rmdir()
+
+
+def _foreseen(file: Path, result: Identified, subject: str, date: str) -> tuple[Course, ...]:
+    """Return the history as it will be with a result, without writing it."""
+    with closing(sqlite3.connect(":memory:")) as memory:
+        memory.execute("PRAGMA foreign_keys = ON")
+        if file.exists() and file.stat().st_size > 0:
+            with closing(_open(file)) as connection:
+                connection.backup(memory)
+        _write(memory, result, subject, date)
+        return _courses(memory, result.method)
+
+
+def _write(connection: sqlite3.Connection, result: Identified, subject: str, date: str) -> None:
+    """Add a result in one transaction, the tables included: a process that is killed leaves the history as it was."""
+    # A script begins its own transaction; statements that follow it belong to the same one.
+    connection.executescript(f"BEGIN IMMEDIATE; PRAGMA application_id = {APPLICATION}; {_SCHEMA} {_WHOSE}")
+    connection.execute("INSERT INTO subject SELECT ? WHERE NOT EXISTS (SELECT * FROM subject)", (subject,))
+    _insert(connection, result, date)
+    connection.commit()
 
 
 def _insert(connection: sqlite3.Connection, result: Identified, date: str) -> None:
@@ -279,9 +290,9 @@ def _open(file: Path) -> sqlite3.Connection:
     """Open a history, or refuse what is none: another file, another program's database, one that is damaged or was changed by hand."""
     try:
         # SQLite takes a file of a few bytes for an empty database, and would write over it.
-        if file.exists() and (not file.is_file() or file.read_bytes()[: len(_MAGIC)] not in (b"", _MAGIC)):
+        if file.exists() and (not file.is_file() or _head(file) not in (b"", _MAGIC)):
             raise _no_history(file, "file is not a database")
-        connection = sqlite3.connect(file)
+        connection = sqlite3.connect(file, timeout=LONGEST_WAIT)
     except OSError as error:
         raise _no_history(file, error.strerror or "a file that cannot be read") from None
     except sqlite3.Error as error:
@@ -294,6 +305,11 @@ def _open(file: Path) -> sqlite3.Connection:
         connection.close()
         raise _no_history(file, wrong)
     return connection
+
+
+def _head(file: Path) -> bytes:
+    with file.open("rb") as stream:
+        return stream.read(len(_MAGIC))
 
 
 def _wrong(connection: sqlite3.Connection) -> str | None:

@@ -1,0 +1,183 @@
+"""Whatever comes in or happens meanwhile: a refusal in one line, nothing half-written, nothing lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.io import files, tomlfile
+
+BOMBS: dict[str, Callable[[], str]] = {
+    "depth 100 000": lambda: "a = " + "[" * 100_000 + "]" * 100_000,
+    "5000 digits": lambda: "a = " + "9" * 5000,
+    "dotted keys": lambda: ".".join(["a"] * 200_000) + " = 1",
+    "dotted tables": lambda: "[" + ".".join(["a"] * 200_000) + "]",
+    "tables in tables": lambda: "a = " + "{b = " * 2000 + "1" + "}" * 2000,
+}
+
+
+@pytest.mark.parametrize("bomb", BOMBS)
+def test_a_toml_bomb_is_refused_at_once(bomb: str, tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(BOMBS[bomb]())
+    start = time.monotonic()
+    with pytest.raises(armrs.BadInput):
+        armrs.load_model(path)
+    with pytest.raises(armrs.BadInput):
+        tomlfile.read(path)
+    assert time.monotonic() - start < 5.0
+
+
+def test_long_arrays_of_numbers_are_no_bomb(tmp_path: Path) -> None:
+    path = tmp_path / "movement.toml"
+    path.write_text("points = [\n  " + ", ".join(["1.25"] * 500) + ",\n  [" + ", ".join(["0.5"] * 100) + "]\n]\n")
+    assert len(tomlfile.read(path)["points"]) == 501
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no devices here")
+def test_devices_and_pipes_are_no_files(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    for path in ("/dev/zero", str(tmp_path / "pipe.toml")):
+        with pytest.raises(armrs.BadInput, match="a device or a pipe"):
+            tomlfile.read(path)
+
+
+def csv(content: bytes, tmp_path: Path) -> armrs.BadInput:
+    from armrs.io.samples import read_samples
+
+    path = tmp_path / "trial.csv"
+    path.write_bytes(content)
+    with pytest.raises(armrs.BadInput) as refused:
+        read_samples(path)
+    return refused.value
+
+
+def test_csv_with_carriage_returns_alone_is_named(tmp_path: Path) -> None:
+    assert "carriage returns" in str(csv(b"t_s,q1_rad\r0,1\r1,2\r", tmp_path))
+
+
+def test_csv_with_200_000_columns_is_refused_at_once(tmp_path: Path) -> None:
+    start = time.monotonic()
+    assert "at most 4096 columns" in str(csv(b",".join(b"c%d" % k for k in range(100_000)) + b"\n", tmp_path))
+    assert time.monotonic() - start < 2.0
+
+
+def written(folder: Path, content: str) -> None:
+    def write(part: Path) -> list[Path]:
+        (part / "a.json").write_text(content)
+        (part / "b.json").write_text(content)
+        return [part / "a.json", part / "b.json"]
+
+    files.write_whole(folder, write)
+
+
+def test_a_process_killed_between_two_files_is_completed_by_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After the commit the result is the new one: the next write, or reading a data set, brings the rest to its place."""
+    written(tmp_path, "old")
+    monkeypatch.setattr(files, "_HOST", "here")
+    dead = _dead_process()
+    pending = tmp_path / f".x.here-{dead}.abc.complete"
+    pending.mkdir()
+    (pending / "b.json").write_text("new")
+    (tmp_path / "a.json").write_text("new")  # moved before the end
+    unfinished = tmp_path / f".x.here-{dead}.abd.part"
+    unfinished.mkdir()
+    mine = tmp_path / f".x.here-{os.getpid()}.abe.part"
+    mine.mkdir()
+    monkeypatch.undo()
+    monkeypatch.setattr(files, "_HOST", "here")
+    files.recover(tmp_path)
+    assert (tmp_path / "a.json").read_text() == (tmp_path / "b.json").read_text() == "new"
+    assert not pending.exists() and not unfinished.exists()
+    assert mine.exists()  # a process that lives is left alone
+
+
+def _dead_process() -> int:
+    done = subprocess.Popen([sys.executable, "-c", ""])
+    done.wait()
+    return done.pid
+
+
+def test_symbolic_links_below_the_output_are_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "trials").symlink_to(tmp_path / "elsewhere")
+
+    def write(part: Path) -> list[Path]:
+        (part / "trials").mkdir()
+        (part / "trials" / "a.csv").write_text("1")
+        return [part / "trials" / "a.csv"]
+
+    with pytest.raises(armrs.BadInput, match="a symbolic link"):
+        files.write_whole(out, write)
+    assert not list((tmp_path / "elsewhere").iterdir())
+    assert [p.name for p in out.iterdir()] == ["trials"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders are not locked there")
+def test_two_processes_do_not_write_to_one_folder(tmp_path: Path) -> None:
+    inside, go_on = threading.Event(), threading.Event()
+
+    def write(part: Path) -> list[Path]:
+        inside.set()
+        go_on.wait(10.0)
+        (part / "a.json").write_text("first")
+        return [part / "a.json"]
+
+    tmp_path.mkdir(exist_ok=True)
+    first = threading.Thread(target=files.write_whole, args=(tmp_path, write))
+    first.start()
+    inside.wait(10.0)
+    with pytest.raises(armrs.BadInput, match="another process of armrs"):
+        written(tmp_path, "second")
+    go_on.set()
+    first.join()
+    assert (tmp_path / "a.json").read_text() == "first"
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "armrs", *arguments]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
+def test_a_process_that_is_asked_to_end_leaves_nothing(number: signal.Signals, status: int, tmp_path: Path) -> None:
+    running = subprocess.Popen(command("demo", "-o", str(tmp_path / "demo")), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(3.0)
+    running.send_signal(number)
+    start = time.monotonic()
+    _, error = running.communicate(timeout=30)
+    assert running.returncode == status, error
+    assert time.monotonic() - start < 10.0
+    assert "Traceback" not in error
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("output", [">/dev/full", ">&-"])
+def test_a_full_or_closed_output_is_no_traceback(output: str) -> None:
+    done = subprocess.run(f"{' '.join(command('effects'))} {output}", shell=True, capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == (1 if "full" in output else 0)
+
+
+def test_an_ascii_terminal_shows_question_marks(tmp_path: Path) -> None:
+    done = subprocess.run(command("effects", "viscous"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"})
+    assert done.returncode == 0 and b"?" in done.stdout and b"Traceback" not in done.stderr
+
+
+def test_help_lists_the_statuses(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "130" in shown and "143" in shown
