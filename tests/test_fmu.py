@@ -16,11 +16,13 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.cosim import Slave
-from armrs.cosim.imported import ImportedSlave, platform_folder
+from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.library import platform_folder
 from armrs.errors import BadInput, SlaveError
 from armrs.fmu import names
+from armrs.fmu.archive import unpack
 from armrs.fmu.check import check_fmu
-from armrs.fmu.description import read_description, unpack
+from armrs.fmu.description import read_description
 from armrs.fmu.export import export_fmu
 from armrs.model import Model, Segment
 from armrs.workflows.demo import true_model
@@ -340,5 +342,5 @@ def test_a_library_that_crashes_is_a_finding(folder: Path, tmp_path: Path) -> No
     place, suffix = platform_folder(3)
     path = repacked(folder / "force3.fmu", tmp_path / "crash.fmu", f"binaries/{place}/ArmRs{suffix}", lambda _: library.read_bytes())
     found = check_fmu(path)
-    assert any("crashes when making an instance" in f.text for f in found)
-    assert sys.platform != "linux" or any("signal 6" in f.text for f in found)
+    assert any(" when making an instance" in f.text for f in found)
+    assert sys.platform != "linux" or any("is killed by signal 6 (SIGABRT)" in f.text for f in found)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.imported import library_path
-from armrs.fmu.description import read_description, unpack
+from armrs.cosim.library import library_path
+from armrs.fmu.archive import unpack
+from armrs.fmu.description import read_description
 from armrs.fmu.export import export_fmu
 from armrs.workflows.demo import true_model
 

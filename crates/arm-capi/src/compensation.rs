@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use arm_core::{Carry, Compensation};
+use arm_core::{Compensation, GravityCompensation};
 
 use crate::arm::armrs_arm;
 use crate::held::{Held, held};
@@ -90,7 +90,7 @@ pub unsafe extern "C" fn armrs_compensation_carry(
 
 /// Writes torques, and their standard deviations where there is a place for them; both or none.
 pub(crate) fn write_carry(
-    carry: &Carry<armrs_real, ARMRS_JOINTS>,
+    carry: &GravityCompensation<armrs_real, ARMRS_JOINTS>,
     torque: &mut [armrs_real; ARMRS_JOINTS],
     sd: Option<&mut [armrs_real; ARMRS_JOINTS]>,
 ) -> Result<(), armrs_status> {

@@ -9,7 +9,7 @@ use crate::{Invalid, Joints, check, joints};
 
 /// Torques and what they may be wrong by.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Carry<T, const N: usize> {
+pub struct GravityCompensation<T, const N: usize> {
     /// Torque of each joint on its distal segment \[N m\].
     pub torque: Joints<T, N>,
     /// Its standard deviation \[N m\].
@@ -77,7 +77,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
     /// Give a motion without speed for the weight and the passive moments alone.
     ///
     /// * `memory` - the state of each effect; zeros where none has any
-    pub fn carry(&self, motion: &Motion<T, N>, memory: &[T; E]) -> Carry<T, N> {
+    pub fn carry(&self, motion: &Motion<T, N>, memory: &[T; E]) -> GravityCompensation<T, N> {
         let rows = self.equation.carrying(motion, memory);
         let deviation = |row: &[T; P]| {
             let mut sum = T::ZERO;
@@ -90,7 +90,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
             }
             sum.sqrt()
         };
-        Carry {
+        GravityCompensation {
             within: true,
             torque: rows.torque(&self.values),
             sd: joints(from_fn(|j| deviation(&rows.columns[j]))),

@@ -50,7 +50,7 @@ mod unroll;
 
 pub use body::{Body, Orthosis};
 pub use chain::{Chain, Segment};
-pub use compensation::{Carry, Compensation};
+pub use compensation::{Compensation, GravityCompensation};
 pub use contact::Contact;
 pub use contribution::{Contributions, contributions};
 pub use coriolis::{centrifugal, coriolis, coriolis_matrix};

@@ -2,8 +2,8 @@
 
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Elbow, Joints, Limits, Robot, Segment, Setup, Shape};
-use arm_gap::data::prepared_session::Study;
-use arm_gap::data::session::{Session, Sight};
+use arm_gap::data::prepared_session::PreparedSession;
+use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use arm_ident::regression::trial::{Role, Tolerance, Trial};
 use arm_sim::{
@@ -115,7 +115,7 @@ fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
         segment_uncertainty: 0.02,
         tolerance: Tolerance::default(),
         trials,
-        sight: Sight::Led,
+        comparison: ComparisonMode::Led,
         own: Vec::new(),
     }
 }
@@ -130,7 +130,7 @@ fn size(channels: &[Vec<f64>]) -> f64 {
 #[test]
 fn linearised_responses_are_those_of_the_simulation() {
     let session = session(&[], (1e-4, 0.01));
-    let study = Study::new(&session, 1).expect("a sound session");
+    let prepared = PreparedSession::new(&session, 1).expect("a sound session");
     let named = |kind: &str, index: usize| -> Hypothesis<2> {
         let mut hypothesis = session.given();
         let mut effect = Effect::new(Kind::named(kind).expect("known"), index);
@@ -158,7 +158,7 @@ fn linearised_responses_are_those_of_the_simulation() {
         (named("time_delay", 0), first, 0.004),
         (named("force_misalignment", 0), first, 0.01),
     ];
-    let course = &study.courses[0];
+    let course = &prepared.courses[0];
     for (hypothesis, target, step) in cases {
         let coordinate = Coordinate {
             target,
@@ -167,9 +167,9 @@ fn linearised_responses_are_those_of_the_simulation() {
             upper: f64::INFINITY,
             step,
         };
-        let anchor = study.anchor(&hypothesis).expect("a run");
-        let response = study
-            .responses_to(&anchor, &[coordinate])
+        let point = prepared.linearize(&hypothesis).expect("a run");
+        let response = prepared
+            .responses_to(&point, &[coordinate])
             .expect("a response");
         let linear = &response[0].0[0];
         let play = |h: &Hypothesis<2>| {
@@ -193,10 +193,10 @@ fn linearised_responses_are_those_of_the_simulation() {
                 inner(&linear[channels.clone()]),
                 inner(&simulated[channels]),
             );
-            let apart: Vec<Vec<f64>> = std::iter::zip(&seen, &expected)
+            let trial_specific: Vec<Vec<f64>> = std::iter::zip(&seen, &expected)
                 .map(|(a, b)| std::iter::zip(a, b).map(|(a, b)| a - b).collect())
                 .collect();
-            let (off, whole) = (size(&apart), size(&expected));
+            let (off, whole) = (size(&trial_specific), size(&expected));
             assert!(
                 off <= 0.06 * whole + 1e-9,
                 "{target:?} {:?}: {off} of {whole}",
@@ -209,9 +209,9 @@ fn linearised_responses_are_those_of_the_simulation() {
 #[test]
 fn a_changed_hypothesis_is_followed_as_it_is_simulated() {
     let session = session(&[], (1e-4, 0.01));
-    let study = Study::new(&session, 1).expect("a sound session");
+    let prepared = PreparedSession::new(&session, 1).expect("a sound session");
     let plain = session.given();
-    let anchor = study.anchor(&plain).expect("a run");
+    let point = prepared.linearize(&plain).expect("a run");
     let strong = [
         ("viscous", 1, &[0.5][..]),
         ("coulomb", 0, &[0.4]),
@@ -227,19 +227,21 @@ fn a_changed_hypothesis_is_followed_as_it_is_simulated() {
         let effect = Effect::new(Kind::named(kind).expect("known"), index).with(values);
         changed.named.push(effect);
         let read = |h: &Hypothesis<2>| {
-            let run = session.run(h, &study.courses[0]).expect("a stable run");
-            session.read(h, &study.courses[0], &run).expect("readings")
+            let run = session.run(h, &prepared.courses[0]).expect("a stable run");
+            session
+                .read(h, &prepared.courses[0], &run)
+                .expect("readings")
         };
         let (now, then) = (read(&changed), read(&plain));
-        let followed = study
-            .residuals(&anchor, &changed)
+        let followed = prepared
+            .residuals(&point, &changed)
             .unwrap_or_else(|e| panic!("{kind}: {e}"));
         for channels in [0..2, 2..4] {
             let (mut off, mut whole) = (0.0, 0.0);
             for c in channels {
                 let count = now[c].len();
                 for i in 20..count - 20 {
-                    let seen = study.courses[0].seen[c][i] - followed[0][c][i];
+                    let seen = prepared.courses[0].seen[c][i] - followed[0][c][i];
                     off += (seen - now[c][i]) * (seen - now[c][i]);
                     whole += (now[c][i] - then[c][i]) * (now[c][i] - then[c][i]);
                 }
@@ -254,8 +256,8 @@ fn a_hidden_spring_is_named_and_nothing_else() {
     let elastic = Kind::named("elastic").expect("known");
     let hidden = Effect::new(elastic, 1).with(&[1.5, 1.0]);
     let session = session(&[hidden], (1e-3, 0.1));
-    let mut study = Study::new(&session, 2).expect("a sound session");
-    let finding = study.search(&|_, _| Ok(())).expect("a finding");
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
     let named = &finding.amended.hypothesis.named;
     assert_eq!(named.len(), 1, "{named:?}");
     assert_eq!((named[0].kind, named[0].index), (elastic, 1));
@@ -266,9 +268,9 @@ fn a_hidden_spring_is_named_and_nothing_else() {
 #[test]
 fn nothing_is_named_where_nothing_is_hidden() {
     let session = session(&[], (1e-3, 0.1));
-    let mut study = Study::new(&session, 2).expect("a sound session");
-    let finding = study.search(&|_, _| Ok(())).expect("a finding");
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
     assert!(finding.amended.hypothesis.named.is_empty());
-    assert!(finding.apart.is_empty());
+    assert!(finding.trial_specific.is_empty());
     assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
 }

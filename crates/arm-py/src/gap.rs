@@ -6,17 +6,17 @@ use arm_core::Chain;
 use arm_core::effect::Effect;
 use arm_gap::GapError;
 use arm_gap::candidates::candidate::Candidate;
-use arm_gap::data::prepared_session::Study;
-use arm_gap::data::session::{Session, Sight};
+use arm_gap::data::prepared_session::PreparedSession;
+use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use arm_gap::measurement_model::prediction::{Channels, Course};
 use arm_gap::selection::first_order_screening::Look;
 use arm_gap::selection::fit::Fitted;
-use arm_gap::selection::lack_of_fit::Lack;
+use arm_gap::selection::lack_of_fit::LackOfFit;
 use arm_gap::selection::model_discrimination::Contest;
 use arm_gap::selection::model_selection::Named;
 use arm_gap::selection::search::Finding;
-use arm_gap::trial_specific::component::Apart;
+use arm_gap::trial_specific::component::TrialSpecific;
 use numpy::ToPyArray;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -66,10 +66,10 @@ impl<'a, 'py> Asked<'a, 'py> {
             segment_uncertainty: settings.segment_uncertainty,
             tolerance: (&settings.tolerance).into(),
             trials: read_trials(self.trials, rig)?,
-            sight: if settings.led {
-                Sight::Led
+            comparison: if settings.led {
+                ComparisonMode::Led
             } else {
-                Sight::Torque
+                ComparisonMode::Torque
             },
             own: settings
                 .own
@@ -84,13 +84,13 @@ impl<'a, 'py> Asked<'a, 'py> {
         &self,
         py: Python<'_>,
         session: &'s Session<N>,
-        work: impl FnOnce(&mut Study<'s, N>) -> Result<T, GapError> + Send,
-    ) -> PyResult<(Study<'s, N>, T)> {
+        work: impl FnOnce(&mut PreparedSession<'s, N>) -> Result<T, GapError> + Send,
+    ) -> PyResult<(PreparedSession<'s, N>, T)> {
         let threads = self.settings.threads;
         let outcome = py.detach(|| {
-            let mut study = Study::new(session, threads)?;
-            let found = work(&mut study)?;
-            Ok((study, found))
+            let mut prepared = PreparedSession::new(session, threads)?;
+            let found = work(&mut prepared)?;
+            Ok((prepared, found))
         });
         own::failed()?;
         outcome.map_err(gap)
@@ -154,10 +154,10 @@ pub fn find_gap<'py>(
         progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let session = asked.session(chain)?;
-        let told = Told::of(progress);
-        let done = asked.studied(py, &session, |s| s.search(&|w, s| told.tell(w, s)));
-        let (study, finding) = told.or_raised(done)?;
-        result(py, &study, &finding)
+        let callback = ProgressCallback::of(progress);
+        let done = asked.studied(py, &session, |s| s.search(&|w, s| callback.tell(w, s)));
+        let (prepared, finding) = callback.or_raised(done)?;
+        result(py, &prepared, &finding)
     }
     let asked = Asked::of(rig, &trials, &settings);
     each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()))
@@ -180,10 +180,10 @@ pub fn look<'py>(
         progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let session = asked.session(chain)?;
-        let told = Told::of(progress);
-        let done = asked.studied(py, &session, |s| s.look(&|w, s| told.tell(w, s)));
-        let (study, look) = told.or_raised(done)?;
-        first_look(py, &study, &look)
+        let callback = ProgressCallback::of(progress);
+        let done = asked.studied(py, &session, |s| s.look(&|w, s| callback.tell(w, s)));
+        let (prepared, look) = callback.or_raised(done)?;
+        first_look(py, &prepared, &look)
     }
     let asked = Asked::of(rig, &trials, &settings);
     each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()))
@@ -191,14 +191,14 @@ pub fn look<'py>(
 
 fn first_look<'py, const N: usize>(
     py: Python<'py>,
-    study: &Study<'_, N>,
+    prepared: &PreparedSession<'_, N>,
     look: &Look<N>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    out.set_item("groups", study.group_of.clone())?;
+    out.set_item("groups", prepared.group_of.clone())?;
     out.set_item("calibrated", fitted(py, &look.calibrated)?)?;
     out.set_item("lack", lack(&look.lack))?;
-    out.set_item("unknowns", unknowns(study, &look.calibrated))?;
+    out.set_item("unknowns", unknowns(prepared, &look.calibrated))?;
     let suspects: Vec<_> = look
         .suspects
         .iter()
@@ -214,17 +214,17 @@ fn first_look<'py, const N: usize>(
         .collect();
     out.set_item("suspects", suspects)?;
     let plays = [("calibrated", look.in_trials.as_slice())];
-    out.set_item("trials", played(py, study, &plays)?)?;
+    out.set_item("trials", played(py, prepared, &plays)?)?;
     Ok(out)
 }
 
 /// Who is told of the work, and what was raised to stop it.
-struct Told<'a> {
+struct ProgressCallback<'a> {
     callable: Option<&'a Py<PyAny>>,
     raised: Mutex<Option<PyErr>>,
 }
 
-impl<'a> Told<'a> {
+impl<'a> ProgressCallback<'a> {
     fn of(callable: Option<&'a Py<PyAny>>) -> Self {
         Self {
             callable,
@@ -235,10 +235,10 @@ impl<'a> Told<'a> {
     fn tell(&self, what: &str, share: f64) -> Result<(), GapError> {
         Python::attach(|py| {
             let call = |callable: &Py<PyAny>| callable.call1(py, (what, share)).map(|_| ());
-            let told = py
+            let callback = py
                 .check_signals()
                 .and_then(|()| self.callable.map_or(Ok(()), call));
-            match told {
+            match callback {
                 // What a display does wrong is no reason to stop, but an interrupt is.
                 Err(error) if !error.is_instance_of::<PyException>(py) => {
                     if let Ok(mut raised) = self.raised.lock() {
@@ -262,16 +262,16 @@ impl<'a> Told<'a> {
 
 /// The nuisances of a calibrated model, with what was known of them; see [`unknown`].
 fn unknowns<const N: usize>(
-    study: &Study<'_, N>,
+    prepared: &PreparedSession<'_, N>,
     calibrated: &Fitted<N>,
 ) -> Vec<(&'static str, usize, usize, f64, f64, f64)> {
-    let nuisances = study.session.nuisances();
+    let nuisances = prepared.session.nuisances();
     let each = nuisances.iter();
     each.filter_map(|c| unknown(&calibrated.hypothesis, c, f64::NAN))
         .collect()
 }
 
-fn lack(l: &Lack) -> (f64, f64, f64) {
+fn lack(l: &LackOfFit) -> (f64, f64, f64) {
     (l.ratio, l.z, l.excess)
 }
 
@@ -294,19 +294,19 @@ fn shown<'py, const N: usize>(
 /// What the model as given and other hypotheses, as they are in each trial, show of every trial, and the angles of a free run in `free`.
 fn played<'py, const N: usize>(
     py: Python<'py>,
-    study: &Study<'_, N>,
+    prepared: &PreparedSession<'_, N>,
     plays: &[(&str, &[Hypothesis<N>])],
 ) -> PyResult<Bound<'py, PyList>> {
-    let given = study.session.given();
-    let trials = std::iter::zip(0.., &study.courses)
+    let given = prepared.session.given();
+    let trials = std::iter::zip(0.., &prepared.courses)
         .map(|(i, course)| {
             let own = plays.iter().map(|(name, beliefs)| (*name, &beliefs[i]));
             let plays: Vec<_> = std::iter::once(("given", &given)).chain(own).collect();
-            let one = shown(py, (study.session, course), &plays)?;
+            let one = shown(py, (prepared.session, course), &plays)?;
             let free = PyDict::new(py);
             for (name, hypothesis) in &plays {
                 let place = (i, course.as_ref());
-                let angles = py.detach(|| study.session.free_run(hypothesis, place));
+                let angles = py.detach(|| prepared.session.free_run(hypothesis, place));
                 set_table(&free, name, angles.ok())?;
             }
             one.set_item("free", free)?;
@@ -361,12 +361,12 @@ pub fn distances<'py>(
             return Err(bad_input("effects", "none", "a named effect"));
         };
         let outcome = py.detach(|| {
-            let noise = Study::new(&all, threads)?.noise;
-            let study = Study::with_noise(&without, noise, threads)?;
-            let contest = Contest::new(study, named, rivals)?;
+            let noise = PreparedSession::new(&all, threads)?.noise;
+            let prepared = PreparedSession::with_noise(&without, noise, threads)?;
+            let contest = Contest::new(prepared, named, rivals)?;
             let mut found = vec![Some(contest.distances(None)?)];
             let one = |i: usize| contest.distances(Some(&planned[i])).ok();
-            let each = contest.study().parallel(planned.len(), one);
+            let each = contest.prepared().parallel(planned.len(), one);
             found.extend(each);
             Ok(found)
         });
@@ -385,17 +385,17 @@ pub fn distances<'py>(
 
 fn result<'py, const N: usize>(
     py: Python<'py>,
-    study: &Study<'_, N>,
+    prepared: &PreparedSession<'_, N>,
     finding: &Finding<N>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    out.set_item("repeated", study.repeated)?;
-    out.set_item("groups", study.group_of.clone())?;
+    out.set_item("repeated", prepared.repeated)?;
+    out.set_item("groups", prepared.group_of.clone())?;
     out.set_item("scale", finding.scale)?;
     out.set_item("calibrated", fitted(py, &finding.calibrated)?)?;
     out.set_item("amended", fitted(py, &finding.amended)?)?;
-    let rhythms = || finding.apart.iter().filter(|a| a.trial.is_none());
-    let entries = |list: &mut dyn Iterator<Item = &Apart>| -> Vec<Entry> {
+    let rhythms = || finding.trial_specific.iter().filter(|a| a.trial.is_none());
+    let entries = |list: &mut dyn Iterator<Item = &TrialSpecific>| -> Vec<Entry> {
         list.map(|a| entry(&a.effect)).collect()
     };
     out.set_item("rhythms", entries(&mut rhythms()))?;
@@ -411,8 +411,8 @@ fn result<'py, const N: usize>(
         .map(|n| named(py, n, finding))
         .collect::<PyResult<Vec<_>>>()?;
     out.set_item("named", PyList::new(py, effects)?)?;
-    let apart: Vec<_> = finding
-        .apart
+    let trial_specific: Vec<_> = finding
+        .trial_specific
         .iter()
         .map(|a| {
             let rivals: Vec<_> = a
@@ -423,32 +423,32 @@ fn result<'py, const N: usize>(
             (entry(&a.effect), a.sd, a.trial, a.span(), a.gain, rivals)
         })
         .collect();
-    out.set_item("apart", apart)?;
+    out.set_item("apart", trial_specific)?;
     let ruled: Vec<_> = finding
         .ruled
         .iter()
         .map(|r| (asked(&r.candidate), r.gain, r.price, r.smallest))
         .collect();
     out.set_item("ruled", ruled)?;
-    let ladder: Vec<_> = finding
-        .ladder
+    let search_trace: Vec<_> = finding
+        .search_trace
         .iter()
-        .map(|rung| {
-            let tried: Vec<_> = rung
+        .map(|step| {
+            let tried: Vec<_> = step
                 .tried
                 .iter()
                 .map(|(members, gain)| (members.iter().map(asked).collect::<Vec<_>>(), *gain))
                 .collect();
-            (tried, rung.before, rung.after)
+            (tried, step.before, step.after)
         })
         .collect();
-    out.set_item("ladder", ladder)?;
+    out.set_item("ladder", search_trace)?;
     let [calibrated, amended] = &finding.in_trials;
     let plays = [
         ("calibrated", calibrated.as_slice()),
         ("amended", amended.as_slice()),
     ];
-    out.set_item("trials", played(py, study, &plays)?)?;
+    out.set_item("trials", played(py, prepared, &plays)?)?;
     Ok(out)
 }
 

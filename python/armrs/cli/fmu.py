@@ -75,11 +75,14 @@ def fmu_info(
 @app.command("check", short_help="Check file, description and library of a unit.")
 def fmu_check(
     file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
+    library: Annotated[bool, typer.Option(help="Try the library, which runs its native code with your rights.")] = True,
     json: JsonFile = None,
 ) -> int:
     """Check an FMU: file, description and library against the standard and against one another.
 
-    The library is loaded and makes a step, in a process of its own. Exit status 1 when something is wrong.
+    The library is loaded and tried in a process of its own, with limits of memory, output and time; on Linux it may write only to a
+    temporary folder. It is native code all the same: check files from strangers with --no-library first. Exit status 1 when something is
+    wrong.
     """
     import dataclasses
 
@@ -87,7 +90,7 @@ def fmu_check(
 
     writable(None, json)
     with console.progress("checking"):
-        found = check_fmu(file)
+        found = check_fmu(file, library=library)
     wrong = sum(f.level == "error" for f in found)
 
     def human() -> None:
@@ -108,6 +111,8 @@ def fmu_run(
     json: JsonFile = None,
 ) -> int:
     """Couple arms, FMUs of any tool and walls, and say whether the numbers may be believed.
+
+    FMUs run their native code with your rights, each in a process of its own with limits of memory, output and time.
 
     Exit status 1 when the run is no result: it diverged, the coupling creates energy, or the iteration did not converge. Then only the
     diagnosis is written, and no samples.

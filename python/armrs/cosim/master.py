@@ -155,7 +155,7 @@ class _Run:
         self.outputs: list[np.ndarray] = []
         self.used: list[np.ndarray] = []
         self.stopped: tuple[str, str] | None = None
-        self.recorded = [[v.name for v in s.variables.values() if v.causality == "output" and v.type == "Float64"] for s in self.slaves]
+        self.recorded = [[v.name for v in s.variables.values() if v.causality == "output" and v.is_signal] for s in self.slaves]
         self._check()
 
     def _check(self) -> None:
@@ -327,7 +327,13 @@ class _Run:
 
     def _advance(self, i: int, time: float, step: float) -> None:
         self.evaluations += 1
-        done = self.slaves[i].do_step(time, step)
+        try:
+            done = self.slaves[i].do_step(time, step)
+        except SlaveError as error:
+            # Of a partner in another process an input that is discarded comes to light here.
+            if error.status != Status.DISCARD:
+                raise
+            raise _Failed(f"{self.slaves[i].name}: {error.message}") from None
         if done.status == Status.DISCARD:
             reached = f", it came to {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
             raise _Failed(f"{self.slaves[i].name} discards the step from {time:.6g} s{reached}: {done.message}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import enum
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -68,6 +69,8 @@ class Variable:
     start, min, max : optional
     nominal : float
     description : str
+    dimensions : tuple of int
+        Lengths of an array; empty for a scalar.
     """
 
     name: str
@@ -79,11 +82,22 @@ class Variable:
     unit: str | None = None
     exponents: tuple[int, ...] | None = None
     scale: float = 1.0
-    start: float | int | bool | str | None = None
+    start: Any = None
     min: float | None = None
     max: float | None = None
     nominal: float = 1.0
     description: str = field(default="", repr=False)
+    dimensions: tuple[int, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return math.prod(self.dimensions)
+
+    @property
+    def is_signal(self) -> bool:
+        """Whether it is one floating point number of 64 bit."""
+        return self.type == "Float64" and not self.dimensions
 
 
 class Partner(abc.ABC):

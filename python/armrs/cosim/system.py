@@ -15,7 +15,7 @@ import numpy as np
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from ..io import tomlfile
-from .imported import ImportedSlave
+from .isolated import IsolatedSlave
 from .partner import Partner, Variable
 from .slave import Slave
 from .wall import Wall
@@ -241,8 +241,11 @@ def _slave(table: dict[str, Any], folder: Path) -> Partner:
         return Wall(wall["axis"], wall["position_m"], wall["stiffness"], wall.get("damping", 0.0), name=checks.text("name", table["name"]))
     path = folder / checks.text(kind, table[kind])
     if kind == "fmu":
-        checks.keys("", table, required=["fmu"], optional=["name", "start"])
-        return ImportedSlave(path, name=checks.text("name", table["name"]) if "name" in table else None)
+        checks.keys("", table, required=["fmu"], optional=["name", "start", "seconds"])
+        settings: dict[str, Any] = (
+            {"seconds": checks.number("seconds", table["seconds"], above=0.0, unit="s")} if "seconds" in table else {}
+        )
+        return IsolatedSlave(path, name=checks.text("name", table["name"]) if "name" in table else None, **settings)
     optional = ["name", "port", "start", "start_deg", "rest", "inner_step_s", "handle_m"]
     checks.keys("", table, required=["model"], optional=optional)
     degrees = table.get("start_deg")
@@ -282,7 +285,7 @@ def _connection(
     if given.causality != "input":
         raise BadInput("to", Text(f"{'.'.join(target)}, {given.causality}"), "an input")
     for end, variable in zip(ends, (output, given), strict=True):
-        if variable.type != "Float64":
+        if not variable.is_signal:
             raise BadInput("from, to", Text(f"{'.'.join(end)} of type {variable.type}"), "numbers of 64 bit")
     label = f"{'.'.join(source)} -> {'.'.join(target)}"
     if output.exponents is None or given.exponents is None:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import os
-import re
-import subprocess
-import sys
+import shutil
+import tempfile
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
+from typing import Any
 
-from ..cosim.imported import platform_folder
+from ..cosim.library import platform_folder
+from ..cosim.process import Confined, ProcessEnded
 from ..errors import BadInput
-from . import rules
-from .description import DESCRIPTION, Description, archive, parse
+from . import rules, schema
+from .archive import DESCRIPTION, archive, read_xml, unpack
+from .content import in_archive, in_terminals
+from .description import Description, parse
 
-_SECONDS = 120
-"""Longest time that the library may take to be tried."""
-_TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
+_SECONDS = 120.0
+"""Longest time that one thing that is tried may take."""
+_MOST_FINDINGS = 1000
 
 
 @dataclass(frozen=True)
@@ -44,16 +45,21 @@ class Finding:
         return f"{self.level}: {self.place}: {self.text}"
 
 
-def check_fmu(path: str | os.PathLike[str]) -> list[Finding]:
-    """Check an FMU for co-simulation, FMI 2.0 or 3.0.
+def check_fmu(path: str | os.PathLike[str], *, library: bool = True, seconds: float = _SECONDS) -> list[Finding]:
+    """Check an FMU, FMI 2.0 or 3.0.
 
-    The archive, the description and the terminals are read; then the library is loaded in a process of its own, which is allowed to
-    crash: every function of the standard must be there, every start value must be the one of the description to the last bit, one step
-    is made, and, where the FMU can, gone back and made again.
+    The archive, and the XML files in it against the standards' schemas and rules. Then the library is loaded in a process of its own,
+    with limits of memory, output and time: the functions of the standard must be there, start values must be those of the description,
+    and everything that the description promises for co-simulation is tried. This runs the native code of the FMU with the rights of the
+    user, but for what the limits forbid (`armrs.cosim.limits`).
 
     Parameters
     ----------
     path : path
+    library : bool
+        Whether the library is tried; without it no foreign code runs.
+    seconds : float
+        Longest time that one thing that is tried may take [s].
 
     Returns
     -------
@@ -65,41 +71,45 @@ def check_fmu(path: str | os.PathLike[str]) -> list[Finding]:
     BadInput
         For a file that is no archive at all.
     """
+    description = None
     with archive(path) as files:
-        found = list(_archive(files))
+        found = [Finding("error", place, text) for place, text in in_archive(files)]
         try:
-            description = parse(files.read(DESCRIPTION))
-        except KeyError:
-            return [*found, Finding("error", DESCRIPTION, "missing")]
+            content = read_xml(files, DESCRIPTION, path)
+            found += _schemas(files, content, path)
+            description = parse(content)
         except BadInput as error:
-            return [*found, Finding("error", error.place, f"found {error.found}, allowed {error.allowed}")]
-        except Exception as error:
-            return [*found, Finding("error", DESCRIPTION, f"cannot be unpacked: {error}")]
-        found += [Finding("error", place, text) for place, text in rules.broken(description)]
-        found += _binary(files, description)
-        if _TERMINALS in files.namelist():
-            found += [Finding("error", _TERMINALS, text) for text in _terminals(files, description)]
-    if not any(f.place.startswith("binaries") for f in found):
-        found += _tried(Path(path))
+            found.append(_refused(error))
+        if description is not None:
+            found += [Finding("error", place, text) for place, text in rules.broken(description)]
+            found += [Finding("note", place, text) for place, text in rules.worth_knowing(description)]
+            found += _binary(files, description)
+            found += [Finding("error", place, text) for place, text in in_terminals(files, description)]
+    if library and description is not None and not any(f.place.startswith("binaries") for f in found):
+        found += _tried(Path(path), seconds)
     return sorted(dict.fromkeys(found), key=lambda f: f.level != "error")
 
 
-def _archive(files: zipfile.ZipFile) -> Iterator[Finding]:
-    names = [info.filename for info in files.infolist()]
-    for info in files.infolist():
-        # zipfile turns the separators of the system it runs on into slashes; `orig_filename` is what the archive holds.
-        name = info.orig_filename
-        if "\\" in name:
-            yield Finding("error", name, "a backslash in a name of the archive, allowed is / between folders")
-        if name.startswith(("/", "./")) or ".." in name.split("/"):
-            yield Finding("error", name, "a name that begins with / or ./ or holds .., allowed are plain relative names")
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            method = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "lzma"}.get(info.compress_type, f"method {info.compress_type}")
-            yield Finding("error", name, f"compressed with {method}, allowed are deflate and none")
-        if info.flag_bits & 1:
-            yield Finding("error", name, "encrypted")
-    for name in {name for name in names if names.count(name) > 1}:
-        yield Finding("error", name, "stands more than once in the archive")
+def _refused(error: BadInput) -> Finding:
+    return Finding("error", error.place, f"found {error.found}, allowed {error.allowed}")
+
+
+def _schemas(files: zipfile.ZipFile, content: bytes, path: str | os.PathLike[str]) -> Iterator[Finding]:
+    """Validate what has a schema."""
+    if not schema.available():
+        text = "not validated with the standard's schemas: they come with FMPy, pip install 'armrs[fmi]'"
+        yield Finding("note", DESCRIPTION, text)
+        return
+    head = content[: content.find(b">", content.find(b"<fmiModelDescription")) + 1]
+    fmi = 2 if b'fmiVersion="2' in head or b"fmiVersion='2" in head else 3
+    for name in sorted({name for _, name in schema.SCHEMAS} & set(files.namelist())):
+        try:
+            data = content if name == DESCRIPTION else read_xml(files, name, path)
+        except BadInput as error:
+            yield _refused(error)
+            continue
+        for violation in schema.violations(fmi, name, data):
+            yield Finding("error", name, violation)
 
 
 def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Finding]:
@@ -113,75 +123,39 @@ def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Findin
     here = [name for name in binaries if name.startswith(f"binaries/{place}/")]
     wanted = f"binaries/{place}/{identifier}{suffix}"
     if wanted not in binaries:
-        there = ", ".join(here) or "nothing"
+        there = ", ".join(here[:5]) or "nothing"
         level = "error" if here else "note"
         yield Finding(level, f"binaries/{place}", f"{there}, wanted is {identifier}{suffix}, named as modelIdentifier says")
 
 
-def _terminals(files: zipfile.ZipFile, description: Description) -> Iterator[str]:
-    try:
-        root = ElementTree.fromstring(files.read(_TERMINALS))
-    except Exception as error:
-        yield f"cannot be read: {error}"
-        return
-    if root.tag != "fmiTerminalsAndIcons":
-        yield f"the element {root.tag}, allowed is fmiTerminalsAndIcons"
-        return
-    version = root.get("fmiVersion", "")
-    if not re.fullmatch(r"3\.\d.*", version):
-        yield f"fmiVersion is {version!r}, allowed is that of FMI 3"
-    for child in root:
-        if child.tag not in ("GraphicalRepresentation", "Terminals", "Annotations"):
-            yield f"an element {child.tag}, allowed are GraphicalRepresentation, Terminals and Annotations"
-    known = {v.name for v in description.variables}
-    wanted = {"Terminal": ("name", "matchingRule"), "TerminalMemberVariable": ("variableName", "variableKind")}
-    seen: set[str | None] = set()
-    for element in root.iter():
-        for key in wanted.get(element.tag, ()):
-            if not element.get(key):
-                yield f"a {element.tag} without {key}"
-        for key in ("variableName", "inStreamVariableName", "outStreamVariableName"):
-            name = element.get(key)
-            if name is not None and name not in known:
-                yield f"{key} {name!r} is no variable of this FMU"
-        if element.tag == "Terminal":
-            if element.get("name") in seen:
-                yield f"two terminals have the name {element.get('name')!r}"
-            seen.add(element.get("name"))
-    icon = root.find("GraphicalRepresentation/Icon")
-    if icon is not None and "terminalsAndIcons/icon.png" not in files.namelist():
-        yield "an Icon, but no terminalsAndIcons/icon.png"
-
-
-def _tried(path: Path) -> list[Finding]:
+def _tried(path: Path, seconds: float) -> list[Finding]:
     """Try the library in a process of its own, so that its crash is a finding and not ours."""
-    command = [sys.executable, "-m", "armrs.fmu.probe", os.fspath(path)]
-    # The child finds this package where we have it from.
-    paths = [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    folder = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
+    process = None
+    found: list[Finding] = []
+    step = "starting"
     try:
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_SECONDS,
-            check=False,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
-        )
-    except subprocess.TimeoutExpired:
-        return [Finding("error", "library", f"does not return within {_SECONDS} s")]
-    found, step, complete = [], "loading", False
-    for line in done.stdout.splitlines():
-        # The FMU may print to standard output too; our lines say so.
-        if not line.startswith("probe:"):
-            continue
-        record = json.loads(line.removeprefix("probe:"))
-        if "step" in record:
-            step = record["step"]
-            complete = step == "end"
-        else:
-            found.append(Finding(**record))
-    if not complete:
-        signal = f"signal {-done.returncode}" if done.returncode < 0 else f"status {done.returncode}"
-        found.append(Finding("error", "library", f"crashes when {step} ({signal})"))
+        unpack(path, folder / "fmu")
+        process = Confined("armrs.cosim.worker", folder)
+        process.send({"task": "try", "path": str(path)})
+        unlimited = process.receive(seconds).get("unlimited", [])
+        found += [Finding("note", "sandbox", str(text)) for text in unlimited]
+        while step != "end":
+            record = process.receive(seconds)
+            step = str(record.get("step", step))
+            if "level" in record and len(found) < _MOST_FINDINGS:
+                found.append(_finding(record))
+    except ProcessEnded as error:
+        printed = f"; it printed: {error.printed[:200]}" if error.printed else ""
+        found.append(Finding("error", "library", f"{error.how} when {step}{printed}"))
+    except BadInput as error:
+        found.append(_refused(error))
+    finally:
+        if process is not None:
+            process.close()
+        shutil.rmtree(folder, ignore_errors=True)
     return found
+
+
+def _finding(record: dict[str, Any]) -> Finding:
+    return Finding(*(str(record.get(key, "")) for key in ("level", "place", "text")))

@@ -1,26 +1,24 @@
-"""An FMU as a file: the zip archive, its model description, its variables with their units. FMI 2.0 and 3.0 for co-simulation."""
+"""The model description of an FMU, FMI 2.0 or 3.0: capabilities, variables with their units, structure."""
 
 from __future__ import annotations
 
 import math
 import os
-import zipfile
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from .. import checks
 from ..cosim.partner import Variable
 from ..errors import BadInput, Text
+from .archive import DESCRIPTION, archive, read_xml
 
-DESCRIPTION = "modelDescription.xml"
 BASE_UNITS = ("kg", "m", "s", "rad")
 _OTHER_UNITS = ("A", "K", "mol", "cd")
-_MOST_XML = 64 << 20
-_MOST_FILES = 1 << 30
-"""Most bytes that are unpacked."""
+_MOST_REFERENCE = 2**32 - 1
+_MOST_NUMBERS = 1_000_000
+"""Most numbers of one array."""
 _TYPES_OF_2 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String", "Enumeration": "Int32"}
 
 
@@ -31,6 +29,28 @@ class Unit:
     name: str
     exponents: tuple[int, ...] | None
     factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """An entry of ModelStructure.
+
+    Attributes
+    ----------
+    kind : {"Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator", "ClockedState"}
+        In the words of FMI 3.0.
+    name : str
+        The variable; "?" for one that does not exist.
+    dependencies : tuple of str, optional
+        Variables that it depends on; None where nothing is said, which means all.
+    kinds : tuple of str, optional
+        One kind of dependency for each.
+    """
+
+    kind: str
+    name: str
+    dependencies: tuple[str, ...] | None = None
+    kinds: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -45,10 +65,11 @@ class Description:
         `token` is the instantiation token of FMI 3.0 or the GUID of FMI 2.0; `identifier` the name of the library.
     flags : dict of str to str
         Attributes of the element CoSimulation.
+    interfaces : dict of str to (dict of str to str)
+        Attributes of each of CoSimulation, ModelExchange and ScheduledExecution that is offered.
     variables : tuple of Variable
     units : dict of str to Unit
-    outputs, initial_unknowns : tuple of str
-        Names of variables.
+    structure : tuple of Unknown
     experiment : dict of str to str
         Attributes of DefaultExperiment.
     root : Element
@@ -62,10 +83,10 @@ class Description:
     tool: str
     text: str
     flags: dict[str, str]
+    interfaces: dict[str, dict[str, str]]
     variables: tuple[Variable, ...] = field(repr=False)
     units: dict[str, Unit] = field(repr=False)
-    outputs: tuple[str, ...]
-    initial_unknowns: tuple[str, ...]
+    structure: tuple[Unknown, ...] = field(repr=False)
     experiment: dict[str, str]
     root: ElementTree.Element = field(repr=False)
 
@@ -73,6 +94,10 @@ class Description:
     def fmi(self) -> int:
         """Major version of the standard: 2 or 3."""
         return int(self.version.split(".")[0])
+
+    def unknowns(self, kind: str) -> tuple[Unknown, ...]:
+        """Entries of ModelStructure of one kind."""
+        return tuple(u for u in self.structure if u.kind == kind)
 
     def flag(self, name: str) -> bool:
         """Return a capability; what is not written is false."""
@@ -89,67 +114,18 @@ def read_description(path: str | os.PathLike[str]) -> Description:
     Raises
     ------
     BadInput
-        For what is no archive, no XML, or no co-simulation FMU of FMI 2.0 or 3.0.
+        For what is no archive, no XML, or no FMU of FMI 2.0 or 3.0.
     """
     with archive(path) as files:
-        try:
-            info = files.getinfo(DESCRIPTION)
-        except KeyError:
-            raise BadInput("archive", Text(f"no {DESCRIPTION}"), f"an FMU with {DESCRIPTION} at its top", file=path) from None
-        if info.file_size > _MOST_XML:
-            raise BadInput(DESCRIPTION, Text(f"{info.file_size} bytes"), f"at most {_MOST_XML} bytes", file=path)
-        content = _content(files, info, path)
+        content = read_xml(files, DESCRIPTION, path)
     try:
         return parse(content)
     except BadInput as error:
         raise error.within(file=path) from None
 
 
-def archive(path: str | os.PathLike[str]) -> zipfile.ZipFile:
-    """Open an FMU as an archive."""
-    try:
-        return zipfile.ZipFile(checks.path("path", path))
-    except zipfile.BadZipFile as error:
-        raise BadInput("archive", Text(str(error)), "an FMU, which is a zip archive", file=path) from None
-    except BadInput:
-        raise
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "a name no file can have"
-        raise BadInput("file", Text(reason), "an FMU that can be read", file=path) from None
-
-
-def unpack(path: str | os.PathLike[str], folder: Path) -> None:
-    """Unpack an FMU below a folder; names that would leave it and archives of absurd size are refused."""
-    with archive(path) as files:
-        total = 0
-        for info in files.infolist():
-            name = info.filename.replace("\\", "/")
-            target = (folder / name).resolve()
-            if not target.is_relative_to(folder.resolve()):
-                raise BadInput("archive", Text(f"the name {info.filename!r}"), "names inside the archive", file=path)
-            total += info.file_size
-            if total > _MOST_FILES:
-                raise BadInput("archive", Text(f"more than {_MOST_FILES} bytes"), "at most that", file=path)
-            if name.endswith("/"):
-                target.mkdir(parents=True, exist_ok=True)
-                continue
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(_content(files, info, path))
-
-
-def _content(files: zipfile.ZipFile, info: zipfile.ZipInfo, path: str | os.PathLike[str]) -> bytes:
-    try:
-        return files.read(info)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError, ValueError) as error:
-        raise BadInput(info.filename, Text(str(error)), "a file that can be unpacked", file=path) from None
-    except Exception as error:  # zlib and lzma have errors of their own
-        raise BadInput(info.filename, Text(f"damaged: {error}"), "a file that can be unpacked", file=path) from None
-
-
 def parse(content: bytes) -> Description:
     """Read a model description from its bytes."""
-    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-        raise BadInput(DESCRIPTION, Text("a document type"), "XML without one")
     try:
         root = ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
@@ -157,26 +133,26 @@ def parse(content: bytes) -> Description:
     version = root.get("fmiVersion", "")
     if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
         raise BadInput(f"{DESCRIPTION}, fmiVersion", version or Text("none"), "2.0 or 3.0")
-    simulation = root.find("CoSimulation")
-    if simulation is None:
-        raise BadInput(DESCRIPTION, Text("no element CoSimulation"), "an FMU for co-simulation")
+    kinds = ("CoSimulation", "ModelExchange", "ScheduledExecution")
+    interfaces = {kind: dict(element.attrib) for kind in kinds if (element := root.find(kind)) is not None}
+    if not interfaces:
+        raise BadInput(DESCRIPTION, Text("no interface"), f"one of {', '.join(kinds)}")
     is_two = version.startswith("2")
     units = {unit.name: unit for unit in _units(root)}
     variables = tuple(_variables_of_2(root, units) if is_two else _variables_of_3(root, units))
-    outputs, unknowns = _structure(root, variables, is_two=is_two)
     experiment = root.find("DefaultExperiment")
     return Description(
         version=version,
         model_name=root.get("modelName", ""),
         token=root.get("guid" if is_two else "instantiationToken", ""),
-        identifier=simulation.get("modelIdentifier", ""),
+        identifier=next(iter(interfaces.values())).get("modelIdentifier", ""),
         tool=root.get("generationTool", ""),
         text=root.get("description", ""),
-        flags=dict(simulation.attrib),
+        flags=interfaces.get("CoSimulation", {}),
+        interfaces=interfaces,
         variables=variables,
         units=units,
-        outputs=outputs,
-        initial_unknowns=unknowns,
+        structure=tuple(_structure(root, variables, is_two=is_two)),
         experiment={} if experiment is None else dict(experiment.attrib),
         root=root,
     )
@@ -185,26 +161,42 @@ def parse(content: bytes) -> Description:
 def _units(root: ElementTree.Element) -> Iterator[Unit]:
     for element in root.iterfind("UnitDefinitions/Unit"):
         base = element.find("BaseUnit")
+        name = element.get("name", "")
         if base is None:
-            yield Unit(element.get("name", ""), None)
+            yield Unit(name, None)
             continue
-        powers = tuple(int(_number(base.get(name)) or 0) for name in (*BASE_UNITS, *_OTHER_UNITS))
+        powers = tuple(_whole(f"unit {name}, {key}", base.get(key, "0")) for key in (*BASE_UNITS, *_OTHER_UNITS))
         # Powers of other base units are kept, so that they differ from what has none.
         exponents = powers[: len(BASE_UNITS)] if not any(powers[len(BASE_UNITS) :]) else powers
-        factor = _number(base.get("factor"))
-        yield Unit(element.get("name", ""), exponents, 1.0 if factor is None else factor)
+        factor = _number(base.get("factor", "1"))
+        if not factor:
+            raise BadInput(f"unit {name}, factor", base.get("factor"), "a finite number other than 0")
+        yield Unit(name, exponents, factor)
 
 
 def _variables_of_3(root: ElementTree.Element, units: dict[str, Unit]) -> Iterator[Variable]:
     types = {t.get("name"): t for t in root.iterfind("TypeDefinitions/*")}
-    for element in root.iterfind("ModelVariables/*"):
+    elements = list(root.iterfind("ModelVariables/*"))
+    by_reference = {e.get("valueReference"): e for e in elements}
+    for element in elements:
         start = element.get("start")
-        if element.tag == "String":
-            inner = element.find("Start")
-            start = None if inner is None else inner.get("value")
-        # Arrays have no scalar start and cannot be connected.
-        kind = element.tag if element.find("Dimension") is None else f"{element.tag}[]"
-        yield _variable(element, element, (types.get(element.get("declaredType")), kind, start), units)
+        if element.tag in ("String", "Binary"):
+            inner = [child.get("value", "") for child in element.iterfind("Start")]
+            start = None if not inner else inner[0]
+        dimensions = tuple(_dimension(d, by_reference) for d in element.iterfind("Dimension"))
+        if math.prod(dimensions) > _MOST_NUMBERS:
+            raise BadInput(f"variable {element.get('name')}", Text(f"{math.prod(dimensions)} elements"), f"at most {_MOST_NUMBERS}")
+        kind = "Int64" if element.tag == "Enumeration" else element.tag
+        yield _variable(element, element, (types.get(element.get("declaredType")), kind, start), units, dimensions)
+
+
+def _dimension(element: ElementTree.Element, by_reference: dict[str | None, ElementTree.Element]) -> int:
+    """Return the length of an array along a dimension, as it is before a structural parameter is changed."""
+    text = element.get("start")
+    if text is None:
+        parameter = by_reference.get(element.get("valueReference"))
+        text = None if parameter is None else parameter.get("start")
+    return _whole("Dimension", text or "", least=0)
 
 
 def _variables_of_2(root: ElementTree.Element, units: dict[str, Unit]) -> Iterator[Variable]:
@@ -212,9 +204,9 @@ def _variables_of_2(root: ElementTree.Element, units: dict[str, Unit]) -> Iterat
     for element in root.iterfind("ModelVariables/ScalarVariable"):
         typed = next((child for child in element if child.tag in _TYPES_OF_2), None)
         if typed is None:
-            continue
+            raise BadInput(f"variable {element.get('name')}", Text("no type"), f"one of {', '.join(_TYPES_OF_2)}")
         declared = types.get(typed.get("declaredType"))
-        yield _variable(element, typed, (declared, _TYPES_OF_2[typed.tag], typed.get("start")), units)
+        yield _variable(element, typed, (declared, _TYPES_OF_2[typed.tag], typed.get("start")), units, ())
 
 
 def _variable(
@@ -222,6 +214,7 @@ def _variable(
     typed: ElementTree.Element,
     own: tuple[ElementTree.Element | None, str, str | None],
     units: dict[str, Unit],
+    dimensions: tuple[int, ...],
 ) -> Variable:
     declared, kind, start = own
     name = element.get("name", "")
@@ -232,45 +225,80 @@ def _variable(
 
     unit = attribute("unit")
     known = units.get(unit or "")
-    floating = kind.startswith("Float")
+    floating = kind.startswith("Float") or typed.tag == "Real"
     return Variable(
         name=name,
-        reference=int(_number(element.get("valueReference")) or 0),
+        reference=_whole(f"variable {name}, valueReference", element.get("valueReference", ""), least=0, most=_MOST_REFERENCE),
         causality=element.get("causality", "local"),
-        variability=element.get("variability", "continuous" if floating else "discrete"),
+        variability=element.get("variability") or _variability(element, floating=floating, is_two=element is not typed),
         initial=element.get("initial"),
         type=kind,
         unit=unit,
         exponents=None if known is None else known.exponents,
         scale=1.0 if known is None else known.factor,
-        start=_start(kind, start),
+        start=_start(kind, start, name) if not dimensions else _starts(kind, start, name),
         min=_number(attribute("min")),
         max=_number(attribute("max")),
         nominal=_number(attribute("nominal")) or 1.0,
         description=element.get("description", ""),
+        dimensions=dimensions,
     )
 
 
-def _start(kind: str, value: str | None) -> Any:
-    if value is None or kind.endswith("[]"):
+def _variability(element: ElementTree.Element, *, floating: bool, is_two: bool) -> str:
+    """Return what the standards take where nothing is said."""
+    if is_two:
+        return "continuous"
+    if element.get("causality") in ("parameter", "calculatedParameter", "structuralParameter"):
+        return "fixed"
+    return "continuous" if floating else "discrete"
+
+
+def _starts(kind: str, value: str | None, name: str) -> tuple[Any, ...] | None:
+    return None if value is None else tuple(_start(kind, part, name) for part in value.split())
+
+
+def _start(kind: str, value: str | None, name: str) -> Any:
+    if value is None:
         return None
-    if kind == "String":
+    if kind in ("String", "Binary"):
         return value
     if kind == "Boolean":
-        return value in ("true", "1")
-    number = _number(value)
-    return number if number is None or kind.startswith("Float") else int(number)
+        return value.strip() in ("true", "1")
+    if kind.startswith("Float"):
+        try:
+            return float(value)
+        except ValueError:
+            raise BadInput(f"variable {name}, start", value, "a number") from None
+    return _whole(f"variable {name}, start", value)
 
 
-def _structure(root: ElementTree.Element, variables: tuple[Variable, ...], *, is_two: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _structure(root: ElementTree.Element, variables: tuple[Variable, ...], *, is_two: bool) -> Iterator[Unknown]:
     if is_two:
-        by_index = dict(enumerate((v.name for v in variables), start=1))
-        paths, key = ("ModelStructure/Outputs/Unknown", "ModelStructure/InitialUnknowns/Unknown"), "index"
+        known = dict(enumerate((v.name for v in variables), start=1))
+        paths, key = {"Output": "Outputs/", "ContinuousStateDerivative": "Derivatives/", "InitialUnknown": "InitialUnknowns/"}, "index"
     else:
-        by_index = {v.reference: v.name for v in variables}
-        paths, key = ("ModelStructure/Output", "ModelStructure/InitialUnknown"), "valueReference"
-    found = [tuple(by_index.get(int(_number(e.get(key)) or 0), "?") for e in root.iterfind(path)) for path in paths]
-    return found[0], found[1]
+        known = {v.reference: v.name for v in variables}
+        kinds = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator", "ClockedState")
+        paths, key = dict.fromkeys(kinds, ""), "valueReference"
+    for kind, folder in paths.items():
+        for element in root.iterfind(f"ModelStructure/{folder}{'Unknown' if is_two else kind}"):
+            place = f"ModelStructure, {kind}"
+            dependencies, kinds_of = element.get("dependencies"), element.get("dependenciesKind")
+            yield Unknown(
+                kind,
+                known.get(_whole(f"{place}, {key}", element.get(key, "")), "?"),
+                None if dependencies is None else tuple(known.get(_whole(place, d), "?") for d in dependencies.split()),
+                None if kinds_of is None else tuple(kinds_of.split()),
+            )
+
+
+def _whole(place: str, text: str, *, least: int = -(2**63), most: int = 2**64 - 1) -> int:
+    """Read a whole number, strictly: no fraction, no exponent."""
+    if re.fullmatch(r"\s*[+-]?[0-9]{1,20}\s*", text) and least <= int(text) <= most:
+        return int(text)
+    limits = f"a whole number from {least} to {most}" if least == 0 and most < 2**63 else "a whole number"
+    raise BadInput(place, text or Text("nothing"), limits)
 
 
 def _number(text: str | None) -> float | None:

@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 
 from .. import _armrs, checks
-from ..cosim.imported import platform_folder
+from ..cosim.library import platform_folder
 from ..cosim.partner import Variable
 from ..cosim.slave import Slave
 from ..errors import ArmrsError

@@ -6,7 +6,8 @@ import os
 from typing import Any
 
 from ..report import console
-from .description import archive, read_description
+from .archive import archive
+from .description import read_description
 
 
 def about(path: str | os.PathLike[str]) -> dict[str, Any]:

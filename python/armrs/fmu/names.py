@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 _FUNCTIONS_2 = """
     GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode
     ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean SetString
@@ -26,7 +28,27 @@ _FUNCTIONS_3 = """
 """
 
 FUNCTIONS = {2: tuple(_FUNCTIONS_2.split()), 3: tuple(_FUNCTIONS_3.split())}
-"""Functions that a library must export, without the prefix `fmi2` or `fmi3`: 44 and 75."""
+"""Functions of the standards, without the prefix `fmi2` or `fmi3`: 44 and 75."""
+
+_EXCHANGE_2 = """
+    EnterEventMode NewDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates GetDerivatives
+    GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates
+"""
+_SIMULATION_2 = """
+    SetRealInputDerivatives GetRealOutputDerivatives DoStep CancelStep GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus
+    GetStringStatus
+"""
+
+
+def functions(fmi: int, interfaces: Iterable[str]) -> tuple[str, ...]:
+    """Return the functions that a library must export: all of FMI 3.0; of FMI 2.0 those of the interfaces that it offers (section 2.3)."""
+    offered = set(interfaces)
+    needless: set[str] = set()
+    if fmi == 2:
+        needless |= set() if "ModelExchange" in offered else set(_EXCHANGE_2.split())
+        needless |= set() if "CoSimulation" in offered else set(_SIMULATION_2.split())
+    return tuple(name for name in FUNCTIONS[fmi] if name not in needless)
+
 
 _BOTH = """
     modelIdentifier needsExecutionTool canBeInstantiatedOnlyOncePerProcess canHandleVariableCommunicationStepSize
@@ -66,3 +88,16 @@ VARIABILITIES = {
     "independent": ("continuous",),
 }
 """Variabilities that each causality allows."""
+
+
+def initials(fmi: int, causality: str, variability: str) -> tuple[str, ...]:
+    """Return the values of `initial` that are allowed, the default first (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5)."""
+    if causality in ("parameter", "structuralParameter") or variability == "constant":
+        return ("exact",)
+    if causality == "input":
+        return ("exact",) if fmi == 3 else ()
+    if causality == "independent":
+        return ()
+    if causality == "calculatedParameter" or variability in ("fixed", "tunable"):
+        return ("calculated", "approx")
+    return ("calculated", "exact", "approx")

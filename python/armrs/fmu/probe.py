@@ -1,148 +1,375 @@
-"""The library of an FMU, tried: run as a process of its own, it writes what it finds as lines of JSON."""
+"""The library of an FMU, tried: what it does against what its description promises. It runs in a process of its own."""
 
 from __future__ import annotations
 
 import ctypes
-import json
+import math
 import struct
-import sys
-import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from ..cosim.imported import ImportedSlave, Library, library_path
+from ..cosim.imported import ImportedSlave
+from ..cosim.library import C_TYPES, NAMES_IN_2, Library, library_path
 from ..cosim.partner import Status, Variable
-from ..errors import ArmrsError
-from . import names
-from .description import Description, read_description, unpack
+from ..errors import ArmrsError, SlaveError
+from . import names, promises
+from .description import Description, parse
+
+_ROUNDED = 1e-12
+"""Relative difference of a start value that a decimal number with 15 digits may cause."""
+_MOST_SHOWN = 5
+"""Findings of one sort that are shown, of possibly thousands of variables."""
 
 
-def _write(record: dict[str, str]) -> None:
-    print(f"probe:{json.dumps(record)}", flush=True)
+@dataclass
+class Trial:
+    """One FMU on trial.
+
+    Attributes
+    ----------
+    path : Path
+        The FMU.
+    folder : Path
+        Where it is unpacked.
+    description : Description
+    send : callable
+        Takes records for the parent: what is done next, and what was found.
+    """
+
+    path: Path
+    folder: Path
+    description: Description
+    send: Callable[[dict[str, Any]], None]
+    shown: dict[str, int] = field(default_factory=dict)
+
+    def step(self, what: str) -> None:
+        """Say what comes next, for the case that it crashes."""
+        self.send({"step": what})
+
+    def find(self, place: str, text: str, *, level: str = "error", sort: str = "") -> None:
+        """Report a finding; of one sort only the first few."""
+        count = self.shown[sort] = self.shown.get(sort, 0) + 1
+        if not sort or count <= _MOST_SHOWN:
+            self.send({"level": level, "place": place, "text": text})
+
+    def make(self, **mode: Any) -> ImportedSlave:
+        """Return a new instance."""
+        return ImportedSlave(self.path, name="tried", folder=self.folder, description=self.description, **mode)
+
+    @property
+    def fmi(self) -> int:
+        """Major version of the standard."""
+        return self.description.fmi
+
+    def flag(self, name: str) -> bool:
+        """Whether something is promised for co-simulation."""
+        return self.description.flag(name)
+
+    @property
+    def start(self) -> float:
+        """Start time of the default experiment [s]."""
+        return finite(self.description.experiment.get("startTime")) or 0.0
+
+    @property
+    def size(self) -> float:
+        """Communication step that is tried [s]."""
+        sizes = (finite(self.description.experiment.get("stepSize")), self.description.number("fixedInternalStepSize"), 0.01)
+        return next(size for size in sizes if size is not None and size > 0.0)
+
+    def begin(self, slave: ImportedSlave) -> None:
+        """Bring an instance to its first step."""
+        slave.enter_initialization_mode(self.start)
+        slave.exit_initialization_mode()
+
+    def readable(self, *causalities: str) -> list[Variable]:
+        """Variables of the types that can be read."""
+        known = NAMES_IN_2 if self.fmi == 2 else C_TYPES
+        return [v for v in self.description.variables if v.type in known and (not causalities or v.causality in causalities)]
+
+    def outputs(self, slave: ImportedSlave) -> dict[str, list[Any]]:
+        """All outputs that can be read."""
+        return {v.name: slave.values(v.name) for v in self.readable("output")}
 
 
-def _step(what: str) -> None:
-    """Say what comes next, for the case that it crashes."""
-    _write({"step": what})
-
-
-def _find(place: str, text: str, level: str = "error") -> None:
-    _write({"level": level, "place": place, "text": text})
-
-
-def main(path: str) -> None:
-    """Try an FMU from its library to a step made twice."""
-    _step("loading the library")
-    description = read_description(path)
-    if not _symbols(path, description):
-        return
-    _step("making an instance")
+def run(path: Path, folder: Path, send: Callable[[dict[str, Any]], None]) -> None:
+    """Try an unpacked FMU from its library to everything that it promises."""
+    description = parse((folder / "modelDescription.xml").read_bytes())
+    trial = Trial(path, folder, description, send)
+    trial.step("loading the library")
     try:
-        slave = ImportedSlave(path)
-    except ArmrsError as error:
-        token = "instantiationToken" if description.fmi == 3 else "guid"
-        _find("library, instantiate", f"refused with the {token} {description.token!r}: {error}")
+        if _symbols(trial) and "CoSimulation" in description.interfaces:
+            _life(trial)
+            for promise in promises.ALL:
+                _guarded(trial, promise)
+    except ArmrsError as refused:
+        trial.find("library", str(refused))
+    trial.step("end")
+
+
+def _guarded(trial: Trial, promise: Callable[[Trial], None]) -> None:
+    """Keep one broken promise from hiding the others."""
+    try:
+        promise(trial)
+    except ArmrsError as refused:
+        trial.find("library", str(refused))
+
+
+def _symbols(trial: Trial) -> bool:
+    fmi = trial.fmi
+    library = Library(library_path(trial.folder, trial.description, trial.path), fmi)
+    wanted = names.functions(fmi, trial.description.interfaces)
+    missing = [f"fmi{fmi}{name}" for name in wanted if not library.has(f"fmi{fmi}{name}")]
+    if missing:
+        trial.find("library", f"{len(missing)} functions of the standard are missing: {', '.join(missing[:_MOST_SHOWN])}")
+        return False
+    version = (library.function("GetVersion", ctypes.c_char_p)() or b"").decode(errors="replace")
+    if version.split(".")[0] != str(fmi):
+        trial.find("library, GetVersion", f"{version!r}, the description has {trial.description.version}")
+    if fmi == 2 and (platform := library.function("GetTypesPlatform", ctypes.c_char_p)()) != b"default":
+        trial.find("library, GetTypesPlatform", f"{platform!r}, allowed is 'default'")
+    return True
+
+
+def _life(trial: Trial) -> None:
+    """Make an instance, compare its start values, step it, go back, reset it."""
+    trial.step("making an instance")
+    try:
+        slave = trial.make()
+    except SlaveError as error:
+        if trial.flag("needsExecutionTool"):
+            trial.find("CoSimulation, needsExecutionTool", f"it needs the tool that made it: not tried ({error})", level="note")
+            return
+        token = "instantiationToken" if trial.fmi == 3 else "guid"
+        trial.find("library, instantiate", f"refused with the {token} {trial.description.token!r}: {error}")
         return
-    version = slave.library.function("GetVersion", ctypes.c_char_p)().decode()
-    if version.split(".")[0] != str(description.fmi):
-        _find("library, GetVersion", f"{version}, the description has {description.version}")
-    _step("comparing start values")
-    _starts(slave)
-    _step("initializing")
-    slave.enter_initialization_mode(0.0)
+    trial.step("setting values before the initialization")
+    _set_all(trial, slave, _settable_at_start(trial), "before the initialization")
+    trial.step("initializing")
+    slave.enter_initialization_mode(trial.start)
+    trial.step("comparing start values")
+    _starts(trial, slave)
+    promises.dependencies(trial, slave)
+    promises.directional_derivatives(trial, slave)
     slave.exit_initialization_mode()
-    _steps(slave)
-    _step("ending")
+    _reads(trial, slave)
+    first = _steps(trial, slave)
+    _tunables(trial, slave)
+    _second_instance(trial)
+    trial.step("ending")
     slave.terminate()
+    _reset(trial, slave, first)
+    trial.step("freeing the instance")
     slave.free()
 
 
-def _symbols(path: str, description: Description) -> bool:
-    with tempfile.TemporaryDirectory(prefix="armrs-fmu-") as folder:
-        unpack(path, Path(folder))
-        library = Library(library_path(Path(folder), description, path), description.fmi)
-        missing = [
-            f"fmi{description.fmi}{name}" for name in names.FUNCTIONS[description.fmi] if not library.has(f"fmi{description.fmi}{name}")
-        ]
-    if missing:
-        _find("library", f"{len(missing)} functions of the standard are missing: {', '.join(missing[:5])}")
-    return not missing
+def _settable_at_start(trial: Trial) -> list[Variable]:
+    """Return inputs and parameters with start values; structural parameters need the configuration mode."""
+    return [v for v in trial.readable("input", "parameter") if v.start is not None]
 
 
-def _starts(slave: ImportedSlave) -> None:
-    """Compare what the library holds with what the description says, to the last bit."""
-    for v in slave.variables.values():
-        if v.start is None or v.type != "Float64" or v.causality == "independent":
-            continue
+def _set_all(trial: Trial, slave: ImportedSlave, variables: list[Variable], when: str) -> None:
+    for v in variables:
         try:
-            found = float(slave.get(v.name)[0])
-        except ArmrsError as error:
-            _find(f"variable {v.name}", f"cannot be read: {error}")
-            return
-        if not _same(found, float(v.start)):
-            _find(f"variable {v.name}", f"start is {v.start!r} in the description and {found!r} in the library")
+            slave.set(v.name, _given(v))
+        except SlaveError as error:  # noqa: PERF203 (every variable is tried)
+            trial.find(f"variable {v.name}", f"its own start value cannot be set {when}: {error}", sort=f"set {when}")
 
 
-def _steps(slave: ImportedSlave) -> None:
-    asked = slave.description.experiment.get("stepSize")
-    try:
-        size = float(asked or slave.internal_step or 0.01)
-    except ValueError:
-        size = slave.internal_step or 0.01  # what the description says wrong is a finding of its own
-    outputs = [v.name for v in slave.variables.values() if v.causality == "output" and _readable(v)]
-    _step("making a step")
-    if not slave.can_rollback:
-        _find("CoSimulation", "states cannot be kept: it takes part in no iterated coupling", "note")
-        _advance(slave, size, outputs)
+def _given(v: Variable) -> Any:
+    """Return the start value in the shape that `set` takes; one value may stand for a whole array."""
+    if not v.dimensions:
+        return v.start
+    return list(v.start) * (v.size if len(v.start) == 1 else 1)
+
+
+def _starts(trial: Trial, slave: ImportedSlave) -> None:
+    """Compare what the library holds with what the description says."""
+    exact = [v for v in trial.readable() if v.start is not None and v.causality != "independent" and initial_of(v) == "exact"]
+    for v in exact:
+        try:
+            found, said = slave.values(v.name), v.start if v.dimensions else (v.start,)
+        except SlaveError as error:
+            trial.find(f"variable {v.name}", f"cannot be read: {error}", sort="unreadable")
+            continue
+        if len(said) == 1:
+            said = said * len(found)
+        if len(said) != len(found):
+            trial.find(f"variable {v.name}", f"start has {len(said)} values, its dimensions say {len(found)}", sort="start size")
+        elif not all(_as_said(v, a, b) for a, b in zip(found, said, strict=True)):
+            shown = (v.start, found) if v.dimensions else (v.start, found[0])
+            trial.find(f"variable {v.name}", f"start is {shown[0]!r} in the description and {shown[1]!r} in the library", sort="start")
+
+
+def _as_said(v: Variable, found: Any, said: Any) -> bool:
+    if not v.type.startswith("Float"):
+        return bool(found == said)
+    if v.type == "Float32":
+        return bool(ctypes.c_float(said).value == found) or math.isclose(found, said, rel_tol=1e-6)
+    return same(found, said) or math.isclose(found, said, rel_tol=_ROUNDED)
+
+
+def _reads(trial: Trial, slave: ImportedSlave) -> None:
+    trial.step("reading every variable")
+    for v in trial.readable():
+        try:
+            slave.values(v.name)
+        except SlaveError as error:  # noqa: PERF203
+            trial.find(f"variable {v.name}", f"cannot be read after the initialization: {error}", sort="unreadable")
+
+
+def _steps(trial: Trial, slave: ImportedSlave) -> dict[str, list[Any]]:
+    """Make a step, twice where the FMU can go back; return the outputs after the first."""
+    trial.step("making a step")
+    state = slave.get_state() if slave.can_rollback else None
+    first = _advance(trial, slave, trial.start, trial.size)
+    if state is None:
+        trial.find("CoSimulation", "states cannot be kept: it takes part in no iterated coupling", level="note")
+    else:
+        word = f"GetFMU{'S' if trial.fmi == 3 else 's'}tate"
+        trial.step("going back to a state")
+        _disturb(trial, slave)
+        slave.set_state(state)
+        _compare(trial, f"library, {word}", first, _advance(trial, slave, trial.start, trial.size), "after going back and making it again")
+        _serialized(trial, slave, state, first)
+        slave.free_state(state)
+    trial.step("making steps of other lengths")
+    if slave.can_vary_step:
+        middle = trial.start + trial.size
+        _advance(trial, slave, middle, 0.5 * trial.size)
+        _advance(trial, slave, middle + 0.5 * trial.size, trial.size)
+    _output_derivatives(trial, slave)
+    return first
+
+
+def _disturb(trial: Trial, slave: ImportedSlave) -> None:
+    """Go on with other inputs, so that a state without inputs or times is seen."""
+    for v in trial.readable("input"):
+        if v.is_signal and v.start is not None:
+            slave.set(v.name, v.start + 0.125 * v.nominal if v.max is None or v.start + 0.125 * v.nominal <= v.max else v.start)
+    slave.do_step(trial.start + trial.size, trial.size)
+
+
+def _serialized(trial: Trial, slave: ImportedSlave, state: Any, first: dict[str, list[Any]]) -> None:
+    if not trial.flag(f"canSerializeFMU{'S' if trial.fmi == 3 else 's'}tate"):
         return
-    state = slave.get_state()
-    once = _advance(slave, size, outputs)
-    _step("going back to a state")
-    slave.set_state(state)
-    again = _advance(slave, size, outputs)
-    for name, a, b in zip(outputs, once, again, strict=True):
-        if not _same(a, b):
-            _find("library, SetFMUState", f"{name} is {a!r} after a step and {b!r} after going back and making it again")
-    _serialized(slave, state, outputs, (size, once))
-    slave.free_state(state)
-
-
-def _serialized(slave: ImportedSlave, state: object, outputs: list[str], expected: tuple[float, np.ndarray]) -> None:
-    if not slave.description.flag(f"canSerializeFMU{'S' if slave.fmi == 3 else 's'}tate"):
-        return
-    _step("writing a state as bytes")
-    size, once = expected
-    copy = slave.deserialize_state(slave.serialize_state(state))  # type: ignore[arg-type]
+    trial.step("writing a state as bytes")
+    content = slave.serialize_state(state)
+    if not content:
+        trial.find("library, SerializeFMUState", "a state of no bytes")
+    copy = slave.deserialize_state(content)
     slave.set_state(copy)
     slave.free_state(copy)
-    for name, a, b in zip(outputs, once, _advance(slave, size, outputs), strict=True):
-        if not _same(a, b):
-            _find("library, SerializeFMUState", f"{name} is {a!r} after a step and {b!r} from the state read back")
+    _compare(trial, "library, SerializeFMUState", first, _advance(trial, slave, trial.start, trial.size), "from the state read back")
 
 
-def _advance(slave: ImportedSlave, size: float, outputs: list[str]) -> np.ndarray:
-    done = slave.do_step(0.0, size)
-    if done.status > Status.WARNING:
-        _find("library, DoStep", f"the first step of {size} s is discarded: {done.message}")
-    values = slave.get(outputs)
-    for name, value in zip(outputs, values, strict=True):
-        if not np.isfinite(value):
-            _find(f"variable {name}", f"is {value} after the first step")
+def _advance(trial: Trial, slave: ImportedSlave, time: float, size: float) -> dict[str, list[Any]]:
+    done = slave.do_step(time, size)
+    place, end = "library, DoStep", time + size
+    if done.terminate:
+        trial.find(place, f"it asks to end the run after the step from {time:g} s", level="note")
+    elif done.status > Status.WARNING:
+        trial.find(place, f"the step of {size:g} s from {time:g} s is discarded: {done.message}")
+    elif done.early_return:
+        trial.find(place, "it returns early, which was not allowed when the instance was made")
+    elif abs(done.last_successful_time - end) > 1e-6 * size + 1e-12 * abs(end) + _lag(slave):
+        trial.find(place, f"lastSuccessfulTime is {done.last_successful_time:g} s after a step to {end:g} s")
+    if done.event and not trial.flag("hasEventMode"):
+        trial.find(place, "it asks for event handling and has no event mode")
+    values = trial.outputs(slave)
+    for name, found in values.items():
+        for value in found:
+            if isinstance(value, float) and not math.isfinite(value):
+                trial.find(f"variable {name}", f"is {value} after a step", sort="finite")
+    _time(trial, slave, end)
     return values
 
 
-def _readable(v: Variable) -> bool:
-    return v.type == "Float64"
+def _time(trial: Trial, slave: ImportedSlave, end: float) -> None:
+    """Compare the independent variable with the time of the importer; FMI 2.0 cannot say which inner step it may lag behind by."""
+    for v in trial.readable("independent") if trial.fmi == 3 else []:
+        found = float(slave.values(v.name)[0])
+        if not abs(found - end) <= 1e-9 * max(1.0, abs(end)) + _lag(slave):
+            trial.find(f"variable {v.name}", f"is {found:g} after a step to {end:g} s", level="note", sort="time")
 
 
-def _same(a: float, b: float) -> bool:
-    return struct.pack("<d", a) == struct.pack("<d", b)
+def _lag(slave: ImportedSlave) -> float:
+    """How far a slave with a fixed inner step may be from the end of a communication step [s]."""
+    return 1.000001 * (slave.internal_step or 0.0)
 
 
-if __name__ == "__main__":
+def _output_derivatives(trial: Trial, slave: ImportedSlave) -> None:
+    order = trial.description.number("maxOutputDerivativeOrder")
+    outputs = [v.name for v in trial.readable("output") if v.is_signal and v.variability == "continuous"]
+    if order and outputs:
+        trial.step("reading derivatives of outputs")
+        slave.get_output_derivatives(outputs)
+
+
+def _tunables(trial: Trial, slave: ImportedSlave) -> None:
+    trial.step("setting inputs and tunable parameters between steps")
+    inputs = [v for v in trial.readable("input") if v.start is not None]
+    tunable = [v for v in trial.readable("parameter") if v.variability == "tunable" and v.start is not None]
+    _set_all(trial, slave, [*inputs, *tunable], "between steps")
+
+
+def _second_instance(trial: Trial) -> None:
+    if trial.flag("canBeInstantiatedOnlyOncePerProcess"):
+        return
+    trial.step("making a second instance beside the first")
     try:
-        main(sys.argv[1])
-    except ArmrsError as refused:
-        _find("library", str(refused))
-    _step("end")
+        other = trial.make()
+    except SlaveError as error:
+        trial.find("library, instantiate", f"a second instance is refused, and canBeInstantiatedOnlyOncePerProcess is not true: {error}")
+        return
+    _starts_of_second(trial, other)
+    other.free()
+
+
+def _starts_of_second(trial: Trial, other: ImportedSlave) -> None:
+    """Compare where a second instance begins with where the first began, whatever the first did since."""
+    trial.step("initializing a second instance")
+    other.enter_initialization_mode(trial.start)
+    _starts(trial, other)
+    other.exit_initialization_mode()
+
+
+def _reset(trial: Trial, slave: ImportedSlave, first: dict[str, list[Any]]) -> None:
+    trial.step("resetting")
+    slave.reset()
+    trial.begin(slave)
+    _compare(trial, "library, Reset", first, _advance(trial, slave, trial.start, trial.size), "after a reset")
+
+
+def _compare(trial: Trial, place: str, once: dict[str, list[Any]], again: dict[str, list[Any]], when: str) -> None:
+    for name, values in once.items():
+        pairs = zip(values, again[name], strict=True)
+        if not all(same(a, b) if isinstance(a, float) else a == b for a, b in pairs):
+            trial.find(place, f"{name} is {_short(values)} after a step and {_short(again[name])} {when}", sort=place)
+
+
+def _short(values: list[Any]) -> str:
+    return repr(values[0]) if len(values) == 1 else repr(values)[:80]
+
+
+def initial_of(v: Variable) -> str:
+    """Return where a start value comes from, with what the standards take where nothing is said."""
+    if v.initial is not None:
+        return v.initial
+    exact = v.causality in ("input", "parameter", "structuralParameter") or v.variability == "constant"
+    return "exact" if exact else "calculated"
+
+
+def finite(text: str | None) -> float | None:
+    """Return a finite number, or None for any other text."""
+    try:
+        value = float(text or "nan")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def same(a: float, b: float) -> bool:
+    """Whether two numbers have the same bits."""
+    return struct.pack("<d", a) == struct.pack("<d", b)

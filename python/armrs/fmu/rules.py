@@ -6,19 +6,21 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator
+from xml.etree import ElementTree
 
 from ..cosim.partner import Variable
 from ..errors import nearest
-from . import names
+from . import names, structure
 from .description import Description, Unit
 
 Broken = tuple[str, str]
 """Place and text of what is wrong."""
 
 _IDENTIFIER = r"(?:[A-Za-z_][A-Za-z0-9_]*|'(?:[^'\\]|\\.)+')"
-_INDEX = r"\[[1-9][0-9]*(?:,[1-9][0-9]*)*\]"
+_INDEX = r"\[[0-9]+(?:,[0-9]+)*\]"
 _PATH = rf"{_IDENTIFIER}(?:{_INDEX})?(?:\.{_IDENTIFIER}(?:{_INDEX})?)*"
 _STRUCTURED = re.compile(rf"(?:{_PATH}|der\({_PATH}(?:,[1-9][0-9]*)?\))")
+_WHOLE = re.compile(r"U?Int\d+")
 _C_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # Powers of kg, m and s. The radian is left out: not every tool counts it.
 _SYMBOLS = {
@@ -44,7 +46,8 @@ def broken(description: Description) -> Iterator[Broken]:
     for variable in description.variables:
         for text in _variable(variable, description):
             yield f"variable {variable.name}", text
-    yield from _structure(description)
+    yield from _references(description)
+    yield from structure.broken(description)
 
 
 def _top(description: Description) -> Iterator[Broken]:
@@ -53,20 +56,17 @@ def _top(description: Description) -> Iterator[Broken]:
         yield "fmiVersion", f"{description.version!r}, allowed is 3.0"
     if not description.token:
         yield ("instantiationToken" if fmi == 3 else "guid"), "missing"
-    if not _C_NAME.fullmatch(description.identifier):
-        yield "CoSimulation, modelIdentifier", f"{description.identifier!r}, allowed is a name as in C"
+    if not description.model_name:
+        yield "modelName", "missing"
+    for kind, attributes in description.interfaces.items():
+        if not _C_NAME.fullmatch(attributes.get("modelIdentifier", "")):
+            yield f"{kind}, modelIdentifier", f"{attributes.get('modelIdentifier', '')!r}, allowed is a name as in C"
     known = names.CO_SIMULATION[fmi]
     for key in flags:
-        if key not in known and ":" not in key and not key.startswith("{"):
-            yield "CoSimulation", f"unknown attribute {key}, which importers silently ignore (nearest known: {nearest(key, known)})"
-    for key, value in flags.items():
-        if key.startswith(("can", "provides", "needs", "has", "might")) and value not in ("true", "false", "0", "1"):
-            yield f"CoSimulation, {key}", f"{value!r}, allowed is true or false"
-    if "fixedInternalStepSize" in flags and not _positive(flags["fixedInternalStepSize"]):
-        yield "CoSimulation, fixedInternalStepSize", f"{flags['fixedInternalStepSize']}, allowed is a positive number of seconds"
-    experiment = description.experiment
-    if "stepSize" in experiment and not _positive(experiment["stepSize"]):
-        yield "DefaultExperiment, stepSize", f"{experiment['stepSize']}, allowed is a positive number of seconds"
+        if key not in known and ":" not in key and not key.startswith("{") and (hint := nearest(key, known)):
+            yield "CoSimulation", f"unknown attribute {key}, which importers silently ignore (nearest known: {hint})"
+    yield from _flags(description)
+    yield from _experiment(description.experiment)
     independent = [v.name for v in description.variables if v.causality == "independent"]
     if fmi == 3 and len(independent) != 1:
         yield "ModelVariables", f"{len(independent)} independent variables, allowed is one"
@@ -75,13 +75,109 @@ def _top(description: Description) -> Iterator[Broken]:
     yield from _attributes(description)
 
 
+def _flags(description: Description) -> Iterator[Broken]:
+    flags = description.flags
+    for key, value in flags.items():
+        if key.startswith(("can", "provides", "needs", "has", "might")) and value not in ("true", "false", "0", "1"):
+            yield f"CoSimulation, {key}", f"{value!r}, allowed is true or false"
+    if "fixedInternalStepSize" in flags and not _positive(flags["fixedInternalStepSize"]):
+        yield "CoSimulation, fixedInternalStepSize", f"{flags['fixedInternalStepSize']}, allowed is a positive number of seconds"
+    state = "State" if description.fmi == 3 else "state"
+    if description.flag(f"canSerializeFMU{state}") and not description.flag(f"canGetAndSetFMU{state}"):
+        yield "CoSimulation", f"canSerializeFMU{state} without canGetAndSetFMU{state}"
+    order = flags.get("maxOutputDerivativeOrder", "0")
+    if not order.strip().isdigit():
+        yield "CoSimulation, maxOutputDerivativeOrder", f"{order!r}, allowed is a whole number from 0"
+
+
+def _experiment(experiment: dict[str, str]) -> Iterator[Broken]:
+    for key in ("stepSize", "tolerance"):
+        if key in experiment and not _positive(experiment[key]):
+            yield f"DefaultExperiment, {key}", f"{experiment[key]}, allowed is a positive number"
+    times = {key: _finite(experiment[key]) for key in ("startTime", "stopTime") if key in experiment}
+    for key, value in times.items():
+        if value is None:
+            yield f"DefaultExperiment, {key}", f"{experiment[key]}, allowed is a finite number of seconds"
+    start, stop = times.get("startTime", 0.0), times.get("stopTime")
+    if start is not None and stop is not None and stop < start:
+        yield "DefaultExperiment, stopTime", f"{stop} s, before the start at {start} s"
+
+
+def _references(description: Description) -> Iterator[Broken]:
+    """Compare what variables refer to with what there is: declared types, display units, derivatives, clocks."""
+    root, fmi = description.root, description.fmi
+    path = "TypeDefinitions/SimpleType" if fmi == 2 else "TypeDefinitions/*"
+    types = {t.get("name"): t for t in root.iterfind(path)}
+    for name, count in Counter(t.get("name") for t in root.iterfind(path)).items():
+        if count > 1:
+            yield f"type {name}", "defined more than once"
+    displays = {u.get("name"): {d.get("name") for d in u.iterfind("DisplayUnit")} for u in root.iterfind("UnitDefinitions/Unit")}
+    for name, t in types.items():
+        inner = next(iter(t), t) if fmi == 2 else t
+        if inner.get("unit") is not None and inner.get("unit") not in displays:
+            yield f"type {name}", f"the unit {inner.get('unit')!r} is not defined"
+    variables = {v.name: v for v in description.variables}
+    by_reference = {str(v.reference): v for v in description.variables}
+    for element in root.iterfind("ModelVariables/*"):
+        name = element.get("name", "")
+        typed = element if fmi == 3 else next((c for c in element if c.tag not in ("Annotations",)), element)
+        for text in _refers(typed, types, displays, fmi):
+            yield f"variable {name}", text
+        derivative = typed.get("derivative")
+        if derivative is not None and name in variables:
+            state = _state(derivative, description, by_reference)
+            if state is None:
+                yield f"variable {name}", f"derivative refers to {derivative}, which is no variable"
+            elif not state.type.startswith("Float"):
+                yield f"variable {name}", f"derivative of {state.name}, which is no floating point number"
+
+
+def _state(text: str, description: Description, by_reference: dict[str, Variable]) -> Variable | None:
+    if description.fmi == 3:
+        return by_reference.get(text.strip())
+    index = int(text) if text.strip().isdigit() else 0
+    return description.variables[index - 1] if 1 <= index <= len(description.variables) else None
+
+
+def _refers(
+    typed: ElementTree.Element, types: dict[str | None, ElementTree.Element], displays: dict[str | None, set[str | None]], fmi: int
+) -> Iterator[str]:
+    declared = typed.get("declaredType")
+    inner = None
+    if declared is not None:
+        if declared not in types:
+            yield f"declaredType {declared!r} is not defined"
+        else:
+            t = types[declared]
+            inner = next(iter(t), t) if fmi == 2 else t
+            tag = inner.tag if fmi == 2 else inner.tag.removesuffix("Type")
+            if tag != typed.tag:
+                yield f"declaredType {declared!r} is one of {tag}, the variable is {typed.tag}"
+    elif typed.tag == "Enumeration":
+        yield "an Enumeration without declaredType"
+    unit = typed.get("unit") or (None if inner is None else inner.get("unit"))
+    shown = typed.get("displayUnit")
+    if shown is not None and unit is None:
+        yield f"displayUnit {shown!r} without a unit"
+    elif shown is not None and unit in displays and shown not in displays[unit] and shown != unit:
+        yield f"displayUnit {shown!r} is not defined for {unit!r}"
+
+
 def _attributes(description: Description) -> Iterator[Broken]:
     known = names.VARIABLE[description.fmi]
     for element in description.root.iterfind("ModelVariables/*"):
         parts = [element, *(child for child in element if description.fmi == 2 and child.tag != "Annotations")]
         for key in {key for part in parts for key in part.attrib}:
-            if key not in known and ":" not in key and not key.startswith("{"):
-                yield f"variable {element.get('name')}", f"unknown attribute {key} (nearest known: {nearest(key, known)})"
+            if key not in known and ":" not in key and not key.startswith("{") and (hint := nearest(key, known)):
+                yield f"variable {element.get('name')}", f"unknown attribute {key} (nearest known: {hint})"
+
+
+def worth_knowing(description: Description) -> Iterator[Broken]:
+    """Give what is no error, and not what the standard has either: attributes that no importer knows."""
+    known = names.CO_SIMULATION[description.fmi]
+    for key in description.flags:
+        if key not in known and ":" not in key and not key.startswith("{") and nearest(key, known) is None:
+            yield "CoSimulation", f"unknown attribute {key}, which importers ignore"
 
 
 def _units(description: Description) -> Iterator[Broken]:
@@ -129,28 +225,36 @@ def _uniqueness(description: Description) -> Iterator[Broken]:
         listing = ", ".join(v.name for v in group)
         # In FMI 2.0 these are aliases of one value: at most one may be set, and what they say of it must agree.
         settable = [v for v in group if v.causality in ("input", "parameter") or v.start is not None]
-        if description.fmi == 3 or len(settable) > 1 or len({v.unit for v in group}) > 1:
+        if description.fmi == 3 or len(settable) > 1 or len({v.unit for v in group}) > 1 or len({v.variability for v in group}) > 1:
             yield f"variables {listing}", f"share the value reference {reference}"
 
 
 def _variable(v: Variable, description: Description) -> Iterator[str]:
+    fmi = description.fmi
     allowed = names.VARIABILITIES.get(v.causality)
-    if allowed is None:
+    if allowed is None or (fmi == 2 and v.causality == "structuralParameter"):
         yield f"causality {v.causality!r}, allowed are {', '.join(names.VARIABILITIES)}"
-    elif v.variability not in allowed and not (description.fmi == 3 and v.causality == "independent"):
+    elif v.variability not in allowed:
         yield f"causality {v.causality} with variability {v.variability}, allowed is {' or '.join(allowed)}"
+    elif v.initial is not None and v.initial not in (initials := names.initials(fmi, v.causality, v.variability)):
+        kinds = " or ".join(initials) or "none"
+        yield f"initial {v.initial} with causality {v.causality} and variability {v.variability}, allowed is {kinds}"
     if v.variability == "continuous" and not v.type.startswith("Float"):
         yield f"variability continuous of the type {v.type}, allowed are floating point numbers"
-    if not v.type.endswith("[]") and v.type not in ("Clock", "Binary"):
-        yield from _start(v, description.fmi)
+    if v.causality == "independent" and not v.type.startswith("Float"):
+        yield f"the independent variable is of the type {v.type}, allowed are floating point numbers"
+    if v.type not in ("Clock", "Binary"):
+        yield from _start(v)
     if v.unit is not None and v.unit not in description.units:
         yield f"the unit {v.unit!r} is not defined"
+    if not v.name or any(c in v.name for c in "\r\n\t"):
+        yield "a name that is empty or holds a line end or a tabulator"
     convention = description.root.get("variableNamingConvention", "flat")
     if convention == "structured" and not _STRUCTURED.fullmatch(v.name):
         yield "no structured name, such as body[1].m"
 
 
-def _start(v: Variable, fmi: int) -> Iterator[str]:
+def _start(v: Variable) -> Iterator[str]:
     initial = v.initial
     if initial is None:
         exact = v.causality in ("parameter", "structuralParameter") or v.variability == "constant"
@@ -160,37 +264,35 @@ def _start(v: Variable, fmi: int) -> Iterator[str]:
         yield f"no start value; {v.causality} with initial {initial} has one"
     if v.start is not None and (initial == "calculated" or v.causality == "independent"):
         yield f"start is {v.start}, allowed is none where the value is calculated"
-    for low, value, high in ((v.min, v.start, v.max), (v.min, v.max, None)):
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            continue
-        if (low is not None and value < low) or (high is not None and value > high):
-            word = "start" if value is v.start else "max"
-            yield f"{word} is {value}, allowed is {-math.inf if low is None else low} to {math.inf if high is None else high}"
+    if v.dimensions and v.start is not None and len(v.start) not in (1, v.size):
+        yield f"start has {len(v.start)} values, its dimensions say {v.size}"
+    yield from _limits(v)
 
 
-def _structure(description: Description) -> Iterator[Broken]:
-    outputs = {v.name for v in description.variables if v.causality == "output"}
-    listed = set(description.outputs)
-    for name in sorted(outputs - listed):
-        yield "ModelStructure", f"the output {name} is not listed"
-    for name in sorted(listed - outputs):
-        yield "ModelStructure", f"{name} is listed as output and is none"
-    calculated = {
-        v.name
-        for v in description.variables
-        if (v.causality == "output" and v.variability != "constant" and v.initial in (None, "approx", "calculated"))
-        or v.causality == "calculatedParameter"
-    }
-    unknowns = set(description.initial_unknowns)
-    for name in sorted(calculated - unknowns):
-        yield "ModelStructure", f"{name} is calculated at the start and is not listed as InitialUnknown"
-    if "?" in unknowns:
-        yield "ModelStructure", "an InitialUnknown that is no variable"
+def _limits(v: Variable) -> Iterator[str]:
+    low = -math.inf if v.min is None else v.min
+    high = math.inf if v.max is None else v.max
+    if low > high:
+        yield f"max is {v.max}, allowed is at least min, {v.min}"
+        return
+    for value in v.start if v.dimensions and v.start else (v.start,):
+        if not isinstance(value, bool) and isinstance(value, (int, float)) and not low <= value <= high:
+            yield f"start is {value}, allowed is {low} to {high}"
+    if _WHOLE.fullmatch(v.type) and isinstance(v.start, int):
+        bits, signed = int(v.type.lstrip("UInt")), v.type.startswith("I")
+        least = -(2 ** (bits - 1)) if signed else 0
+        if not least <= v.start < least + 2**bits:
+            yield f"start is {v.start}, a number of the type {v.type} is {least} to {least + 2**bits - 1}"
 
 
-def _positive(text: str) -> bool:
+def _finite(text: str) -> float | None:
     try:
         value = float(text)
     except ValueError:
-        return False
-    return value > 0 and math.isfinite(value)
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _positive(text: str) -> bool:
+    value = _finite(text)
+    return value is not None and value > 0

@@ -24,7 +24,7 @@ use window::Window;
 
 use core::array::from_fn;
 
-use crate::compensation::Carry;
+use crate::compensation::GravityCompensation;
 use crate::effect::Motion;
 use crate::equation::{Equation, Measured, Prior};
 use crate::scalar::Real;
@@ -278,13 +278,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     ///
     /// With their standard deviation from the covariance of all unknowns. Give a motion without speed for the weight and
     /// the passive moments alone.
-    pub fn carry(&self, motion: &Motion<T, N>) -> Carry<T, N> {
+    pub fn carry(&self, motion: &Motion<T, N>) -> GravityCompensation<T, N> {
         let rows = self.equation.carrying(motion, &self.memory);
         let excess = self.excess();
         let torque = rows.torque(&self.values());
         let expected = rows.torque(&self.priors.map(|p| p.mean));
         let far = |j: usize| (torque[j] - expected[j]).abs();
-        Carry {
+        GravityCompensation {
             // Not a number is not within.
             within: (0..N).all(|j| far(j) <= self.tuning.envelope[j]),
             torque,

@@ -6,11 +6,11 @@ use arm_core::effect::{
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 
 use crate::GapError;
-use crate::data::prepared_session::Study;
-use crate::data::session::{Session, Sight};
+use crate::data::prepared_session::PreparedSession;
+use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::internal_state;
-use crate::sensitivity::linearization_point::{Anchor, Change, Response};
+use crate::sensitivity::linearization_point::{Change, LinearizationPoint, Response};
 
 /// Share of a joint's torque that an effect has in the change with which its response is taken.
 const SHARE: f64 = 0.02;
@@ -115,8 +115,8 @@ impl Candidate {
     /// `None` where no question of the kind has these parameters free, or these movements do not excite it.
     ///
     pub fn again<const N: usize>(
-        study: &Study<N>,
-        anchor: &Anchor<N>,
+        prepared: &PreparedSession<N>,
+        point: &LinearizationPoint<N>,
         mut effect: Effect<f64>,
         free: &[usize],
     ) -> Option<Self> {
@@ -138,7 +138,7 @@ impl Candidate {
             spread: 1.0,
         };
         if candidate.step == 0.0 {
-            candidate.step = torque_step(&motions(study, anchor), &candidate)?;
+            candidate.step = torque_step(&motions(prepared, point), &candidate)?;
         }
         Some(candidate)
     }
@@ -208,44 +208,49 @@ impl Library {
     /// * `periodic` - frequency \[Hz\] and phase \[rad\] of a periodic residual of the handle, where there is one
     ///
     /// # Errors
-    /// As [`Study::responses`].
+    /// As [`PreparedSession::responses`].
     pub fn build<const N: usize>(
-        study: &Study<N>,
-        anchor: &Anchor<N>,
+        prepared: &PreparedSession<N>,
+        point: &LinearizationPoint<N>,
         periodic: Option<[f64; 2]>,
     ) -> Result<Self, GapError> {
-        Self::of(study, anchor, study.session.kinds(), periodic.as_slice())
+        Self::of(
+            prepared,
+            point,
+            prepared.session.kinds(),
+            periodic.as_slice(),
+        )
     }
 
     /// Asks what is periodic alone, in waves of the given frequencies \[Hz\] and phases \[rad\].
     ///
     /// # Errors
-    /// As [`Study::responses`].
+    /// As [`PreparedSession::responses`].
     pub fn of_waves<const N: usize>(
-        study: &Study<N>,
-        anchor: &Anchor<N>,
+        prepared: &PreparedSession<N>,
+        point: &LinearizationPoint<N>,
         waves: &[[f64; 2]],
     ) -> Result<Self, GapError> {
-        let kinds = study.session.kinds();
+        let kinds = prepared.session.kinds();
         let kinds = kinds.filter(|k| k.probe().nature == Nature::Periodic);
-        Self::of(study, anchor, kinds, waves)
+        Self::of(prepared, point, kinds, waves)
     }
 
     fn of<const N: usize>(
-        study: &Study<N>,
-        anchor: &Anchor<N>,
+        prepared: &PreparedSession<N>,
+        point: &LinearizationPoint<N>,
         kinds: impl Iterator<Item = Kind>,
         waves: &[[f64; 2]],
     ) -> Result<Self, GapError> {
-        let hypothesis = &anchor.hypothesis;
-        let motions = motions(study, anchor);
+        let hypothesis = &point.hypothesis;
+        let motions = motions(prepared, point);
         let mut candidates = Vec::new();
         for kind in kinds {
-            for index in places(study.session, kind) {
+            for index in places(prepared.session, kind) {
                 for asked in kind.probe().questions.iter().enumerate() {
                     let mut own = ask(&motions, kind, index, asked, waves);
                     // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
-                    if !study.repeated && kind.probe().nature != Nature::Periodic {
+                    if !prepared.repeated && kind.probe().nature != Nature::Periodic {
                         own.iter_mut().for_each(|c| c.refined = &[]);
                     }
                     candidates.extend(own);
@@ -254,9 +259,9 @@ impl Library {
         }
         let changes: Vec<_> = candidates
             .iter()
-            .flat_map(|c| c.changes(study.session, hypothesis))
+            .flat_map(|c| c.changes(prepared.session, hypothesis))
             .collect();
-        let mut all = study.each_response(anchor, &changes).into_iter();
+        let mut all = prepared.each_response(point, &changes).into_iter();
         let mut kept = Vec::new();
         let mut responses = Vec::new();
         for candidate in candidates {
@@ -281,11 +286,11 @@ impl Library {
     /// Adds named effects in the shapes that they have; where each stands, and the coefficients of its columns.
     ///
     /// # Errors
-    /// As [`Study::responses`].
+    /// As [`PreparedSession::responses`].
     pub fn add_named<const N: usize>(
         &mut self,
-        study: &Study<N>,
-        anchor: &Anchor<N>,
+        prepared: &PreparedSession<N>,
+        point: &LinearizationPoint<N>,
         named: &[(Candidate, Effect<f64>)],
     ) -> Result<Vec<Option<Twin>>, GapError> {
         let mut places = Vec::new();
@@ -301,12 +306,12 @@ impl Library {
                     sizes.push(0.0);
                 }
             }
-            let Some(exact) = Candidate::again(study, anchor, effect, &own.free) else {
+            let Some(exact) = Candidate::again(prepared, point, effect, &own.free) else {
                 places.push(None);
                 continue;
             };
-            let changes = exact.changes(study.session, &anchor.hypothesis);
-            match study.responses(anchor, &changes) {
+            let changes = exact.changes(prepared.session, &point.hypothesis);
+            match prepared.responses(point, &changes) {
                 Ok(own) => self.responses.push(own),
                 Err(GapError::Simulation { .. }) => {
                     places.push(None);
@@ -332,7 +337,7 @@ pub struct Twin {
 
 /// Where a kind may act in a session.
 fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
-    let led = session.sight == Sight::Led;
+    let led = session.comparison == ComparisonMode::Led;
     // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them, nor of what a
     // weight or an inertia could as well be.
     let swings_freely = session.swings_freely();
@@ -378,15 +383,18 @@ struct Movement<const N: usize> {
     torque: [f64; N],
 }
 
-fn motions<const N: usize>(study: &Study<N>, anchor: &Anchor<N>) -> Vec<Movement<N>> {
+fn motions<const N: usize>(
+    prepared: &PreparedSession<N>,
+    point: &LinearizationPoint<N>,
+) -> Vec<Movement<N>> {
     let one = |group: usize| {
-        let course = &study.courses[study.references[group]];
-        let state = |i: usize| match (course.motion(), anchor.lines.get(group)) {
+        let course = &prepared.courses[prepared.references[group]];
+        let state = |i: usize| match (course.motion(), point.lines.get(group)) {
             (Some(motion), _) => (motion.q[i], motion.qd[i], motion.qdd[i]),
             (None, Some(line)) => line.state(i),
             (None, None) => (Joints::zeros(), Joints::zeros(), Joints::zeros()),
         };
-        let chain = &study.session.chain;
+        let chain = &prepared.session.chain;
         let mut square = [0.0; N];
         let count = course.seen[0].len();
         let motion = (0..count)
@@ -409,7 +417,7 @@ fn motions<const N: usize>(study: &Study<N>, anchor: &Anchor<N>) -> Vec<Movement
             torque: square.map(|s| libm::sqrt(s).max(UNLOADED)),
         }
     };
-    study.parallel(study.references.len(), one)
+    prepared.parallel(prepared.references.len(), one)
 }
 
 /// The candidates of one question about a kind at a place.

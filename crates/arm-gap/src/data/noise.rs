@@ -7,7 +7,7 @@
 use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
 
 use crate::GapError;
-use crate::data::valid_segments::Stretches;
+use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
 
 /// Highest order of the autoregressions.
@@ -154,10 +154,10 @@ impl Noise {
     }
 
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
-    pub fn whiten(&self, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
-        let picked = stretches.pick(channels);
+    pub fn whiten(&self, channels: &Channels, valid_segments: &ValidSegments) -> Vec<f64> {
+        let picked = valid_segments.pick(channels);
         let whitened = std::iter::zip(&self.whiteners, picked).map(|(whitener, pieces)| {
-            let mut row = Vec::with_capacity(stretches.len());
+            let mut row = Vec::with_capacity(valid_segments.len());
             for mut piece in pieces {
                 whitener.apply(&mut piece);
                 row.extend(piece);
@@ -168,12 +168,17 @@ impl Noise {
     }
 
     /// Whitens a set of channels of one trial, whose samples weigh as they do there.
-    pub fn whiten_in(&self, trial: usize, channels: &Channels, stretches: &Stretches) -> Vec<f64> {
-        let mut row = self.whiten(channels, stretches);
+    pub fn whiten_in(
+        &self,
+        trial: usize,
+        channels: &Channels,
+        valid_segments: &ValidSegments,
+    ) -> Vec<f64> {
+        let mut row = self.whiten(channels, valid_segments);
         if let Some(weights) = self.weights.get(trial) {
             let each = weights
                 .iter()
-                .flat_map(|w| stretches.samples().map(|i| w[i]));
+                .flat_map(|w| valid_segments.samples().map(|i| w[i]));
             for (value, weight) in row.iter_mut().zip(each) {
                 *value *= weight;
             }

@@ -9,11 +9,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::GapError;
 use crate::data::noise::{Noise, dot};
 use crate::data::repeats::groups;
-use crate::data::session::{Session, Sight};
-use crate::data::valid_segments::{Stretches, Told, widened};
+use crate::data::session::{ComparisonMode, Session};
+use crate::data::valid_segments::{ObservableForce, ValidSegments, widened};
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course};
-use crate::sensitivity::linearization_point::Anchor;
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::factor;
 use crate::threads;
 
@@ -26,17 +26,17 @@ struct Rest {
     /// Samples that are left out.
     left_out: Vec<bool>,
     /// What the force tells where it does not tell both components.
-    told: Arc<Vec<Told>>,
+    told: Arc<Vec<ObservableForce>>,
 }
 
 /// A session made ready.
-pub struct Study<'a, const N: usize> {
+pub struct PreparedSession<'a, const N: usize> {
     /// What is challenged and by what.
     pub session: &'a Session<N>,
     /// Every trial, in their order.
     pub courses: Vec<Arc<Course<N>>>,
     /// The samples of each that are compared.
-    pub stretches: Vec<Stretches>,
+    pub valid_segments: Vec<ValidSegments>,
     /// The group of repeats that each trial belongs to.
     pub group_of: Vec<usize>,
     /// One trial of each group, in whose motion responses are computed.
@@ -57,23 +57,23 @@ pub struct Study<'a, const N: usize> {
     pub threads: usize,
 }
 
-impl<'a, const N: usize> Study<'a, N> {
+impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Makes a session ready; the noise is read off the repeats of the fit trials against the model as given.
     ///
     /// # Errors
     /// [`GapError`] for data that cannot be judged, or a model that cannot be simulated.
     pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
         let noise = Noise::unknown(session.channels())?;
-        let mut study = Self::with_noise(session, noise, threads)?;
-        let mut given = study.anchor(&session.given())?;
-        let all = study.fitted.clone();
-        study.leave_out_rest(&given);
-        if study.fitted != all {
+        let mut prepared = Self::with_noise(session, noise, threads)?;
+        let mut given = prepared.linearize(&session.given())?;
+        let all = prepared.fitted.clone();
+        prepared.leave_out_rest(&given);
+        if prepared.fitted != all {
             // A trial in which nothing is left to compare has no place among the residuals either.
-            given = study.anchor(&session.given())?;
+            given = prepared.linearize(&session.given())?;
         }
-        study.measure_noise(&given)?;
-        Ok(study)
+        prepared.measure_noise(&given)?;
+        Ok(prepared)
     }
 
     /// Makes a session ready whose noise is known from another one.
@@ -89,13 +89,13 @@ impl<'a, const N: usize> Study<'a, N> {
         let courses = (0..session.trials.len())
             .map(|i| Ok(Arc::new(session.course(i)?)))
             .collect::<Result<Vec<_>, GapError>>()?;
-        let stretches: Vec<_> = std::iter::zip(&session.trials, &courses)
-            .map(|(trial, course)| Stretches::of(trial, course, &[], Arc::default()))
+        let valid_segments: Vec<_> = std::iter::zip(&session.trials, &courses)
+            .map(|(trial, course)| ValidSegments::of(trial, course, &[], Arc::default()))
             .collect();
         let fitted: Vec<usize> = session
             .fit_trials()
             .into_iter()
-            .filter(|&i| !stretches[i].is_empty())
+            .filter(|&i| !valid_segments[i].is_empty())
             .collect();
         if fitted.is_empty() {
             return Err(GapError::Data {
@@ -108,7 +108,7 @@ impl<'a, const N: usize> Study<'a, N> {
         Ok(Self {
             session,
             courses,
-            stretches,
+            valid_segments,
             group_of,
             references,
             noise,
@@ -125,9 +125,9 @@ impl<'a, const N: usize> Study<'a, N> {
     ///
     /// # Errors
     /// [`GapError::Numerics`] for series that no noise can be read off.
-    pub fn measure_noise(&mut self, anchor: &Anchor<N>) -> Result<(), GapError> {
+    pub fn measure_noise(&mut self, point: &LinearizationPoint<N>) -> Result<(), GapError> {
         let channels = self.session.channels();
-        let told = self.told();
+        let observed_share = self.observed_share();
         let mut deviations = Vec::new();
         // For each deviation what a trial may differ by without noise.
         let mut shifts: Vec<Arc<Vec<Vec<Vec<f64>>>>> = Vec::new();
@@ -139,19 +139,19 @@ impl<'a, const N: usize> Study<'a, N> {
                 continue;
             };
             let n = members.len();
-            let stretches = &self.stretches[self.fitted[first]];
-            let same = |m: &usize| self.stretches[self.fitted[*m]] == *stretches;
+            let valid_segments = &self.valid_segments[self.fitted[first]];
+            let same = |m: &usize| self.valid_segments[self.fitted[*m]] == *valid_segments;
             if n < 2 || !members.iter().all(same) {
                 continue;
             }
             let scale = libm::sqrt(n as f64 / (n as f64 - 1.0));
             let picked: Vec<Vec<Vec<f64>>> = members
                 .iter()
-                .map(|&m| flat(&anchor.residuals[m], stretches))
+                .map(|&m| flat(&point.residuals[m], valid_segments))
                 .collect();
-            let own = anchor.own.iter();
+            let own = point.own.iter();
             let columns = Arc::new(
-                own.map(|r| flat(&r.0[group], stretches))
+                own.map(|r| flat(&r.0[group], valid_segments))
                     .collect::<Vec<_>>(),
             );
             for one in &picked {
@@ -173,7 +173,7 @@ impl<'a, const N: usize> Study<'a, N> {
             .map(|c| {
                 // An arm that swings freely has no torque to show, but its inertia has.
                 let seen = self.fitted.iter().flat_map(|&t| &self.courses[t].seen[c]);
-                let all = seen.chain(anchor.residuals.iter().flat_map(|r| &r[c]));
+                let all = seen.chain(point.residuals.iter().flat_map(|r| &r[c]));
                 let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
                     (a.min(*v), b.max(*v))
                 });
@@ -181,21 +181,25 @@ impl<'a, const N: usize> Study<'a, N> {
             })
             .collect();
         self.noise = if self.repeated {
-            self.noise_of(&deviations, &shifts, (&range, &told))?
+            self.noise_of(&deviations, &shifts, (&range, &observed_share))?
         } else {
-            self.noise_of_residuals(anchor, (&range, &told))?
+            self.noise_of_residuals(point, (&range, &observed_share))?
         };
         Ok(())
     }
 
     /// The share of the samples of each channel that tell anything.
-    fn told(&self) -> Vec<f64> {
+    fn observed_share(&self) -> Vec<f64> {
         let channels = self.session.channels();
-        let all: usize = self.fitted.iter().map(|&t| self.stretches[t].len()).sum();
+        let all: usize = self
+            .fitted
+            .iter()
+            .map(|&t| self.valid_segments[t].len())
+            .sum();
         let told = self
             .fitted
             .iter()
-            .map(|&t| self.stretches[t].told(channels));
+            .map(|&t| self.valid_segments[t].rows_per_channel(channels));
         let sum = told.fold(vec![0; channels], |sum, own| {
             std::iter::zip(sum, own).map(|(a, b)| a + b).collect()
         });
@@ -258,15 +262,17 @@ impl<'a, const N: usize> Study<'a, N> {
     ///
     /// Whether anything changed since the last time; then anchors are to be made anew. The samples of repeats stay the same:
     /// they rest together.
-    pub fn leave_out_rest(&mut self, anchor: &Anchor<N>) -> bool {
-        let dry = dry_joints(&anchor.hypothesis);
+    pub fn leave_out_rest(&mut self, point: &LinearizationPoint<N>) -> bool {
+        let dry = dry_joints(&point.hypothesis);
         if dry == self.dry {
             return false;
         }
         self.dry = dry;
-        let one = |group: usize| self.rest(anchor, group);
+        let one = |group: usize| self.rest(point, group);
         self.resting = (0..self.references.len()).map(one).collect();
-        let compared = |study: &Self| -> usize { study.stretches.iter().map(Stretches::len).sum() };
+        let compared = |prepared: &Self| -> usize {
+            prepared.valid_segments.iter().map(ValidSegments::len).sum()
+        };
         let before = compared(self);
         self.cut();
         if (compared(self) as f64) < LEAST_LEFT * before as f64 {
@@ -309,13 +315,13 @@ impl<'a, const N: usize> Study<'a, N> {
                     *flag |= time >= start - AROUND.0 && time <= end + AROUND.1;
                 }
             }
-            self.stretches[i] = Stretches::of(trial, &self.courses[i], &left_out, told);
+            self.valid_segments[i] = ValidSegments::of(trial, &self.courses[i], &left_out, told);
         }
         let kept: Vec<usize> = self
             .session
             .fit_trials()
             .into_iter()
-            .filter(|&i| !self.stretches[i].is_empty())
+            .filter(|&i| !self.valid_segments[i].is_empty())
             .collect();
         if !kept.is_empty() {
             self.fitted = kept;
@@ -326,30 +332,32 @@ impl<'a, const N: usize> Study<'a, N> {
     ///
     /// The contact alone places an arm of one or two joints: what holds a resting joint shows in one component of the force
     /// and nowhere else. A longer arm gives way to it, and nothing is known then.
-    fn rest(&self, anchor: &Anchor<N>, group: usize) -> Rest {
+    fn rest(&self, point: &LinearizationPoint<N>, group: usize) -> Rest {
         let course = &self.courses[self.references[group]];
         let joints: Vec<Vec<bool>> = (0..N)
             .map(|j| match self.dry[j] {
-                true => widened(&self.resting_joint(anchor, (group, j)), course),
+                true => widened(&self.resting_joint(point, (group, j)), course),
                 false => vec![false; course.seen[0].len()],
             })
             .collect();
         let held = |i: usize| -> Vec<usize> { (0..N).filter(|&j| joints[j][i]).collect() };
         let count = course.seen[0].len();
-        match anchor.lines.get(group) {
-            Some(line) if N <= 2 && self.session.sight == Sight::Led => {
+        match point.lines.get(group) {
+            Some(line) if N <= 2 && self.session.comparison == ComparisonMode::Led => {
                 let told = |i: usize| match held(i)[..] {
-                    [] => Told::Both,
+                    [] => ObservableForce::Both,
                     // The torque of the other joint, as a component of the force.
                     [j] if N == 2 => {
                         let moves = jacobian(&self.session.chain, &Pose::new(&line.state(i).0));
                         let column = moves.column(1 - j);
                         match column.norm() {
-                            size if size > 0.0 => Told::Along([column[0] / size, column[1] / size]),
-                            _ => Told::Neither,
+                            size if size > 0.0 => {
+                                ObservableForce::Along([column[0] / size, column[1] / size])
+                            }
+                            _ => ObservableForce::Neither,
                         }
                     }
-                    _ => Told::Neither,
+                    _ => ObservableForce::Neither,
                 };
                 Rest {
                     left_out: Vec::new(),
@@ -364,12 +372,16 @@ impl<'a, const N: usize> Study<'a, N> {
     }
 
     /// The samples of a movement at which a joint rests.
-    fn resting_joint(&self, anchor: &Anchor<N>, (group, j): (usize, usize)) -> Vec<bool> {
+    fn resting_joint(
+        &self,
+        point: &LinearizationPoint<N>,
+        (group, j): (usize, usize),
+    ) -> Vec<bool> {
         /// Share of its fastest speed below which a joint rests, the speed below which it always does, and the one above
         /// which it never does \[rad/s\].
         const SLOW: (f64, f64, f64) = (0.25, 0.005, 0.03);
         let course = &self.courses[self.references[group]];
-        let speed = |i: usize| match (course.motion(), anchor.lines.get(group)) {
+        let speed = |i: usize| match (course.motion(), point.lines.get(group)) {
             (Some(motion), _) => motion.qd[i][j].abs(),
             (None, Some(line)) => line.state(i).1[j].abs(),
             (None, None) => f64::INFINITY,
@@ -378,7 +390,7 @@ impl<'a, const N: usize> Study<'a, N> {
         let fastest = speeds.iter().copied().fold(0.0, f64::max);
         let limit = (SLOW.0 * fastest).clamp(SLOW.1, SLOW.2);
         let mut rest: Vec<bool> = speeds.into_iter().map(|v| v <= limit).collect();
-        if self.session.sight == Sight::Torque {
+        if self.session.comparison == ComparisonMode::Torque {
             // A joint that reverses on the way does not rest: the law of its friction holds through zero.
             let shortest = (course.rate / course.band) as usize;
             for run in rest.chunk_by_mut(|a, b| a == b) {
@@ -427,8 +439,8 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
 }
 
 /// Thinned channels with their stretches joined.
-pub fn flat(channels: &Channels, stretches: &Stretches) -> Vec<Vec<f64>> {
-    let picked = stretches.pick(channels).into_iter();
+pub fn flat(channels: &Channels, valid_segments: &ValidSegments) -> Vec<Vec<f64>> {
+    let picked = valid_segments.pick(channels).into_iter();
     picked.map(|pieces| pieces.concat()).collect()
 }
 

@@ -24,14 +24,14 @@ pub struct Session<const N: usize> {
     /// The trials.
     pub trials: Vec<Trial<N>>,
     /// What is compared.
-    pub sight: Sight,
+    pub comparison: ComparisonMode,
     /// Kinds of one's own that are asked besides those of the catalogue.
     pub own: Vec<Kind>,
 }
 
 /// What is compared with the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
+pub enum ComparisonMode {
     /// Angles and forces of the closed chain, simulated along the robot's own path.
     Led,
     /// Joint torques, from inverse dynamics of the measured motion.
@@ -65,9 +65,9 @@ impl<const N: usize> Session<N> {
 
     /// Number of channels.
     pub fn channels(&self) -> usize {
-        match self.sight {
-            Sight::Led => N + 2,
-            Sight::Torque => N,
+        match self.comparison {
+            ComparisonMode::Led => N + 2,
+            ComparisonMode::Torque => N,
         }
     }
 
@@ -94,7 +94,7 @@ impl<const N: usize> Session<N> {
             let Some(promise) = kind.probe().promise else {
                 continue;
             };
-            if self.sight == Sight::Torque && promise != Promise::AngleOffset {
+            if self.comparison == ComparisonMode::Torque && promise != Promise::AngleOffset {
                 continue;
             }
             let places = match kind.info().place {
@@ -170,14 +170,14 @@ impl<const N: usize> Session<N> {
                 add(Target::Calibration(e), sd, f64::NEG_INFINITY, f64::INFINITY);
             }
         }
-        if self.sight == Sight::Torque {
+        if self.comparison == ComparisonMode::Torque {
             let sd = KEPT * self.tolerance.angle_offset;
             for (j, part) in (0..N).flat_map(|j| [(j, 0), (j, 1)]) {
                 let target = Target::Eccentricity(j, part);
                 add(target, sd, f64::NEG_INFINITY, f64::INFINITY);
             }
         }
-        if self.sight == Sight::Led {
+        if self.comparison == ComparisonMode::Led {
             let sd = KEPT * self.tolerance.handle_placement;
             for axis in 0..2 {
                 add(Target::Contact(0, axis), KNOWN, -0.3, 0.5);
@@ -204,8 +204,8 @@ impl<const N: usize> Session<N> {
             upper: f64::INFINITY,
             step: 0.25 * sd,
         };
-        match self.sight {
-            Sight::Led if sd > 0.0 => vec![
+        match self.comparison {
+            ComparisonMode::Led if sd > 0.0 => vec![
                 placed(Target::Placement(0)),
                 placed(Target::Placement(1)),
                 placed(Target::Shift(0)),
@@ -231,9 +231,9 @@ impl<const N: usize> Session<N> {
             return refuse("trials to fit", "none".into(), "at least one");
         }
         for trial in &self.trials {
-            let missing = match self.sight {
-                Sight::Led => trial.handle.is_none() || trial.force_on_arm.is_none(),
-                Sight::Torque => trial.torque.is_none() && trial.force_on_arm.is_none(),
+            let missing = match self.comparison {
+                ComparisonMode::Led => trial.handle.is_none() || trial.force_on_arm.is_none(),
+                ComparisonMode::Torque => trial.torque.is_none() && trial.force_on_arm.is_none(),
             };
             if missing {
                 return refuse(

@@ -3,16 +3,16 @@
 use crate::GapError;
 use crate::candidates::candidate::Library;
 use crate::data::noise::{Noise, dot};
-use crate::data::prepared_session::{Study, flat};
+use crate::data::prepared_session::{PreparedSession, flat};
 use crate::measurement_model::prediction::Channels;
 use crate::selection::fit::priors;
-use crate::sensitivity::linearization_point::{Anchor, Response};
+use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
 use crate::sensitivity::normal_equations::solve;
 
 /// Samples of the common band, on either side, among which the size of what is left is measured.
 const AROUND: usize = 32;
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// The noise by what no question could explain of a hypothesis' residuals.
     ///
     /// A swing that dies out is seen ever more clearly: what encoders and a rigid model get wrong grows with the motion. Every
@@ -22,10 +22,10 @@ impl<const N: usize> Study<'_, N> {
     /// * `told` - share of the samples of each channel that tell anything
     pub(crate) fn noise_of_residuals(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
-        let mut left = self.unexplained(anchor)?;
+        let mut left = self.unexplained(point)?;
         let mut weights = vec![Channels::new(); self.courses.len()];
         let mean: Vec<f64> = (0..range.len())
             .map(|c| {
@@ -35,7 +35,7 @@ impl<const N: usize> Study<'_, N> {
             })
             .collect();
         for (own, &trial) in left.iter_mut().zip(&self.fitted) {
-            let samples: Vec<usize> = self.stretches[trial].samples().collect();
+            let samples: Vec<usize> = self.valid_segments[trial].samples().collect();
             let length = self.courses[trial].counted.len();
             for (channel, mean) in own.iter_mut().zip(&mean) {
                 let weigh = |i: usize| {
@@ -64,9 +64,9 @@ impl<const N: usize> Study<'_, N> {
     ///
     /// Without repeats this is all that tells of the noise: a residual that still holds what is missing would make the
     /// missing look like noise.
-    fn unexplained(&self, anchor: &Anchor<N>) -> Result<Vec<Vec<Vec<f64>>>, GapError> {
-        let nuisances = self.responses_to(anchor, &anchor.coordinates)?;
-        let library = Library::build(self, anchor, None)?;
+    fn unexplained(&self, point: &LinearizationPoint<N>) -> Result<Vec<Vec<Vec<f64>>>, GapError> {
+        let nuisances = self.responses_to(point, &point.coordinates)?;
+        let library = Library::build(self, point, None)?;
         let columns: Vec<&Response> = nuisances
             .iter()
             .chain(library.responses.iter().flatten())
@@ -74,13 +74,13 @@ impl<const N: usize> Study<'_, N> {
         let channels = self.session.channels();
         let size: Vec<f64> = (0..channels)
             .map(|c| {
-                let all = anchor.residuals.iter().flat_map(|r| &r[c]);
+                let all = point.residuals.iter().flat_map(|r| &r[c]);
                 let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
                 libm::sqrt(sum / f64::max(count, 1.0)).max(1e-12)
             })
             .collect();
         let rows = |channels: &Channels, trial: usize| -> Vec<f64> {
-            let picked = flat(channels, &self.stretches[trial]);
+            let picked = flat(channels, &self.valid_segments[trial]);
             std::iter::zip(picked, &size)
                 .flat_map(|(values, size)| values.into_iter().map(move |v| v / size))
                 .collect()
@@ -91,7 +91,7 @@ impl<const N: usize> Study<'_, N> {
                 .iter()
                 .map(|r| rows(&r.0[self.group_of[trial]], trial))
                 .collect();
-            (list, rows(&anchor.residuals[i], trial))
+            (list, rows(&point.residuals[i], trial))
         });
         let count = columns.len();
         let mut gram = nalgebra::DMatrix::zeros(count, count);
@@ -104,7 +104,7 @@ impl<const N: usize> Study<'_, N> {
                 score[a] += dot(&list[a], residual);
             }
         }
-        for (i, prior) in priors(&anchor.hypothesis, &anchor.coordinates)
+        for (i, prior) in priors(&point.hypothesis, &point.coordinates)
             .into_iter()
             .enumerate()
         {

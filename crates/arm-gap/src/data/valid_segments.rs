@@ -19,7 +19,7 @@ const SHORTEST: usize = 8;
 /// Dry friction holds a resting joint with any torque up to its own, and the force of the hand bears it. What is left to
 /// compare is the component that no torque in the resting joint changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Told {
+pub enum ObservableForce {
     /// Both components.
     Both,
     /// The one along a unit vector.
@@ -30,22 +30,22 @@ pub enum Told {
 
 /// The samples of a trial that are compared: stretches without a gap, thinned to the common band.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretches {
+pub struct ValidSegments {
     samples: Vec<Vec<usize>>,
     /// What the force tells at every sample of the trial; both components where nothing is listed.
-    told: Arc<Vec<Told>>,
+    observable: Arc<Vec<ObservableForce>>,
 }
 
-impl Stretches {
+impl ValidSegments {
     /// Of one trial.
     ///
     /// * `left_out` - samples that are not compared
-    /// * `told` - what the force tells at every sample; nothing listed: both components
+    /// * `observable` - what the force tells at every sample; nothing listed: both components
     pub fn of<const N: usize>(
         trial: &Trial<N>,
         course: &Course<N>,
         left_out: &[bool],
-        told: Arc<Vec<Told>>,
+        observable: Arc<Vec<ObservableForce>>,
     ) -> Self {
         let step = ((course.rate / (SAMPLES_PER_PERIOD * course.band)) as usize).max(1);
         let sound = away_from_gaps(&trial.valid, margin(course.rate, course.band));
@@ -63,7 +63,10 @@ impl Stretches {
         }
         samples.push(current);
         samples.retain(|stretch| stretch.len() >= SHORTEST);
-        Self { samples, told }
+        Self {
+            samples,
+            observable,
+        }
     }
 
     /// Number of samples.
@@ -77,17 +80,17 @@ impl Stretches {
     }
 
     /// Number of samples at which each of some channels tells anything.
-    pub fn told(&self, channels: usize) -> Vec<usize> {
+    pub fn rows_per_channel(&self, channels: usize) -> Vec<usize> {
         let count = |least: usize| {
             let components = self.samples.iter().flatten().map(|&i| match self.at(i) {
-                Told::Both => 2,
-                Told::Along(_) => 1,
-                Told::Neither => 0,
+                ObservableForce::Both => 2,
+                ObservableForce::Along(_) => 1,
+                ObservableForce::Neither => 0,
             });
             components.filter(|&n| n >= least).count()
         };
         let mut all = vec![self.len(); channels];
-        if !self.told.is_empty()
+        if !self.observable.is_empty()
             && let [.., first, second] = all.as_mut_slice()
         {
             (*first, *second) = (count(1), count(2));
@@ -106,7 +109,7 @@ impl Stretches {
                 if seen % size == 0 {
                     parts.push(Self {
                         samples: Vec::new(),
-                        told: Arc::clone(&self.told),
+                        observable: Arc::clone(&self.observable),
                     });
                 }
                 let (head, tail) = rest.split_at((size - seen % size).min(rest.len()));
@@ -128,16 +131,16 @@ impl Stretches {
             self.samples.iter().map(at).collect()
         };
         let mut picked: Vec<Vec<Vec<f64>>> = channels.iter().map(one).collect();
-        if !self.told.is_empty()
+        if !self.observable.is_empty()
             && let [.., first, second] = picked.as_mut_slice()
         {
             for (k, stretch) in self.samples.iter().enumerate() {
                 for (at, &i) in stretch.iter().enumerate() {
                     let (y, z) = (&mut first[k][at], &mut second[k][at]);
                     (*y, *z) = match self.at(i) {
-                        Told::Both => (*y, *z),
-                        Told::Along(unit) => (unit[0] * *y + unit[1] * *z, 0.0),
-                        Told::Neither => (0.0, 0.0),
+                        ObservableForce::Both => (*y, *z),
+                        ObservableForce::Along(unit) => (unit[0] * *y + unit[1] * *z, 0.0),
+                        ObservableForce::Neither => (0.0, 0.0),
                     };
                 }
             }
@@ -150,8 +153,11 @@ impl Stretches {
         self.samples.iter().flatten().copied()
     }
 
-    fn at(&self, sample: usize) -> Told {
-        self.told.get(sample).copied().unwrap_or(Told::Both)
+    fn at(&self, sample: usize) -> ObservableForce {
+        self.observable
+            .get(sample)
+            .copied()
+            .unwrap_or(ObservableForce::Both)
     }
 }
 

@@ -8,7 +8,7 @@ use arm_core::Joints;
 use arm_numerics::statistics::autoregressive::effective_samples;
 use nalgebra::{DMatrix, DVector};
 
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::joint_torque::free_run::{CHANGE, State};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::prediction::Channels;
@@ -54,7 +54,7 @@ struct Swing<const N: usize> {
     residuals: Vec<DVector<f64>>,
 }
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// Fits nuisances and named effects of free swings anew, by the angles of simulated runs.
     ///
     /// `None` where the arm is not free, or cannot be followed; then what was fitted before stands.

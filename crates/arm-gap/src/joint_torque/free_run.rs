@@ -7,7 +7,7 @@ use arm_core::Joints;
 use arm_sim::{Drive, Experiment, Interpolation, Series, SimulationError, Start, simulate};
 use nalgebra::{DMatrix, DVector};
 
-use crate::data::session::{Session, Sight};
+use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, STEPS, offsets, unbent};
 
@@ -33,7 +33,7 @@ impl<const N: usize> Session<N> {
         hypothesis: &Hypothesis<N>,
         (trial, course): (usize, &Course<N>),
     ) -> Result<Channels, SimulationError> {
-        if self.sight == Sight::Led {
+        if self.comparison == ComparisonMode::Led {
             return Ok(Vec::new());
         }
         let (trial, rate) = (&self.trials[trial], course.rate);

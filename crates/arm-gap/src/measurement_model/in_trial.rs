@@ -9,7 +9,7 @@ use arm_sim::SimulationError;
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::noise::dot;
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{FURTHEST, Session};
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, difference};
@@ -90,7 +90,7 @@ impl<const N: usize> Session<N> {
     }
 }
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// A hypothesis and rhythms as they are in every trial, whatever its role; as they were where one cannot be simulated.
     pub fn in_trials(&self, believed: (&Hypothesis<N>, &[Effect<f64>])) -> Vec<Hypothesis<N>> {
         let one = |trial: usize| {

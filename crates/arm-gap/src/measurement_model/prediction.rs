@@ -10,7 +10,7 @@ use arm_sim::{
 };
 
 use crate::GapError;
-use crate::data::session::{Session, Sight};
+use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::measurement_model::internal_state;
 
@@ -111,7 +111,7 @@ impl<const N: usize> Session<N> {
         let raw = self.measured(trial);
         let seen = smooth(&raw, band, trial.rate)?;
         let handle = match &trial.handle {
-            Some(points) if self.sight == Sight::Led => {
+            Some(points) if self.comparison == ComparisonMode::Led => {
                 let axis = |a: usize| points.iter().map(|p| p[a]).collect::<Vec<_>>();
                 let band = (HANDLE_BAND * band).min(0.4 * trial.rate);
                 let smooth = smooth(&[axis(0), axis(1)], band, trial.rate)?;
@@ -125,13 +125,13 @@ impl<const N: usize> Session<N> {
         let span = first..(first + START).min(trial.len());
         let count = span.len() as f64;
         let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
-        let motion = match self.sight {
-            Sight::Led => None,
-            Sight::Torque => Some(motion(trial, band)?),
+        let motion = match self.comparison {
+            ComparisonMode::Led => None,
+            ComparisonMode::Torque => Some(motion(trial, band)?),
         };
-        let margin = match self.sight {
-            Sight::Led => 0,
-            Sight::Torque => margin(trial.rate, band),
+        let margin = match self.comparison {
+            ComparisonMode::Led => 0,
+            ComparisonMode::Torque => margin(trial.rate, band),
         };
         Ok(Course {
             raw,
@@ -148,15 +148,15 @@ impl<const N: usize> Session<N> {
 
     fn measured(&self, trial: &Trial<N>) -> Channels {
         let joint = |j: usize| trial.q.iter().map(|q| q[j]).collect::<Vec<_>>();
-        match self.sight {
-            Sight::Led => {
+        match self.comparison {
+            ComparisonMode::Led => {
                 let force = |c: usize| {
                     let forces = trial.force_on_arm.iter().flatten();
                     forces.map(|f| f[c]).collect::<Vec<_>>()
                 };
                 (0..N).map(joint).chain((0..2).map(force)).collect()
             }
-            Sight::Torque => {
+            ComparisonMode::Torque => {
                 let torque: Vec<Joints<f64, N>> = (0..trial.len())
                     .map(|i| {
                         let motors = trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i]);
@@ -194,7 +194,7 @@ impl<const N: usize> Session<N> {
         course: &Course<N>,
         parts: usize,
     ) -> Result<Run<N>, SimulationError> {
-        if self.sight == Sight::Torque {
+        if self.comparison == ComparisonMode::Torque {
             return Ok(Run {
                 experiment: None,
                 recording: Recording::default(),
@@ -295,9 +295,9 @@ impl<const N: usize> Session<N> {
     /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led; torques in the common band, for
     /// what differentiated angles say above it is noise.
     pub fn measured_in<'c>(&self, course: &'c Course<N>) -> &'c Channels {
-        match self.sight {
-            Sight::Led => &course.raw,
-            Sight::Torque => &course.seen,
+        match self.comparison {
+            ComparisonMode::Led => &course.raw,
+            ComparisonMode::Torque => &course.seen,
         }
     }
 
@@ -311,9 +311,9 @@ impl<const N: usize> Session<N> {
         course: &Course<N>,
     ) -> Result<Channels, SimulationError> {
         let run = self.run(hypothesis, course)?;
-        match self.sight {
-            Sight::Led => self.read_raw(hypothesis, course, &run),
-            Sight::Torque => self.read(hypothesis, course, &run),
+        match self.comparison {
+            ComparisonMode::Led => self.read_raw(hypothesis, course, &run),
+            ComparisonMode::Torque => self.read(hypothesis, course, &run),
         }
     }
 

@@ -4,12 +4,12 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::candidates::candidate::{Candidate, Library};
-use crate::data::prepared_session::Study;
-use crate::data::session::Sight;
+use crate::data::prepared_session::PreparedSession;
+use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
-use crate::selection::lack_of_fit::{Lack, lack_of_fit};
-use crate::selection::score_test::Scan;
+use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
+use crate::selection::score_test::ScoreTest;
 use crate::selection::search::Progress;
 use crate::trial_specific::tremor_detection::Line;
 
@@ -21,7 +21,7 @@ pub struct Look<const N: usize> {
     /// The same as it is in each trial; see [`crate::measurement_model::in_trial`].
     pub in_trials: Vec<Hypothesis<N>>,
     /// Its lack of fit.
-    pub lack: Lack,
+    pub lack: LackOfFit,
     /// Every candidate alone, the one that is most worth its price first.
     pub suspects: Vec<Suspect>,
 }
@@ -41,31 +41,31 @@ pub struct Suspect {
     pub smallest: f64,
 }
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// Calibrates, and asks every candidate alone to first order.
     ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
     pub fn look(&mut self, progress: Progress<'_>) -> Result<Look<N>, GapError> {
         progress("calibrating", 0.1)?;
-        let (mut calibrated, mut anchor) = self.calibrate()?;
+        let (mut calibrated, mut point) = self.calibrate()?;
         if !self.repeated {
-            self.measure_noise(&anchor)?;
-            (calibrated, anchor) = self.calibrate()?;
+            self.measure_noise(&point)?;
+            (calibrated, point) = self.calibrate()?;
         }
         progress("asking the catalogue", 0.6)?;
-        let library = Library::build(self, &anchor, None)?;
-        let scan = Scan::new(self, &calibrated, &anchor, &library)?.scaled();
-        let lack = lack_of_fit(self, &anchor, &calibrated);
-        let mut suspects: Vec<Suspect> = (0..scan.len())
+        let library = Library::build(self, &point, None)?;
+        let score_test = ScoreTest::new(self, &calibrated, &point, &library)?.scaled();
+        let lack = lack_of_fit(self, &point, &calibrated);
+        let mut suspects: Vec<Suspect> = (0..score_test.len())
             .filter_map(|c| {
-                let choice = scan.evaluate(&[c])?;
+                let choice = score_test.evaluate(&[c])?;
                 let candidate = library.candidates[c].clone();
                 Some(Suspect {
                     effect: candidate.found(&choice.coefficients[0]),
-                    gain: choice.gain / scan.scale,
-                    price: scan.price[c] * scan.spread[c],
-                    smallest: scan.smallest_seen(c),
+                    gain: choice.gain / score_test.scale,
+                    price: score_test.price[c] * score_test.spread[c],
+                    smallest: score_test.smallest_seen(c),
                     candidate,
                 })
             })
@@ -85,10 +85,8 @@ impl<const N: usize> Study<'_, N> {
                 None => best.push(suspect),
             }
         }
-        if self.session.sight == Sight::Led {
-            let rhythm = self
-                .rhythm(&anchor, Line::BetweenRepeats)?
-                .map(|r| r.effect);
+        if self.session.comparison == ComparisonMode::Led {
+            let rhythm = self.rhythm(&point, Line::BetweenRepeats)?.map(|r| r.effect);
             if let Some(hypothesis) = self.tuned(&calibrated.hypothesis, rhythm.as_slice()) {
                 calibrated.hypothesis = hypothesis;
             }

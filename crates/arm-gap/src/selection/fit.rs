@@ -4,11 +4,11 @@ use nalgebra::DMatrix;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::Channels;
 use crate::selection::score_variance::spread;
-use crate::sensitivity::linearization_point::Anchor;
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, factor, solve};
 
 /// Most steps of a fit.
@@ -76,18 +76,18 @@ pub fn departure<const N: usize>(hypothesis: &Hypothesis<N>, coordinates: &[Coor
         .sum()
 }
 
-impl<'a, const N: usize> Study<'a, N> {
+impl<'a, const N: usize> PreparedSession<'a, N> {
     /// A hypothesis near an anchor with its residuals and their cost.
     fn state(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         hypothesis: Hypothesis<N>,
         asked: Vec<Candidate>,
     ) -> Result<Fitted<N>, GapError> {
-        let residuals = self.residuals(anchor, &hypothesis)?;
-        let squares = anchor.rows.squares(self, &residuals);
+        let residuals = self.residuals(point, &hypothesis)?;
+        let squares = point.rows.squares(self, &residuals);
         let data: f64 = squares.iter().map(|c| c.square).sum();
-        let cost = data + departure(&hypothesis, &anchor.coordinates);
+        let cost = data + departure(&hypothesis, &point.coordinates);
         Ok(Fitted {
             hypothesis,
             asked,
@@ -100,18 +100,18 @@ impl<'a, const N: usize> Study<'a, N> {
     /// whatever else is asked.
     ///
     /// # Errors
-    /// As [`Study::responses_at`].
+    /// As [`PreparedSession::responses_at`].
     pub fn equations(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
         more: &[&crate::sensitivity::linearization_point::Response],
     ) -> Result<(Vec<Coordinate>, Vec<Cluster>), GapError> {
         let own = fitted.named();
-        let responses = self.responses_at(anchor, &fitted.hypothesis, &own)?;
+        let responses = self.responses_at(point, &fitted.hypothesis, &own)?;
         let extra: Vec<_> = responses.iter().chain(more.iter().copied()).collect();
-        let clusters = anchor.rows.clusters(self, &extra, &fitted.residuals);
-        let coordinates = anchor.coordinates.iter().copied().chain(own).collect();
+        let clusters = point.rows.clusters(self, &extra, &fitted.residuals);
+        let coordinates = point.coordinates.iter().copied().chain(own).collect();
         Ok((coordinates, clusters))
     }
 
@@ -123,15 +123,15 @@ impl<'a, const N: usize> Study<'a, N> {
     /// [`GapError`] where the start cannot be followed from the anchor.
     pub fn fit(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
     ) -> Result<Fitted<N>, GapError> {
-        let mut fitted = self.state(anchor, start, asked)?;
+        let mut fitted = self.state(point, start, asked)?;
         for _ in 0..STEPS {
             let hypothesis = &fitted.hypothesis;
             // What cannot be followed a little further on is fitted as far as it was.
-            let Ok((coordinates, clusters)) = self.equations(anchor, &fitted, &[]) else {
+            let Ok((coordinates, clusters)) = self.equations(point, &fitted, &[]) else {
                 break;
             };
             let damped = |damping: &f64| {
@@ -142,7 +142,7 @@ impl<'a, const N: usize> Study<'a, N> {
                         let value = hypothesis.get(c.target) + step;
                         h.with(c.target, value.clamp(c.lower, c.upper))
                     });
-                let next = self.state(anchor, moved, fitted.asked.clone()).ok()?;
+                let next = self.state(point, moved, fitted.asked.clone()).ok()?;
                 (next.cost < fitted.cost).then_some(next)
             };
             // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands.
@@ -161,10 +161,14 @@ impl<'a, const N: usize> Study<'a, N> {
     /// Squares of what a fitted hypothesis leaves of each cluster when the others alone decide its numbers, to first order.
     ///
     /// # Errors
-    /// As [`Study::equations`].
-    pub fn foretold(&self, anchor: &Anchor<N>, fitted: &Fitted<N>) -> Result<f64, GapError> {
+    /// As [`PreparedSession::equations`].
+    pub fn foretold(
+        &self,
+        point: &LinearizationPoint<N>,
+        fitted: &Fitted<N>,
+    ) -> Result<f64, GapError> {
         let hypothesis = &fitted.hypothesis;
-        let (coordinates, clusters) = self.equations(anchor, fitted, &[])?;
+        let (coordinates, clusters) = self.equations(point, fitted, &[])?;
         let mut sum = 0.0;
         for (out, cluster) in clusters.iter().enumerate() {
             let others: Vec<Cluster> = clusters
@@ -193,16 +197,16 @@ impl<'a, const N: usize> Study<'a, N> {
         &self,
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
-    ) -> Result<(Fitted<N>, Anchor<'a, N>), GapError> {
-        let mut anchor = self.anchor(&start)?;
-        let mut before = self.state(&anchor, start, asked)?;
+    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>), GapError> {
+        let mut point = self.linearize(&start)?;
+        let mut before = self.state(&point, start, asked)?;
         for _ in 0..AGAIN {
-            let after = self.fit(&anchor, before.hypothesis.clone(), before.asked.clone())?;
+            let after = self.fit(&point, before.hypothesis.clone(), before.asked.clone())?;
             let gained = before.cost - after.cost;
             if gained < 2.0 * enough(after.cost) {
-                return Ok((after, anchor));
+                return Ok((after, point));
             }
-            let there = match self.anchor(&after.hypothesis) {
+            let there = match self.linearize(&after.hypothesis) {
                 Ok(there) => there,
                 // What can be followed but not simulated is no answer.
                 Err(_) => break,
@@ -211,9 +215,9 @@ impl<'a, const N: usize> Study<'a, N> {
             if simulated.cost > before.cost {
                 break;
             }
-            (before, anchor) = (simulated, there);
+            (before, point) = (simulated, there);
         }
-        Ok((before, anchor))
+        Ok((before, point))
     }
 }
 
@@ -282,24 +286,24 @@ impl Precision {
     }
 }
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// How well the unknowns of a fitted hypothesis are known.
     ///
     /// The spread between trials counts where it is larger than the noise tells.
     ///
     /// # Errors
-    /// [`GapError::Numerics`] as [`Study::equations`].
+    /// [`GapError::Numerics`] as [`PreparedSession::equations`].
     pub fn precision(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
         scale: f64,
     ) -> Result<Precision, GapError> {
         let hypothesis = &fitted.hypothesis;
-        let (coordinates, clusters) = match self.equations(anchor, fitted, &[]) {
+        let (coordinates, clusters) = match self.equations(point, fitted, &[]) {
             // Where a small change of what was found cannot be simulated, nothing can be said of how well it is known.
             Err(GapError::Simulation { .. }) => {
-                let mut coordinates = anchor.coordinates.clone();
+                let mut coordinates = point.coordinates.clone();
                 coordinates.extend(fitted.named());
                 let sd = vec![f64::INFINITY; coordinates.len()];
                 return Ok(Precision { coordinates, sd });

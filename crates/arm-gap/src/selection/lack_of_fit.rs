@@ -1,16 +1,16 @@
 //! What a fitted hypothesis leaves: more than repeats differ among themselves?
 
 use crate::data::noise::dot;
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
-use crate::sensitivity::linearization_point::Anchor;
+use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Rows whose squares are summed to see how much such sums scatter: about a second.
 const RUN: usize = 12;
 
 /// Lack of fit against pure error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lack {
+pub struct LackOfFit {
     /// Variance of what repeats have in common over the variance of what they differ in, both for each degree of freedom.
     pub ratio: f64,
     /// The ratio less one in its standard deviations, of which a second of what repeats differ in tells how large they are; not a
@@ -22,45 +22,48 @@ pub struct Lack {
 
 /// Lack of fit of a hypothesis over the groups of repeats.
 pub fn lack_of_fit<const N: usize>(
-    study: &Study<N>,
-    anchor: &Anchor<N>,
+    prepared: &PreparedSession<N>,
+    point: &LinearizationPoint<N>,
     fitted: &Fitted<N>,
-) -> Lack {
-    let (mut common, mut common_dof, mut apart, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
+) -> LackOfFit {
+    let (mut common, mut common_dof, mut trial_specific, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
     let mut runs = Vec::new();
-    for group in 0..study.references.len() {
-        let members: Vec<usize> = (0..study.fitted.len())
+    for group in 0..prepared.references.len() {
+        let members: Vec<usize> = (0..prepared.fitted.len())
             .filter(|&m| {
-                let trial = study.fitted[m];
-                study.group_of[trial] == group
+                let trial = prepared.fitted[m];
+                prepared.group_of[trial] == group
             })
             .collect();
         let Some(&first) = members.first() else {
             continue;
         };
-        let stretches = &study.stretches[study.fitted[first]];
+        let valid_segments = &prepared.valid_segments[prepared.fitted[first]];
         if members
             .iter()
-            .any(|&m| study.stretches[study.fitted[m]] != *stretches)
+            .any(|&m| prepared.valid_segments[prepared.fitted[m]] != *valid_segments)
         {
             continue;
         }
-        let own = anchor.own.iter();
+        let own = point.own.iter();
         let columns = orthogonal(
-            own.map(|r| study.noise.whiten(&r.0[group], stretches))
+            own.map(|r| prepared.noise.whiten(&r.0[group], valid_segments))
                 .collect(),
         );
         let rows: Vec<Vec<f64>> = members
             .iter()
             .map(|&m| {
-                let mut row = study.noise.whiten(&fitted.residuals[m], stretches);
+                let mut row = prepared.noise.whiten(&fitted.residuals[m], valid_segments);
                 project_off(&mut row, &columns);
                 row
             })
             .collect();
         let n = rows.len() as f64;
         let size = rows[0].len();
-        let told: usize = stretches.told(study.session.channels()).iter().sum();
+        let told: usize = valid_segments
+            .rows_per_channel(prepared.session.channels())
+            .iter()
+            .sum();
         let free = told.saturating_sub(columns.len()) as f64;
         let mut differ = vec![0.0; size];
         for (i, differ) in differ.iter_mut().enumerate() {
@@ -68,10 +71,10 @@ pub fn lack_of_fit<const N: usize>(
             common += n * mean * mean;
             let each = rows.iter().map(|r| (r[i] - mean) * (r[i] - mean));
             *differ = each.sum::<f64>();
-            apart += *differ;
+            trial_specific += *differ;
         }
         if n > 1.0 {
-            let channels = differ.chunks_exact(stretches.len());
+            let channels = differ.chunks_exact(valid_segments.len());
             let each = channels.flat_map(|channel| channel.chunks_exact(RUN));
             let sums = each.map(|run| (run.iter().sum::<f64>(), n - 1.0));
             // Where rest takes a component of the force there is nothing to see.
@@ -80,16 +83,16 @@ pub fn lack_of_fit<const N: usize>(
         common_dof += free;
         apart_dof += free * (n - 1.0);
     }
-    let unknowns = study.session.nuisances().len() + fitted.asked.len();
+    let unknowns = prepared.session.nuisances().len() + fitted.asked.len();
     let common_dof = (common_dof - unknowns as f64).max(1.0);
     if apart_dof < 1.0 {
-        return Lack {
+        return LackOfFit {
             ratio: f64::NAN,
             z: f64::NAN,
             excess: f64::NAN,
         };
     }
-    let noise = apart / apart_dof;
+    let noise = trial_specific / apart_dof;
     let ratio = common / common_dof / noise;
     // Rows that are not quite white, or larger at some times than at others, scatter more than white ones.
     let scatter = runs.iter().fold(0.0, |s, (sum, freedom)| {
@@ -98,7 +101,7 @@ pub fn lack_of_fit<const N: usize>(
         s + off * off / (2.0 * dof)
     }) / f64::max(runs.len() as f64, 1.0);
     let variance = (2.0 / common_dof + 2.0 / apart_dof) * scatter.max(1.0);
-    Lack {
+    LackOfFit {
         ratio,
         z: (ratio - 1.0) / libm::sqrt(variance),
         excess: common / noise - common_dof,

@@ -5,17 +5,17 @@ use arm_ident::regression::trial::Trial;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::prediction::{Channels, difference};
 use crate::selection::fit::{priors, regularise};
-use crate::sensitivity::linearization_point::{Anchor, Response};
+use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
 
 /// A named effect, and others that would do instead.
 pub struct Contest<'a, const N: usize> {
-    study: Study<'a, N>,
+    prepared: PreparedSession<'a, N>,
     /// The session with the named effect.
     named: Hypothesis<N>,
     /// `None` for one that the trials that were made do not show.
@@ -34,18 +34,18 @@ struct Rival<const N: usize> {
 impl<'a, const N: usize> Contest<'a, N> {
     /// Between a named effect and its rivals, on the fit trials of a session.
     ///
-    /// * `study` - its session has everything as known effects but the named one
+    /// * `prepared` - its session has everything as known effects but the named one
     /// * `rivals` - effects as they fit best, and which of their parameters are free
     ///
     /// # Errors
     /// [`GapError`] where the model cannot be simulated.
     pub fn new(
-        mut study: Study<'a, N>,
+        mut prepared: PreparedSession<'a, N>,
         named: Effect<f64>,
         rivals: &[(Effect<f64>, Vec<usize>)],
     ) -> Result<Self, GapError> {
-        let without = study.session.given();
-        let given = study.anchor(&without)?;
+        let without = prepared.session.given();
+        let given = prepared.linearize(&without)?;
         let with = |effect| {
             let mut hypothesis = without.clone();
             hypothesis.named.push(effect);
@@ -54,7 +54,7 @@ impl<'a, const N: usize> Contest<'a, N> {
         let rivals: Vec<Option<Rival<N>>> = rivals
             .iter()
             .map(|(effect, free)| {
-                let candidate = Candidate::again(&study, &given, *effect, free)?;
+                let candidate = Candidate::again(&prepared, &given, *effect, free)?;
                 Some(Rival {
                     hypothesis: with(*effect),
                     coordinates: candidate.coordinates(without.named.len(), effect),
@@ -62,10 +62,10 @@ impl<'a, const N: usize> Contest<'a, N> {
             })
             .collect();
         let named = with(named);
-        let anchor = rested(&mut study, &named)?;
-        let made = clusters(&rivals, &study, &anchor)?;
+        let point = rested(&mut prepared, &named)?;
+        let made = clusters(&rivals, &prepared, &point)?;
         Ok(Self {
-            study,
+            prepared,
             named,
             rivals,
             made,
@@ -73,8 +73,8 @@ impl<'a, const N: usize> Contest<'a, N> {
     }
 
     /// The trials that were made.
-    pub fn study(&self) -> &Study<'a, N> {
-        &self.study
+    pub fn prepared(&self) -> &PreparedSession<'a, N> {
+        &self.prepared
     }
 
     /// For every rival the distance between what it and the named effect would show, in standard deviations of the noise,
@@ -89,11 +89,12 @@ impl<'a, const N: usize> Contest<'a, N> {
             Some(trial) => {
                 let session = Session {
                     trials: vec![trial.clone()],
-                    ..self.study.session.clone()
+                    ..self.prepared.session.clone()
                 };
-                let mut study = Study::with_noise(&session, self.study.noise.of_others(), 1)?;
-                let anchor = rested(&mut study, &self.named)?;
-                clusters(&self.rivals, &study, &anchor)?
+                let mut prepared =
+                    PreparedSession::with_noise(&session, self.prepared.noise.of_others(), 1)?;
+                let point = rested(&mut prepared, &self.named)?;
+                clusters(&self.rivals, &prepared, &point)?
             }
         };
         let each = self.rivals.iter().zip(self.made.iter().zip(&more));
@@ -108,7 +109,7 @@ impl<'a, const N: usize> Contest<'a, N> {
     }
 
     fn distance(&self, rival: &Rival<N>, clusters: &[Cluster]) -> f64 {
-        let mut coordinates = self.study.session.nuisances();
+        let mut coordinates = self.prepared.session.nuisances();
         coordinates.extend(&rival.coordinates);
         let mut normal = Normal::new(clusters, &priors(&rival.hypothesis, &coordinates));
         regularise(&mut normal.gram, &rival.hypothesis, &coordinates);
@@ -128,22 +129,22 @@ impl<'a, const N: usize> Contest<'a, N> {
 
 /// A hypothesis on a study, without the samples at which dry friction of it holds a joint.
 fn rested<'a, const N: usize>(
-    study: &mut Study<'a, N>,
+    prepared: &mut PreparedSession<'a, N>,
     hypothesis: &Hypothesis<N>,
-) -> Result<Anchor<'a, N>, GapError> {
-    let anchor = study.anchor(hypothesis)?;
-    if study.leave_out_rest(&anchor) {
-        return study.anchor(hypothesis);
+) -> Result<LinearizationPoint<'a, N>, GapError> {
+    let point = prepared.linearize(hypothesis)?;
+    if prepared.leave_out_rest(&point) {
+        return prepared.linearize(hypothesis);
     }
-    Ok(anchor)
+    Ok(point)
 }
 
 /// For every rival what the named effect shows beyond it on the fit trials of a study, beside the responses to all that may be
 /// refitted.
 fn clusters<const N: usize>(
     rivals: &[Option<Rival<N>>],
-    study: &Study<N>,
-    anchor: &Anchor<N>,
+    prepared: &PreparedSession<N>,
+    point: &LinearizationPoint<N>,
 ) -> Result<Vec<Vec<Cluster>>, GapError> {
     rivals
         .iter()
@@ -151,13 +152,13 @@ fn clusters<const N: usize>(
             let Some(rival) = rival else {
                 return Ok(Vec::new());
             };
-            let own = study.responses_at(anchor, &rival.hypothesis, &rival.coordinates)?;
-            let left = study.residuals(anchor, &rival.hypothesis)?;
-            let shown: Vec<Channels> = std::iter::zip(&left, &anchor.residuals)
+            let own = prepared.responses_at(point, &rival.hypothesis, &rival.coordinates)?;
+            let left = prepared.residuals(point, &rival.hypothesis)?;
+            let shown: Vec<Channels> = std::iter::zip(&left, &point.residuals)
                 .map(|(a, b)| difference(a, b))
                 .collect();
             let columns: Vec<&Response> = own.iter().collect();
-            Ok(anchor.rows.clusters(study, &columns, &shown))
+            Ok(point.rows.clusters(prepared, &columns, &shown))
         })
         .collect()
 }

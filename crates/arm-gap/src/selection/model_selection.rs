@@ -6,13 +6,13 @@ use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
 use crate::candidates::candidate::{Candidate, Library, Twin};
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
-use crate::selection::score_test::{Choice, Scan};
+use crate::selection::score_test::{Choice, ScoreTest};
 use crate::selection::search::{Progress, Settled};
-use crate::sensitivity::linearization_point::Anchor;
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use arm_numerics::statistics::distributions::chi_square_tail;
 
 /// Share of all that is explained that an effect must explain, whatever the others are.
@@ -88,26 +88,23 @@ struct Rival<const N: usize> {
     fitted: Fitted<N>,
 }
 
-impl<'a, const N: usize> Study<'a, N> {
+impl<'a, const N: usize> PreparedSession<'a, N> {
     /// A fitted hypothesis without the effect at a place, fitted again; of infinite cost where nothing goes without it.
     fn without(
         &self,
         fitted: &Fitted<N>,
         slot: usize,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
     ) -> Result<Fitted<N>, GapError> {
         let mut hypothesis: Hypothesis<N> = fitted.hypothesis.clone();
         let mut asked = fitted.asked.clone();
         hypothesis.named.remove(slot);
         asked.remove(slot);
-        let again = |hypothesis: &Hypothesis<N>| match self.fit(
-            anchor,
-            hypothesis.clone(),
-            asked.clone(),
-        ) {
-            Err(GapError::Simulation { .. }) => Ok(None),
-            other => other.map(Some),
-        };
+        let again =
+            |hypothesis: &Hypothesis<N>| match self.fit(point, hypothesis.clone(), asked.clone()) {
+                Err(GapError::Simulation { .. }) => Ok(None),
+                other => other.map(Some),
+            };
         if let Some(less) = again(&hypothesis)? {
             return Ok(less);
         }
@@ -132,7 +129,7 @@ impl<'a, const N: usize> Study<'a, N> {
     /// Goes back: effects that are no longer worth their price are taken out.
     pub(crate) fn pruned(
         &self,
-        (mut fitted, mut anchor): Settled<'a, N>,
+        (mut fitted, mut point): Settled<'a, N>,
         calibrated: &Fitted<N>,
         scale: f64,
     ) -> Result<Settled<'a, N>, GapError> {
@@ -143,22 +140,22 @@ impl<'a, const N: usize> Study<'a, N> {
         while !fitted.asked.is_empty() {
             let mut weakest: Option<(f64, Fitted<N>)> = None;
             // Not a number without repeats, which `max` passes over.
-            let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &anchor, &fitted).excess;
+            let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &point, &fitted).excess;
             let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
-            let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &anchor));
+            let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &point));
             let without = without.collect::<Result<Vec<_>, _>>()?;
             let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
             // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
             let foretold = match self.repeated {
                 true => None,
-                false => Some(self.foretold(&anchor, &fitted)?),
+                false => Some(self.foretold(&point, &fitted)?),
             };
             for (slot, less) in without.into_iter().enumerate() {
                 let mut gain = gains[slot];
                 if let Some(with) = foretold
                     && gain.is_finite()
                 {
-                    gain = gain.min(self.foretold(&anchor, &less)? - with);
+                    gain = gain.min(self.foretold(&point, &less)? - with);
                 }
                 // Less may be the imperfect shape of another one.
                 let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
@@ -178,35 +175,35 @@ impl<'a, const N: usize> Study<'a, N> {
             }
             let Some((_, less)) = weakest else { break };
             match self.settle(less.hypothesis, less.asked) {
-                Ok(settled) => (fitted, anchor) = settled,
+                Ok(settled) => (fitted, point) = settled,
                 // It may be worth little, and nothing can be simulated without it.
                 Err(GapError::Simulation { .. }) => break,
                 Err(error) => return Err(error),
             }
         }
-        Ok((fitted, anchor))
+        Ok((fitted, point))
     }
 
     /// What could stand in the place of each named effect; a better one takes it.
     pub(crate) fn judged(
         &self,
-        (mut fitted, mut anchor): Settled<'a, N>,
+        (mut fitted, mut point): Settled<'a, N>,
         calibrated: &Fitted<N>,
         (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
         progress: Progress<'_>,
-    ) -> Result<(Fitted<N>, Anchor<'a, N>, Vec<Named>), GapError> {
+    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>, Vec<Named>), GapError> {
         let mut exchanges = 0;
         'again: loop {
             let mut named = Vec::new();
             let mut library = match fitted.asked.len() {
                 0 => None,
-                _ => Some(Library::build(self, &anchor, periodic)?),
+                _ => Some(Library::build(self, &point, periodic)?),
             };
             let twins = match &mut library {
                 Some(library) => {
                     let effects = fitted.hypothesis.named.iter().copied();
                     let named: Vec<_> = fitted.asked.iter().cloned().zip(effects).collect();
-                    library.add_named(self, &anchor, &named)?
+                    library.add_named(self, &point, &named)?
                 }
                 None => Vec::new(),
             };
@@ -215,13 +212,13 @@ impl<'a, const N: usize> Study<'a, N> {
                     "comparing alternatives",
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 )?;
-                let less = self.without(&fitted, slot, &anchor)?;
+                let less = self.without(&fitted, slot, &point)?;
                 let gain = (less.cost - fitted.cost).min(f64::MAX);
                 let rivals = match &library {
                     // Of what cannot be followed without it nothing can be said.
                     Some(library) if less.cost.is_finite() => {
                         let place = (slot, &less, twin.as_ref());
-                        let found = self.rivals(&fitted, place, (&anchor, library), scale);
+                        let found = self.rivals(&fitted, place, (&point, library), scale);
                         found.unwrap_or_default()
                     }
                     _ => Vec::new(),
@@ -246,7 +243,7 @@ impl<'a, const N: usize> Study<'a, N> {
                     // What can be followed but not simulated is no answer.
                     if let Ok(settled) = self.settle(hypothesis, asked) {
                         // Others may have stood for what the former one missed.
-                        (fitted, anchor) = self.pruned(settled, calibrated, scale)?;
+                        (fitted, point) = self.pruned(settled, calibrated, scale)?;
                         continue 'again;
                     }
                 }
@@ -265,7 +262,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 });
             }
             named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
-            return Ok((fitted, anchor, named));
+            return Ok((fitted, point, named));
         }
     }
 
@@ -312,11 +309,11 @@ impl<'a, const N: usize> Study<'a, N> {
         &self,
         fitted: &Fitted<N>,
         (slot, less, twin): (usize, &Fitted<N>, Option<&Twin>),
-        (anchor, library): (&Anchor<N>, &Library),
+        (point, library): (&LinearizationPoint<N>, &Library),
         scale: f64,
     ) -> Result<Vec<Rival<N>>, GapError> {
         let own = &fitted.asked[slot];
-        let refitted = Scan::new(self, less, anchor, library)?;
+        let refitted = ScoreTest::new(self, less, point, library)?;
         let others: Vec<usize> = (0..refitted.len())
             .filter(|&c| {
                 let effect = &library.candidates[c].effect;
@@ -339,16 +336,16 @@ impl<'a, const N: usize> Study<'a, N> {
             ..less.clone()
         };
         let in_place = twin.and_then(|twin| {
-            let scan = Scan::new(self, &as_fitted, anchor, library).ok()?;
-            Some((scan, twin))
+            let score_test = ScoreTest::new(self, &as_fitted, point, library).ok()?;
+            Some((score_test, twin))
         });
-        let mut singles: Vec<(f64, Choice, (&Scan, &Fitted<N>))> = Vec::new();
+        let mut singles: Vec<(f64, Choice, (&ScoreTest, &Fitted<N>))> = Vec::new();
         for &c in &others {
             let choice = refitted.evaluate(&[c]);
             let choice = choice.map(|choice| (choice.gain / gain, choice, (&refitted, less)));
-            let stand_in = in_place.as_ref().and_then(|(scan, twin)| {
-                let (part, choice) = scan.stand_in(c, twin)?;
-                Some((part, choice, (scan, &as_fitted)))
+            let stand_in = in_place.as_ref().and_then(|(score_test, twin)| {
+                let (part, choice) = score_test.stand_in(c, twin)?;
+                Some((part, choice, (score_test, &as_fitted)))
             });
             let both = choice.into_iter().chain(stand_in);
             singles.extend(both.filter(|(part, ..)| *part > RIVAL));
@@ -356,7 +353,7 @@ impl<'a, const N: usize> Study<'a, N> {
         singles.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut seen: Vec<&Candidate> = Vec::new();
         let mut rivals = Vec::new();
-        for (_, choice, (scan, from)) in &singles {
+        for (_, choice, (score_test, from)) in &singles {
             let candidate = &library.candidates[choice.members[0]];
             if seen.iter().any(|s| s.is_same_effect(&candidate.effect)) {
                 continue;
@@ -367,16 +364,16 @@ impl<'a, const N: usize> Study<'a, N> {
             seen.push(candidate);
             let mut asked = candidate.clone();
             let member = choice.members[0];
-            (asked.price, asked.spread) = (scan.price[member], scan.spread[member]);
+            (asked.price, asked.spread) = (score_test.price[member], score_test.spread[member]);
             let Some(rival) = self.attempt(
                 from,
                 (std::slice::from_ref(&asked), &choice.coefficients),
-                anchor,
+                point,
             ) else {
                 continue;
             };
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
-            let likeness = twin.map_or(0.0, |t| scan.likeness(t.place, choice.members[0]));
+            let likeness = twin.map_or(0.0, |t| score_test.likeness(t.place, choice.members[0]));
             let Some(&effect) = rival.hypothesis.named.last() else {
                 continue;
             };

@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::candidates::candidate::{Library, Twin};
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::{Fitted, priors, regularise};
 use crate::selection::score_variance::{spread, unlike};
-use crate::sensitivity::linearization_point::{Anchor, Response};
+use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
 use crate::sensitivity::normal_equations::{Normal, factor, solve};
 
 /// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
@@ -15,7 +15,7 @@ use crate::sensitivity::normal_equations::{Normal, factor, solve};
 pub const THRESHOLD: f64 = 12.0;
 
 /// The candidates' normal equations after everything else was projected off.
-pub struct Scan {
+pub struct ScoreTest {
     /// Products of the candidates' columns.
     gram: DMatrix<f64>,
     /// Their products with the residual.
@@ -29,7 +29,7 @@ pub struct Scan {
     /// What each candidate must earn to be named.
     pub price: Vec<f64>,
     /// Misfit for each degree of freedom that no choice of candidates would take away; at least one, and one until it is measured
-    /// by [`Scan::scaled`].
+    /// by [`ScoreTest::scaled`].
     pub scale: f64,
     /// Cost before any choice, and degrees of freedom of the data.
     square: f64,
@@ -50,20 +50,20 @@ pub struct Choice {
     pub worth: f64,
 }
 
-impl Scan {
+impl ScoreTest {
     /// Projects nuisances and named effects off.
     ///
     /// # Errors
     /// [`GapError`] where the fitted hypothesis cannot be simulated or is singular.
     pub fn new<const N: usize>(
-        study: &Study<N>,
+        prepared: &PreparedSession<N>,
         fitted: &Fitted<N>,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         library: &Library,
     ) -> Result<Self, GapError> {
         let hypothesis = &fitted.hypothesis;
         let asked: Vec<&Response> = library.responses.iter().flatten().collect();
-        let (known, clusters) = study.equations(anchor, fitted, &asked)?;
+        let (known, clusters) = prepared.equations(point, fitted, &asked)?;
         let mut prior = priors(hypothesis, &known);
         prior.resize(known.len() + asked.len(), None);
         let mut normal = Normal::new(&clusters, &prior);
@@ -102,8 +102,8 @@ impl Scan {
             bounds.extend((0..candidate.width()).map(|i| candidate.bounds(i)));
             ranges.push(start..bounds.len());
         }
-        let rows = study.rows_of_references();
-        let mut scan = Self {
+        let rows = prepared.rows_of_references();
+        let mut score_test = Self {
             gram,
             score,
             columns: ranges,
@@ -122,12 +122,12 @@ impl Scan {
             freedom: normal.rows.saturating_sub(base.len() + 10).max(1) as f64,
             bounds,
         };
-        for index in 0..scan.columns.len() {
-            let Some(choice) = scan.evaluate(&[index]) else {
+        for index in 0..score_test.columns.len() {
+            let Some(choice) = score_test.evaluate(&[index]) else {
                 continue;
             };
             // The direction in which the candidate was found, on its columns and on what was projected off.
-            let range = scan.columns[index].clone();
+            let range = score_test.columns[index].clone();
             let found: Vec<(usize, f64)> = range.zip(choice.coefficients[0].clone()).collect();
             let own = found.iter().map(|(c, b)| (first + c, *b));
             let others = base.iter().enumerate().map(|(a, &i)| {
@@ -135,10 +135,10 @@ impl Scan {
                 (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(*c, a)]))
             });
             let weights: Vec<(usize, f64)> = own.chain(others).collect();
-            scan.spread[index] = spread(&clusters, &weights);
-            scan.unlike[index] = unlike(&clusters, &weights);
+            score_test.spread[index] = spread(&clusters, &weights);
+            score_test.unlike[index] = unlike(&clusters, &weights);
         }
-        Ok(scan)
+        Ok(score_test)
     }
 
     /// With the misfit measured that no choice takes away, in units of which worths and smallest sizes count.
@@ -280,7 +280,7 @@ impl Scan {
     }
 }
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// Number of rows with one trial of each group.
     pub fn rows_of_references(&self) -> usize {
         let mut seen = Vec::new();
@@ -288,7 +288,7 @@ impl<const N: usize> Study<'_, N> {
         for &trial in &self.fitted {
             if !seen.contains(&self.group_of[trial]) {
                 seen.push(self.group_of[trial]);
-                let told = self.stretches[trial].told(self.session.channels());
+                let told = self.valid_segments[trial].rows_per_channel(self.session.channels());
                 rows += told.iter().sum::<usize>();
             }
         }

@@ -4,15 +4,15 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::candidates::candidate::{Candidate, Library};
-use crate::data::prepared_session::Study;
-use crate::data::session::Sight;
+use crate::data::prepared_session::PreparedSession;
+use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::{Fitted, Precision, enough};
-use crate::selection::lack_of_fit::{Lack, lack_of_fit};
+use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::model_selection::{FLOOR, Named, mimicked_by_any};
-use crate::selection::score_test::{Choice, Scan};
-use crate::sensitivity::linearization_point::Anchor;
-use crate::trial_specific::component::Apart;
+use crate::selection::score_test::{Choice, ScoreTest};
+use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::trial_specific::component::TrialSpecific;
 use crate::trial_specific::tremor_detection::Line;
 
 /// Most disturbances of single trials that are named.
@@ -33,7 +33,7 @@ const WIDTH: usize = 12;
 
 /// One round of the search.
 #[derive(Clone, Debug)]
-pub struct Rung {
+pub struct SearchStep {
     /// What was added, best first: the candidates and what they gained.
     pub tried: Vec<(Vec<Candidate>, f64)>,
     /// Cost before it.
@@ -65,15 +65,15 @@ pub struct Finding<const N: usize> {
     /// The named effects, those that explain most first.
     pub named: Vec<Named>,
     /// What is not the same in every trial.
-    pub apart: Vec<Apart>,
+    pub trial_specific: Vec<TrialSpecific>,
     /// The calibrated and the amended model as they are in each trial; see [`crate::measurement_model::in_trial`].
     pub in_trials: [Vec<Hypothesis<N>>; 2],
     /// Rounds of the search.
-    pub ladder: Vec<Rung>,
+    pub search_trace: Vec<SearchStep>,
     /// How well the amended model is known.
     pub precision: Precision,
     /// Lack of fit of the calibrated and of the amended model.
-    pub lack: [Lack; 2],
+    pub lack: [LackOfFit; 2],
     /// What else was asked.
     pub ruled: Vec<Ruled>,
     /// Misfit for each degree of freedom.
@@ -84,16 +84,16 @@ pub struct Finding<const N: usize> {
 pub type Progress<'a> = &'a (dyn Fn(&str, f64) -> Result<(), GapError> + Sync);
 
 /// A fitted hypothesis with the simulation that it was followed from.
-pub(crate) type Settled<'a, const N: usize> = (Fitted<N>, Anchor<'a, N>);
+pub(crate) type Settled<'a, const N: usize> = (Fitted<N>, LinearizationPoint<'a, N>);
 
 /// What was found of effects that last.
-struct Hunt<'a, const N: usize> {
+struct SearchState<'a, const N: usize> {
     calibrated: Fitted<N>,
     /// What the calibrated model leaves, at the same samples and with the same noise.
-    before: Lack,
+    before: LackOfFit,
     current: Fitted<N>,
-    anchor: Anchor<'a, N>,
-    ladder: Vec<Rung>,
+    point: LinearizationPoint<'a, N>,
+    search_trace: Vec<SearchStep>,
     ruled: Vec<Ruled>,
     /// Number of candidates.
     asked: f64,
@@ -102,7 +102,7 @@ struct Hunt<'a, const N: usize> {
     been: Vec<(Vec<Candidate>, [bool; N], f64)>,
 }
 
-impl<const N: usize> Hunt<'_, N> {
+impl<const N: usize> SearchState<'_, N> {
     /// Whether it has been here before and was no worse off: from here it would go round in a circle.
     fn is_back(&mut self, dry: [bool; N]) -> bool {
         let Fitted { asked, cost, .. } = &self.current;
@@ -129,7 +129,7 @@ impl<const N: usize> Hunt<'_, N> {
     }
 }
 
-impl<'a, const N: usize> Study<'a, N> {
+impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Searches for what the model lacks.
     ///
     /// First what is not the same in every trial, told by what repeats differ in; then what lasts; then a ripple of the
@@ -144,119 +144,119 @@ impl<'a, const N: usize> Study<'a, N> {
             self.measure_noise(&settled.1)?;
             settled = self.calibrate()?;
         }
-        let led = self.session.sight == Sight::Led;
-        let mut apart: Vec<Apart> = Vec::new();
+        let led = self.session.comparison == ComparisonMode::Led;
+        let mut trial_specific: Vec<TrialSpecific> = Vec::new();
         let mut periodic = None;
         let measured = self.courses.clone();
         if led {
             progress("looking at single trials", 0.05)?;
             if let Some(found) = self.rhythm(&settled.1, Line::BetweenRepeats)? {
                 self.take_out(&settled.1, &found)?;
-                apart.push(found);
+                trial_specific.push(found);
                 settled = self.calibrate_anew()?;
             }
-            settled = self.disturbances(settled, &mut apart)?;
+            settled = self.disturbances(settled, &mut trial_specific)?;
         }
-        let mut hunt = self.hunt(settled, periodic, progress)?;
-        if led && !hunt.current.asked.is_empty() {
+        let mut state = self.search_from(settled, periodic, progress)?;
+        if led && !state.current.asked.is_empty() {
             // What rang may have been what was named since; what was named may have hidden a rhythm; and how an arm answers one
             // depends on what was named.
-            let before = apart.iter().position(|a| a.trial.is_none());
+            let before = trial_specific.iter().position(|a| a.trial.is_none());
             let without = std::mem::replace(&mut self.courses, measured.clone());
-            let again = self.rhythm(&hunt.anchor, Line::BetweenRepeats)?;
+            let again = self.rhythm(&state.point, Line::BetweenRepeats)?;
             match (before, again) {
-                (Some(before), Some(again)) if again.is_like(&apart[before]) => {
-                    self.take_out(&hunt.anchor, &again)?;
-                    apart[before] = again;
-                    hunt = self.renewed(hunt)?;
+                (Some(before), Some(again)) if again.is_like(&trial_specific[before]) => {
+                    self.take_out(&state.point, &again)?;
+                    trial_specific[before] = again;
+                    state = self.renewed(state)?;
                 }
                 (None, None) => self.courses = without,
                 (before, again) => {
-                    before.map(|before| apart.remove(before));
+                    before.map(|before| trial_specific.remove(before));
                     if let Some(again) = again {
-                        self.take_out(&hunt.anchor, &again)?;
-                        apart.push(again);
+                        self.take_out(&state.point, &again)?;
+                        trial_specific.push(again);
                     }
                     let settled = self.calibrate_anew()?;
-                    hunt = self.hunt(settled, periodic, progress)?;
+                    state = self.search_from(settled, periodic, progress)?;
                 }
             }
         }
         if led {
-            let found = self.rhythm(&hunt.anchor, Line::OfTheRobot)?;
+            let found = self.rhythm(&state.point, Line::OfTheRobot)?;
             let found = found.filter(|f| {
                 (f.locked || f.wave()[0] > SLOW)
-                    && f.gain > hunt.least(&f.effect)
+                    && f.gain > state.least(&f.effect)
                     // What is left of a rhythm that was taken out has its frequency.
-                    && !apart.iter().any(|a| a.swings_with(f))
+                    && !trial_specific.iter().any(|a| a.swings_with(f))
             });
             periodic = match &found {
                 Some(found) => Some(found.wave()).filter(|[frequency, _]| *frequency < SLOW),
-                None => self.slow_ripple((&hunt.current, &hunt.anchor), hunt.scale),
+                None => self.slow_ripple((&state.current, &state.point), state.scale),
             };
             if let (Some(found), None) = (&found, periodic) {
-                self.take_out(&hunt.anchor, found)?;
-                apart.push(found.clone());
+                self.take_out(&state.point, found)?;
+                trial_specific.push(found.clone());
             }
             if found.is_some() || periodic.is_some() {
                 let again = self.calibrate_anew()?;
-                hunt = self.hunt(again, periodic, progress)?;
+                state = self.search_from(again, periodic, progress)?;
             }
         }
-        if apart.iter().any(|a| a.trial.is_some()) && !hunt.current.asked.is_empty() {
+        if trial_specific.iter().any(|a| a.trial.is_some()) && !state.current.asked.is_empty() {
             // What looked like a disturbance may have been what was named since.
             self.take_back();
-            apart.retain(|a| a.trial.is_none());
-            self.measure_noise(&self.anchor(&hunt.current.hypothesis)?)?;
-            let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
-            let settled = self.disturbances(settled, &mut apart)?;
+            trial_specific.retain(|a| a.trial.is_none());
+            self.measure_noise(&self.linearize(&state.current.hypothesis)?)?;
+            let settled = self.settle(state.current.hypothesis, state.current.asked)?;
+            let settled = self.disturbances(settled, &mut trial_specific)?;
             let from;
-            (hunt.calibrated, from) = self.settle(hunt.calibrated.hypothesis, Vec::new())?;
-            hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
-            (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
+            (state.calibrated, from) = self.settle(state.calibrated.hypothesis, Vec::new())?;
+            state.before = lack_of_fit(self, &from, &state.calibrated);
+            (state.current, state.point) = self.pruned(settled, &state.calibrated, state.scale)?;
         }
         let mut named;
         let mut turns = 0;
         let mut outcomes = Vec::new();
         loop {
             let kinds = |f: &Fitted<N>| f.asked.iter().map(Candidate::kind).collect::<Vec<_>>();
-            let before = kinds(&hunt.current);
-            (hunt.current, hunt.anchor, named) = self.judged(
-                (hunt.current, hunt.anchor),
-                &hunt.calibrated,
-                (hunt.asked, hunt.scale, periodic),
+            let before = kinds(&state.current);
+            (state.current, state.point, named) = self.judged(
+                (state.current, state.point),
+                &state.calibrated,
+                (state.asked, state.scale, periodic),
                 progress,
             )?;
             turns += 1;
-            let after = kinds(&hunt.current);
+            let after = kinds(&state.current);
             if turns == TURNS || after == before || outcomes.contains(&after) {
                 break;
             }
             outcomes.push(after);
             // What a coarser law could have missed may be seen beside the one that took its place.
-            let rounds = hunt.ladder.len();
-            hunt = self.hunt_on(hunt, periodic, progress)?;
-            if hunt.ladder.len() == rounds {
+            let rounds = state.search_trace.len();
+            state = self.search_on(state, periodic, progress)?;
+            if state.search_trace.len() == rounds {
                 break;
             }
         }
-        let Hunt {
+        let SearchState {
             mut calibrated,
             before,
             current: mut amended,
-            anchor,
-            ladder,
+            point,
+            search_trace,
             ruled,
             scale,
             ..
-        } = hunt;
+        } = state;
         progress("measuring what is left", 0.9)?;
-        let mut precision = self.precision(&anchor, &amended, scale)?;
+        let mut precision = self.precision(&point, &amended, scale)?;
         for one in &named {
             let missed = amended.asked[one.slot].kind().probe().missed;
             precision.widen(one.slot, missed, one.gain);
         }
-        let lack = [before, lack_of_fit(self, &anchor, &amended)];
+        let lack = [before, lack_of_fit(self, &point, &amended)];
         if let Some((hypothesis, _)) = self.refined(&calibrated) {
             calibrated.hypothesis = hypothesis;
         }
@@ -264,7 +264,7 @@ impl<'a, const N: usize> Study<'a, N> {
             (amended.hypothesis, precision) = (hypothesis, known);
         }
         self.courses = measured;
-        let rhythms = rhythms_of(&apart);
+        let rhythms = rhythms_of(&trial_specific);
         for fitted in [&mut calibrated, &mut amended] {
             if let Some(hypothesis) = self.tuned(&fitted.hypothesis, &rhythms) {
                 fitted.hypothesis = hypothesis;
@@ -272,14 +272,14 @@ impl<'a, const N: usize> Study<'a, N> {
         }
         if !rhythms.is_empty() {
             // The contact is part of what decides how large a rhythm is.
-            let tuned = self.anchor(&amended.hypothesis)?;
-            for one in apart.iter_mut().filter(|a| a.trial.is_none()) {
+            let tuned = self.linearize(&amended.hypothesis)?;
+            for one in trial_specific.iter_mut().filter(|a| a.trial.is_none()) {
                 if let Some(sized) = self.sized(&tuned, one) {
                     *one = sized;
                 }
             }
         }
-        let rhythms = rhythms_of(&apart);
+        let rhythms = rhythms_of(&trial_specific);
         let in_trials = [
             self.in_trials((&calibrated.hypothesis, &[])),
             self.in_trials((&amended.hypothesis, &rhythms)),
@@ -289,9 +289,9 @@ impl<'a, const N: usize> Study<'a, N> {
             calibrated,
             amended,
             named,
-            apart,
+            trial_specific,
             in_trials,
-            ladder,
+            search_trace,
             precision,
             lack,
             ruled,
@@ -300,97 +300,98 @@ impl<'a, const N: usize> Study<'a, N> {
     }
 
     /// Looks for effects that last, round by round, from a calibrated model.
-    fn hunt(
+    fn search_from(
         &mut self,
-        (calibrated, anchor): Settled<'a, N>,
+        (calibrated, point): Settled<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<Hunt<'a, N>, GapError> {
-        let start = Hunt {
-            before: lack_of_fit(self, &anchor, &calibrated),
+    ) -> Result<SearchState<'a, N>, GapError> {
+        let start = SearchState {
+            before: lack_of_fit(self, &point, &calibrated),
             current: calibrated.clone(),
             calibrated,
-            anchor,
-            ladder: Vec::new(),
+            point,
+            search_trace: Vec::new(),
             ruled: Vec::new(),
             asked: 1.0,
             scale: 1.0,
             been: Vec::new(),
         };
-        self.hunt_on(start, periodic, progress)
+        self.search_on(start, periodic, progress)
     }
 
     /// Goes on looking from what was found.
-    fn hunt_on(
+    fn search_on(
         &mut self,
-        mut hunt: Hunt<'a, N>,
+        mut state: SearchState<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<Hunt<'a, N>, GapError> {
-        hunt.is_back(self.dry);
+    ) -> Result<SearchState<'a, N>, GapError> {
+        state.is_back(self.dry);
         for round in 0..MOST {
             progress("asking the catalogue", 0.1 + 0.1 * round as f64)?;
-            let library = Library::build(self, &hunt.anchor, periodic)?;
-            let scan = match Scan::new(self, &hunt.current, &hunt.anchor, &library) {
+            let library = Library::build(self, &state.point, periodic)?;
+            let score_test = match ScoreTest::new(self, &state.current, &state.point, &library) {
                 // What was found so far stands.
                 Err(GapError::Simulation { .. } | GapError::Singular { .. })
-                    if !hunt.current.asked.is_empty() =>
+                    if !state.current.asked.is_empty() =>
                 {
                     break;
                 }
                 other => other?.scaled(),
             };
-            hunt.asked = library.candidates.len() as f64;
-            hunt.scale = scan.scale;
-            hunt.ruled = self.ruled(&library, &scan);
-            let room = MOST - hunt.current.asked.len();
-            let from = (&hunt.calibrated, &hunt.current);
-            let Some((settled, rung)) = self.round(from, &hunt.anchor, (&library, &scan), room)
+            state.asked = library.candidates.len() as f64;
+            state.scale = score_test.scale;
+            state.ruled = self.ruled(&library, &score_test);
+            let room = MOST - state.current.asked.len();
+            let from = (&state.calibrated, &state.current);
+            let Some((settled, step)) =
+                self.round(from, &state.point, (&library, &score_test), room)
             else {
                 break;
             };
-            hunt.ladder.push(rung);
+            state.search_trace.push(step);
             let settled = self.afresh(settled);
-            (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
-            if self.leave_out_rest(&hunt.anchor) {
-                hunt = self.renewed(hunt)?;
+            (state.current, state.point) = self.pruned(settled, &state.calibrated, state.scale)?;
+            if self.leave_out_rest(&state.point) {
+                state = self.renewed(state)?;
             }
-            if hunt.is_back(self.dry) {
-                hunt.ladder.pop();
+            if state.is_back(self.dry) {
+                state.search_trace.pop();
                 break;
             }
             // Without repeats a second look has only its own residual to tell noise from what the model lacks.
-            if hunt.current.asked.len() >= MOST || !self.repeated {
+            if state.current.asked.len() >= MOST || !self.repeated {
                 break;
             }
         }
-        Ok(hunt)
+        Ok(state)
     }
 
     /// What was found, after the data that are compared have changed.
-    fn renewed(&mut self, mut hunt: Hunt<'a, N>) -> Result<Hunt<'a, N>, GapError> {
-        self.measure_noise(&self.anchor(&hunt.current.hypothesis)?)?;
+    fn renewed(&mut self, mut state: SearchState<'a, N>) -> Result<SearchState<'a, N>, GapError> {
+        self.measure_noise(&self.linearize(&state.current.hypothesis)?)?;
         let from;
-        (hunt.calibrated, from) = self.settle(hunt.calibrated.hypothesis, Vec::new())?;
-        hunt.before = lack_of_fit(self, &from, &hunt.calibrated);
-        let settled = self.settle(hunt.current.hypothesis, hunt.current.asked)?;
-        (hunt.current, hunt.anchor) = self.pruned(settled, &hunt.calibrated, hunt.scale)?;
-        Ok(hunt)
+        (state.calibrated, from) = self.settle(state.calibrated.hypothesis, Vec::new())?;
+        state.before = lack_of_fit(self, &from, &state.calibrated);
+        let settled = self.settle(state.current.hypothesis, state.current.asked)?;
+        (state.current, state.point) = self.pruned(settled, &state.calibrated, state.scale)?;
+        Ok(state)
     }
 
     /// What was found, fitted once more with segments and sensors as given, where much is left: without it they were bent far,
     /// and may not find back by themselves.
-    fn afresh(&self, (fitted, anchor): Settled<'a, N>) -> Settled<'a, N> {
+    fn afresh(&self, (fitted, point): Settled<'a, N>) -> Settled<'a, N> {
         /// Misfit for each row beyond which much is left.
         const MUCH: f64 = 1.5;
         let channels = self.session.channels();
         let told = self
             .fitted
             .iter()
-            .map(|&t| self.stretches[t].told(channels));
+            .map(|&t| self.valid_segments[t].rows_per_channel(channels));
         let rows: usize = told.flatten().sum();
         if fitted.cost < MUCH * rows as f64 {
-            return (fitted, anchor);
+            return (fitted, point);
         }
         let start = Hypothesis {
             named: fitted.hypothesis.named.clone(),
@@ -398,40 +399,40 @@ impl<'a, const N: usize> Study<'a, N> {
         };
         match self.settle(start, fitted.asked.clone()) {
             Ok(again) if again.0.cost < fitted.cost => again,
-            _ => (fitted, anchor),
+            _ => (fitted, point),
         }
     }
 
     /// Leaves out of single trials what disturbs them, the clearest first.
     fn disturbances(
         &mut self,
-        (mut fitted, mut anchor): Settled<'a, N>,
-        apart: &mut Vec<Apart>,
+        (mut fitted, mut point): Settled<'a, N>,
+        trial_specific: &mut Vec<TrialSpecific>,
     ) -> Result<Settled<'a, N>, GapError> {
-        let most = apart.len() + DISTURBANCES;
-        while apart.len() < most
-            && let Some(one) = self.disturbance(&anchor, 1.0)
+        let most = trial_specific.len() + DISTURBANCES;
+        while trial_specific.len() < most
+            && let Some(one) = self.disturbance(&point, 1.0)
             && let Some(trial) = one.trial
         {
             self.leave_out(trial, one.span());
-            apart.push(one);
-            self.measure_noise(&self.anchor(&anchor.hypothesis)?)?;
-            (fitted, anchor) = self.settle(fitted.hypothesis, fitted.asked)?;
+            trial_specific.push(one);
+            self.measure_noise(&self.linearize(&point.hypothesis)?)?;
+            (fitted, point) = self.settle(fitted.hypothesis, fitted.asked)?;
         }
-        Ok((fitted, anchor))
+        Ok((fitted, point))
     }
 
     /// The model as given, with everything refitted that was never exact.
     ///
     /// # Errors
-    /// As [`Study::settle`].
+    /// As [`PreparedSession::settle`].
     pub fn calibrate(&self) -> Result<Settled<'a, N>, GapError> {
         self.settle(self.session.given(), Vec::new())
     }
 
     /// The same after the data have changed, with the noise read anew.
     fn calibrate_anew(&mut self) -> Result<Settled<'a, N>, GapError> {
-        let given = self.anchor(&self.session.given())?;
+        let given = self.linearize(&self.session.given())?;
         self.measure_noise(&given)?;
         self.calibrate()
     }
@@ -440,10 +441,10 @@ impl<'a, const N: usize> Study<'a, N> {
     fn round(
         &self,
         (calibrated, current): (&Fitted<N>, &Fitted<N>),
-        anchor: &Anchor<N>,
-        (library, scan): (&Library, &Scan),
+        point: &LinearizationPoint<N>,
+        (library, score_test): (&Library, &ScoreTest),
         room: usize,
-    ) -> Option<(Settled<'a, N>, Rung)> {
+    ) -> Option<(Settled<'a, N>, SearchStep)> {
         let fresh = |members: &[usize], c: usize| {
             let candidate = &library.candidates[c];
             !current.asked.iter().any(|a| a.is_same_question(candidate))
@@ -451,7 +452,7 @@ impl<'a, const N: usize> Study<'a, N> {
                     .iter()
                     .any(|&m| library.candidates[m].is_same_question(candidate))
         };
-        let choices = scan.search(&[], AHEAD.min(room), WIDTH, &fresh);
+        let choices = score_test.search(&[], AHEAD.min(room), WIDTH, &fresh);
         // Less than every effect must explain need not be converged.
         let explained = calibrated.cost - current.cost;
         let least = |member: &usize| {
@@ -494,16 +495,17 @@ impl<'a, const N: usize> Study<'a, N> {
                 .iter()
                 .map(|&m| {
                     let mut candidate = library.candidates[m].clone();
-                    (candidate.price, candidate.spread) = (scan.price[m], scan.spread[m]);
+                    (candidate.price, candidate.spread) =
+                        (score_test.price[m], score_test.spread[m]);
                     candidate
                 })
                 .collect();
-            let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), anchor) else {
+            let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), point) else {
                 continue;
             };
             let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
             let gain = current.cost - fitted.cost;
-            let worth = gain / scan.scale - price;
+            let worth = gain / score_test.scale - price;
             let simple = worth - self.price_of_shapes(&asked);
             tried.push((asked, gain));
             if worth > 0.0 {
@@ -514,13 +516,13 @@ impl<'a, const N: usize> Study<'a, N> {
         worthy.sort_by(|a, b| b.0.total_cmp(&a.0));
         // What can be followed but not simulated is no answer.
         worthy.into_iter().find_map(|(_, better)| {
-            let rung = Rung {
+            let step = SearchStep {
                 tried: tried.clone(),
                 before: current.cost,
                 after: better.cost,
             };
             let settled = self.settle(better.hypothesis, better.asked).ok()?;
-            Some((settled, rung))
+            Some((settled, step))
         })
     }
 
@@ -531,7 +533,7 @@ impl<'a, const N: usize> Study<'a, N> {
         &self,
         current: &Fitted<N>,
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
     ) -> Option<Fitted<N>> {
         const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
         let mut all = current.asked.clone();
@@ -543,7 +545,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 let own: Vec<f64> = own.iter().map(|b| share * b).collect();
                 hypothesis.named.push(candidate.found(&own));
             }
-            if let Ok(fitted) = self.fit(anchor, hypothesis.handed_over(), all.clone()) {
+            if let Ok(fitted) = self.fit(point, hypothesis.handed_over(), all.clone()) {
                 if fitted.cost < current.cost {
                     return Some(fitted);
                 }
@@ -555,20 +557,21 @@ impl<'a, const N: usize> Study<'a, N> {
         best
     }
 
-    fn ruled(&self, library: &Library, scan: &Scan) -> Vec<Ruled> {
-        (0..scan.len())
+    fn ruled(&self, library: &Library, score_test: &ScoreTest) -> Vec<Ruled> {
+        (0..score_test.len())
             .map(|c| Ruled {
                 candidate: library.candidates[c].clone(),
-                gain: scan.evaluate(&[c]).map_or(0.0, |choice| choice.gain) / scan.scale,
-                price: scan.price[c] * scan.spread[c],
-                smallest: scan.smallest_seen(c),
+                gain: score_test.evaluate(&[c]).map_or(0.0, |choice| choice.gain)
+                    / score_test.scale,
+                price: score_test.price[c] * score_test.spread[c],
+                smallest: score_test.smallest_seen(c),
             })
             .collect()
     }
 }
 
 /// Those that swing in every trial.
-fn rhythms_of(apart: &[Apart]) -> Vec<Effect<f64>> {
-    let rhythms = apart.iter().filter(|a| a.trial.is_none());
+fn rhythms_of(trial_specific: &[TrialSpecific]) -> Vec<Effect<f64>> {
+    let rhythms = trial_specific.iter().filter(|a| a.trial.is_none());
     rhythms.map(|a| a.effect).collect()
 }

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use arm_sim::SimulationError;
 
 use crate::GapError;
-use crate::data::prepared_session::Study;
-use crate::data::session::Sight;
+use crate::data::prepared_session::PreparedSession;
+use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
@@ -34,7 +34,7 @@ pub struct Change<const N: usize> {
 }
 
 /// A hypothesis that was simulated.
-pub struct Anchor<'a, const N: usize> {
+pub struct LinearizationPoint<'a, const N: usize> {
     /// The hypothesis.
     pub hypothesis: Hypothesis<N>,
     /// The runs along which led arms are followed, by group; nothing where torques are compared.
@@ -51,16 +51,19 @@ pub struct Anchor<'a, const N: usize> {
     pub rows: Rows,
 }
 
-impl<'a, const N: usize> Study<'a, N> {
+impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Simulates a hypothesis, and linearises around it.
     ///
     /// # Errors
     /// [`GapError::Simulation`] names the first trial that it cannot be simulated on.
-    pub fn anchor(&self, hypothesis: &Hypothesis<N>) -> Result<Anchor<'a, N>, GapError> {
+    pub fn linearize(
+        &self,
+        hypothesis: &Hypothesis<N>,
+    ) -> Result<LinearizationPoint<'a, N>, GapError> {
         let failed = |trial: usize| move |source| GapError::Simulation { trial, source };
-        let lines = match self.session.sight {
-            Sight::Torque => Vec::new(),
-            Sight::Led => {
+        let lines = match self.session.comparison {
+            ComparisonMode::Torque => Vec::new(),
+            ComparisonMode::Led => {
                 let one = |group: usize| {
                     let trial = self.references[group];
                     Linear::along(self.session, hypothesis, &self.courses[trial])
@@ -70,7 +73,7 @@ impl<'a, const N: usize> Study<'a, N> {
                 lines.into_iter().collect::<Result<Vec<_>, _>>()?
             }
         };
-        let mut anchor = Anchor {
+        let mut point = LinearizationPoint {
             hypothesis: hypothesis.clone(),
             lines,
             shown: Vec::new(),
@@ -79,31 +82,31 @@ impl<'a, const N: usize> Study<'a, N> {
             own: Vec::new(),
             rows: Rows::default(),
         };
-        anchor.shown = self.shown(&anchor, hypothesis)?;
+        point.shown = self.shown(&point, hypothesis)?;
         let one = |i: usize| {
             let trial = self.fitted[i];
             let course = &self.courses[trial];
-            let shown = self.follow(&anchor, hypothesis, (self.group_of[trial], course));
+            let shown = self.follow(&point, hypothesis, (self.group_of[trial], course));
             Ok(difference(&course.seen, &shown.map_err(failed(trial))?))
         };
         let residuals = self.parallel(self.fitted.len(), one);
-        anchor.residuals = residuals.into_iter().collect::<Result<_, GapError>>()?;
-        let mut all = anchor.coordinates.clone();
+        point.residuals = residuals.into_iter().collect::<Result<_, GapError>>()?;
+        let mut all = point.coordinates.clone();
         all.extend(self.session.by_trial());
-        let mut responses = self.responses_to(&anchor, &all)?;
-        anchor.own = responses.split_off(anchor.coordinates.len());
-        anchor.rows = Rows::new(self, &responses, &anchor.own);
-        Ok(anchor)
+        let mut responses = self.responses_to(&point, &all)?;
+        point.own = responses.split_off(point.coordinates.len());
+        point.rows = Rows::new(self, &responses, &point.own);
+        Ok(point)
     }
 
     /// What the sensors would read on a trial of a group, in the common band.
     fn follow(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         hypothesis: &Hypothesis<N>,
         (group, course): (usize, &Course<N>),
     ) -> Result<Channels, SimulationError> {
-        let raw = self.follow_raw(anchor, hypothesis, (group, course))?;
+        let raw = self.follow_raw(point, hypothesis, (group, course))?;
         smooth(&raw, course.band, course.rate).map_err(|_| ASTRAY)
     }
 
@@ -113,11 +116,11 @@ impl<'a, const N: usize> Study<'a, N> {
     /// [`SimulationError`] for a hypothesis that is not possible or too far away.
     pub fn follow_raw(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         hypothesis: &Hypothesis<N>,
         (group, course): (usize, &Course<N>),
     ) -> Result<Channels, SimulationError> {
-        match anchor.lines.get(group) {
+        match point.lines.get(group) {
             Some(line) => line.play(hypothesis, course),
             None => self.session.torques(hypothesis, course),
         }
@@ -126,12 +129,12 @@ impl<'a, const N: usize> Study<'a, N> {
     /// What the sensors would read of each group's reference.
     fn shown(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         hypothesis: &Hypothesis<N>,
     ) -> Result<Vec<Channels>, GapError> {
         let one = |group: usize| {
             let trial = self.references[group];
-            self.follow(anchor, hypothesis, (group, &self.courses[trial]))
+            self.follow(point, hypothesis, (group, &self.courses[trial]))
                 .map_err(|source| GapError::Simulation { trial, source })
         };
         let all = self.parallel(self.references.len(), one);
@@ -144,18 +147,18 @@ impl<'a, const N: usize> Study<'a, N> {
     /// [`GapError::Simulation`] names the first trial on which it cannot be followed.
     pub fn residuals(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         hypothesis: &Hypothesis<N>,
     ) -> Result<Vec<Channels>, GapError> {
-        if *hypothesis == anchor.hypothesis {
-            return Ok(anchor.residuals.clone());
+        if *hypothesis == point.hypothesis {
+            return Ok(point.residuals.clone());
         }
-        let shown = self.shown(anchor, hypothesis)?;
-        let changes: Vec<Channels> = std::iter::zip(&shown, &anchor.shown)
+        let shown = self.shown(point, hypothesis)?;
+        let changes: Vec<Channels> = std::iter::zip(&shown, &point.shown)
             .map(|(now, then)| difference(now, then))
             .collect();
         let one = |(residual, &trial)| difference(residual, &changes[self.group_of[trial]]);
-        Ok(std::iter::zip(&anchor.residuals, &self.fitted)
+        Ok(std::iter::zip(&point.residuals, &self.fitted)
             .map(one)
             .collect())
     }
@@ -166,30 +169,30 @@ impl<'a, const N: usize> Study<'a, N> {
     /// [`GapError::Simulation`] where a change is not possible.
     pub fn responses(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         changes: &[Change<N>],
     ) -> Result<Vec<Response>, GapError> {
-        self.each_response(anchor, changes).into_iter().collect()
+        self.each_response(point, changes).into_iter().collect()
     }
 
     /// The same, where some of the changes may not be possible.
     pub fn each_response(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         changes: &[Change<N>],
     ) -> Vec<Result<Response, GapError>> {
         let groups = self.references.len();
         let one = |job: usize| {
             let (change, group) = (&changes[job / groups], job % groups);
             let trial = self.references[group];
-            let response = match anchor.lines.get(group) {
+            let response = match point.lines.get(group) {
                 Some(line) => {
                     let reach = (change.sensing, change.moves_handle);
                     line.response(&change.changed, change.size, reach)
                 }
                 None => self
-                    .follow(anchor, &change.changed, (group, &self.courses[trial]))
-                    .map(|shown| slope(&shown, &anchor.shown[group], change.size)),
+                    .follow(point, &change.changed, (group, &self.courses[trial]))
+                    .map(|shown| slope(&shown, &point.shown[group], change.size)),
             };
             response.map_err(|source| GapError::Simulation { trial, source })
         };
@@ -207,36 +210,36 @@ impl<'a, const N: usize> Study<'a, N> {
     /// Responses to numbers of the anchor's hypothesis.
     ///
     /// # Errors
-    /// As [`Study::responses`].
+    /// As [`PreparedSession::responses`].
     pub fn responses_to(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         coordinates: &[Coordinate],
     ) -> Result<Vec<Response>, GapError> {
         let changes: Vec<_> = coordinates
             .iter()
-            .map(|c| self.nudged(&anchor.hypothesis, c))
+            .map(|c| self.nudged(&point.hypothesis, c))
             .collect();
-        self.responses(anchor, &changes)
+        self.responses(point, &changes)
     }
 
     /// Responses to numbers of a hypothesis away from the anchor.
     ///
     /// # Errors
-    /// As [`Study::residuals`].
+    /// As [`PreparedSession::residuals`].
     pub fn responses_at(
         &self,
-        anchor: &Anchor<N>,
+        point: &LinearizationPoint<N>,
         hypothesis: &Hypothesis<N>,
         coordinates: &[Coordinate],
     ) -> Result<Vec<Response>, GapError> {
-        if *hypothesis == anchor.hypothesis || coordinates.is_empty() {
-            return self.responses_to(anchor, coordinates);
+        if *hypothesis == point.hypothesis || coordinates.is_empty() {
+            return self.responses_to(point, coordinates);
         }
-        let base = self.shown(anchor, hypothesis)?;
+        let base = self.shown(point, hypothesis)?;
         let one = |c: &Coordinate| {
             let change = self.nudged(hypothesis, c);
-            let shown = self.shown(anchor, &change.changed)?;
+            let shown = self.shown(point, &change.changed)?;
             let each = std::iter::zip(&shown, &base).map(|(a, b)| slope(a, b, change.size));
             Ok(Response(each.collect()))
         };
@@ -262,13 +265,13 @@ impl<'a, const N: usize> Study<'a, N> {
     /// Measured less predicted channels of the fitted trials under the anchor's hypothesis, before the low-pass.
     ///
     /// # Errors
-    /// As [`Study::residuals`].
-    pub fn raw_residuals(&self, anchor: &Anchor<N>) -> Result<Vec<Channels>, GapError> {
+    /// As [`PreparedSession::residuals`].
+    pub fn raw_residuals(&self, point: &LinearizationPoint<N>) -> Result<Vec<Channels>, GapError> {
         let one = |i: usize| {
             let trial = self.fitted[i];
             let course: &Arc<Course<N>> = &self.courses[trial];
             let place = (self.group_of[trial], course.as_ref());
-            let shown = self.follow_raw(anchor, &anchor.hypothesis, place);
+            let shown = self.follow_raw(point, &point.hypothesis, place);
             let shown = shown.map_err(|source| GapError::Simulation { trial, source })?;
             Ok(difference(&course.raw, &shown))
         };

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::noise::dot;
-use crate::data::prepared_session::Study;
-use crate::data::valid_segments::Stretches;
+use crate::data::prepared_session::PreparedSession;
+use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::linearization_point::Response;
 use crate::sensitivity::normal_equations::{Cluster, factor};
@@ -20,7 +20,7 @@ struct Class {
     group: usize,
     /// The movement in whose reference columns are computed.
     reference: usize,
-    stretches: Stretches,
+    valid_segments: ValidSegments,
     /// Number of rows of one trial that tell anything.
     rows: usize,
     /// Positions in the list of fitted trials.
@@ -43,18 +43,26 @@ impl Rows {
     /// Whitens the responses to what is always refitted.
     ///
     /// * `own` - responses to what differs from trial to trial
-    pub fn new<const N: usize>(study: &Study<N>, responses: &[Response], own: &[Response]) -> Self {
+    pub fn new<const N: usize>(
+        prepared: &PreparedSession<N>,
+        responses: &[Response],
+        own: &[Response],
+    ) -> Self {
         let mut classes: Vec<Class> = Vec::new();
-        for (m, &trial) in study.fitted.iter().enumerate() {
-            let (group, stretches) = (study.group_of[trial], &study.stretches[trial]);
-            if !study.repeated {
+        for (m, &trial) in prepared.fitted.iter().enumerate() {
+            let (group, valid_segments) =
+                (prepared.group_of[trial], &prepared.valid_segments[trial]);
+            if !prepared.repeated {
                 // Parts of a trial stand in for the repeats that are not there.
-                for part in stretches.parts(PARTS) {
+                for part in valid_segments.parts(PARTS) {
                     classes.push(Class {
                         group: classes.len(),
                         reference: group,
-                        rows: part.told(study.session.channels()).iter().sum(),
-                        stretches: part,
+                        rows: part
+                            .rows_per_channel(prepared.session.channels())
+                            .iter()
+                            .sum(),
+                        valid_segments: part,
                         members: vec![m],
                         columns: Vec::new(),
                         products: DMatrix::zeros(0, 0),
@@ -64,24 +72,27 @@ impl Rows {
             }
             let known = classes
                 .iter_mut()
-                .find(|c| c.group == group && c.stretches == *stretches);
+                .find(|c| c.group == group && c.valid_segments == *valid_segments);
             match known {
                 Some(class) => class.members.push(m),
                 None => classes.push(Class {
                     group,
                     reference: group,
-                    rows: stretches.told(study.session.channels()).iter().sum(),
-                    stretches: stretches.clone(),
+                    rows: valid_segments
+                        .rows_per_channel(prepared.session.channels())
+                        .iter()
+                        .sum(),
+                    valid_segments: valid_segments.clone(),
                     members: vec![m],
                     columns: Vec::new(),
                     products: DMatrix::zeros(0, 0),
                 }),
             }
         }
-        let whitened = study.parallel(classes.len(), |i| {
+        let whitened = prepared.parallel(classes.len(), |i| {
             let class = &classes[i];
             let all = own.iter().chain(responses);
-            let columns: Vec<Vec<f64>> = all.map(|r| class.whitened(study, r)).collect();
+            let columns: Vec<Vec<f64>> = all.map(|r| class.whitened(prepared, r)).collect();
             let products = products(&columns, &columns, true);
             (columns, products)
         });
@@ -93,7 +104,7 @@ impl Rows {
         };
         Self {
             classes,
-            own: study.session.by_trial().into_iter().map(sd).collect(),
+            own: prepared.session.by_trial().into_iter().map(sd).collect(),
         }
     }
 
@@ -103,18 +114,18 @@ impl Rows {
     /// * `residuals` - of the fitted trials
     pub fn clusters<const N: usize>(
         &self,
-        study: &Study<N>,
+        prepared: &PreparedSession<N>,
         extra: &[&Response],
         residuals: &[Channels],
     ) -> Vec<Cluster> {
-        let condensed = study.parallel(self.classes.len(), |i| {
+        let condensed = prepared.parallel(self.classes.len(), |i| {
             let class = &self.classes[i];
-            let more: Vec<Vec<f64>> = extra.iter().map(|r| class.whitened(study, r)).collect();
+            let more: Vec<Vec<f64>> = extra.iter().map(|r| class.whitened(prepared, r)).collect();
             let gram = bordered(class, &more);
             let residuals: Vec<Vec<f64>> = class
                 .members
                 .iter()
-                .map(|&m| class.white(study, &residuals[m]))
+                .map(|&m| class.white(prepared, &residuals[m]))
                 .collect();
             self.condense(class, (&class.columns, &more), gram, &residuals)
         });
@@ -128,16 +139,16 @@ impl Rows {
     /// Only the squares of residuals, with what belongs to each trial alone taken out.
     pub fn squares<const N: usize>(
         &self,
-        study: &Study<N>,
+        prepared: &PreparedSession<N>,
         residuals: &[Channels],
     ) -> Vec<Cluster> {
         let k = self.own.len();
-        let squares = study.parallel(self.classes.len(), |i| {
+        let squares = prepared.parallel(self.classes.len(), |i| {
             let class = &self.classes[i];
             let residuals: Vec<Vec<f64>> = class
                 .members
                 .iter()
-                .map(|&m| class.white(study, &residuals[m]))
+                .map(|&m| class.white(prepared, &residuals[m]))
                 .collect();
             let gram = class.products.view((0, 0), (k, k)).into_owned();
             self.condense(class, (&class.columns[..k], &[]), gram, &residuals)
@@ -195,14 +206,24 @@ impl Rows {
 }
 
 impl Class {
-    fn whitened<const N: usize>(&self, study: &Study<N>, response: &Response) -> Vec<f64> {
-        self.white(study, &response.0[self.reference])
+    fn whitened<const N: usize>(
+        &self,
+        prepared: &PreparedSession<N>,
+        response: &Response,
+    ) -> Vec<f64> {
+        self.white(prepared, &response.0[self.reference])
     }
 
-    fn white<const N: usize>(&self, study: &Study<N>, channels: &Channels) -> Vec<f64> {
+    fn white<const N: usize>(
+        &self,
+        prepared: &PreparedSession<N>,
+        channels: &Channels,
+    ) -> Vec<f64> {
         // Trials of which several share their columns are repeats, and weigh the same.
-        let trial = study.fitted[self.members[0]];
-        study.noise.whiten_in(trial, channels, &self.stretches)
+        let trial = prepared.fitted[self.members[0]];
+        prepared
+            .noise
+            .whiten_in(trial, channels, &self.valid_segments)
     }
 }
 

@@ -5,7 +5,7 @@ use arm_core::effect::{Effect, Kind, Nature};
 
 /// An effect that stands apart from the fit of all trials.
 #[derive(Clone, Debug)]
-pub struct Apart {
+pub struct TrialSpecific {
     /// The effect; for a rhythm its phase is that of the first trial.
     pub effect: Effect<f64>,
     /// Standard deviation of its first parameter.
@@ -24,7 +24,7 @@ pub struct Apart {
     pub sizes: Vec<Vec<f64>>,
 }
 
-impl Apart {
+impl TrialSpecific {
     /// Frequency \[Hz\] and phase \[rad\] of a rhythm.
     pub fn wave(&self) -> [f64; 2] {
         shapes_of(self.effect.kind).map(|p| self.effect.parameters[p])

@@ -9,8 +9,8 @@ use arm_core::effect::Effect;
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::noise::dot;
-use crate::data::prepared_session::Study;
-use crate::data::session::Sight;
+use crate::data::prepared_session::PreparedSession;
+use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, away_from_gaps, difference, margin, smooth};
 use crate::selection::fit::{departure, stepped};
@@ -44,7 +44,7 @@ struct Tuned<const N: usize> {
     left: Left,
 }
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// A hypothesis with stiffness and damping of the contact as the ringing tells them in one fit trial of each movement.
     ///
     /// What the band of the comparison told is where they start from and are drawn to, with the uncertainty from before; where
@@ -54,7 +54,7 @@ impl<const N: usize> Study<'_, N> {
     pub fn tuned(&self, start: &Hypothesis<N>, rhythms: &[Effect<f64>]) -> Option<Hypothesis<N>> {
         /// What the other start must gain, in squares of what is left: as an effect of as many parameters must.
         const PLAIN: f64 = 12.0;
-        if self.session.sight != Sight::Led {
+        if self.session.comparison != ComparisonMode::Led {
             return None;
         }
         let swing = |r: &Effect<f64>| r.parameters[shapes_of(r.kind)[0]];

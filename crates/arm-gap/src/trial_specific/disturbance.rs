@@ -3,29 +3,29 @@
 use arm_core::effect::{Effect, KINDS, Nature};
 
 use crate::data::noise::dot;
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::prediction::Channels;
 use crate::selection::lack_of_fit::{orthogonal, project_off};
-use crate::sensitivity::linearization_point::Anchor;
-use crate::trial_specific::component::Apart;
+use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::trial_specific::component::TrialSpecific;
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// The clearest disturbance of a single trial; `None` when no trial stands out.
     ///
     /// A trial is compared with its repeats where it has some, else with the fitted model. Two shapes are tried: a burst
     /// of torque in a joint, and an angle sensor that slips and stays off.
     ///
     /// * `scale` - misfit for each degree of freedom
-    pub fn disturbance(&self, anchor: &Anchor<N>, scale: f64) -> Option<Apart> {
+    pub fn disturbance(&self, point: &LinearizationPoint<N>, scale: f64) -> Option<TrialSpecific> {
         let white: Vec<Vec<f64>> = self
             .fitted
             .iter()
-            .zip(&anchor.residuals)
-            .map(|(&t, r)| self.noise.whiten(r, &self.stretches[t]))
+            .zip(&point.residuals)
+            .map(|(&t, r)| self.noise.whiten(r, &self.valid_segments[t]))
             .collect();
         // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
         let each = self.fitted.iter();
-        let usual: Vec<Vec<Vec<f64>>> = each.map(|&trial| self.usual(anchor, trial)).collect();
+        let usual: Vec<Vec<Vec<f64>>> = each.map(|&trial| self.usual(point, trial)).collect();
         let deviations: Vec<Vec<f64>> = (0..self.fitted.len())
             .map(|m| {
                 let mut deviation = self.deviation(&white, m);
@@ -41,11 +41,11 @@ impl<const N: usize> Study<'_, N> {
         let tried = (self.fitted.len() * 4 * N * 100) as f64;
         let price =
             crate::selection::score_test::THRESHOLD + libm::log(rows) + 2.0 * libm::log(tried);
-        let mut best: Option<Apart> = None;
+        let mut best: Option<TrialSpecific> = None;
         for m in suspects {
             let trial = self.fitted[m];
             let see = |(effect, response): (Effect<f64>, Channels)| {
-                let mut row = self.noise.whiten(&response, &self.stretches[trial]);
+                let mut row = self.noise.whiten(&response, &self.valid_segments[trial]);
                 project_off(&mut row, &usual[m]);
                 let square = dot(&row, &row);
                 (square > 0.0).then_some(Asked {
@@ -55,7 +55,7 @@ impl<const N: usize> Study<'_, N> {
                 })
             };
             let asked: Vec<Asked> = self
-                .shapes_in(anchor, trial)
+                .shapes_in(point, trial)
                 .into_iter()
                 .filter_map(see)
                 .collect();
@@ -83,7 +83,7 @@ impl<const N: usize> Study<'_, N> {
                 if gain > least {
                     let mut effect = one.effect;
                     effect.parameters[0] = size / shrink;
-                    best = Some(Apart {
+                    best = Some(TrialSpecific {
                         effect,
                         sd: libm::sqrt(scale * scatter / one.square) / shrink,
                         trial: Some(trial),
@@ -100,18 +100,21 @@ impl<const N: usize> Study<'_, N> {
     }
 
     /// Whitened columns of what differs from trial to trial without being a disturbance, each orthogonal to the others.
-    fn usual(&self, anchor: &Anchor<N>, trial: usize) -> Vec<Vec<f64>> {
-        let stretches = &self.stretches[trial];
+    fn usual(&self, point: &LinearizationPoint<N>, trial: usize) -> Vec<Vec<f64>> {
+        let valid_segments = &self.valid_segments[trial];
         let length = self.session.trials[trial].len();
         let constant = |j: usize| {
             let mut channels = vec![vec![0.0; length]; self.session.channels()];
             channels[j] = vec![1.0; length];
             channels
         };
-        let own = anchor.own.iter();
-        let placed = own.map(|r| self.noise.whiten(&r.0[self.group_of[trial]], stretches));
+        let own = point.own.iter();
+        let placed = own.map(|r| {
+            self.noise
+                .whiten(&r.0[self.group_of[trial]], valid_segments)
+        });
         let columns: Vec<Vec<f64>> = placed
-            .chain((0..N).map(|j| self.noise.whiten(&constant(j), stretches)))
+            .chain((0..N).map(|j| self.noise.whiten(&constant(j), valid_segments)))
             .collect();
         orthogonal(columns)
     }
@@ -124,7 +127,7 @@ impl<const N: usize> Study<'_, N> {
                 let trial = self.fitted[o];
                 o != m
                     && self.group_of[trial] == group
-                    && self.stretches[trial] == self.stretches[self.fitted[m]]
+                    && self.valid_segments[trial] == self.valid_segments[self.fitted[m]]
             })
             .collect()
     }
@@ -150,14 +153,18 @@ impl<const N: usize> Study<'_, N> {
     }
 
     /// Unit disturbances of a trial with what they would show: bursts in every joint, slips of every angle sensor.
-    fn shapes_in(&self, anchor: &Anchor<N>, trial: usize) -> Vec<(Effect<f64>, Channels)> {
+    fn shapes_in(
+        &self,
+        point: &LinearizationPoint<N>,
+        trial: usize,
+    ) -> Vec<(Effect<f64>, Channels)> {
         const EVERY: f64 = 0.1;
         const LONG: [f64; 3] = [0.3, 0.6, 1.2];
         const UNIT: f64 = 1e-2;
         let course = &self.courses[self.references[self.group_of[trial]]];
         let end = course.raw[0].len() as f64 / course.rate;
         let starts = (end / EVERY) as usize;
-        let Some(line) = anchor.lines.get(self.group_of[trial]) else {
+        let Some(line) = point.lines.get(self.group_of[trial]) else {
             return Vec::new();
         };
         let bursts: Vec<Effect<f64>> = KINDS
@@ -174,7 +181,7 @@ impl<const N: usize> Study<'_, N> {
             })
             .collect();
         let answered = self.parallel(bursts.len(), |i| {
-            let mut changed = anchor.hypothesis.clone();
+            let mut changed = point.hypothesis.clone();
             changed.named.push(bursts[i]);
             line.response(&changed, UNIT, (false, false)).ok()
         });

@@ -4,11 +4,11 @@
 use core::f64::consts::FRAC_PI_2;
 
 use crate::candidates::candidate::Library;
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
-use crate::selection::score_test::Scan;
+use crate::selection::score_test::ScoreTest;
 use crate::selection::search::SLOW;
-use crate::sensitivity::linearization_point::Anchor;
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::tremor_detection::{SLOWEST_RIPPLE, UNSTEADY};
 
 /// Turns of the phase, over the longest trial, between two frequencies that are asked.
@@ -20,14 +20,14 @@ const AT_ONCE: usize = 24;
 /// Frequencies asked to either side of the best one, and between it and the next.
 const CLOSER: i32 = 5;
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// Frequency \[Hz\] and phase \[rad\] of a slow ripple of the robot that is plain in all movements together, and alike in each;
     /// `None` where there is none, trials are too long for it, or what was fitted cannot be followed a little further.
     ///
     /// * `scale` - misfit for each degree of freedom
     pub fn slow_ripple(
         &self,
-        (fitted, anchor): (&Fitted<N>, &Anchor<N>),
+        (fitted, point): (&Fitted<N>, &LinearizationPoint<N>),
         scale: f64,
     ) -> Option<[f64; 2]> {
         let longest = |&t: &usize| self.courses[t].seen[0].len() as f64 / self.courses[t].rate;
@@ -42,44 +42,45 @@ impl<const N: usize> Study<'_, N> {
             .collect();
         let mut best: Option<Wave> = None;
         for frequencies in coarse.chunks(AT_ONCE) {
-            best = better(best, self.waves_at(frequencies, (fitted, anchor)));
+            best = better(best, self.waves_at(frequencies, (fitted, point)));
         }
         let (_, [near, _]) = best?;
         let closer = |k: i32| near + step * f64::from(k) / f64::from(CLOSER + 1);
         let closer: Vec<f64> = (-CLOSER..=CLOSER).map(closer).collect();
-        let (_, wave) = better(best, self.waves_at(&closer, (fitted, anchor)))?;
-        let (library, scan) = self.scanned(&[wave], (fitted, anchor))?;
-        let choice = scan.evaluate(&[0])?;
+        let (_, wave) = better(best, self.waves_at(&closer, (fitted, point)))?;
+        let (library, score_test) = self.scanned(&[wave], (fitted, point))?;
+        let choice = score_test.evaluate(&[0])?;
         let tried = 2.0 * libm::log(count as f64) + self.price_of_shapes(&library.candidates);
-        let worth = choice.gain / scale.max(1.0) - scan.spread[0] * scan.price[0] - tried;
-        let steady = scan.unlike[0] < UNSTEADY * choice.gain;
+        let worth =
+            choice.gain / scale.max(1.0) - score_test.spread[0] * score_test.price[0] - tried;
+        let steady = score_test.unlike[0] < UNSTEADY * choice.gain;
         (worth > 0.0 && steady).then_some(wave)
     }
 
     fn scanned(
         &self,
         waves: &[[f64; 2]],
-        (fitted, anchor): (&Fitted<N>, &Anchor<N>),
-    ) -> Option<(Library, Scan)> {
-        let library = Library::of_waves(self, anchor, waves).ok()?;
-        let scan = Scan::new(self, fitted, anchor, &library).ok()?;
+        (fitted, point): (&Fitted<N>, &LinearizationPoint<N>),
+    ) -> Option<(Library, ScoreTest)> {
+        let library = Library::of_waves(self, point, waves).ok()?;
+        let score_test = ScoreTest::new(self, fitted, point, &library).ok()?;
         // One that cannot be asked is missing, and the others no longer stand in their places.
-        (library.candidates.len() == waves.len()).then_some((library, scan))
+        (library.candidates.len() == waves.len()).then_some((library, score_test))
     }
 
     /// The frequency that explains most, with any phase and in both axes: its gain, and frequency and phase.
     fn waves_at(
         &self,
         frequencies: &[f64],
-        (fitted, anchor): (&Fitted<N>, &Anchor<N>),
+        (fitted, point): (&Fitted<N>, &LinearizationPoint<N>),
     ) -> Option<Wave> {
         let waves: Vec<[f64; 2]> = frequencies
             .iter()
             .flat_map(|&f| [[f, 0.0], [f, FRAC_PI_2]])
             .collect();
-        let (_, scan) = self.scanned(&waves, (fitted, anchor))?;
+        let (_, score_test) = self.scanned(&waves, (fitted, point))?;
         let wave = |(k, &frequency): (usize, &f64)| {
-            let choice = scan.evaluate(&[2 * k, 2 * k + 1])?;
+            let choice = score_test.evaluate(&[2 * k, 2 * k + 1])?;
             let phase = common_phase(&choice.coefficients[0], &choice.coefficients[1]);
             Some((choice.gain, [frequency, phase]))
         };
@@ -101,12 +102,12 @@ fn better(a: Option<Wave>, b: Option<Wave>) -> Option<Wave> {
 
 /// The phase \[rad\] that axes have in common whose sines and cosines are so large, in step or against each other.
 fn common_phase(sines: &[f64], cosines: &[f64]) -> f64 {
-    let (mut mixed, mut apart) = (0.0, 0.0);
+    let (mut mixed, mut trial_specific) = (0.0, 0.0);
     for (s, c) in std::iter::zip(sines, cosines) {
         mixed += 2.0 * s * c;
-        apart += s * s - c * c;
+        trial_specific += s * s - c * c;
     }
-    0.5 * libm::atan2(mixed, apart)
+    0.5 * libm::atan2(mixed, trial_specific)
 }
 
 #[cfg(test)]

@@ -7,12 +7,12 @@ use arm_core::{Contact, Joints, Pose, jacobian};
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
-use crate::data::prepared_session::Study;
+use crate::data::prepared_session::PreparedSession;
 use crate::data::repeats::same_rate;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
-use crate::sensitivity::linearization_point::{Anchor, slope};
+use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::sensitivity::normal_equations::factor;
-use crate::trial_specific::component::{Apart, shapes_of};
+use crate::trial_specific::component::{TrialSpecific, shapes_of};
 use arm_numerics::signal::spectrum::{Sum, coefficient, line};
 
 /// Where a line is looked for.
@@ -42,13 +42,17 @@ const TIE: f64 = 10.0;
 /// Coherence of the phases of trials above which a rhythm is locked to their start.
 const LOCKED: f64 = 0.8;
 
-impl<const N: usize> Study<'_, N> {
+impl<const N: usize> PreparedSession<'_, N> {
     /// Rhythms and ripple: a line in the spectrum of what is left, named by the pattern in which the channels follow.
     ///
     /// # Errors
     /// [`GapError::Simulation`] where the hypothesis cannot be simulated.
-    pub fn rhythm(&self, anchor: &Anchor<N>, place: Line) -> Result<Option<Apart>, GapError> {
-        let residuals = self.raw_residuals(anchor)?;
+    pub fn rhythm(
+        &self,
+        point: &LinearizationPoint<N>,
+        place: Line,
+    ) -> Result<Option<TrialSpecific>, GapError> {
+        let residuals = self.raw_residuals(point)?;
         let rate = self.courses[self.fitted[0]].rate;
         if self
             .fitted
@@ -61,7 +65,7 @@ impl<const N: usize> Study<'_, N> {
             Line::BetweenRepeats => self.differences(&residuals),
             Line::OfTheRobot => {
                 let trial = self.fitted[0];
-                let rig = self.session.rig(&anchor.hypothesis);
+                let rig = self.session.rig(&point.hypothesis);
                 let rig = rig.map_err(|source| GapError::Simulation { trial, source })?;
                 std::iter::zip(&residuals, &self.fitted)
                     .map(|(residual, &trial)| self.closure(residual, trial, &rig.contact))
@@ -75,7 +79,7 @@ impl<const N: usize> Study<'_, N> {
             Line::OfTheRobot => (SLOWEST_RIPPLE, &[Sum::Swings, Sum::Powers][..]),
         };
         let lines = sums.iter().filter_map(|sum| line(&all, rate, lowest, *sum));
-        let named = |frequency: f64| self.swinging_at(frequency, place, (anchor, &residuals));
+        let named = |frequency: f64| self.swinging_at(frequency, place, (point, &residuals));
         Ok(lines.filter_map(named).next())
     }
 
@@ -84,14 +88,14 @@ impl<const N: usize> Study<'_, N> {
         &self,
         frequency: f64,
         place: Line,
-        (anchor, residuals): (&Anchor<N>, &[Channels]),
-    ) -> Option<Apart> {
+        (point, residuals): (&LinearizationPoint<N>, &[Channels]),
+    ) -> Option<TrialSpecific> {
         let mut best: Vec<(f64, Explained)> = Vec::new();
         for columns in self.swings(frequency) {
             if place == Line::OfTheRobot && columns[0].kind.probe().nature != Nature::Periodic {
                 continue;
             }
-            let answers = self.answers(anchor, frequency, &columns);
+            let answers = self.answers(point, frequency, &columns);
             if let Some(explained) = self.explain(residuals, frequency, (&columns, &answers)) {
                 let worth = explained.gain - 8.0 * columns.len() as f64;
                 best.push((worth, explained));
@@ -114,7 +118,7 @@ impl<const N: usize> Study<'_, N> {
             })
             .map(|(worth, other)| (other.effect, most - worth))
             .collect();
-        Some(Apart {
+        Some(TrialSpecific {
             effect: first.effect,
             sd: first.sd,
             trial: None,
@@ -156,7 +160,7 @@ impl<const N: usize> Study<'_, N> {
     /// What is left between the arm's tip and the handle, stretch of the contact taken off: y and z \[m\].
     fn closure(&self, residual: &Channels, trial: usize, contact: &Contact<f64>) -> Channels {
         let course = &self.courses[trial];
-        let stretches = [0, 1].map(|axis| {
+        let valid_segments = [0, 1].map(|axis| {
             let spring = (contact.stiffness[axis], contact.damping[axis]);
             stretch(&residual[N + axis], spring, course.rate)
         });
@@ -166,7 +170,7 @@ impl<const N: usize> Study<'_, N> {
             let moved = Joints::<f64, N>::from_fn(|j, _| residual[j][i]);
             let tip = jacobian(&self.session.chain, &Pose::new(&q)) * moved;
             for axis in 0..2 {
-                out[axis].push(tip[axis] + stretches[axis][i]);
+                out[axis].push(tip[axis] + valid_segments[axis][i]);
             }
         }
         out
@@ -176,17 +180,23 @@ impl<const N: usize> Study<'_, N> {
     ///
     /// # Errors
     /// [`GapError::Numerics`] for channels that the filter refuses.
-    pub fn take_out(&mut self, anchor: &Anchor<N>, apart: &Apart) -> Result<(), GapError> {
-        for (sizes, &trial) in apart.sizes.iter().zip(&self.fitted.clone()) {
-            let Some(line) = anchor.lines.get(self.group_of[trial]) else {
+    pub fn take_out(
+        &mut self,
+        point: &LinearizationPoint<N>,
+        trial_specific: &TrialSpecific,
+    ) -> Result<(), GapError> {
+        for (sizes, &trial) in trial_specific.sizes.iter().zip(&self.fitted.clone()) {
+            let Some(line) = point.lines.get(self.group_of[trial]) else {
                 continue;
             };
             let mut course = Course::clone(&self.courses[trial]);
-            for (k, column) in apart.columns.iter().enumerate() {
+            for (k, column) in trial_specific.columns.iter().enumerate() {
                 for quarter in [false, true] {
                     let size = sizes[2 * k + usize::from(quarter)];
-                    let mut changed = anchor.hypothesis.clone();
-                    changed.named.push(small(column, apart.wave()[0], quarter));
+                    let mut changed = point.hypothesis.clone();
+                    changed
+                        .named
+                        .push(small(column, trial_specific.wave()[0], quarter));
                     let Ok(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
                         continue;
                     };
@@ -230,12 +240,16 @@ impl<const N: usize> Study<'_, N> {
     /// a tenth where an arm nearly rings with it. `None` where it cannot be simulated.
     ///
     /// Its standard deviation counts how sizes scatter from trial to trial.
-    pub fn sized(&self, anchor: &Anchor<N>, apart: &Apart) -> Option<Apart> {
-        let residuals = self.raw_residuals(anchor).ok()?;
-        let frequency = apart.wave()[0];
-        let size = apart.effect.parameters[free_of(apart.effect.kind)[0]].abs();
+    pub fn sized(
+        &self,
+        point: &LinearizationPoint<N>,
+        trial_specific: &TrialSpecific,
+    ) -> Option<TrialSpecific> {
+        let residuals = self.raw_residuals(point).ok()?;
+        let frequency = trial_specific.wave()[0];
+        let size = trial_specific.effect.parameters[free_of(trial_specific.effect.kind)[0]].abs();
         let shown = |group: usize, named: Option<Effect<f64>>| {
-            let mut hypothesis = anchor.hypothesis.clone();
+            let mut hypothesis = point.hypothesis.clone();
             hypothesis.named.extend(named);
             let course = &self.courses[self.references[group]];
             let run = self.session.run(&hypothesis, course).ok()?;
@@ -243,14 +257,14 @@ impl<const N: usize> Study<'_, N> {
         };
         let answer = |group: usize| {
             let base = shown(group, None)?;
-            let each = apart.columns.iter().map(|column| {
+            let each = trial_specific.columns.iter().map(|column| {
                 let swinging = shown(group, Some(sized_at(column, frequency, size)))?;
                 Some(slope(&swinging, &base, size))
             });
             each.collect()
         };
         let answers = self.parallel(self.references.len(), answer);
-        let explained = self.explain(&residuals, frequency, (&apart.columns, &answers))?;
+        let explained = self.explain(&residuals, frequency, (&trial_specific.columns, &answers))?;
         let sizes = explained.sizes.iter();
         let sizes: Vec<f64> = sizes
             .map(|s| libm::sqrt(s.iter().map(|v| v * v).sum::<f64>()))
@@ -259,24 +273,29 @@ impl<const N: usize> Study<'_, N> {
         let mean = sizes.iter().sum::<f64>() / n;
         let square = sizes.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>();
         let scatter = libm::sqrt(square / (n * (n - 1.0).max(1.0)));
-        let mut effect = apart.effect;
+        let mut effect = trial_specific.effect;
         for &p in free_of(effect.kind) {
             let info = &effect.kind.info().parameters[p];
             effect.parameters[p] = explained.effect.parameters[p].clamp(info.min, info.max);
         }
-        Some(Apart {
+        Some(TrialSpecific {
             effect,
             sd: f64::max(explained.sd, scatter),
-            ..apart.clone()
+            ..trial_specific.clone()
         })
     }
 
     /// What small swings show on each movement, to first order.
-    fn answers(&self, anchor: &Anchor<N>, frequency: f64, columns: &[Effect<f64>]) -> Vec<Answer> {
+    fn answers(
+        &self,
+        point: &LinearizationPoint<N>,
+        frequency: f64,
+        columns: &[Effect<f64>],
+    ) -> Vec<Answer> {
         self.parallel(self.references.len(), |group| {
-            let line = anchor.lines.get(group)?;
+            let line = point.lines.get(group)?;
             let each = columns.iter().map(|effect| {
-                let mut changed = anchor.hypothesis.clone();
+                let mut changed = point.hypothesis.clone();
                 changed.named.push(small(effect, frequency, false));
                 line.response_raw(&changed, UNIT, (false, false)).ok()
             });

@@ -40,7 +40,7 @@ use arm_numerics::NumericsError;
 use arm_numerics::error::check_range;
 use arm_numerics::least_squares::program::{Program, Status};
 use arm_numerics::statistics::autoregressive::effective_samples;
-use arm_numerics::statistics::sandwich_covariance::Bread;
+use arm_numerics::statistics::sandwich_covariance::SandwichCovariance;
 use arm_numerics::{Condenser, Factor, Matrix};
 
 /// Direction is read from angles below this frequency \[Hz\]: a quasi-static movement has nothing above.
@@ -598,7 +598,7 @@ fn residual_variance<const N: usize>(
 /// By how much every unknown moves with the scores of all steps and with those `moved` that no step finds: an error of one
 /// step is carried into the next.
 fn influence(
-    steps: &[(&Step, Bread)],
+    steps: &[(&Step, SandwichCovariance)],
     mut moved: Vec<f64>,
     score: impl Fn(usize) -> Vec<f64>,
 ) -> Result<Vec<f64>, IdentError> {
@@ -628,7 +628,7 @@ fn covariance(
         .iter()
         .map(|s| {
             let fixed: Vec<bool> = s.active.iter().map(|&a| bounds && a != 0).collect();
-            Ok((s, Bread::with_fixed(&s.posterior.r, &fixed)?))
+            Ok((s, SandwichCovariance::with_fixed(&s.posterior.r, &fixed)?))
         })
         .collect::<Result<Vec<_>, IdentError>>()?;
     let all = steps.first().map_or(0, |s| s.clusters.len());

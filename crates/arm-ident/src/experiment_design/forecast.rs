@@ -16,7 +16,7 @@ use crate::regression::sensitivity::{Course, parts};
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
 use crate::regression::unknown::{Source, Unknown, unknowns};
 use arm_numerics::NumericsError;
-use arm_numerics::statistics::sandwich_covariance::{Bread, standard_error};
+use arm_numerics::statistics::sandwich_covariance::{SandwichCovariance, standard_error};
 use arm_numerics::{Condenser, Factor, Matrix};
 
 /// Step of the simulations \[s\]: the fourth-order integrator holds stiff contacts with it.
@@ -437,7 +437,7 @@ fn covariance(
     let known = bread.with_prior(&zero, &sd)?;
     let spread = meat.with_prior(&zero, &sd)?;
     let score = spread.r.transpose().product(&spread.r);
-    Ok(Bread::new(&known.r, &[])?.sandwich(&score)?)
+    Ok(SandwichCovariance::new(&known.r, &[])?.sandwich(&score)?)
 }
 
 /// Lower triangular `G` with `G Gᵀ` the matrix; directions without noise stay zero.

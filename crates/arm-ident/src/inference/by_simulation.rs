@@ -11,7 +11,7 @@ use arm_numerics::error::{check_finite, check_least, check_len, check_range};
 use arm_numerics::least_squares::condense::Condenser;
 use arm_numerics::least_squares::factor::Factor;
 use arm_numerics::least_squares::program::Program;
-use arm_numerics::statistics::sandwich_covariance::Bread;
+use arm_numerics::statistics::sandwich_covariance::SandwichCovariance;
 
 /// A parameter beside the estimate is this share of its size away: between rounding (1e-14 of an angle) and curvature.
 const BESIDE: f64 = 1e-6;
@@ -276,7 +276,7 @@ impl<const N: usize> Search<'_, N> {
 /// Standard deviations of a factor in units of the noise, as if no bound held.
 fn deviations(factor: &Factor) -> Vec<f64> {
     let p = factor.parameters();
-    match Bread::new(&factor.r, &[]) {
+    match SandwichCovariance::new(&factor.r, &[]) {
         Ok(bread) => {
             let covariance = bread.white(1.0);
             (0..p).map(|i| libm::sqrt(covariance[(i, i)])).collect()

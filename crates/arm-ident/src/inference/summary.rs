@@ -10,7 +10,9 @@ use crate::regression::unknown::{Moment, Source, Unknown};
 use arm_numerics::NumericsError;
 use arm_numerics::linalg::matrix::Matrix;
 use arm_numerics::statistics::distributions::student_t_quantile;
-use arm_numerics::statistics::sandwich_covariance::{Bread, information_ratio, standard_error};
+use arm_numerics::statistics::sandwich_covariance::{
+    SandwichCovariance, information_ratio, standard_error,
+};
 
 /// Relative singular value below which a combination does not act on the data. Filtering and whitening leave exact
 /// dependencies exact to rounding; inertia in a slow movement is many orders above.
@@ -164,7 +166,7 @@ fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Spr
             binding.push((0..p).map(|i| if i == u { 1.0 } else { 0.0 }).collect());
         }
     }
-    let bread = Bread::new(&solved.posterior.r, &binding)?;
+    let bread = SandwichCovariance::new(&solved.posterior.r, &binding)?;
     let n = solved.clusters.len() as f64;
     let scores = solved
         .clusters

@@ -2,7 +2,7 @@
 //!
 //! The estimate minimises `½‖R x − z‖²` with some constraints binding. In the directions that stay free its covariance is the sandwich
 //! `H⁻¹ M H⁻¹`, `H = RᵀR`, where M is the covariance of the score `Σ y (b − yᵀx)`. Scores summed over a trial (a cluster) are independent between trials
-//! whatever the noise within a trial is, so M is estimated from their spread ([`Bread::clustered`]); for a single trial M is a long-run covariance
+//! whatever the noise within a trial is, so M is estimated from their spread ([`SandwichCovariance::clustered`]); for a single trial M is a long-run covariance
 //! ([`crate::statistics::long_run`]) or comes from blocks longer than the correlation time ([`blocks`]).
 //!
 //! Errors that repeat in every trial alike (calibration, lengths) are in none of these: add their covariance with [`Matrix::plus`].
@@ -18,16 +18,16 @@ const DEPENDENT: f64 = 1e-11;
 
 /// `H⁻¹` in the free directions, as factors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bread {
+pub struct SandwichCovariance {
     /// `p × f`: parameters per free coordinate.
     basis: Matrix,
     /// `f × f`, upper triangular: `TᵀT = basisᵀ H basis`.
     triangle: Matrix,
 }
 
-impl Bread {
+impl SandwichCovariance {
     /// * `r` - `m × p`, the factor of the estimate, prior rows included
-    /// * `binding` - gradients of the binding constraints, `p` each: unit vectors for bounds ([`Bread::with_fixed`]), rows of linear constraints, gradients of
+    /// * `binding` - gradients of the binding constraints, `p` each: unit vectors for bounds ([`SandwichCovariance::with_fixed`]), rows of linear constraints, gradients of
     ///   cones at the solution
     ///
     /// # Errors
@@ -74,10 +74,10 @@ impl Bread {
         })
     }
 
-    /// As [`Bread::new`] where only bounds bind: `fixed[j]` for a parameter that sits on its bound.
+    /// As [`SandwichCovariance::new`] where only bounds bind: `fixed[j]` for a parameter that sits on its bound.
     ///
     /// # Errors
-    /// As [`Bread::new`].
+    /// As [`SandwichCovariance::new`].
     pub fn with_fixed(r: &Matrix, fixed: &[bool]) -> Result<Self, NumericsError> {
         let p = r.cols();
         check_len("fixed", fixed.len(), p)?;

@@ -1,6 +1,6 @@
 use crate::noise::{Noise, gap};
 use arm_numerics::statistics::sandwich_covariance::{
-    Bread, blocks, information_ratio, intervals, standard_error,
+    SandwichCovariance, blocks, information_ratio, intervals, standard_error,
 };
 use arm_numerics::{Condenser, Factor, Matrix, NumericsError};
 
@@ -45,7 +45,7 @@ fn clustered_intervals_cover_and_white_ones_do_not() {
     for _ in 0..REPETITIONS {
         let Session { trials, all } = session(&mut noise, 10);
         let x = all.solve().expect("full rank");
-        let bread = Bread::new(&all.r, &[]).expect("full rank");
+        let bread = SandwichCovariance::new(&all.r, &[]).expect("full rank");
         let scores: Vec<Vec<f64>> = trials.iter().map(|t| t.score(&x).expect("three")).collect();
         let robust = bread.clustered(&scores).expect("ten");
         let naive = bread.white(all.rho2 / (all.rows as f64 - 3.0));
@@ -79,11 +79,11 @@ fn a_prior_pulls_all_clusters_alike_and_adds_no_spread() {
         .expect("valid");
     let x = prior.solve().expect("full rank");
     let scores: Vec<Vec<f64>> = trials.iter().map(|t| t.score(&x).expect("three")).collect();
-    let tight = Bread::new(&prior.r, &[])
+    let tight = SandwichCovariance::new(&prior.r, &[])
         .expect("full rank")
         .clustered(&scores)
         .expect("ten");
-    let loose = Bread::new(&all.r, &[])
+    let loose = SandwichCovariance::new(&all.r, &[])
         .expect("full rank")
         .clustered(&scores)
         .expect("ten");
@@ -98,7 +98,7 @@ fn the_mean_of_three_numbers() {
     let all = Factor::of(&y, &values).expect("finite");
     let x = all.solve().expect("one");
     let scores: Vec<Vec<f64>> = values.iter().map(|v| vec![v - x[0]]).collect();
-    let bread = Bread::new(&all.r, &[]).expect("one");
+    let bread = SandwichCovariance::new(&all.r, &[]).expect("one");
     let covariance = bread.clustered(&scores).expect("three");
     assert!((x[0] - 3.0).abs() < 1e-14 && (covariance[(0, 0)] - 7.0 / 3.0).abs() < 1e-14);
     assert!((bread.white(7.0)[(0, 0)] - 7.0 / 3.0).abs() < 1e-14);
@@ -112,16 +112,18 @@ fn binding_constraints_take_their_direction_out() {
     let r = Factor::of(&noise.matrix(40, 3), &[0.0; 40])
         .expect("finite")
         .r;
-    let full = Bread::new(&r, &[]).expect("full rank").white(1.0);
+    let full = SandwichCovariance::new(&r, &[])
+        .expect("full rank")
+        .white(1.0);
     let inverse = full.product(&r.transpose().product(&r));
     assert!(gap(inverse.as_slice(), Matrix::identity(3).as_slice()) < 1e-12);
 
-    let fixed = Bread::with_fixed(&r, &[false, true, false]).expect("full rank");
+    let fixed = SandwichCovariance::with_fixed(&r, &[false, true, false]).expect("full rank");
     assert_eq!(fixed.free(), 2);
     let covariance = fixed.white(1.0);
     assert!((0..3).all(|i| covariance[(1, i)].abs() < 1e-15));
     // The same as the problem without that column.
-    let smaller = Bread::new(&r.select_columns(&[0, 2]), &[])
+    let smaller = SandwichCovariance::new(&r.select_columns(&[0, 2]), &[])
         .expect("full rank")
         .white(1.0);
     assert!((covariance[(0, 0)] - smaller[(0, 0)]).abs() < 1e-13);
@@ -129,7 +131,8 @@ fn binding_constraints_take_their_direction_out() {
 
     // On x₀ + 2 x₁ = const. that combination is certain; scale and repetition of the constraint do not matter.
     let sum = [1.0, 2.0, 0.0];
-    let held = Bread::new(&r, &[sum.to_vec(), sum.map(|v| 1e6 * v).to_vec()]).expect("full rank");
+    let held = SandwichCovariance::new(&r, &[sum.to_vec(), sum.map(|v| 1e6 * v).to_vec()])
+        .expect("full rank");
     assert_eq!(held.free(), 2);
     assert!(standard_error(&held.white(1.0), &sum).expect("three") < 1e-7);
     let meat = r.transpose().product(&r);
@@ -145,14 +148,14 @@ fn binding_constraints_take_their_direction_out() {
 fn a_held_parameter_makes_an_undetermined_problem_determined() {
     let r = Matrix::from_row_major(1, 2, &[1.0, 1.0]).expect("two");
     assert!(matches!(
-        Bread::new(&r, &[]),
+        SandwichCovariance::new(&r, &[]),
         Err(NumericsError::Rank {
             found: 1,
             expected: 2,
             ..
         })
     ));
-    let held = Bread::with_fixed(&r, &[true, false]).expect("one left");
+    let held = SandwichCovariance::with_fixed(&r, &[true, false]).expect("one left");
     assert!((held.white(4.0)[(1, 1)] - 4.0).abs() < 1e-14);
 }
 
@@ -172,7 +175,7 @@ fn information_ratio_and_refusals() {
     assert_eq!(information_ratio(0.5, 1.0), Ok(0.75));
     assert_eq!(information_ratio(2.0, 1.0), Ok(0.0));
     assert!(information_ratio(0.5, 0.0).is_err());
-    let bread = Bread::new(&Matrix::identity(2), &[]).expect("full rank");
+    let bread = SandwichCovariance::new(&Matrix::identity(2), &[]).expect("full rank");
     assert!(matches!(
         bread.clustered(&[vec![1.0, 1.0]]),
         Err(NumericsError::TooFew {
@@ -189,8 +192,8 @@ fn information_ratio_and_refusals() {
     );
     assert!(bread.apply(&[1.0]).is_err());
     assert!(bread.sandwich(&Matrix::identity(3)).is_err());
-    assert!(Bread::with_fixed(&Matrix::identity(2), &[true]).is_err());
-    assert!(Bread::new(&Matrix::identity(2), &[vec![1.0, f64::NAN]]).is_err());
+    assert!(SandwichCovariance::with_fixed(&Matrix::identity(2), &[true]).is_err());
+    assert!(SandwichCovariance::new(&Matrix::identity(2), &[vec![1.0, f64::NAN]]).is_err());
     let cov = Matrix::identity(2);
     assert!(intervals(&[1.0], &cov, 9.0, 0.95).is_err());
     assert!(intervals(&[1.0, f64::NAN], &cov, 9.0, 0.95).is_err());
