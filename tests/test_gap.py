@@ -59,7 +59,8 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
             "How to repeat",
         },
     )
-    assert verdict.startswith("The model lacks viscous in joint 2 (elbow): resistance in proportion to joint speed, viscosity 0.")
+    assert verdict.startswith("The model lacks viscous in joint 2 (elbow), viscosity 0.")
+    assert verdict.count(". ") == 0 and "on held-out trials falls from" in verdict
 
 
 def test_a_joint_may_have_any_name(viscous: armrs.GapFound, tmp_path: Path) -> None:

@@ -192,7 +192,7 @@ def _result(data: Mapping[str, Any], folder: Path) -> str:
     head = f"<h1>{escape(KINDS[data['verb']])}: {escape(words.name(data))}</h1>\n"
     if words.is_synthetic(data):
         head += '<p><span class="label">Synthetic data: simulated, not measured</span></p>\n'
-    return head + paragraph(words.verdict(data), "verdict") + _sections(data, figures) + drawn + _origin(data)
+    return head + paragraph(words.verdict(data), "verdict") + figures.get("first", "") + _sections(data, figures) + drawn + _origin(data)
 
 
 def _sections(data: Mapping[str, Any], figures: Mapping[str, str]) -> str:

@@ -11,9 +11,10 @@ from ...report import plotting
 from ...report.figures import Drawn, slug
 from . import maps
 from .found import GapFound, Missing
+from .headline import place_of
 from .reading import channel_names, is_led
 from .shapes import Portrait, portrait, telling_trial
-from .words import place_of
+from .summary import summary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +31,8 @@ def gap(result: GapFound) -> list[Drawn]:
     """Draw what the workflow found; `section` of each figure is the part of the report that it belongs to."""
     drawn: list[Drawn] = []
     with plotting.style():
+        drawn.append(summary(result))
         if any(g.calibrated is not None for g in result.gap.values()):
-            drawn.append(_sizes(result))
             drawn.append(_before_and_after(result))
         drawn += _maps(result)
         if result.ladder:
@@ -50,56 +51,6 @@ def _shown(name: str) -> tuple[str, float]:
     """Return how a channel is shown, and its factor: angles in degrees."""
     quantity, unit = name.rsplit("_", 1)
     return (f"{quantity} [°]", 180.0 / np.pi) if unit == "rad" else (f"{quantity} [{'N m' if unit == 'Nm' else unit}]", 1.0)
-
-
-def _sizes(result: GapFound) -> Drawn:
-    """Draw the root mean square gap of every channel beside what repeats differ by, a panel for each unit."""
-    units: dict[str, list[str]] = {}
-    for name in result.gap:
-        units.setdefault(_shown(name)[0].split(" ", 1)[1], []).append(name)
-    figure = plotting.figure(4.6 * len(units) + 0.6, 0.42 * max(map(len, units.values())) + 1.5)
-    axes = figure.subplots(1, len(units), squeeze=False)[0]
-    values = {"given": "before", "calibrated": "calibrated", "amended": "after"}
-    for ax, (unit, names) in zip(axes, units.items(), strict=True):
-        for row, name in enumerate(names):
-            factor, own = _shown(name)[1], result.gap[name]
-            there = [getattr(own, values[s]) for s in _steps(result)]
-            seen = [v * factor for v in there if v is not None]
-            ax.hlines(row, min(seen), max(seen), color=plotting.SILVER, lw=2.0, zorder=1)
-            if own.floor is not None:
-                ax.plot(own.floor * factor, row, marker="|", ms=20, mew=2.6, color=plotting.GREEN, ls="", zorder=2)
-            for step, value in zip(_steps(result), there, strict=True):
-                if value is not None:
-                    colour, _, _, _ = STEPS[step]
-                    ax.plot(
-                        value * factor, row, marker="o", ms=8, color=colour, mfc="white" if step == "given" else colour, mew=1.8, zorder=3
-                    )
-        ax.set_yticks(range(len(names)), [_shown(name)[0].split(" ")[0] for name in names])
-        ax.set_ylim(len(names) - 0.4, -0.6)
-        ax.set_xlim(left=0.0)
-        ax.grid(visible=False, axis="y")
-        ax.tick_params(axis="y", length=0)
-        ax.set_xlabel(f"root mean square {unit}")
-    floor = any(g.floor is not None for g in result.gap.values())
-    _legend(figure, _steps(result), floor=floor)
-    text = "Simulated less measured, over all test trials: trials on which nothing was chosen and nothing fitted."
-    if len(_steps(result)) > 2:
-        text += " The step from calibrated to the named effects is what the names are worth."
-    if floor:
-        text += " The green line is what repeats of one movement differ by, and no model can be nearer."
-    return Drawn("gap", "The gap of every channel", text, figure, "gap")
-
-
-def _legend(figure: Any, steps: Sequence[str], *, floor: bool) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=STEPS[s][0], marker="o", ls="", ms=8, mew=1.8, mfc="white" if s == "given" else STEPS[s][0], label=STEPS[s][1])
-        for s in steps
-    ]
-    if floor:
-        handles.append(Line2D([], [], color=plotting.GREEN, marker="|", ls="", mew=2.6, ms=14, label="repeats differ by"))
-    figure.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=9)
 
 
 def _before_and_after(result: GapFound) -> Drawn:

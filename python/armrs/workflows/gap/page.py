@@ -8,6 +8,7 @@ from typing import Any
 from ...report import words as common
 from ...report.pages import bullets, heading, paragraph, table
 from . import words
+from .headline import effect_name
 
 _SECTIONS = ("gap", "effects", "where", "evidence")
 
@@ -42,8 +43,7 @@ def _missing(data: Mapping[str, Any], drawn: str) -> str:
     joints = data["data"]["joints"]
     out = heading("What the model lacks")
     out += bullets(
-        f"{words.effect_name(e, joints)}: {e['summary']}. {e['formula']}. {words.size(e)}; by chance {words.chance(e)}."
-        for e in data["effects"]
+        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {words.size(e)}; by chance {words.chance(e)}." for e in data["effects"]
     )
     out += table(words.missing(data))
     out += paragraph(

@@ -8,28 +8,14 @@ from typing import Any
 
 from ...report import words as common
 from ...report.tables import Table, number, spread, unit
+from . import headline
+from .headline import effect_name, joined
 from .reading import MISFIT
 
-_FEW = 2
-"""Effects that a verdict describes; of more it only gives the names."""
+verdict = headline.headline
+"""The result in one sentence."""
 _TELLS = 5.0
 """Standard deviations from which on a movement tells two effects apart."""
-
-
-def place_of(kind: str, joint: int | None, channel: str | None, joints: Sequence[str] = ()) -> str:
-    """Return an effect with its place, in words."""
-    name = f" ({joints[joint - 1]})" if joint and joint <= len(joints) and joints[joint - 1] != f"joint {joint}" else ""
-    place = f" in joint {joint}{name}" if joint else f" of {channel}" if channel else ""
-    return kind.replace("_", " ") + place
-
-
-def effect_name(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
-    """Return a named effect, an alternative or a limit with its place, in words."""
-    return place_of(effect["kind"], effect["joint"], effect["channel"], joints)
-
-
-def _joined(names: Sequence[str], last: str = "and") -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}" if names else ""
 
 
 def size(effect: Mapping[str, Any]) -> str:
@@ -50,66 +36,18 @@ def chance(effect: Mapping[str, Any]) -> str:
 _UNTESTED = "Without repeats of a movement, whether what is left is noise cannot be tested."
 
 
-def verdict(result: Mapping[str, Any]) -> str:
-    """Return the result in a sentence or two."""
-    joints = result["data"]["joints"]
-    # Of many things the names are enough in a sentence; a table says the rest.
-    many = len(result["effects"]) > _FEW
-    names = [
-        effect_name(e, joints) + ("" if many else f": {e['summary']}, {size(e)}") + (f", in {e['trial']} only" if e.get("trial") else "")
-        for e in result["effects"]
-    ]
-    is_tested = result["lack_of_fit"]["amended"]["z"] is not None
-    if result["verdict"] == "nothing_missing":
-        if not is_tested:
-            return f"No effect was found that these data show. {_UNTESTED}{_judged(result)}"
-        return "Nothing is missing: what is left of these data is what repeats of one movement differ by." + _judged(result)
-    listed = names[0] if len(names) == 1 else "; ".join(names)
-    lacks = f"The model lacks {listed}." if len(names) == 1 else f"The model lacks {len(names)} things: {listed}."
-    if result["verdict"] == "explained":
-        rest = f"With {'it' if len(names) == 1 else 'them'}, {_left(result)}." if is_tested else _UNTESTED
-        return f"{lacks} {rest}{_judged(result)}"
-    rest = "something is missing that the catalogue has no name for"
-    looks = result["unexplained"]["looks_like"]
-    tail = f" {looks[0].upper()}{looks[1:]}." if looks else ""
-    return (f"{lacks} Beyond that, {rest}." if names else f"{rest[0].upper()}{rest[1:]}.") + tail + _judged(result)
-
-
-def _left(result: Mapping[str, Any]) -> str:
-    """Say what is left where effects explain the data."""
-    if result["lack_of_fit"]["amended"]["z"] < MISFIT:
-        return "what is left is noise"
-    share = result["unexplained"]["share"]
-    size = f"{share:.1%}" if share >= 0.001 else "less than 0.1%"
-    return f"{size} of the misfit is left, less than the noise: the laws are not exact"
-
-
-def _judged(result: Mapping[str, Any]) -> str:
-    """Say what the names are worth on the test trials, by the channel that gained most."""
-    seen = {n: g for n, g in result["gap"].items() if None not in (g["calibrated"], g["after"]) and g["calibrated"]}
-    if not seen or not any(not e.get("trial") for e in result["effects"]):
-        return ""
-    # Not by what calibration alone has spoilt.
-    name = max(seen, key=lambda n: min(seen[n]["before"] or seen[n]["calibrated"], seen[n]["calibrated"]) / max(seen[n]["after"], 1e-300))
-    gap = seen[name]
-    quantity, held_in = name.rsplit("_", 1)
-    held_in = {"Nm": "N m"}.get(held_in, held_in)
-    floor = f"; repeats differ by {gap['floor']:.2g}" if gap["floor"] is not None else ""
-    return f" On trials kept apart {quantity} is then off by {gap['after']:.2g} instead of {gap['calibrated']:.2g} {held_in}{floor}."
-
-
 def others(result: Mapping[str, Any]) -> list[str]:
     """Return what may be there instead, a line for each effect that has alternatives, and what would tell."""
     lines = []
     for effect in result["effects"]:
         listed = [f"{effect_name(a)} ({_how(a)})" for a in effect["alternatives"]]
         if listed:
-            lines.append(f"Instead of {effect_name(effect)} it may be {_joined(listed, 'or')}.")
+            lines.append(f"Instead of {effect_name(effect)} it may be {joined(listed, 'or')}.")
         # What several are told by stands once.
         told: dict[str, list[str]] = {}
         for a in effect["alternatives"]:
             told.setdefault(_separating(a), []).append(effect_name(a))
-        lines += [f"To tell {effect_name(effect)} from {_joined(names, 'or')}: {how}" for how, names in told.items() if how]
+        lines += [f"To tell {effect_name(effect)} from {joined(names, 'or')}: {how}" for how, names in told.items() if how]
     return lines
 
 
@@ -154,6 +92,13 @@ def left(result: Mapping[str, Any]) -> list[str]:
             )
     if not lines:
         lines.append(_UNTESTED)
+    for name in headline.still_open(result):
+        channel = result["gap"][name]
+        quantity, held_in = name.rsplit("_", 1)
+        lines.append(
+            f"{quantity} is open on the test trials: off by {headline.left(channel):.2g} {unit(held_in)}, where repeats differ by "
+            f"{channel['floor']:.2g}{headline.place(result, name)}."
+        )
     if result["unexplained"]["share"]:
         lines.append(f"{result['unexplained']['share']:.1%} of what was beyond noise is still there.")
     if result["unexplained"]["looks_like"]:
@@ -170,8 +115,7 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         print(line)
     common.show("Gap on the test trials, root mean square of simulated less measured", gap(result))
     common.show("Where the calibrated model and the data disagree most", where(result))
-    if result["verdict"] != "explained":
-        print("\n".join(left(result)) + "\n")
+    print("\n".join(left(result)) + "\n")
     if result["verdict"] == "nothing_missing":
         common.show("The smallest effects that these data would have shown", limits(result))
     common.files_written(written[-1:])
@@ -222,6 +166,7 @@ def missing(data: Mapping[str, Any]) -> Table:
 def gap(data: Mapping[str, Any]) -> Table:
     """Return the gap of every channel: as given, calibrated, with the named effects, and the floor."""
     named = any(not e.get("trial") for e in data["effects"])
+    opened = headline.still_open(data)
     steps = ("before", "calibrated", "after", "floor") if named else ("before", "calibrated", "floor")
     rows: list[list[object]] = []
     for name, channel in data["gap"].items():
@@ -233,9 +178,18 @@ def gap(data: Mapping[str, Any]) -> Table:
         closed = f"{(channel['calibrated'] - channel['after']) / above:.0%}" if counts else None
         quantity, held_in = name.rsplit("_", 1)
         values = [None if channel[step] is None else f"{channel[step]:.3g}" for step in steps]
-        rows.append([f"{quantity} [{'N m' if held_in == 'Nm' else held_in}]", *values, *([closed] if named else [])])
+        rows.append(
+            [
+                f"{quantity} [{'N m' if held_in == 'Nm' else held_in}]",
+                *values,
+                *([closed] if named else []),
+                "open" if name in opened else None,
+            ]
+        )
     head = {"before": "as given", "calibrated": "calibrated", "after": "with the named", "floor": "repeats differ by"}
-    return Table(["channel", *(head[step] for step in steps), *(["closed above that"] if named else [])], rows, 1)
+    columns = ["channel", *(head[step] for step in steps), *(["closed above that"] if named else []), ""]
+    # Nothing is open: there is no column for it.
+    return Table(columns, rows, 1) if opened else Table(columns[:-1], [row[:-1] for row in rows], 1)
 
 
 def where(data: Mapping[str, Any], most: int = 6) -> Table:

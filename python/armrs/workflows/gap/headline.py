@@ -1,0 +1,149 @@
+"""The result of the gap workflow in one sentence, borne out by its own table of gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...report.tables import number, spread, unit
+
+OPEN = 1.5
+"""A channel is open where its gap exceeds so many times its floor; only where the result does not say itself what is open."""
+_SIZED = 2
+"""Effects whose sizes stand in the sentence; of more it only gives the names."""
+
+
+def place_of(kind: str, joint: int | None, channel: str | None, joints: Sequence[str] = ()) -> str:
+    """Return an effect with its place, in words."""
+    name = f" ({joints[joint - 1]})" if joint and joint <= len(joints) and joints[joint - 1] != f"joint {joint}" else ""
+    place = f" in joint {joint}{name}" if joint else f" of {channel}" if channel else ""
+    return kind.replace("_", " ") + place
+
+
+def effect_name(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
+    """Return a named effect, an alternative or a limit with its place, in words."""
+    return place_of(effect["kind"], effect["joint"], effect["channel"], joints)
+
+
+def joined(names: Sequence[str], last: str = "and") -> str:
+    """Return `a, b and c`."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}" if names else ""
+
+
+def left(channel: Mapping[str, Any]) -> float | None:
+    """Return what the last model leaves of a channel."""
+    value = channel["calibrated"] if channel["after"] is None else channel["after"]
+    return None if value is None else float(value)
+
+
+def still_open(result: Mapping[str, Any]) -> list[str]:
+    """Return the channels whose gap on the test trials the named effects leave open, the widest first.
+
+    What the result lists as `open` counts; a result without such a list is judged by `OPEN`.
+    """
+    listed = result.get("open")
+    if listed is None:
+        pairs = [(name, left(g), g["floor"]) for name, g in result["gap"].items()]
+        names = [name for name, value, floor in pairs if value is not None and floor and value > OPEN * floor]
+    else:
+        names = list(dict.fromkeys(entry["channel"] for entry in listed))
+    return sorted(names, key=lambda name: -_times(result["gap"].get(name, {}), "last"))
+
+
+def headline(result: Mapping[str, Any]) -> str:
+    """Return the answer in one sentence: what the model lacks, and what that does to the gap on trials that were kept apart."""
+    joints, effects = result["data"]["joints"], result["effects"]
+    opened, unexplained = still_open(result), result["verdict"] == "unexplained"
+    tested = result["lack_of_fit"]["amended"]["z"] is not None
+    if not effects and not unexplained and not opened:
+        if not tested:
+            return "No effect was found that these data show; without repeats, whether what is left is noise cannot be tested."
+        return "Nothing is missing: on held-out trials every channel is off by what repeats differ by."
+    if effects:
+        lacks = f"The model lacks {_names(effects, joints)}"
+        lacks += ", and something that the catalogue has no name for" if unexplained else ", and that is not all" if opened else ""
+    else:
+        lacks = "Something is missing that the catalogue has no name for" if unexplained else "No effect of the catalogue was found"
+        lacks += "" if unexplained else ", yet something is missing"
+    said = _gap(result, opened)
+    return f"{lacks}{': ' if said else ''}{said}."
+
+
+def _names(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> str:
+    """Return the named effects, with their sizes where they are few; of one kind in several joints once."""
+    if len(effects) <= _SIZED:
+        return joined([_sized(e, joints) for e in effects])
+    together: dict[str, list[int]] = {}
+    for e in effects:
+        if e["joint"] and _decided(e) and not e.get("trial"):
+            together.setdefault(e["kind"], []).append(e["joint"])
+    names = []
+    for kind, places in together.items():
+        where = f"joint {places[0]}" if len(places) == 1 else f"joints {joined([str(j) for j in sorted(places)])}"
+        names.append(f"{kind.replace('_', ' ')} in {where}")
+    names += [_name(e, joints) for e in effects if not (e["joint"] and _decided(e) and not e.get("trial"))]
+    return f"{len(effects)} effects ({'; '.join(names)})"
+
+
+def _decided(effect: Mapping[str, Any]) -> bool:
+    return effect.get("decided") is not False
+
+
+def _name(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
+    """Return an effect in words: where the data do not decide, with what it may be instead."""
+    where = f" in {effect['trial']} only" if effect.get("trial") else ""
+    if _decided(effect):
+        return effect_name(effect, joints) + where
+    stated = [effect, *effect["alternatives"]]
+    if len({(e["joint"], e["channel"]) for e in stated}) == 1:
+        # All of them act in one place.
+        kinds = joined([e["kind"].replace("_", " ") for e in stated], "or")
+        named = effect_name({**effect, "kind": kinds}, joints)
+    else:
+        named = joined([effect_name(e, joints) for e in stated], "or")
+    return f"{named}{where}, which these movements cannot tell apart"
+
+
+def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
+    name = _name(effect, joints)
+    if not _decided(effect):
+        return name
+    fitted = [(n, p) for n, p in effect["parameters"].items() if p["std"] is not None]
+    if not fitted:
+        return name
+    parameter, value = fitted[0]
+    return f"{name}, {parameter} {number(value['value'], value['std'])} ± {spread(value['std'])} {unit(value['unit'])}".rstrip()
+
+
+def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
+    """Say what the gap of one channel does: of an open one where there is such, else of that which was widest."""
+    gap = {name: g for name, g in result["gap"].items() if g["calibrated"]}
+    if not gap:
+        return "there is no test trial to measure the gap on"
+    shown = [name for name in opened if name in gap]
+    name = shown[0] if shown else max(gap, key=lambda n: _times(gap[n], "calibrated"))
+    channel = gap[name]
+    quantity, held_in = name.rsplit("_", 1)
+    held_in = {"Nm": "N m"}.get(held_in, held_in)
+    floor = f", where repeats differ by {channel['floor']:.2g} {held_in}" if channel["floor"] else ""
+    floor += place(result, name) if shown else ""
+    value = left(channel)
+    if shown or channel["after"] is None or not any(not e.get("trial") for e in result["effects"]):
+        return f"on held-out trials {quantity} is {'still ' if shown and result['effects'] else ''}off by {value:.2g} {held_in}{floor}"
+    them = "it" if len(result["effects"]) == 1 else "them"
+    return f"with {them}, the gap of {quantity} on held-out trials falls from {channel['calibrated']:.2g} to {value:.2g} {held_in}{floor}"
+
+
+def place(result: Mapping[str, Any], name: str) -> str:
+    """Return where a channel is open, where the result says that: ` (trials/fast_2.csv, 3.1 to 4.6 s)`."""
+    entry = next((o for o in result.get("open") or [] if o["channel"] == name), None)
+    if entry is None or not entry.get("trial"):
+        return ""
+    span = f", {entry['t_start']:.1f} to {entry['t_end']:.1f} s" if entry.get("t_start") is not None else ""
+    return f" ({entry['trial']}{span})"
+
+
+def _times(channel: Mapping[str, Any], step: str) -> float:
+    """Return a gap in units of its floor, or in its own where there is none."""
+    value = (left(channel) if step == "last" else channel.get(step)) if channel else None
+    return 0.0 if value is None else float(value) / float(channel["floor"] or 1.0)

@@ -1,0 +1,228 @@
+"""The picture that a gap report opens with: the arm with the named effects where they act, and the gap shrinking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...catalogue import Kind, catalogue
+from ...report import plotting
+from ...report.figures import Drawn
+from ...report.tables import number, spread, unit
+from .found import ChannelGap, GapFound, Missing
+from .headline import still_open
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+STEPS = {
+    "before": (plotting.GREY, "model as given"),
+    "calibrated": (plotting.ORANGE, "calibrated"),
+    "after": (plotting.BLUE, "with the named effects"),
+}
+"""The steps of a gap: colour and name."""
+_LINES = 11
+"""Effects that find room beside the sketch."""
+
+
+def summary(result: GapFound) -> Drawn:
+    """Draw the arm with the named effects, and beside it the gap of every channel on the test trials in units of its floor."""
+    gaps = {name: g for name, g in result.gap.items() if g.calibrated is not None}
+    named = len(result.effects)
+    figure = plotting.figure(10.6, max(3.9, 0.34 * len(gaps) + 1.7, 0.3 * min(named, _LINES) + 1.5))
+    left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.0, 1.05)})
+    sketch(result, left)
+    text = "Left, the arm in the middle of its movements, with the named effects where they act."
+    if not named:
+        text = "Left, the arm in the middle of its movements; no effect was named."
+    if gaps:
+        shrinking(result, gaps, right)
+        text += " Right, simulated less measured on trials that were kept apart, in units of what repeats differ by."
+        if result.effects:
+            text += " The step from calibrated to the named effects is what the names are worth."
+    else:
+        right.set_axis_off()
+        right.text(0.0, 0.5, "There is no test trial to measure the gap on.")
+    return Drawn("summary", "What is missing, and what it is worth", text, figure, "first")
+
+
+# ---- the arm
+
+
+def sketch(result: GapFound, ax: Axes) -> None:
+    """Draw the arm in the middle of its movements, the robot where there is one, and the named effects."""
+    model = result.dataset.model
+    q = np.median(np.concatenate([t.q[t.valid] for t in result.dataset.trials]), axis=0)
+    directions = np.cumsum(q)
+    steps = np.array([s.length for s in model.segments])[:, None] * np.column_stack([np.cos(directions), np.sin(directions)])
+    points = np.vstack([model.base, np.asarray(model.base) + np.cumsum(steps, axis=0)])
+    reach = float(np.ptp(points, axis=0).max())
+    if model.robot is not None:
+        _robot(result, points[-1], ax)
+    acting = {place for effect in result.effects for place in _places(effect, catalogue()[effect.kind])}
+    for k in range(len(steps)):
+        marked = ("segment", k) in acting
+        ax.plot(*points[k : k + 2].T, color=plotting.BLUE if marked else plotting.INK, lw=6.0, solid_capstyle="round", zorder=2)
+    for k, point in enumerate(points[:-1]):
+        marked = ("joint", k) in acting
+        ax.plot(*point, marker="o", ms=15 if marked else 9, mfc=plotting.BLUE if marked else "white", mec=plotting.INK, mew=1.8, zorder=4)
+        if marked:
+            ax.text(point[0], point[1], str(k + 1), color="white", ha="center", va="center", fontsize=9, fontweight="bold", zorder=5)
+    hand = ("hand", 0) in acting
+    ax.plot(*points[-1], marker="s", ms=11, mfc=plotting.BLUE if hand else "white", mec=plotting.INK, mew=1.8, zorder=4)
+    _down(points, reach, ("frame", 0) in acting, ax)
+    for first, last in ((k - 1, k) for place, k in acting if place == "across"):
+        _bow(points, first, last, reach, ax)
+    _labels(result, points, ax)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.06)
+    ax.set_axis_off()
+
+
+def _places(effect: Missing, kind: Kind) -> list[tuple[str, int]]:
+    """Return what of the sketch an effect marks: by where its kind acts, never by its name."""
+    if kind.first_joint > 1 and effect.joint is not None:
+        return [("joint", effect.joint - 2), ("joint", effect.joint - 1), ("across", effect.joint - 1)]
+    if effect.joint is not None:
+        return [("segment" if kind.where == "segment" else "joint", effect.joint - 1)]
+    return [("frame" if kind.where == "frame" else "hand", 0)]
+
+
+def _robot(result: GapFound, tip: np.ndarray, ax: Axes) -> None:
+    robot = result.dataset.model.robot
+    angles = [t.robot_q[t.valid] for t in result.dataset.trials if t.robot_q is not None]
+    if robot is None or not angles:
+        return
+    first = float(np.median(np.concatenate(angles), axis=0)[0])
+    base = np.asarray(robot.base)
+    elbow = base + robot.lengths[0] * np.array([np.cos(first), np.sin(first)])
+    line = np.vstack([base, elbow, tip])
+    ax.plot(*line.T, color=plotting.SILVER, lw=4.0, solid_capstyle="round", zorder=1)
+    ax.plot(*base, marker="s", ms=10, color=plotting.SILVER, zorder=1)
+    ax.text(base[0], base[1], "robot  ", color=plotting.GREY, ha="right", va="center", fontsize=9)
+
+
+def _down(points: np.ndarray, reach: float, marked: bool, ax: Axes) -> None:
+    """Draw the weight's direction at the base."""
+    colour = plotting.BLUE if marked else plotting.SILVER
+    at = points[0] - [0.12 * reach, 0.0]
+    ax.plot([at[0], at[0]], [at[1], at[1] - 0.2 * reach], color=colour, lw=2.2 if marked else 1.4)
+    ax.plot(at[0], at[1] - 0.2 * reach, marker="v", ms=8, color=colour)
+    ax.text(at[0], at[1] - 0.26 * reach, "g", color=colour, ha="center", va="top", fontsize=10)
+
+
+def _bow(points: np.ndarray, first: int, last: int, reach: float, ax: Axes) -> None:
+    """Draw a cord over two joints, beside the segment between them."""
+    along = points[last] - points[first]
+    normal = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-9)
+    s = np.linspace(-0.25, 1.25, 40)
+    path = points[first] + s[:, None] * along + (0.1 * reach * (0.4 + np.sin(np.pi * np.clip(s, 0, 1))))[:, None] * normal
+    ax.plot(*path.T, color=plotting.BLUE, lw=2.0, ls=(0, (2, 1.2)), zorder=3)
+
+
+def _labels(result: GapFound, points: np.ndarray, ax: Axes) -> None:
+    """Write the named effects above the sketch, each with its place and its size."""
+    joints = [j.name for j in result.dataset.model.joints]
+    lines = []
+    for effect in result.effects:
+        named = f"{joints[effect.joint - 1]}: " if effect.joint else f"{effect.channel}: " if effect.channel else ""
+        here = f"{effect.joint}  {named}" if effect.joint else f"■  {named}" if catalogue()[effect.kind].where != "frame" else "g  "
+        lines.append((here + _words(effect), plotting.INK if getattr(effect, "decided", True) is not False else plotting.RED))
+    if len(lines) > _LINES:
+        lines = [*lines[: _LINES - 1], (f"and {len(lines) - _LINES + 1} more", plotting.GREY)]
+    for k, (line, colour) in enumerate(lines):
+        ax.annotate(
+            line,
+            (0.0, 1.0),
+            xycoords="axes fraction",
+            xytext=(0, -15 * k),
+            textcoords="offset points",
+            va="top",
+            fontsize=9.5,
+            color=colour,
+        )
+    if lines:
+        # The sketch keeps out of their way.
+        top, low = points[:, 1].max(), points[:, 1].min()
+        ax.plot(points[0, 0], top + (top - low + 0.2) * 0.11 * len(lines), alpha=0.0)
+
+
+def _words(effect: Missing) -> str:
+    """Return an effect with its size, and with its rivals where the data do not decide."""
+    text = effect.kind.replace("_", " ")
+    if getattr(effect, "decided", True) is False:
+        rivals = dict.fromkeys(a.kind.replace("_", " ") for a in effect.alternatives)
+        return f"{text}, or {' or '.join(rivals)}: not decided"
+    name, value = next(((n, v) for n, v in effect.parameters.items() if v.std is not None), (None, None))
+    if name is not None and value is not None:
+        text += f" {number(value.value, value.std)} ± {spread(value.std)} {unit(value.unit)}".rstrip()
+    return text + (" (one trial)" if effect.trial else "")
+
+
+# ---- the gap
+
+
+def shrinking(result: GapFound, gaps: Mapping[str, ChannelGap], ax: Axes) -> None:
+    """Draw the gap of every channel in units of its floor (without repeats: of the calibrated gap), step by step."""
+    steps = list(STEPS) if any(e.trial is None for e in result.effects) else ["before", "calibrated"]
+    floors = all(g.floor for g in gaps.values())
+    opened = still_open(result.to_dict() | {"data": {"joints": []}})
+    largest = 1.0
+    for row, (name, gap) in enumerate(gaps.items()):
+        one = (gap.floor if floors else gap.calibrated) or 1.0
+        values = [(step, getattr(gap, step)) for step in steps]
+        seen = [(step, value / one) for step, value in values if value is not None]
+        largest = max(largest, *(value for _, value in seen))
+        ax.hlines(row, min(v for _, v in seen), max(v for _, v in seen), color=plotting.SILVER, lw=2.4, zorder=1)
+        doubt = getattr(gap, "floor_std", None)
+        if floors and doubt:
+            ax.fill_betweenx(
+                [row - 0.36, row + 0.36], max(1.0 - doubt / one, 0.05), 1.0 + doubt / one, color=plotting.GREEN, alpha=0.25, lw=0
+            )
+        for step, value in seen:
+            colour, _ = STEPS[step]
+            ax.plot(value, row, marker="o", ms=9, color=colour, mfc="white" if step == "before" else colour, mew=1.8, zorder=3)
+        text, colour = _change(name, seen, one, opened=name in opened), plotting.RED if name in opened else plotting.INK
+        right: dict[str, Any] = {"xycoords": ax.get_yaxis_transform(), "xytext": (6, 0), "textcoords": "offset points"}
+        ax.annotate(text, (1.0, row), va="center", fontsize=9, color=colour, **right)
+    if floors:
+        ax.axvline(1.0, color=plotting.GREEN, lw=2.2, zorder=2)
+    if largest > 4.0:
+        ax.set_xscale("log")
+        ax.set_xticks(ticks := [t for t in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if t < 1.3 * largest], [str(t) for t in ticks])
+        ax.minorticks_off()
+        ax.set_xlim(right=1.25 * largest)
+    else:
+        ax.set_xlim(0.0, max(1.15 * largest, 1.5))
+    ax.set_yticks(range(len(gaps)), [name.rsplit("_", 1)[0] for name in gaps])
+    ax.set_ylim(len(gaps) - 0.4, -0.6)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel(
+        "gap on held-out trials, times what repeats differ by" if floors else "gap on held-out trials, times that of the calibrated model"
+    )
+    _legend(ax, steps, floors=floors)
+
+
+def _change(name: str, seen: Sequence[tuple[str, float]], one: float, *, opened: bool) -> str:
+    """Return what is fitted and what is left, `2.4 → 0.16 N`; `seen` are the steps in units of `one`."""
+    held_in = name.rsplit("_", 1)[1]
+    factor, text = (180.0 / np.pi, "°") if held_in == "rad" else (1.0, " N m" if held_in == "Nm" else f" {held_in}")
+    ends = [f"{value * one * factor:.2g}" for step, value in seen if step != "before"]
+    return " → ".join(ends) + text + ("  open" if opened else "")
+
+
+def _legend(ax: Axes, steps: list[str], *, floors: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D(
+            [], [], color=STEPS[s][0], marker="o", ls="", ms=8, mew=1.8, mfc="white" if s == "before" else STEPS[s][0], label=STEPS[s][1]
+        )
+        for s in steps
+    ]
+    if floors:
+        handles.append(Line2D([], [], color=plotting.GREEN, lw=2.2, label="repeats differ by"))
+    ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(-0.04, 1.0), ncols=2, fontsize=9, columnspacing=1.2, handletextpad=0.5)

@@ -1,0 +1,85 @@
+"""The one sentence that a gap report opens with, on made-up results in the form of `gap.json`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from armrs.workflows.gap.headline import headline, still_open
+from armrs.workflows.gap.words import gap, left
+
+
+def channel(before: float, calibrated: float, after: float, floor: float | None) -> dict[str, Any]:
+    return {"before": before, "calibrated": calibrated, "after": after, "floor": floor}
+
+
+def effect(kind: str, joint: int | None = None, size: tuple[str, float, float, str] | None = None, **more: Any) -> dict[str, Any]:
+    parameters = {} if size is None else {size[0]: {"value": size[1], "std": size[2], "unit": size[3]}}
+    return {"kind": kind, "joint": joint, "channel": None, "parameters": parameters, "alternatives": [], **more}
+
+
+def result(verdict: str, *effects: dict[str, Any], z: float | None = 0.5, **more: Any) -> dict[str, Any]:
+    return {
+        "verdict": verdict,
+        "effects": list(effects),
+        "gap": {"Fz_N": channel(3.0, 2.4, 0.16, 0.15), "q3_rad": channel(0.003, 0.002, 0.0019, 0.0018)},
+        "data": {"joints": ["shoulder", "elbow", "wrist"]},
+        "lack_of_fit": {"calibrated": {"ratio": 3.0, "z": 20.0}, "amended": {"ratio": 1.0, "z": z}},
+        "unexplained": {"share": 0.0, "looks_like": None},
+        **more,
+    }
+
+
+DRY = effect("coulomb", 2, ("torque", 0.161, 0.006, "N m"))
+
+
+def test_a_named_effect_is_told_with_its_size_and_what_it_is_worth() -> None:
+    assert headline(result("explained", DRY)) == (
+        "The model lacks coulomb in joint 2 (elbow), torque 0.1610 ± 0.0060 N m: with it, the gap of Fz on held-out trials falls from 2.4 to "
+        "0.16 N, where repeats differ by 0.15 N."
+    )
+
+
+def test_an_open_gap_contradicts_no_sentence() -> None:
+    """As where a reflex was absorbed: the wrist off by 0.0153 rad where repeats differ by 0.0019."""
+    channels = {"q3_rad": channel(0.02, 0.0155, 0.0153, 0.0019), "Fz_N": channel(0.7, 0.65, 0.65, 0.14)}
+    for verdict, effects in (("nothing_missing", []), ("explained", [DRY])):
+        told = result(verdict, *effects, gap=channels)
+        assert still_open(told) == ["q3_rad", "Fz_N"]
+        said = headline(told)
+        assert "Nothing is missing" not in said and "falls from" not in said
+        assert "off by 0.015 rad, where repeats differ by 0.0019 rad" in said
+        assert [row[-1] for row in gap(told).rows] == ["open", "open"]
+        assert any("q3 is open on the test trials" in line for line in left(told))
+
+
+def test_what_the_result_calls_open_counts_with_its_place() -> None:
+    listed = [{"channel": "q3_rad", "trial": "trials/fast_2.csv", "t_start": 3.14, "t_end": 4.6}]
+    told = result("unexplained", DRY, open=listed)
+    assert still_open(told) == ["q3_rad"]
+    assert headline(told).endswith("q3 is still off by 0.0019 rad, where repeats differ by 0.0018 rad (trials/fast_2.csv, 3.1 to 4.6 s).")
+    assert "and something that the catalogue has no name for" in headline(told)
+    # What it calls closed is closed, whatever the ratio: its test knows what the floor is uncertain by.
+    assert still_open(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.3, 0.15)}, open=[])) == []
+
+
+def test_what_is_not_decided_is_said_to_be() -> None:
+    rival = {"kind": "viscous", "joint": 1, "channel": None}
+    torn = effect("coulomb", 1, ("torque", 0.14, 0.01, "N m"), decided=False, family="dry", alternatives=[rival])
+    assert headline(result("explained", torn)).startswith(
+        "The model lacks coulomb or viscous in joint 1 (shoulder), which these movements cannot tell apart: with it, "
+    )
+    elsewhere = {**torn, "alternatives": [{**rival, "joint": 2}]}
+    assert "coulomb in joint 1 (shoulder) or viscous in joint 2 (elbow), which" in headline(result("explained", elsewhere))
+
+
+def test_many_effects_are_named_by_kind() -> None:
+    springs = [effect("elastic", j, ("stiffness", 1.0, 0.1, "N m/rad")) for j in (3, 1, 2)]
+    said = headline(result("explained", *springs, DRY))
+    assert said.startswith("The model lacks 4 effects (elastic in joints 1, 2 and 3; coulomb in joint 2): with them, ")
+
+
+def test_nothing_is_claimed_that_was_not_tested() -> None:
+    assert headline(result("nothing_missing")).startswith("Nothing is missing: on held-out trials")
+    assert "cannot be tested" in headline(result("nothing_missing", z=None))
+    assert headline(result("explained", DRY, gap={})).endswith("there is no test trial to measure the gap on.")
+    assert headline(result("unexplained")).startswith("Something is missing that the catalogue has no name for: on held-out trials")
