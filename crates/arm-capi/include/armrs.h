@@ -65,7 +65,7 @@
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_estimator`.
-#define ARMRS_ESTIMATOR_WORDS 1368
+#define ARMRS_ESTIMATOR_WORDS 1504
 #endif
 
 #if defined(ARMRS_SINGLE)

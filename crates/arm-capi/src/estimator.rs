@@ -156,7 +156,7 @@ pub struct armrs_estimator {
 
 /// Size of an `armrs_estimator`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_ESTIMATOR_WORDS: usize = 1368;
+pub const ARMRS_ESTIMATOR_WORDS: usize = 1504;
 /// Size of an `armrs_estimator`.
 #[cfg(feature = "single")]
 pub const ARMRS_ESTIMATOR_WORDS: usize = 736;
