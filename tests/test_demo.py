@@ -10,6 +10,7 @@ import pytest
 
 import armrs
 from armrs import cli, demo
+from markup import assert_escaped
 
 WITHIN = 5.0
 """Largest relative error of what the data determine [%]; the thesis has 2 to 10 on the real arm."""
@@ -77,6 +78,10 @@ def test_the_report_stands_alone_and_says_synthetic(folder: Path) -> None:
     assert page.count("Synthetic data: simulated, not measured") == 3
     assert page.count("<img") == page.count('src="data:image/png;base64,') >= 8
     assert (folder / "copy.json").read_text(encoding="utf-8") == (folder / "demo.json").read_text(encoding="utf-8")
+
+
+def test_no_string_of_the_result_becomes_markup(folder: Path, tmp_path: Path) -> None:
+    assert_escaped(folder / "demo.json", tmp_path)
 
 
 def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(

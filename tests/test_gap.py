@@ -20,6 +20,7 @@ from armrs.workflows.gap.shapes import portrait
 from armrs.workflows.gap.suspicion import examine
 from browser import opened
 from gap_sessions import session
+from markup import assert_escaped
 
 
 def look(report: Path, *, figures: int, headings: set[str]) -> str:
@@ -61,6 +62,7 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
     )
     assert verdict.startswith("The model lacks viscous in joint 2 (elbow), viscosity 0.")
     assert verdict.count(". ") == 0 and "on held-out trials falls from" in verdict
+    assert_escaped(tmp_path / "gap.json", tmp_path)
 
 
 def test_a_joint_may_have_any_name(viscous: armrs.GapFound, tmp_path: Path) -> None:

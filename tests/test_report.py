@@ -12,6 +12,8 @@ import pytest
 
 import armrs
 from armrs import _armrs, cli
+from browser import opened
+from markup import PNG, Markup, assert_escaped
 
 VOID = {"meta", "img", "br"}
 
@@ -123,13 +125,59 @@ def test_one_page_of_several_results(results: Path, tmp_path: Path, capsys: pyte
 def test_text_from_files_is_escaped(results: Path, tmp_path: Path) -> None:
     result = json.loads((results / "passive/passive.json").read_text(encoding="utf-8"))
     result["data"]["name"] = "<script>alert(1)</script>"
-    result["figures"] = [{"file": "../<gone>.png", "title": '"><img src=x>', "text": "&"}]
+    result["figures"] = [{"file": "<gone>.png", "title": '"><img src=x>', "text": "&"}]
     (tmp_path / "passive.json").write_text(json.dumps(result), encoding="utf-8")
     text = armrs.write_report([tmp_path / "passive.json"], tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<script" not in text
     assert "&lt;script&gt;" in text
     assert "no longer beside the result" in text
     Page(text)
+
+
+@pytest.mark.parametrize(("verb", "name"), [("identify", "identified"), ("passive", "passive"), ("simulate", "simulated")])
+def test_no_string_of_a_result_becomes_markup(results: Path, tmp_path: Path, verb: str, name: str) -> None:
+    assert_escaped(results / verb / f"{name}.json", tmp_path)
+
+
+def test_what_decided_a_value_is_no_class_unless_it_is_one_of_ours(results: Path, tmp_path: Path) -> None:
+    result = json.loads((results / "identify/identified.json").read_text(encoding="utf-8"))
+    result["figures"] = []
+    result["parameters"][0]["decided_by"] = 'x" onmouseover="alert(1)'
+    (tmp_path / "identified.json").write_text(json.dumps(result), encoding="utf-8")
+    text = armrs.write_report([tmp_path / "identified.json"], tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<tr><td" in text
+    Markup(text)
+
+
+def test_a_page_may_load_and_run_nothing(results: Path) -> None:
+    """In a browser: the policy lets the styles and pictures of the page in, and stops what is added to it."""
+    path = results / "identify/report.html"
+    with opened(path) as seen:
+        assert seen.page.evaluate("getComputedStyle(document.querySelector('main')).maxWidth") != "none"
+        assert seen.page.evaluate("document.querySelector('img').naturalWidth") > 300
+    added = path.with_name("added.html")
+    added.write_text(
+        path.read_text(encoding="utf-8").replace("</main>", "<script>document.title = 'ran'</script></main>"), encoding="utf-8"
+    )
+    titles, errors = [], []
+    with pytest.raises(AssertionError), opened(added) as seen:
+        titles.append(seen.page.title())
+        errors += seen.errors
+    assert titles == ["armrs report"]
+    assert any("Content Security Policy" in error for error in errors)
+
+
+@pytest.mark.parametrize("place", ["../outside.png", "{folder}/outside.png", "link.png"])
+def test_a_figure_outside_the_folder_of_the_result_is_refused(results: Path, tmp_path: Path, place: str) -> None:
+    result = json.loads((results / "passive/passive.json").read_text(encoding="utf-8"))
+    (tmp_path / "outside.png").write_bytes(PNG)
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (inside / "link.png").symlink_to(tmp_path / "outside.png")
+    result["figures"] = [{"file": place.format(folder=tmp_path), "title": "", "text": ""}]
+    (inside / "passive.json").write_text(json.dumps(result), encoding="utf-8")
+    with pytest.raises(armrs.BadInput, match="outside the folder of the result"):
+        armrs.write_report([inside / "passive.json"], tmp_path / "report.html")
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from armrs.montecarlo.change import vary_of
 from armrs.montecarlo.summary import Moments
 from armrs.workflows.identify import identify
 from armrs.workflows.record import measure
+from markup import assert_escaped
 
 EXPERIMENT = """\
 [subject]
@@ -245,6 +246,10 @@ def test_the_command_says_what_came_out(source: Path, plain: Path, capsys: pytes
     page = (plain / "report.html").read_text(encoding="utf-8")
     assert "Synthetic data" in page and "What was found" in page and page.count("<img") == 2
     assert main(["report", str(plain / "sweep.json"), "-o", str(plain / "again")]) == 0
+
+
+def test_no_string_of_the_result_becomes_markup(plain: Path, tmp_path: Path) -> None:
+    assert_escaped(plain / "sweep.json", tmp_path)
 
 
 def test_moments_in_pieces_are_moments_of_the_whole() -> None:

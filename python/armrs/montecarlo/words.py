@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..report import tables
+from ..report import tables, words
 from ..report.tables import Table
 
 MEANING = (
@@ -101,9 +101,7 @@ def count_lines(data: Mapping[str, Any]) -> list[str]:
 
 def swept(data: Mapping[str, Any], run: Mapping[str, Any], written: Sequence[Path]) -> None:
     """Print a sweep, what this run of it took, and where its files are."""
-    from ..report import words
-
-    words.head(data)
+    words.head(data, verdict(data))
     if data["vary"]:
         words.show("What was drawn", varied(data))
     if data["quantities"]:
@@ -120,18 +118,6 @@ def run_line(run: Mapping[str, Any]) -> str:
         return "Nothing was left to compute."
     memory = "" if run["largest_process_MB"] is None else f"; largest process {run['largest_process_MB']:.0f} MB"
     return f"Computed {run['computed']} cases in {run['seconds']:.1f} s, {run['computed'] / run['seconds']:.3g} a second{memory}."
-
-
-def page(data: Mapping[str, Any]) -> str:
-    """Return the sections of a report."""
-    from ..report.pages import bullets, heading, paragraph, table
-
-    out = heading("The cases") + bullets(count_lines(data))
-    if data["vary"]:
-        out += heading("What was drawn") + table(varied(data))
-    if data["quantities"]:
-        out += heading("What was found") + paragraph(MEANING, "soft") + table(recovered(data))
-    return out
 
 
 def _is_off(q: Mapping[str, Any], level: float) -> bool:

@@ -54,6 +54,11 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
     return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1)
 
 
+def deciding(items: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return what decided each estimate, as a word of `DECIDED_BY`; nothing for any other word."""
+    return [item["decided_by"] if item["decided_by"] in DECIDED_BY else "" for item in items]
+
+
 def measured(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the estimates of an identification that rest on the measurement and can be trusted, combinations first, each once."""
     found = {

@@ -40,19 +40,8 @@ def is_synthetic(result: Mapping[str, Any]) -> bool:
 
 
 def verdict(result: Mapping[str, Any]) -> str:
-    """Return a result in a sentence or two."""
-    from ..montecarlo import words as sweep
-    from ..workflows.gap import words as gap
-
-    sentences = {
-        "identify": _identified,
-        "simulate": _simulated,
-        "passive": _passive,
-        "demo": _demo,
-        "gap": gap.verdict,
-        "fmu run": _coupled,
-        "sweep": sweep.verdict,
-    }
+    """Return a result in a sentence or two; results of `gap` and `sweep` have words of their own."""
+    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
     return sentences[result["verb"]](result)
 
 
@@ -114,6 +103,17 @@ def data_lines(data: Mapping[str, Any]) -> list[str]:
     return lines + [f"Warning: {line}" for line in data["warnings"]]
 
 
+def decided_lines(items: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what the words mean that say what decided these estimates."""
+    present = {e["decided_by"] for e in items}
+    return [f"Decided by {key}: it rests on {meaning}." for key, meaning in tables.DECIDED_BY.items() if key in present]
+
+
+def check_lines(result: Mapping[str, Any]) -> list[str]:
+    """Return what the checks of passive moments came to, a line each."""
+    return [str(check["text"]) for check in result.get("checks", ())]
+
+
 def cannot_tell(result: Mapping[str, Any]) -> list[str]:
     """Return what the data cannot tell, a line each."""
     lines = [_trade(line) for line in result["not_separable"]]
@@ -131,7 +131,7 @@ def _trade(line: str) -> str:
 def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print an identification."""
     data, joints, level = result["data"], result["data"]["joints"], result["level"]
-    head(result)
+    head(result, verdict(result))
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
     show(
@@ -165,7 +165,7 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what a run came to."""
-    head(result)
+    head(result, verdict(result))
     show("", tables.run(result))
     for line in result.get("assumed", ()):
         print(line)
@@ -174,7 +174,7 @@ def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def coupled(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what a co-simulation came to."""
-    head(result)
+    head(result, verdict(result))
     show("", tables.coupling(result))
     show("Connections", tables.connections(result))
     for name in result["not_connected"]:
@@ -184,7 +184,7 @@ def coupled(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print passive moments."""
-    head(result)
+    head(result, verdict(result))
     show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
     if result["dependence"]:
         show("Elastic moment against own and adjacent angle", tables.dependence(result))
@@ -222,10 +222,10 @@ def files_written(written: Sequence[Path]) -> None:
         print("\n".join(str(path) for path in written))
 
 
-def head(result: Mapping[str, Any]) -> None:
+def head(result: Mapping[str, Any], sentence: str) -> None:
     """Print what a result is about and its verdict."""
     label = " (synthetic data)" if is_synthetic(result) else ""
-    print(f"{name(result)}{label}: {verdict(result)}")
+    print(f"{name(result)}{label}: {sentence}")
     print()
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..io import files
 from ..report import plotting
 from ..report.results import origin
-from . import dynamics, equations, humans, mechanical, movements, page, passive, propagation, simulation, six
+from . import dynamics, equations, humans, left_out, mechanical, movements, page, passive, propagation, simulation, six
 from .item import Found, Item
 
 if TYPE_CHECKING:
@@ -127,6 +127,8 @@ def _data(parts: list[dict[str, Any]], command: str | None) -> dict[str, Any]:
             "items rest on virtual experiments, which say how the methods behave, not what these subjects were like."
         ),
         "parts": parts,
+        "thesis": left_out.THESIS,
+        "left_out": left_out.table(),
         "equations": equations.rows(),
         "made_by": origin(command),
     }

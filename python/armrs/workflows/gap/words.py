@@ -33,6 +33,17 @@ def chance(effect: Mapping[str, Any]) -> str:
     return f"with probability {effect['p_value']:.0e}" if effect["p_value"] > 1e-12 else "with a probability below 1e-12"
 
 
+def named(result: Mapping[str, Any]) -> list[str]:
+    """Return the named effects, a line each: what it is, its formula, its size, and how likely it is by chance."""
+    joints = result["data"]["joints"]
+    return [f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}; by chance {chance(e)}." for e in result["effects"]]
+
+
+def is_led(result: Mapping[str, Any]) -> bool:
+    """Tell whether a robot led the arm: the gap is in contact forces."""
+    return any(name.endswith("_N") for name in result["gap"])
+
+
 _UNTESTED = "Without repeats of a movement, whether what is left is noise cannot be tested."
 
 
@@ -109,7 +120,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
 
 def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what the workflow found."""
-    common.head(result)
+    common.head(result, verdict(result))
     common.show("Missing in the model", missing(result))
     for line in (*others(result), *apart(result)):
         print(line)

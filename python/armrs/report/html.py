@@ -1,0 +1,103 @@
+"""HTML from Jinja2 templates: everything is escaped, and a page may load and run nothing but what is in it."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
+from markupsafe import Markup
+
+from ..errors import BadInput, Text
+from ..io import files
+
+TEMPLATES = Path(__file__).with_name("templates")
+
+__all__ = ["Environment", "Picture", "TemplateError", "environment", "picture", "render", "source", "write_page"]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure in a page. `source` is the image as a data URI, or `None` where its file is gone."""
+
+    file: str
+    title: str
+    text: str
+    source: str | None
+
+
+def environment(*folders: Path) -> Environment:
+    """Return an environment of the templates of reports and of those in `folders`: escaping always, a missing value is an error."""
+    return Environment(
+        loader=FileSystemLoader([TEMPLATES, *folders]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def render(engine: Environment, template: str, values: Mapping[str, Any]) -> Markup:
+    """Return what a template makes of values, as HTML that is not escaped again."""
+    return Markup(engine.get_template(template).render(values))
+
+
+def source(engine: Environment, name: str) -> Markup:
+    """Return a file beside the templates (styles, scripts) as it is."""
+    assert engine.loader is not None
+    return Markup(engine.loader.get_source(engine, name)[0])
+
+
+def picture(entry: Mapping[str, Any], folder: Path) -> Picture:
+    """Return a figure that a result names, its image taken from below the folder of the result.
+
+    Raises
+    ------
+    BadInput
+        When the file is outside the folder, or is no PNG image.
+    """
+    file, title, text = (str(entry[key]) for key in ("file", "title", "text"))
+    path = folder / file
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+        raw = path.read_bytes() if inside and path.is_file() else None
+    except (OSError, ValueError, RuntimeError):
+        return Picture(file, title, text, None)
+    if not inside:
+        raise BadInput("figures", Text(f"{file}, which is outside the folder of the result"), "PNG images below it", file=path)
+    if raw is None:
+        return Picture(file, title, text, None)
+    if not raw.startswith(b"\x89PNG"):
+        raise BadInput("figures", Text(f"{file} is no PNG image"), "PNG images", file=path)
+    return Picture(file, title, text, "data:image/png;base64," + base64.b64encode(raw).decode("ascii"))
+
+
+def write_page(
+    engine: Environment, path: Path, parts: Iterable[Markup], *, title: str, styles: Sequence[str] = (), scripts: Sequence[str] = ()
+) -> None:
+    """Write a page of finished parts, with styles and scripts from files beside the templates.
+
+    Its Content-Security-Policy allows these styles and scripts, by their SHA-256, and images that are in the page; nothing else.
+    """
+    style = Markup("").join(source(engine, name) for name in ("page.css", *styles))
+    script = Markup("").join(source(engine, name) for name in scripts)
+    values = {"title": title, "parts": list(parts), "style": style, "script": script, "policy": _policy(style, script)}
+    files.write_text(path, render(engine, "page.html.j2", values), kind=".html")
+
+
+def _policy(style: str, script: str) -> str:
+    allowed = {
+        "default-src": "'none'",
+        "img-src": "data:",
+        "style-src": _digest(style),
+        "script-src": _digest(script) if script else "'none'",
+    }
+    return "; ".join(f"{key} {value}" for key, value in (allowed | {"base-uri": "'none'", "form-action": "'none'"}).items())
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
