@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from armrs import cli
+from armrs.thesis.people import TABLE_4_10
 from browser import opened
 
 NEEDED = {"3.5", "3.6", "3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
@@ -22,6 +23,20 @@ def named(title: str) -> set[str]:
     found = set(re.findall(r"\b[34]\.\d+", title))
     for chapter, first, last in re.findall(r"(\d)\.(\d+) to \1\.(\d+)", title):
         found |= {f"{chapter}.{k}" for k in range(int(first), int(last) + 1)}
+    return found
+
+
+def numbered(text: str) -> set[str]:
+    """Return `Figure 4.1`, `Table 4.3`, `Figure B.9` … that a title names, with ranges and lists written out."""
+    found = set()
+    for word, rest in re.findall(r"\b([Ff]igures?|[Tt]ables?)((?:[ ,;]|and|to|[A-D1-4]\.\d+|\d(?!\.))+(?:of appendix [A-D])?)", text):
+        kind = word.rstrip("s").capitalize()
+        appendix = re.search(r"of appendix ([A-D])", rest)
+        if appendix:
+            rest = re.sub(r"\b(\d)\b", rf"{appendix[1]}.\1", rest[: appendix.start()])
+        found |= {f"{kind} {name}" for name in re.findall(r"[A-D1-4]\.\d+", rest)}
+        for chapter, first, last in re.findall(r"([A-D1-4])\.(\d+) to \1\.(\d+)", rest):
+            found |= {f"{kind} {chapter}.{k}" for k in range(int(first), int(last) + 1)}
     return found
 
 
@@ -49,9 +64,79 @@ def test_arithmetic_on_what_is_printed(items: dict[str, dict[str, Any]]) -> None
     """Against numbers that were found by hand and by interval arithmetic on the printed digits."""
     values = {key: item["values"] for key, item in items.items()}
     assert values["table-4.3"] == pytest.approx({"m2·l2": 0.1334, "m1·l1": 0.26496, "m1·l1 + a1·m2": 0.70112})
-    assert values["equations-3.14-3.20"] == pytest.approx({"l3_m": 0.0747, "l1_m": 0.1899, "l1_printed_m": 0.1442}, abs=6e-5)
+    # A hand of 0.79 · 0.093 m and 0.0061 · 77 kg, a handle of 0.277 kg at 0.0844 m, and at 0.844 m as printed.
+    hand, handle = 0.0061 * 77.0, 0.277
+    at = [(hand * 0.79 * 0.093 + handle * place) / (hand + handle) for place in (0.0844, 0.844)]
+    assert at == pytest.approx([0.0775, 0.3593], abs=5e-5)
+    assert values["equations-3.14-3.20"] == pytest.approx(
+        {"l3_m": at[0], "l3_printed_m": at[1], "l1_m": 0.1899, "l1_printed_m": 0.1442}, abs=6e-5
+    )
+    # From the printed digits of table 4.4: 0.003 where 0.005 was given, 0.008 where 0.002 was.
+    assert values["table-4.4"]["printed_error_percent_τp2"] == pytest.approx(-40.0)
+    assert values["table-4.4"]["printed_error_percent_τp1"] == pytest.approx(300.0)
+    assert "−40 and 300 %" in items["table-4.4"]["why"]
     assert values["equations-3.4-3.10"] == pytest.approx({"b11_excess_kgm2": 0.0061, "wrist_torque_Nm": 0.715}, abs=6e-4)
     assert values["tables-4.6-4.8"] == {"deviations_that_disagree": 14, "errors_that_disagree": 23, "errors_printed": 84}
+
+
+def test_moments_of_inertia_are_those_of_the_lengths_beside_them(items: dict[str, dict[str, Any]]) -> None:
+    """By hand from de Leva's transverse radii of gyration, 26.9 and 26.5 % of the length, and 2.71 and 1.62 % of 77 kg."""
+
+    def by_hand(upper: float, forearm: float) -> list[float]:
+        return [0.0271 * 77.0 * (0.269 * upper) ** 2, 0.0162 * 77.0 * (0.265 * forearm) ** 2]
+
+    found = [items["table-D.1"]["values"][f"transverse_{k}_kgm2"] for k in (1, 2, 3)]
+    assert found[:2] == pytest.approx(by_hand(0.32, 0.25))
+    assert [segment.inertia for segment in TABLE_4_10[:2]] == pytest.approx(by_hand(0.322, 0.264))
+    assert TABLE_4_10[2].inertia == pytest.approx(0.0016, abs=5e-5)
+    for value in found:
+        assert f"{value:.4f}" in items["table-D.1"]["ours"]
+
+
+def test_errors_of_appendix_a_are_computed_as_printed(items: dict[str, dict[str, Any]]) -> None:
+    """Equation 5.5 of equation 5.3 at −45° and 55°, with 3 and 10 N, 0.1°, 0.2 N and 0.5 mm."""
+    q1, q2, a2 = np.radians(-45.0), np.radians(55.0), 0.239
+    angle = np.radians(0.1)
+    f1 = a2 * (-np.sin(q1 + q2) * 3.0 + np.cos(q1 + q2) * 10.0)
+    f2 = 9.81 * np.cos(q1 + q2) * 0.1334
+    of_f1 = f1 * np.sqrt((0.0005 / a2) ** 2 + (angle / q1) ** 2 + (angle / q2) ** 2 + (0.2 / 3.0) ** 2 + (0.2 / 10.0) ** 2)
+    of_f2 = f2 * np.sqrt((angle / q1) ** 2 + (angle / q2) ** 2)
+    values = items["equation-5.5"]["values"]
+    assert values["printed_per_sample_Nm"] == pytest.approx(2.0 * (of_f1 + of_f2))
+    assert values["sigma_Nm"] < 0.5 * of_f1
+    shown = [row[-1] for row in items["equation-5.5"]["tables"][0]["rows"]]
+    assert [float(cell) for cell in shown] == pytest.approx([n * 2.0 * (of_f1 + of_f2) for n in (50, 200, 800, 3200)], abs=0.06)
+    share = items["passive-moment-uncertainty"]["values"]["com_share_of_mass_at_shoulder"]
+    com, mass = (float(items["passive-moment-uncertainty"]["tables"][0]["rows"][k][1]) for k in (1, 0))
+    assert share == pytest.approx(com / mass, abs=0.01)
+    assert f"contributes {share:.0%} of what the masses do" in items["passive-moment-uncertainty"]["why"]
+
+
+THESIS = {
+    *(f"Figure 1.{k}" for k in range(1, 4)), *(f"Figure 3.{k}" for k in range(1, 16)), *(f"Figure 4.{k}" for k in range(1, 42)),
+    "Table 2.1", *(f"Table 4.{k}" for k in range(1, 11)), *(f"Figure B.{k}" for k in range(1, 10)), *(f"Figure C.{k}" for k in range(1, 7)),
+    *(f"Figure D.{k}" for k in range(1, 7)),
+}  # fmt: skip
+"""Every numbered figure and table of chapters 1 to 4 and figure of the appended papers."""
+
+
+def test_every_figure_and_table_is_recomputed_or_listed_as_left_out(made: Path, items: dict[str, dict[str, Any]]) -> None:
+    data = json.loads((made / "reproduced.json").read_text(encoding="utf-8"))
+    about = [item["title"] for item in items.values()]
+    left = [row[0] for row in data["left_out"]["rows"]]
+    seen = set().union(*map(numbered, (*about, *left)))
+    assert THESIS - seen == set()
+    assert not set().union(*map(numbered, about)) & set().union(*map(numbered, left))
+    assert all(len(row) == 3 and len(row[2]) > 20 for row in data["left_out"]["rows"])
+    assert "Timotej Kodek" in data["thesis"] and "2004" in data["thesis"]
+
+
+def test_printing_gives_every_part(made: Path) -> None:
+    with opened(made / "report.html") as seen:
+        seen.page.emulate_media(media="print")
+        assert seen.page.eval_on_selector_all(".part", "all => all.every(p => p.offsetHeight > 100)")
+        assert not seen.page.locator("nav").is_visible()
+        assert "Timotej Kodek" in seen.page.inner_text("main")
 
 
 def test_the_virtual_experiments_find_what_was_simulated(items: dict[str, dict[str, Any]]) -> None:

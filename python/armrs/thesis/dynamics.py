@@ -17,7 +17,7 @@ from ..workflows.experiment import THESIS_CONTACT
 from ..workflows.simulate import Movement, Simulated, simulate
 from . import drawing
 from .item import Found, Group, Sheet
-from .people import RATE, TABLE_4_10, WORKING_ROBOT, WRIST, arm
+from .people import RATE, TABLE_4_10, WORKING_ROBOT, WRIST, arm, transverse
 from .sessions import SHOULDER_HELD, holding, subject_one
 
 if TYPE_CHECKING:
@@ -38,15 +38,15 @@ PRINTED = {"inertial": 0.2, "velocity": 0.001}
 JOINTS = tuple(drawing.JOINTS)
 REPEATABILITY = (0.05, 0.1, 0.2)
 """Standard deviations of the angles over six trials, section 3 of appendix D [rad]."""
-TRANSVERSE = (0.0155, 0.0055, 0.0030)
+LENGTHS = (0.32, 0.25, 0.09)
+"""Table 1 of appendix D with a2 + a3 = 0.34 m [m]."""
+TRANSVERSE = transverse(LENGTHS)
 """Moments of inertia about the axis that turns, after de Leva, the hand with the handle [kg m²]."""
 
 
 def subject(inertias: tuple[float, ...]) -> Model:
     """Return the arm of table 1 of appendix D with the moments of inertia given."""
-    rows = zip(
-        ("upper arm", "forearm", "hand and handle"), (0.32, 0.25, 0.09), (2.09, 1.25, 0.75), (0.19, 0.12, 0.08), inertias, strict=True
-    )
+    rows = zip(("upper arm", "forearm", "hand and handle"), LENGTHS, (2.09, 1.25, 0.75), (0.19, 0.12, 0.08), inertias, strict=True)
     joints = (Joint("shoulder"), Joint("elbow"), WRIST)
     return Model(tuple(Segment(*row) for row in rows), joints, robot=WORKING_ROBOT, contact=THESIS_CONTACT)
 
@@ -199,12 +199,16 @@ def inertias() -> Found:
     changes = [np.abs(parts(movement(1.0, i))["inertial"]).max(axis=0) for i in (printed, TRANSVERSE)]
     effect = [[joint, f"{a:.3f}", f"{b:.3f}"] for joint, a, b in zip(JOINTS, *changes, strict=True)]
     return Found(
-        ours="Transverse moments of inertia after de Leva for 77 kg: 0.0155, 0.0055 and 0.0030 kg m² with the handle.",
+        ours=(
+            f"Transverse moments of inertia after de Leva for 77 kg and these lengths: {TRANSVERSE[0]:.4f}, {TRANSVERSE[1]:.4f} and "
+            f"{TRANSVERSE[2]:.4f} kg m², the last with the handle as a point."
+        ),
         why=(
             "The first two that are printed are those about the long axes of the segments, about which nothing turns in the plane; the "
             "third is that of a forearm. With the elbow moving alone this hardly shows, since the forearm's and the hand's errors cancel "
             "at the elbow; in a movement of the shoulder it would."
         ),
+        values={f"transverse_{k}_kgm2": value for k, value in enumerate(TRANSVERSE, 1)},
         sheets=[
             Sheet("Moments of inertia about the centre of mass [kg m²]", Table(["segment", "printed", "transverse", "ratio"], rows)),
             Sheet("Largest inertial torques at 1 rad/s [N m]", Table(["joint", "printed values", "transverse values"], effect)),
@@ -222,7 +226,7 @@ def inertias() -> Found:
 )
 def speeds() -> Found:
     """Compare printed speeds of the handle with those of the elbow."""
-    radius = 0.25 + 0.09
+    radius = LENGTHS[1] + LENGTHS[2]
     rows = [[f"{v:g}", f"{w:g}", f"{v / radius:.2f}", f"{v / w:.3f}"] for v, w in zip(HAND_SPEEDS, SPEEDS, strict=True)]
     return Found(
         ours=f"On an arc of {radius:g} m those speeds of the hand turn the elbow at {', '.join(row[2] for row in rows)} rad/s.",

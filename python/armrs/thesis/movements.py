@@ -14,7 +14,7 @@ from ..workflows.record import muscle_activity
 from ..workflows.simulate import Simulated
 from . import drawing
 from .item import Found, Group, Sheet
-from .people import HANDLE, ORTHOSIS, TABLE_4_10, arm, mechanical, points
+from .people import HANDLE, ORTHOSIS, SUBJECT_ONE, TABLE_4_10, arm, mechanical, points
 from .sessions import ELBOW_HELD, SEED, SHOULDER_HELD, holding, subject_one
 from .simulation import HUMAN_PATH, MECHANICAL_PATH
 
@@ -204,7 +204,8 @@ def small_movements() -> Found:
 )
 def bodies() -> Found:
     """Compute the joined bodies as printed and as meant."""
-    upper, hand, m_hand = TABLE_4_10[0], 0.069, 0.0061 * 78.0
+    # Section 3.1: 79 % of the length of the hand and 0.61 % of the mass of the body.
+    upper, hand, m_hand = TABLE_4_10[0], 0.79 * TABLE_4_10[2].length, 0.0061 * (SUBJECT_ONE.body_mass or 0.0)
     mass, place = HANDLE
 
     def joined(at: float, handle: float = mass) -> float:
@@ -226,7 +227,7 @@ def bodies() -> Found:
             "everything else in the thesis counts the upper arm's from the shoulder. Tables 4.6 to 4.8 rest on a handle of 0.193 kg, not "
             "of 0.277."
         ),
-        values={"l3_m": joined(place), "l1_m": float(right), "l1_printed_m": float(printed)},
+        values={"l3_m": joined(place), "l3_printed_m": joined(0.844), "l1_m": float(right), "l1_printed_m": float(printed)},
         sheets=[
             Sheet(
                 "The handle behind the references of tables 4.6 to 4.8",

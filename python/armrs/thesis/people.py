@@ -27,12 +27,8 @@ LENGTHS = (0.322, 0.264, 0.093)
 WORKING_ROBOT = Robot(lengths=(0.6, 0.6), base=(1.05, -0.1))
 """The robot of the passive moments, whose lengths the thesis does not give; this one reaches every configuration."""
 RATE = 50.0
-TABLE_4_10 = (
-    Segment("upper arm", 0.322, 2.114, 0.186, 0.0155),
-    Segment("forearm", 0.264, 1.264, 0.121, 0.0055),
-    Segment("hand and handle", 0.093, 0.753, 0.081, 0.0030),
-)
-"""Table 4.10; moments of inertia, which it does not have, after de Leva."""
+SUBJECT_ONE = Subject(77.0, 1.80, "male")
+"""Body mass as section 4.2.2 prints it [kg]; the height is chosen [m]."""
 WRIST = Joint("wrist", stiffness=12.0, viscosity=0.05, coulomb=0.03)
 """A hand strapped to the handle: the wrist stays within a few degrees, as section 3.4.1 says."""
 
@@ -47,6 +43,23 @@ def literature(subject: Subject, lengths: tuple[float, ...] = LENGTHS) -> tuple[
     """Return a subject's segments by de Leva's tables, the hand with the handle."""
     segments, _ = literature_arm(subject, list(lengths))
     return Model(segments, tuple(Joint(name) for name in JOINTS)).with_mass(3, *HANDLE).segments
+
+
+def transverse(lengths: tuple[float, ...] = LENGTHS) -> tuple[float, ...]:
+    """Return moments of inertia of subject one after de Leva for segments of these lengths, the hand with the handle [kg m²].
+
+    About the axis of the joints, through each segment's centre of mass. The handle counts as a point.
+    """
+    return tuple(segment.inertia for segment in literature(SUBJECT_ONE, lengths))
+
+
+TABLE_4_10 = tuple(
+    Segment(name, length, mass, com, inertia)
+    for name, length, mass, com, inertia in zip(
+        ("upper arm", "forearm", "hand and handle"), LENGTHS, (2.114, 1.264, 0.753), (0.186, 0.121, 0.081), transverse(), strict=True
+    )
+)
+"""Table 4.10; moments of inertia, which it does not have, after de Leva."""
 
 
 def arm(segments: tuple[Segment, ...], joints: Sequence[Joint] = (), effects: Sequence[Effect] = (), robot: Robot = WORKING_ROBOT) -> Model:

@@ -107,7 +107,9 @@ def torque_errors() -> Found:
 def parameter_errors() -> Found:
     """Compare the printed error of a fitted parameter with least squares and Monte Carlo."""
     random = np.random.default_rng(SEED)
-    sigma = _at(np.radians(-45.0), np.radians(55.0))[1]
+    q1, q2 = np.radians(-45.0), np.radians(55.0)
+    _, sigma, printed_f1 = _at(q1, q2)
+    printed_f2 = 9.81 * np.cos(q1 + q2) * FIRST_MOMENT * np.hypot(ANGLE / q1, ANGLE / q2)
     rows = []
     for count in (50, 200, 800, 3200):
         theta = np.radians(np.linspace(0.0, 11.5, count))
@@ -115,8 +117,9 @@ def parameter_errors() -> Found:
         noise = sigma * random.standard_normal((500, count))
         sampled = (FIRST_MOMENT + noise @ column / (column @ column)).std(ddof=1)
         right = sigma / np.sqrt(column @ column)
-        rows.append([count, f"{sampled:.6f}", f"{right:.6f}", f"{2 * count * 2 * sigma:.1f}"])
+        rows.append([count, f"{sampled:.6f}", f"{right:.6f}", f"{2 * count * (printed_f1 + printed_f2):.1f}"])
     return Found(
+        values={"printed_per_sample_Nm": float(2.0 * (printed_f1 + printed_f2)), "sigma_Nm": sigma},
         ours=f"The deviation of m2·l2 falls with the root of the number of samples, to {rows[-1][2]} kg m with 3200 of them.",
         why=(
             "The printed error grows with the number of samples, has the unit of a torque, and has lost the inverse of the normal matrix. "
@@ -179,10 +182,9 @@ def passive_uncertainty() -> Found:
     sampled = uncertainty.by_monte_carlo(model, q, force, deviations, draws=2000, seed=SEED).mean(axis=0)
     sources = ("masses, 5 %", "centres of mass, 5 %", "lengths, 2 mm", "angles, 0.3°", "force bias, 0.2 N", "force gain, 1 %")
     ends = np.cumsum([3, 3, 3, 3, 2, 2])
-    rows = [
-        [name, *(f"{v:.3f}" for v in uncertainty.by_jacobian(block).mean(axis=0))]
-        for name, block in zip(sources, np.split(parts, ends[:-1]), strict=True)
-    ]
+    blocks = [uncertainty.by_jacobian(block).mean(axis=0) for block in np.split(parts, ends[:-1])]
+    share = float(blocks[1][0] / blocks[0][0])
+    rows = [[name, *(f"{v:.3f}" for v in block)] for name, block in zip(sources, blocks, strict=True)]
     rows += [["all, Jacobian", *(f"{v:.3f}" for v in jacobian)], ["all, Monte Carlo", *(f"{v:.3f}" for v in sampled)]]
     ratio = float(np.max(np.abs(jacobian / sampled - 1)))
     return Found(
@@ -192,9 +194,10 @@ def passive_uncertainty() -> Found:
         ),
         why=(
             "Lengths and centres of mass cancel only if both are wrong by the same factor. A centre of mass alone, which comes from a "
-            "table while the length is measured, weighs nearly as much as a mass. J does not contain any l_j, as appendix B says it does."
+            f"table while the length is measured, contributes {share:.0%} of what the masses do at the shoulder. J does not contain any "
+            "l_j, as appendix B says it does."
         ),
-        values={"jacobian_over_monte_carlo_most_off": ratio},
+        values={"jacobian_over_monte_carlo_most_off": ratio, "com_share_of_mass_at_shoulder": share},
         sheets=[
             Sheet(
                 f"Standard deviations of the passive moments [N m], {trial.configuration}°, mean over the movement",
