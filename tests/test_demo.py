@@ -62,6 +62,27 @@ def test_the_data_set_is_labelled_and_the_truth_lies_apart(folder: Path) -> None
     assert max(np.abs(t.q - t.q[0]).max() for t in dataset.trials) < np.radians(15)
 
 
+def test_the_search_finds_the_brakes_and_closes_the_gap(folder: Path, result: dict) -> None:
+    gap = json.loads((folder / "gap/gap.json").read_text(encoding="utf-8"))
+    assert {(e["kind"], e["joint"]) for e in gap["effects"]} == {("coulomb", 1), ("coulomb", 2)}
+    for effect in gap["effects"]:
+        torque = effect["parameters"]["torque"]
+        assert abs(torque["value"] - demo.BRAKES[effect["joint"] - 1]) < 1.96 * torque["std"] < 0.05
+        # Two speeds tell dry friction from viscosity.
+        assert "viscous" not in [a["kind"] for a in effect["alternatives"]]
+    for name in ("Fy_N", "Fz_N"):
+        channel = gap["gap"][name]
+        assert channel["after"] < 1.1 * channel["floor"] < 0.6 * channel["calibrated"]
+    assert result["verdict"].startswith("The search found both brakes (0.139 and 0.161 N m were hidden): the model lacks coulomb in joint")
+    assert "coulomb = 0.0" in (folder / "session/model.toml").read_text(encoding="utf-8")
+
+
+def test_the_slow_movements_alone_cannot_tell_dry_friction_from_viscosity(result: dict) -> None:
+    (shoulder,) = (line for line in result["slow_alone"]["lines"] if "joint 1 (shoulder)" in line)
+    assert "cannot be told from" in shoulder
+    assert "viscous" in shoulder and "coulomb" in shoulder
+
+
 def test_a_converted_data_set_is_still_synthetic(folder: Path, tmp_path: Path) -> None:
     armrs.convert(folder / "data", tmp_path, to="parquet")
     assert armrs.load_dataset(tmp_path).synthetic
@@ -69,14 +90,15 @@ def test_a_converted_data_set_is_still_synthetic(folder: Path, tmp_path: Path) -
 
 def test_the_direction_of_motion_shows_the_friction_before_and_not_after(folder: Path, result: dict) -> None:
     assert "shoulder 0.1" in result["missing_text"]
-    assert "not found by a search" in result["missing_text"]
     assert (folder / "figures/direction.png").stat().st_size > 20_000
 
 
 def test_the_report_stands_alone_and_says_synthetic(folder: Path) -> None:
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("Synthetic data: simulated, not measured") == 3
-    assert page.count("<img") == page.count('src="data:image/png;base64,') >= 8
+    assert page.count("Synthetic data: simulated, not measured") == 4
+    assert page.count("<img") == page.count('src="data:image/png;base64,') >= 14
+    # It opens with one sentence and the picture of the gap.
+    assert page.index('class="verdict"') < page.index("What is missing, and what it is worth") < page.index("<h2>What was done")
     assert (folder / "copy.json").read_text(encoding="utf-8") == (folder / "demo.json").read_text(encoding="utf-8")
 
 
@@ -97,6 +119,7 @@ def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
         "comparison_text": "",
         "missing_text": "b",
         "verdict": "c",
+        "slow_alone": {"lines": ["e"]},
         "data": {"name": "d", "joints": []},
         "level": 0.95,
     }

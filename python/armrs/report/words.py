@@ -157,9 +157,13 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     show(result["comparison_text"], tables.comparison(result))
     print(result["missing_text"])
     print()
+    print("The slow movements alone cannot tell everything apart:")
+    print("\n".join(f"  {line}" for line in result["slow_alone"]["lines"]))
+    print()
     print(verdict(result))
-    for data in (path.parent for path in written if path.name == "dataset.toml"):
-        print(f"The session is in {data}. Go on with: armrs identify {data} --with coulomb, or armrs gap {data}")
+    sessions = [path.parent for path in written if path.name == "dataset.toml"]
+    if sessions:
+        print(f"Go on with: armrs identify {sessions[0]} --with coulomb, or armrs gap {sessions[-1]}")
     files_written(written[-1:])
 
 
