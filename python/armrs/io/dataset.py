@@ -17,6 +17,7 @@ from .. import checks
 from ..errors import ArmrsError, BadInput, Text, unknown_name
 from ..model import Model, load_model, part_of
 from . import files, tomlfile
+from .muscle_activity import comparable, mark_activity
 from .plausibility import still_angles
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Trial, read_trial
@@ -298,10 +299,12 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
             raise error.within(file=path) from None
         trials.append(reading.trial)
         warnings += [f"{entry.file}: {line}" for line in reading.warnings]
+    marked, lines = mark_activity(trials)
+    warnings += lines
     return Dataset(
         name=description.name,
         model=model,
-        trials=tuple(trials),
+        trials=comparable(marked),
         force_on=description.force_on,
         sample_rate=description.sample_rate,
         subject=description.subject,

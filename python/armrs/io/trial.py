@@ -56,7 +56,9 @@ class Trial:
     emg : mapping of str to ndarray, shape (n,)
         Muscle activity by column name, in the unit of the file.
     valid : ndarray of bool, shape (n,)
-        False where any angle, force, torque or robot angle is NaN.
+        False where any angle, force, torque or robot angle is NaN, and where muscles are active.
+    active : ndarray of bool, shape (n,)
+        Where muscles are active in this trial, as `armrs.io.muscle_activity` marks it.
     filled_columns : mapping of str to ndarray of bool, shape (n,)
         Which samples of a column (named in SI units) were missing and bridged. Columns without any are left out.
     gaps : tuple of (str, float, float)
@@ -82,6 +84,7 @@ class Trial:
     dq: np.ndarray | None = None
     emg: Mapping[str, np.ndarray] = field(default_factory=dict)
     valid: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
+    active: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
     filled_columns: Mapping[str, np.ndarray] = field(default_factory=dict)
     gaps: tuple[tuple[str, float, float], ...] = ()
     original_t: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -107,6 +110,8 @@ class Trial:
             measured = [a for a in (self.q, self.force_on_arm, self.moment_on_arm, self.robot_q, self.tau) if a is not None]
             rows = [np.isfinite(a).reshape(len(a), -1).all(axis=1) for a in measured]
             object.__setattr__(self, "valid", np.logical_and.reduce(rows))
+        if self.active.size == 0:
+            object.__setattr__(self, "active", np.zeros(n, dtype=bool))
         for name in ("emg", "filled_columns", "original"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         arrays = [value for value in vars(self).values() if isinstance(value, np.ndarray)]

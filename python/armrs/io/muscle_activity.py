@@ -1,0 +1,109 @@
+"""Muscle activity: samples at which a muscle is more active than at rest say nothing of the passive arm, and are marked.
+
+The envelope of each channel is its rectified deviation from its mean, averaged over a tenth of a second. Its resting level is the median of
+the session, its scatter the median absolute deviation. What exceeds the level by eight deviations is activity. Torque begins later than
+activity and outlasts it, so the marks are widened.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from .trial import Trial
+
+SMOOTHED = 0.1
+"""Time over which the rectified signal is averaged [s]."""
+DEVIATIONS = 8.0
+"""Of the resting scatter that a sample must exceed: white noise does not in 10⁶ samples (a test counts), resting tone has longer tails."""
+BEFORE, AFTER = 0.05, 0.3
+"""By how much marks are widened [s]: torque follows activity by 30 to 100 ms (Cavanagh and Komi 1979) and decays in about as long again."""
+MOST = 0.5
+"""Share of a session beyond which activity is no exception: the median is then no resting level."""
+_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
+
+def mark_activity(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], list[str]]:
+    """Mark the samples of a session at which any muscle is active.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Of one session, whose channels have one gain.
+
+    Returns
+    -------
+    trials : tuple of Trial
+        With `active` set, and `valid` False there.
+    lines : list of str
+        What the reader should know.
+    """
+    names = sorted({name for trial in trials for name in trial.emg})
+    active = [np.zeros(len(trial), dtype=bool) for trial in trials]
+    lines = []
+    for name in names:
+        envelopes = [_envelope(trial, name) for trial in trials]
+        together = np.concatenate([e[np.isfinite(e)] for e in envelopes])
+        if together.size == 0 or np.ptp(together) == 0.0:
+            continue
+        level = float(np.median(together))
+        threshold = level + DEVIATIONS * _TO_SIGMA * float(np.median(np.abs(together - level)))
+        marks = [_widened(np.nan_to_num(e, nan=0.0) > threshold, trial.dt) for e, trial in zip(envelopes, trials, strict=True)]
+        share = float(np.mean(np.concatenate(marks)))
+        if share > MOST:
+            lines.append(f"{name}: active in {share:.0%} of the session, so its resting level is not known; nothing is marked by it")
+            continue
+        for own, mark in zip(active, marks, strict=True):
+            own |= mark
+    return _applied(trials, active, lines)
+
+
+def _applied(trials: Sequence[Trial], active: list[np.ndarray], lines: list[str]) -> tuple[tuple[Trial, ...], list[str]]:
+    marked = []
+    for trial, own in zip(trials, active, strict=True):
+        valid = trial.valid & ~own
+        if own.any():
+            lines.append(f"{trial.file}: muscles are active for {float(own.sum()) * trial.dt:.2g} s; these samples are left out")
+        # A trial that is active throughout is no passive recording at all; the line above says so.
+        marked.append(dataclasses.replace(trial, active=own, valid=valid if valid.any() else trial.valid))
+    return tuple(marked), lines
+
+
+def comparable(trials: Sequence[Trial]) -> tuple[Trial, ...]:
+    """Return trials in which what is active in one repeat of a movement is left out of all: repeats are compared sample by sample."""
+    shared = []
+    for trial in trials:
+        active = np.zeros(len(trial), dtype=bool)
+        for other in trials:
+            if other.configuration == trial.configuration:
+                n = min(len(trial), len(other))
+                active[:n] |= other.active[:n]
+        valid = trial.valid & ~active
+        shared.append(dataclasses.replace(trial, valid=valid) if active.any() and valid.any() else trial)
+    return tuple(shared)
+
+
+def _envelope(trial: Trial, name: str) -> np.ndarray:
+    """Return the envelope of a channel, NaN where the trial has no such channel."""
+    if name not in trial.emg:
+        return np.full(len(trial), np.nan)
+    signal = trial.emg[name]
+    there = np.isfinite(signal)
+    if not there.any():
+        return np.full(len(trial), np.nan)
+    filled = np.interp(trial.t, trial.t[there], signal[there])
+    rectified = filled if filled.min() >= 0.0 else np.abs(filled - filled.mean())
+    half = max(1, round(0.5 * SMOOTHED / trial.dt))
+    padded = np.pad(rectified, half, mode="reflect")
+    return np.convolve(padded, np.full(2 * half + 1, 1.0 / (2 * half + 1)), mode="valid")
+
+
+def _widened(mark: np.ndarray, dt: float) -> np.ndarray:
+    before, after = round(BEFORE / dt), round(AFTER / dt)
+    wide = mark.copy()
+    for k in np.flatnonzero(mark):
+        wide[max(0, k - before) : k + after + 1] = True
+    return wide

@@ -1,0 +1,97 @@
+"""Samples at which muscles are active are marked and left out; quiet channels mark nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs.io.muscle_activity import comparable, mark_activity
+
+SEGMENTS = (armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165), armrs.Segment("forearm", 0.264, 1.264, 0.121, 0.0074))
+JOINTS = (armrs.Joint("shoulder", viscosity=0.25), armrs.Joint("elbow", viscosity=0.2, stiffness=0.5, rest=0.6))
+ROBOT = armrs.Robot((0.45, 0.45), (1.05, -0.10))
+MODEL = armrs.Model(SEGMENTS, JOINTS, robot=ROBOT)
+MOVEMENT = armrs.Movement(np.radians([[-60, 40], [-25, 75], [-70, 90], [-60, 40]]), speed=0.5, acceleration=2.0)
+BURST = armrs.Effect("voluntary", 2, parameters={"amplitude": 1.0, "start": 2.5, "duration": 0.6})
+
+
+OTHER = armrs.Movement(np.radians([[-70, 60], [-40, 20], [-60, 95], [-30, 50], [-70, 60]]), speed=1.0, acceleration=4.0)
+
+
+def trial(repeat: int, seed: int, burst: bool, movement: armrs.Movement = MOVEMENT) -> armrs.Trial:
+    """A measured trial with a surface EMG of the biceps: noise at rest, ten times as much in a burst."""
+    rng = np.random.default_rng(seed)
+    model = MODEL.replace(effects=(BURST,)) if burst else MODEL
+    run = armrs.simulate(model, movement, rate=50.0)
+    noise = rng.standard_normal
+    q = run.q + 5e-4 * noise(run.q.shape)
+    force = run.force_on_arm + 0.1 * noise(run.force_on_arm.shape)
+    # Drawn last, so that angles and forces have the same noise with and without a burst.
+    emg = 0.02 * noise(len(run.t))
+    if burst:
+        during = (run.t > 2.45) & (run.t < 3.1)
+        emg[during] += 0.2 * noise(during.sum())
+    name = "slow" if movement is MOVEMENT else "fast"
+    return armrs.Trial(f"{name}_{repeat}.csv", name, repeat, "fit", run.t, q, force_on_arm=force, emg={"emg_biceps": emg})
+
+
+def test_noise_at_rest_is_no_activity() -> None:
+    t = np.arange(100_000) / 100.0
+    quiet = [
+        armrs.Trial(f"{k}.csv", "rest", k, "fit", t, np.zeros((len(t), 1)), emg={"emg_a": np.random.default_rng(k).standard_normal(len(t))})
+        for k in range(1, 11)
+    ]
+    marked, lines = mark_activity(quiet)
+    assert sum(int(m.active.sum()) for m in marked) == 0
+    assert lines == []
+
+
+def test_a_channel_that_is_active_all_the_time_marks_nothing_and_says_so() -> None:
+    t = np.arange(2000) / 100.0
+    envelope = np.where(np.arange(2000) % 400 < 300, np.linspace(1.0, 2.0, 2000), 0.01)
+    one = armrs.Trial("a.csv", "a", 1, "fit", t, np.zeros((2000, 1)), emg={"emg_a": envelope})
+    marked, lines = mark_activity([one])
+    assert marked[0].valid.all() or "resting level is not known" in lines[0]
+
+
+def test_a_burst_is_marked_with_a_margin_and_left_out_of_all_repeats_where_they_are_compared() -> None:
+    trials = [trial(1, 11, False), trial(2, 12, True), trial(3, 13, False)]
+    marked, lines = mark_activity(trials)
+    assert [bool(m.active.any()) for m in marked] == [False, True, False]
+    during = (trials[0].t > 2.5) & (trials[0].t < 3.1)
+    assert [bool(m.valid.all()) for m in marked] == [True, False, True]
+    for m in comparable(marked):
+        assert not m.valid[during].any()
+        assert m.valid[(m.t < 2.2) | (m.t > 3.7)].all()
+    assert len(lines) == 1 and "slow_2.csv" in lines[0]
+
+
+def test_marks_take_most_of_what_a_burst_does_to_the_estimates() -> None:
+    """In units of the intervals; what is left is the price of the samples: a second of each of three trials of five."""
+    others = [trial(k, 20 + k, False, OTHER) for k in (1, 2, 3)]
+    clean = [*(trial(k, 10 + k, False) for k in (1, 2, 3)), *others]
+    disturbed = [trial(1, 11, False), trial(2, 12, True), trial(3, 13, False), *others]
+
+    def identified(trials: Sequence[armrs.Trial]) -> armrs.Identified:
+        return armrs.identify(armrs.Dataset("s", MODEL.replace(segment_uncertainty=0.1), tuple(trials), force_on="arm"), motion="measured")
+
+    base, marked, unmarked = identified(clean), identified(comparable(mark_activity(disturbed)[0])), identified(disturbed)
+
+    def moved(result: armrs.Identified) -> float:
+        pairs = zip((*base.parameters, *base.combinations), (*result.parameters, *result.combinations), strict=True)
+        return max(abs(b.value - a.value) / (a.interval[1] - a.interval[0]) for a, b in pairs)
+
+    assert moved(unmarked) > 1.0
+    assert moved(marked) < 0.5
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_data_set_without_or_with_dead_channels_is_as_it_was(share: float) -> None:
+    one = trial(1, 11, False)
+    kept = {} if share == 0.0 else {"emg_dead": np.zeros(len(one))}
+    plain = armrs.Trial(one.file, one.configuration, 1, "fit", one.t, one.q, force_on_arm=one.force_on_arm, emg=kept)
+    marked, lines = mark_activity([plain])
+    assert marked[0].valid.all() and lines == []
