@@ -340,8 +340,8 @@ def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[
             f"{TWO_SPEEDS['quick'].speed:g} rad/s, both joints. {len(session.fit_trials)} trials were fitted, {len(session.test_trials)} "
             "kept apart. The search asked the whole catalogue of effects and was told nothing of the brakes.",
             f"Session of the thesis (`data`): the robot swung one joint at a time by ±{SWING_DEG:g}° about three postures at {SPEED:g} "
-            f"rad/s. {len(data.fit_trials)} trials were fitted with what the search had found; {len(data.test_trials)} were only checked on, "
-            "some of them about a posture that was never fitted.",
+            f"rad/s. {len(data.fit_trials)} trials were fitted with what the search had found; {len(data.test_trials)} were only "
+            "checked on, some of them about a posture that was never fitted.",
             f"Sensors read both: 0.1° of noise on angles, 0.2 N on forces, 12 bits over ±110 N, {data.sample_rate:g} Hz. Repeats differ by "
             "sensor noise alone, which is kinder than a laboratory.",
         ],
@@ -349,8 +349,8 @@ def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[
         "comparison": rows,
         "comparison_text": (
             f"Identified with what was found, on the slow session of the thesis: everything that its movements determine is within "
-            f"{worst:.1f} % of what was simulated. The relative errors of the thesis' own identification of the real arm with brakes on "
-            "(table 4.5) stand beside. Slow movements show the moments and the friction, not the masses: those rest on the model handed over."
+            f"{worst:.1f} % of what was simulated. The relative errors of the thesis' own identification of the real arm with brakes "
+            "on (table 4.5) stand beside. Slow movements show the moments and the friction, not the masses: those rest on the model handed over."
         ),
         "missing_text": (
             "What the identified model leaves of the test trials differs between the directions of motion where friction is missing. Half "
