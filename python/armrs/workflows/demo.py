@@ -350,7 +350,7 @@ def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[
         "comparison_text": (
             f"Identified with what was found, on the slow session of the thesis: everything that its movements determine is within "
             f"{worst:.1f} % of what was simulated. The relative errors of the thesis' own identification of the real arm with brakes "
-            "on (table 4.5) stand beside. Slow movements show the moments and the friction, not the masses: those rest on the model handed over."
+            "on (table 4.5) stand beside. Slow movements show the moments and the friction, not the masses: those rest on the model given."
         ),
         "missing_text": (
             "What the identified model leaves of the test trials differs between the directions of motion where friction is missing. Half "
