@@ -146,7 +146,7 @@ def test_every_default_of_files_md_is_that_of_the_code() -> None:
 
 
 def test_files_md_names_every_key_of_an_identification(session: Path) -> None:
-    from armrs.report.results import identified_data
+    from armrs.report.plain import identified_data
 
     text = (DOCS / "files.md").read_text(encoding="utf-8")
     data = identified_data(armrs.identify(session))

@@ -23,7 +23,8 @@ from armrs import cli
 from armrs.io.files import json_text
 from armrs.io.samples import write_samples
 from armrs.report import figures
-from armrs.report.results import simulated_columns, simulated_data
+from armrs.report.plain import simulated_data
+from armrs.report.results import simulated_columns
 from armrs.workflows.simulate import PIECE
 from armrs.workflows.streamed import stream
 from conftest import MODEL

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import operator
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from .errors import BadInput, Text, unknown_name
+from .io.files import path as path
+from .io.files import with_articles
 
 _MISSING = Text("nothing")
 _Kind = TypeVar("_Kind")
@@ -158,13 +158,6 @@ _KINDS = {"U": "texts", "S": "bytes", "b": "booleans", "c": "complex numbers", "
 """What NumPy's kinds of arrays that are no numbers hold."""
 
 
-def path(place: str, value: object, *kinds: type) -> Path:
-    """Return the path of a file or folder; `kinds` are what else is allowed, for the message."""
-    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
-        raise BadInput(place, value, " or ".join([*_articles(kinds), "a path"]))
-    return Path(value)
-
-
 def loaded(place: str, value: object, kind: type[_Kind], load: Callable[[Any], _Kind]) -> _Kind:
     """Return an object of a class, or what the file at a path holds."""
     if isinstance(value, kind):
@@ -176,7 +169,7 @@ def loaded(place: str, value: object, kind: type[_Kind], load: Callable[[Any], _
 def instance(place: str, value: object, *kinds: type) -> None:
     """Refuse an object of another class."""
     if not isinstance(value, kinds):
-        raise BadInput(place, value, " or ".join(_articles(kinds)))
+        raise BadInput(place, value, " or ".join(with_articles(kinds)))
 
 
 def instances(place: str, value: object, kind: type[_Kind]) -> tuple[_Kind, ...]:
@@ -201,11 +194,6 @@ def texts(place: str, value: object, what: str = "names") -> tuple[str, ...]:
     if not all(parts):
         raise BadInput(place, value, f"{what} with commas between them")
     return parts
-
-
-def _articles(kinds: Iterable[type]) -> list[str]:
-    names = ["None" if kind is type(None) else kind.__name__ for kind in kinds]
-    return [name if name == "None" else f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in names]
 
 
 def function(place: str, value: object) -> None:

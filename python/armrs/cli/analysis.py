@@ -63,7 +63,8 @@ def identify(
     result is not added to a history.
     """
     from ..io.dataset import load_dataset
-    from ..report import results, words
+    from ..report import words
+    from ..report.plain import identified_data
     from ..workflows import history as sessions
     from ..workflows.identify import identify as run_identification
 
@@ -83,12 +84,16 @@ def identify(
             motion=motion.value,
             level=level,
         )
-    plain = results.identified_data(result, command_line(context))
+    plain = identified_data(result, command_line(context))
     with contextlib.ExitStack() as kept:
         # What is added to the history stays only if everything else could be written.
         if history is not None and result.is_sound:
             plain["history"] = [course.to_dict() for course in kept.enter_context(sessions.adding(history, result, day))]
-        written = results.write_identified(result, plain, folder) if folder else []
+        written = []
+        if folder:
+            from ..report.results import write_identified
+
+            written = write_identified(result, plain, folder)
         console.warn([*data.warnings, *result.warnings])
         if history is not None and not result.is_sound:
             console.warn([f"{history}: not added to the history, since the result is not sound"])
@@ -114,7 +119,6 @@ def gap(
     """
     from ..io.dataset import load_dataset
     from ..workflows.gap import calibrate, find_gap, words
-    from ..workflows.gap.results import gap_data, write_gap
 
     if quick and out is not None:
         raise BadInput("--quick", Text("-o beside it"), "--json, or nothing: a first answer has no report")
@@ -128,6 +132,8 @@ def gap(
         return 0
     with console.stages("looking for what is missing") as tell:
         result = find_gap(data, threads=threads, progress=tell)
+    from ..workflows.gap.results import gap_data, write_gap
+
     plain = gap_data(result, command_line(context))
     written = write_gap(result, plain, folder) if folder else []
     console.warn([*data.warnings, *result.warnings])
@@ -152,15 +158,20 @@ def passive(
     Exit status 1 when no joint moved long enough in both directions.
     """
     from ..io.dataset import load_dataset
-    from ..report import results, words
+    from ..report import words
+    from ..report.plain import passive_data
     from ..workflows.passive import passive_moments
 
     folder = writable(out, json)
     data = load_dataset(dataset)
     with console.progress("passive moments"):
         result = passive_moments(data, cutoff=cutoff_hz, bins=bins)
-    plain = results.passive_data(result, command_line(context))
-    written = results.write_passive(result, plain, folder) if folder else []
+    plain = passive_data(result, command_line(context))
+    written = []
+    if folder:
+        from ..report.results import write_passive
+
+        written = write_passive(result, plain, folder)
     console.warn([*data.warnings, *result.warnings])
     present(lambda: plain, json, lambda: words.passive(plain, written))
     return 0 if result.curves else 1

@@ -68,7 +68,8 @@ def simulate(
 ) -> None:
     """Simulate the closed-chain experiment: a robot leads the arm."""
     from ..model import load_model
-    from ..report import results, words
+    from ..report import words
+    from ..report.plain import simulated_data
     from ..workflows.simulate import load_movement
     from ..workflows.streamed import stream
 
@@ -95,8 +96,12 @@ def simulate(
                 coupling=coupling.value,
             )
             result = stack.enter_context(run)
-        plain = results.simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
-        written = results.write_simulated(result, plain, folder, suffix=suffix, trial=measured) if folder else []
+        plain = simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
+        written = []
+        if folder:
+            from ..report.results import write_simulated
+
+            written = write_simulated(result, plain, folder, suffix=suffix, trial=measured)
         warnings = result.warnings
     console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *warnings])
     present(lambda: plain, json, lambda: words.simulated(plain, written))

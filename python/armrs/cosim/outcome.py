@@ -9,7 +9,7 @@ import numpy as np
 
 from ..io import files
 from ..io.samples import write_samples
-from ..report import figures, plotting, results
+from ..report import figures, plain, plotting, results
 from .master import Coupled
 
 
@@ -46,7 +46,7 @@ def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[st
         ],
         "not_connected": system.unconnected,
         "warnings": list(run.warnings),
-        "made_by": results.origin(command),
+        "made_by": plain.origin(command),
     }
 
 

@@ -8,12 +8,11 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from .. import checks
 from ..errors import BadInput, Text
 
 PathLike = str | os.PathLike[str]
@@ -24,6 +23,23 @@ _UNFINISHED = re.compile(r"\..*\.(?P<host>\w+)-(?P<process>\d+)\..*\.part")
 _COMPLETE = ".complete"
 """Suffix of a folder whose files are all written and on their way to their places."""
 _SCRATCH = re.compile(r"armrs-.*?(?P<host>\w+)-(?P<process>\d+)-.*")
+
+
+def path(place: str, value: object, *kinds: type) -> Path:
+    """Return the path of a file or folder; `kinds` are what else is allowed, for the message."""
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
+        raise BadInput(place, value, " or ".join([*with_articles(kinds), "a path"]))
+    return Path(value)
+
+
+def with_articles(kinds: Iterable[type]) -> list[str]:
+    """Return names of classes as a message lists them: `a Model`, `an Arm`, `None`."""
+    names = ["None" if kind is type(None) else kind.__name__ for kind in kinds]
+    return [name if name == "None" else f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in names]
+
+
+_path = path
+"""For functions with an argument of that name."""
 
 
 @contextmanager
@@ -277,7 +293,7 @@ def may_replace(path: PathLike, kind: str) -> None:
 
 def output_folder(path: PathLike, place: str = "folder") -> Path:
     """Return a folder to write below; it need not exist yet, but it must not be a file. `place` is what the caller calls it."""
-    folder = checks.path(place, path)
+    folder = _path(place, path)
     if folder.exists() and not folder.is_dir():
         raise BadInput(place, Text("a file"), "a folder", file=path)
     return folder

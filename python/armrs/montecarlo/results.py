@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from ..io import files
-from ..report.results import origin, write_result
+from ..report.plain import origin
+from ..report.results import write_result
 from . import figures
 from .change import Vary
 from .spec import Sweep

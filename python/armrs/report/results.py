@@ -1,74 +1,21 @@
-"""Results as plain data and as files: JSON, model, figures and report below one folder."""
+"""Results as files: JSON, model, figures and report below one folder."""
 
 from __future__ import annotations
 
-import dataclasses
-import platform
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import _armrs
-from ..analysis.quantities import value_in
 from ..io import files
-from ..io.dataset import Dataset
 from ..io.samples import write_pieces
 from ..io.trial import Trial
-from ..rig import NO_CONTACT
-from ..workflows.identify import Estimate, Identified
-from ..workflows.passive import LEVEL, PassiveMoments
+from ..workflows.identify import Identified
+from ..workflows.passive import PassiveMoments
 from ..workflows.simulate import Simulated
 from ..workflows.streamed import Run
 from . import figures, pages, plotting
-
-
-def origin(command: str | None) -> dict[str, Any]:
-    """Return what made a result: version and build of armrs, Python, and the command where there was one."""
-    return {
-        "armrs": _armrs.__version__,
-        "build_profile": _armrs.build_profile,
-        "python": platform.python_version(),
-        "command": command,
-    }
-
-
-def data_of(dataset: Dataset) -> dict[str, Any]:
-    """Return what a report says of a data set."""
-
-    def of(role: str) -> dict[str, Any]:
-        trials = [t for t in dataset.trials if t.role == role]
-        return {
-            "trials": len(trials),
-            "duration_s": float(sum(t.t[-1] - t.t[0] for t in trials)),
-            "samples": sum(len(t) for t in trials),
-        }
-
-    return {
-        "name": dataset.name,
-        "synthetic": dataset.synthetic,
-        "joints": [joint.name for joint in dataset.model.joints],
-        "configurations": list(dict.fromkeys(t.configuration for t in dataset.trials)),
-        "fit": of("fit"),
-        "test": of("test"),
-        "forces": any(t.force_on_arm is not None for t in dataset.trials),
-        "torques": any(t.tau is not None for t in dataset.trials),
-        "warnings": list(dataset.warnings),
-    }
-
-
-def identified_data(result: Identified, command: str | None = None) -> dict[str, Any]:
-    """Return an identification as it is written to JSON: that of `Identified.to_dict`, what it rests on, and the model's own values."""
-    data = {"verb": "identify", **result.to_dict(), "data": data_of(result.dataset), "made_by": origin(command)}
-    for name in ("parameters", "combinations"):
-        data[name] = [_with_given(estimate, result) for estimate in getattr(result, name)]
-    return data
-
-
-def _with_given(estimate: Estimate, result: Identified) -> dict[str, Any]:
-    given = value_in(result.dataset.model, estimate.name, kind=estimate.kind, joint=estimate.joint)
-    return dataclasses.asdict(estimate) | {"given": given}
 
 
 def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> list[Path]:
@@ -105,55 +52,6 @@ def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figu
     files.write_json(document, data)
     pages.write_report([document], page)
     return [*pictures, document, page]
-
-
-def simulated_data(result: Run, name: str, command: str | None = None) -> dict[str, Any]:
-    """Return what a run came to, as it is written to JSON; its samples stand in a file of their own."""
-    fastest = error = 0.0
-    largest = (-1.0, 0.0)
-    first: Simulated | None = None
-    last: Simulated | None = None
-    for piece in result.pieces():
-        force = np.hypot(*piece.force_on_arm.T)
-        at = int(np.argmax(force))
-        if force[at] > largest[0]:
-            largest = (force[at], piece.t[at])
-        fastest = max(fastest, np.abs(piece.qd).max())
-        error = max(error, np.abs(piece.columns["energy_error"]).max())
-        first, last = piece if first is None else first, piece
-    assert first is not None and last is not None
-    stored = sum(last.columns[f"energy.{part}"][-1] - first.columns[f"energy.{part}"][0] for part in ("kinetic", "potential", "contact"))
-    return {
-        "verb": "simulate",
-        "data": {"name": name, "synthetic": True, "joints": [joint.name for joint in result.model.joints]},
-        **result.settings,
-        "duration_s": last.t[-1],
-        "samples": result.samples,
-        "digest": result.digest,
-        "assumed": _assumed(first),
-        "largest_force_N": largest[0],
-        "largest_force_at_s": largest[1],
-        "largest_speed_rad_s": fastest,
-        "energy": {
-            "stored_J": stored,
-            **{f"{part}_J": last.columns[f"work.{part}"][-1] for part in ("handle", "drive", "resisted", "damped")},
-            "error_J": error,
-        },
-        "made_by": origin(command),
-    }
-
-
-def _assumed(result: Simulated) -> list[str]:
-    """Return what a run of an arm that is led took for granted because its model does not say it, a sentence each."""
-    lines: list[str] = []
-    if result.columns.get("handle") is None:
-        return lines
-    if result.model.contact is None and result.settings["coupling"] == "compliant":
-        (stiffness, _), (damping, _) = NO_CONTACT
-        lines.append(f"The model has no [contact]: {stiffness:g} N/m and {damping:g} N s/m along y and z were taken.")
-    if result.model.robot is None:
-        lines.append("The model has no [robot]: its angles were not computed, and whether it reaches the path was not checked.")
-    return lines
 
 
 def simulated_columns(result: Simulated) -> dict[str, np.ndarray]:
@@ -201,32 +99,6 @@ def write_simulated(result: Run, data: dict[str, Any], folder: Path, *, suffix: 
         return [out / name, *write_result(out, "simulated", data, drawn)]
 
     return files.write_whole(folder, write)
-
-
-def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str, Any]:
-    """Return passive moments as they are written to JSON."""
-    joints = [joint.name for joint in result.dataset.model.joints]
-    curves = []
-    for curve in result.curves:
-        deviation = curve.half_width_std[np.isfinite(curve.half_width_std)]
-        curves.append(
-            curve.to_dict()
-            | {"joint_name": joints[curve.joint - 1], "half_width_std_mean_Nm": float(np.mean(deviation)) if deviation.size else None}
-        )
-    return {
-        "verb": "passive",
-        "data": data_of(result.dataset),
-        "cutoff_Hz": result.cutoff,
-        "curves": curves,
-        "dependence": [
-            d.to_dict() | {"joint_name": joints[d.joint - 1], "adjacent_name": joints[d.adjacent - 1]} for d in result.dependence
-        ],
-        "couplings": [c.to_dict() | {"joint_names": [joints[j - 1] for j in c.joints]} for c in result.couplings],
-        "checks": [{"name": c.name, "passed": c.passed, "text": c.text} for c in result.checks],
-        "level": LEVEL,
-        "warnings": list(result.warnings),
-        "made_by": origin(command),
-    }
 
 
 def write_passive(result: PassiveMoments, data: dict[str, Any], folder: Path) -> list[Path]:

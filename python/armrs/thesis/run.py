@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..io import files
 from ..report import plotting
-from ..report.results import origin
+from ..report.plain import origin
 from . import dynamics, equations, humans, left_out, mechanical, movements, page, passive, propagation, simulation, six
 from .item import Found, Item
 

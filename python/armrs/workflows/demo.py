@@ -20,7 +20,7 @@ from ..io import files
 from ..io.dataset import Dataset, load_dataset, write_dataset
 from ..io.trial import Trial
 from ..model import Contact, Joint, Model, Robot, Segment
-from ..report import figures, pages, plotting, results
+from ..report import figures, pages, plain, plotting, results
 from .gap import GapFound, find_gap
 from .gap.headline import effect_name, headline, joined
 from .gap.results import gap_data, write_gap
@@ -249,7 +249,7 @@ def comparison(truth: Model, found: Identified) -> list[dict[str, Any]]:
     """Return identified values beside known ones, as plain data: what the thesis compares in table 4.5, and what the data determine."""
     rows: list[dict[str, Any]] = []
     seen = set()
-    data = results.identified_data(found)
+    data = plain.identified_data(found)
     for item in [*data["combinations"], *data["parameters"]]:
         key = item["name"] if item["kind"] in ("segment", "combination") else f"{item['name']} {item['joint']}"
         reference = value_in(truth, item["name"], kind=item["kind"], joint=item["joint"])
@@ -286,8 +286,8 @@ def _write(out: Path, made: Demonstration, command: str | None) -> list[Path]:
     drawn = [opening, figures.known(rows, joints, found.level), figures.direction_of_motion(left[0], left[1], joints)]
     data = _demo_data(made, rows, [_half_gap(parts) for parts in left], command)
     gap = write_gap(made.gap, gap_data(made.gap, command), out / "gap")
-    identified = results.write_identified(found, results.identified_data(found, command), out / "identified")
-    moments = results.write_passive(passive, results.passive_data(passive, command), out / "passive")
+    identified = results.write_identified(found, plain.identified_data(found, command), out / "identified")
+    moments = results.write_passive(passive, plain.passive_data(passive, command), out / "passive")
     own = results.write_result(out, "demo", data, drawn)
     documents = [path for path in (*own, *gap, *identified, *moments) if path.suffix == ".json"]
     page = pages.write_report(documents, out / "report.html")
@@ -330,7 +330,7 @@ def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[
     slow, quick = (joined([n for n, c in TWO_SPEEDS.items() if (c.speed < SLOWEST) == is_slow]) for is_slow in (True, False))
     return {
         "verb": "demo",
-        "data": results.data_of(session),
+        "data": plain.data_of(session),
         "verdict": search_verdict(made.gap),
         "story": [
             "The mechanical arm of table 4.3 of the thesis was simulated with its brakes, a robot of two links of 0.45 m and a contact of "
@@ -358,5 +358,5 @@ def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[
             + ", ".join(f"{j.name} {a:.3f} and {b:.3f} N m" for j, a, b in zip(data.model.joints, *gaps, strict=True))
             + "."
         ),
-        "made_by": results.origin(command),
+        "made_by": plain.origin(command),
     }

@@ -10,7 +10,8 @@ from typing import Any
 from ...catalogue import catalogue
 from ...io import files, tomlfile
 from ...io.dataset import FILE, Dataset
-from ...report.results import data_of, origin, write_result
+from ...report.plain import data_of, origin
+from ...report.results import write_result
 from . import figures
 from .found import GapFound
 

@@ -12,7 +12,7 @@ from ...catalogue import catalogue
 from ...custom_effects import OwnEffect
 from ...io.dataset import Dataset, load_dataset, naming_trials
 from ...model import Contact, Model, Robot
-from ...report.results import data_of, origin
+from ...report.plain import data_of, origin
 from ...rig import NO_CONTACT, all_effects, rig
 from . import maps, reading, suspicion
 from .found import Absorbed, ChannelGap, GapFound, Place, Suspect
