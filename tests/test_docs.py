@@ -232,3 +232,14 @@ def test_every_test_and_function_of_the_table_of_equations_exists() -> None:
     for name in itertools.chain(*(re.findall(r"`(?:\w+::)?(\w+)`", row[2]) for row in rows)):
         declared = re.compile(rf"\b(?:fn|def|struct|class) {name}\b|\b{name}: |\"{name}\"")
         assert any(declared.search(source) for source in sources), name
+
+
+def test_the_thesis_is_cited() -> None:
+    """Author, title and year stand wherever a reader meets "the thesis" first."""
+    from armrs.thesis.left_out import THESIS
+
+    for name in ("README.md", "docs/architecture.md", "CITATION.cff"):
+        text = " ".join((ROOT / name).read_text(encoding="utf-8").split())
+        assert "Kodek" in text and "Timotej" in text and "2004" in text, name
+        assert "Estimation of Upper Extremity Biomechanical Parameters Using a Robot Manipulator" in text, name
+    assert all(part in THESIS for part in ("Timotej Kodek", "Using a Robot Manipulator", "2004"))
