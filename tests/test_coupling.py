@@ -15,6 +15,7 @@ import pytest
 
 from armrs import Contact, Joint, Model, _armrs, cli
 from armrs.cosim import Partner, Slave
+from armrs.cosim.accuracy import run_checked
 from armrs.cosim.imported import ImportedSlave
 from armrs.cosim.master import Coupled, run_system
 from armrs.cosim.partner import StepResult
@@ -230,8 +231,11 @@ def test_a_partner_that_asks_to_end_ends_the_run() -> None:
         def do_step(self, time: float, step: float) -> StepResult:
             return dataclasses.replace(super().do_step(time, step), terminate=time > 0.05)
 
-    with pytest.raises(CoupledError, match=r"wall asks to end the run after the step from 0\.06 s"):
-        run_system(couple([Ending("y", 1.0, 1.0)], [], step=0.01, duration=1.0))
+    run = run_checked(couple([Ending("y", 1.0, 1.0)], [], step=0.01, duration=1.0))
+    assert run.verdict == "ended"
+    assert "wall asks to end the run in the step from 0.06 s" in run.why
+    assert run.t[-1] == pytest.approx(0.06)
+    assert len(run.columns["wall.F[1]"]) == len(run.t)
 
 
 # ---- a wall

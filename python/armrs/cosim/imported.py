@@ -108,6 +108,7 @@ class ImportedSlave(Partner):
             if folder is None:
                 unpack(path, unpacked)
             self.library = Library(library_path(unpacked, self.description, path), self.fmi)
+            self._do_step = self.library.function("DoStep")
             resources = unpacked / "resources"
             resources.mkdir(exist_ok=True)
             handle = self.library.instantiate(self.name, self.description.token, resources, logging=logging, **mode)
@@ -122,7 +123,10 @@ class ImportedSlave(Partner):
         self._plans: dict[tuple[str, ...], _Plan] = {}
         self._flags = [c_bool() for _ in range(3)]
         self._last = c_double()
-        self._places = (*(byref(flag) for flag in self._flags), byref(self._last))
+        self._is_three = self.fmi == 3
+        self._time, self._step = c_double(), c_double()
+        places = (c_bool(False), *(byref(flag) for flag in self._flags), byref(self._last)) if self._is_three else (c_int(0),)
+        self._step_arguments = (self._instance, self._time, self._step, *places)
         # Also at the end of the process, while there still is an interpreter that a library may need.
         self._release = weakref.finalize(self, _release, self.library, handle, remove)
 
@@ -176,7 +180,7 @@ class ImportedSlave(Partner):
         plan = self._plan(names)
         if plan.simple is not None:
             self._done(plan.simple.names[0], plan.simple.get(self._instance, *plan.simple.arguments))
-            return plan.simple.view.astype(float)
+            return plan.simple.view.astype(float)  # a copy
         out = np.empty(plan.count)
         for group in plan.groups:
             if len(group.buffer) != len(group.places):
@@ -196,21 +200,25 @@ class ImportedSlave(Partner):
 
     def do_step(self, time: float, step: float) -> StepResult:
         """Make a communication step from a time [s], of a length [s]."""
-        function = self.library.function("DoStep")
-        if self.fmi == 3:
+        self._time.value, self._step.value = time, step
+        if self._is_three:
             for flag in self._flags:
                 flag.value = False
             self._last.value = time + step
-            status = function(self._instance, c_double(time), c_double(step), c_bool(False), *self._places)
-            event, terminate, early = (flag.value for flag in self._flags)
+            status = self._do_step(*self._step_arguments)
+            event, terminate, early = [flag.value for flag in self._flags]
+            if status == 0:
+                return StepResult(Status.OK, self._last.value, event, terminate, early)
             reached = self._last.value
         else:
-            status = function(self._instance, c_double(time), c_double(step), c_int(0))
+            status = self._do_step(*self._step_arguments)
+            if status == 0:
+                return StepResult(Status.OK, time + step)
             event = early = False
             # A slave of FMI 2.0 that wants to end discards the step and says so when it is asked.
             terminate = status == Status.DISCARD and self._terminated()
-            reached = time + step if status <= Status.WARNING else self._reached(time)
-        if status > Status.DISCARD or status < 0:
+            reached = time + step if status == Status.WARNING else self._reached(time)
+        if not 0 <= status <= Status.DISCARD:
             raise SlaveError("do_step", status, self.library.last_message())
         message = self.library.last_message() if status == Status.DISCARD else ""
         return StepResult(Status(status), reached, event, terminate, early, message)

@@ -54,6 +54,7 @@ class IsolatedSlave(Partner):
         self.description = read_description(path)
         describe(self, self.path, self.description, name)
         # Inputs travel with the next call, and what was read after the last step comes with the next step: one way there and back a step.
+        self._stepping = False
         self._pending: list[tuple[Any, Any]] = []
         self._wanted: dict[tuple[str, ...], None] = {}
         self._fresh: dict[tuple[str, ...], list[float]] = {}
@@ -80,14 +81,18 @@ class IsolatedSlave(Partner):
     def exit_initialization_mode(self) -> None:
         """End the initialization."""
         self._call("exit_initialization_mode")
+        self._stepping = True
 
     def set(self, names: Sequence[str] | str, values: Any) -> None:
         """Set variables by name."""
         self._known(names)
         self._fresh.clear()
-        self._pending.append(
-            (names if isinstance(names, str) else list(names), values.tolist() if isinstance(values, np.ndarray) else values)
-        )
+        listing = names if isinstance(names, str) else list(names)
+        given = values.tolist() if isinstance(values, np.ndarray) else values
+        if self._stepping:
+            self._pending.append((listing, given))
+        else:
+            self._call("set", listing, given)
 
     def get(self, names: Sequence[str] | str) -> np.ndarray:
         """Return variables by name, shape (len(names),)."""
@@ -136,6 +141,8 @@ class IsolatedSlave(Partner):
 
     def reset(self) -> None:
         """Go back to how the slave was made."""
+        self._pending.clear()
+        self._stepping = False
         self._call("reset")
 
     def free(self) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, CoupledError, SlaveError, Text
+from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
 from .partner import Partner, Status
 from .system import Connection, System
 
@@ -17,6 +17,8 @@ MOST_CREATED = 0.02
 MOST_IN_STEPS = 0.1
 """The same of the magnitudes summed over steps."""
 WORTH_A_WARNING = 0.005
+RESULTS = ("stable", "good", "ended")
+"""Verdicts of runs whose numbers may be used."""
 _PORT_INPUTS = ("handle.F[", "robot.v[")
 _LITTLE = 1e-6
 """Energy below which a share says nothing [J]."""
@@ -55,8 +57,9 @@ class Coupled:
     Attributes
     ----------
     system : System
-    verdict : {"good", "unstable", "not resolved", "diverged", "not converged"}
-        Only a good run is a result.
+    verdict : {"stable", "good", "ended", "unstable", "not resolved", "not accurate", "diverged", "failed", "not converged"}
+        "stable" where the error was not estimated, "good" where it is within the accuracy, "ended" where a slave asked to end the run.
+        The others are no results.
     why : str
         One line on the verdict.
     t : ndarray, shape (n,)
@@ -71,6 +74,8 @@ class Coupled:
     evaluations : float
         Steps of all slaves together for each communication step.
     warnings : tuple of str
+    estimates : tuple of `armrs.cosim.accuracy.Estimate`
+        Estimated errors; empty where they were not estimated.
     """
 
     system: System
@@ -84,10 +89,11 @@ class Coupled:
     connections: tuple[ConnectionReport, ...] = field(repr=False)
     evaluations: float
     warnings: tuple[str, ...]
+    estimates: tuple[Any, ...] = field(default=(), repr=False)
 
 
 def run_system(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
-    """Run a system from zero to its duration.
+    """Run a system from zero to its duration, without an estimate of its error: `armrs.cosim.accuracy.run_checked` has one.
 
     Parameters
     ----------
@@ -111,9 +117,11 @@ def run_system(system: System, *, progress: Callable[[int], None] = lambda steps
     """
     run = _Run(system)
     run.initialize()
-    run.steps(progress)
-    result = run.result()
-    if result.verdict != "good":
+    # Numbers beyond all bounds are looked for, and said in words.
+    with np.errstate(all="ignore"):
+        run.steps(progress)
+        result = run.result()
+    if result.verdict not in RESULTS:
         error = CoupledError(f"{result.verdict}: {result.why}")
         error.run = result
         raise error
@@ -122,6 +130,10 @@ def run_system(system: System, *, progress: Callable[[int], None] = lambda steps
 
 class _Failed(Exception):
     """A step that could not be made."""
+
+
+class _Ended(Exception):
+    """A slave asked to end the run; the step was made as far as it goes."""
 
 
 class _Run:
@@ -183,15 +195,21 @@ class _Run:
         system = self.system
         for slave in self.slaves:
             given = system.starts.get(slave.name, {})
-            if given:
-                slave.set(list(given), list(given.values()))
-            slave.enter_initialization_mode(0.0, system.duration)
+            try:
+                if given:
+                    slave.set(list(given), list(given.values()))
+                slave.enter_initialization_mode(0.0, system.duration)
+            except SlaveError as error:
+                raise _refused_start(slave, given, error) from None
         for _ in self.slaves:
             for i in range(len(self.slaves)):
                 self._give(i, self.y)
                 self._take(i)
         for slave in self.slaves:
-            slave.exit_initialization_mode()
+            try:
+                slave.exit_initialization_mode()
+            except SlaveError as error:  # noqa: PERF203 (each slave is named)
+                raise _refused_start(slave, system.starts.get(slave.name, {}), error) from None
         for i in range(len(self.slaves)):
             self._take(i)
         self.before = self.y.copy()
@@ -211,6 +229,12 @@ class _Run:
             except _Failed as failed:
                 self.stopped = ("diverged", str(failed))
                 return
+            except _Ended as ended:
+                self.stopped = ("ended", str(ended))
+                return
+            except SlaveError as error:
+                self.stopped = ("failed", str(error))
+                return
             if not np.isfinite(self.y).all():
                 bad = system.connections[int(np.flatnonzero(~np.isfinite(self.y))[0])].label
                 self.stopped = ("diverged", f"{bad} is not finite at {end:.6g} s")
@@ -221,6 +245,9 @@ class _Run:
             if self.stopped is not None:
                 return
             progress(1)
+        self._terminate()
+
+    def _terminate(self) -> None:
         for slave in self.slaves:
             slave.terminate()
 
@@ -334,11 +361,11 @@ class _Run:
             if error.status != Status.DISCARD:
                 raise
             raise _Failed(f"{self.slaves[i].name}: {error.message}") from None
+        if done.terminate:
+            raise _Ended(f"{self.slaves[i].name} asks to end the run in the step from {time:.6g} s; the samples end there")
         if done.status == Status.DISCARD:
             reached = f", it came to {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
             raise _Failed(f"{self.slaves[i].name} discards the step from {time:.6g} s{reached}: {done.message}")
-        if done.terminate:
-            raise _Failed(f"{self.slaves[i].name} asks to end the run after the step from {time:.6g} s")
 
     # ---- what is kept
     def _record(self, time: float) -> None:
@@ -390,7 +417,7 @@ class _Run:
             return *self.stopped, []
         if not self.dual_of:
             why = "no energy balance: no connection has a dual variable"
-            return "good", why, [why] if self.system.connections else []
+            return "stable", why, [why] if self.system.connections else []
         warnings = []
         for i in dict.fromkeys(self.target[self.dual_of].tolist()):
             # What enters one slave is judged together: y and z of one handle.
@@ -416,7 +443,7 @@ class _Run:
                 return "not resolved", f"{text}; take a shorter step", []
             if off > WORTH_A_WARNING * through:
                 warnings.append(text)
-        return "good", "the energy that the coupling creates is small", warnings
+        return "stable", "the energy that the coupling creates is small", warnings
 
     def _input(self, k: int) -> str:
         """Name of the input at the end of a connection."""
@@ -444,6 +471,13 @@ class _Run:
             energy_exchanged=float(np.max(np.abs(exchanged[:, k]))) if has_dual else None,
             energy_created=float(created[-1, k]) if has_dual else None,
         )
+
+
+def _refused_start(slave: Partner, given: Mapping[str, Any], error: SlaveError) -> ArmrsError:
+    """Name the slave of a refusal before the first step: the start values of a system are an input."""
+    if error.status == Status.FATAL or not given:
+        return SlaveError(error.function, error.status, f"{slave.name}: {error.message}")
+    return BadInput(f"{slave.name}, [slave.start]", Text(error.message), "values that the slave takes")
 
 
 def _differences(residual: Callable[[np.ndarray], np.ndarray], at: np.ndarray, r: np.ndarray, by: np.ndarray) -> np.ndarray:

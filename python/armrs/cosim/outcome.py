@@ -1,4 +1,4 @@
-"""A run of a system as plain data, and as files: JSON, figures, a report, and the samples of a good run."""
+"""A run of a system as plain data, and as files: JSON, figures, a report, and the samples of a run that is a result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from ..io import files
 from ..io.samples import write_samples
 from ..report import figures, plain, plotting, results
-from .master import Coupled
+from .master import RESULTS, Coupled
 
 
 def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[str, Any]:
@@ -44,6 +44,8 @@ def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[st
             }
             for report in run.connections
         ],
+        "accuracy": system.accuracy,
+        "errors": [{"name": e.name, "unit": e.unit, "estimated_error": e.error, "allowed": e.allowed} for e in run.estimates],
         "not_connected": system.unconnected,
         "warnings": list(run.warnings),
         "made_by": plain.origin(command),
@@ -51,12 +53,14 @@ def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[st
 
 
 def write_coupled(run: Coupled, data: dict[str, Any], folder: Path, *, suffix: str = ".csv") -> list[Path]:
-    """Write `coupled.json`, figures, `report.html`, and the samples of a good run below a folder; return the files, the report last.
+    """Write `coupled.json`, figures, `report.html`, and the samples of a run that is a result below a folder.
+
+    The files are returned, the report last.
 
     Of a run that is no result only the diagnosis is written: no samples.
     """
     drawn = [_drawn(run)]
-    good = run.verdict == "good"
+    good = run.verdict in RESULTS
     data["file"] = f"coupled{suffix}" if good else None
 
     def write(out: Path) -> list[Path]:

@@ -23,7 +23,8 @@ class Status(enum.IntEnum):
     FATAL = 4
 
 
-@dataclass(frozen=True)
+# Not frozen: that would double what making one costs, and one is made in every step.
+@dataclass(slots=True)
 class StepResult:
     """What a communication step gave.
 

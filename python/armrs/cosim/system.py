@@ -17,10 +17,13 @@ from ..errors import BadInput, Text, unknown_name
 from ..io import tomlfile
 from .isolated import IsolatedSlave
 from .partner import Partner, Variable
+from .ready import from_table
 from .slave import Slave
 from .wall import Wall
 
 ALGORITHMS = ("jacobi", "gauss-seidel", "iterated")
+KINDS = ("model", "fmu", "wall", "signal", "pid", "impedance")
+"""What a slave of SYSTEM.toml can be."""
 WITHIN = ("start", "mean", "end")
 _POWER = (1, 2, -3)
 _MOST_STEPS = 10_000_000
@@ -76,6 +79,10 @@ class System:
         Communication step and length of the run [s].
     tolerance : float
         What the iteration may leave at the interface, relative to the larger of nominal and present value.
+    accuracy : float
+        Error that a good run may have at the interface and in the angles of arms, relative to the largest change of each variable.
+    refine : int
+        How often the step may be halved to reach it.
     warnings : tuple of str
     """
 
@@ -86,6 +93,8 @@ class System:
     step: float = 1e-3
     duration: float = 1.0
     tolerance: float = 1e-6
+    accuracy: float = 0.01
+    refine: int = 0
     warnings: tuple[str, ...] = ()
 
     @property
@@ -118,6 +127,8 @@ def couple(
     step: float = 1e-3,
     duration: float = 1.0,
     tolerance: float = 1e-6,
+    accuracy: float = 0.01,
+    refine: int = 0,
     starts: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> System:
     """Make a system of slaves and connections, and check that they fit together.
@@ -129,7 +140,7 @@ def couple(
     connections : iterable
         Pairs `("robot.F", "arm.handle.F")`, or tables with the keys of `[[connection]]`. A name without index stands for all of its
         indices.
-    algorithm, step, duration, tolerance
+    algorithm, step, duration, tolerance, accuracy, refine
         As in `System`.
     starts : mapping, optional
         Values to be set before the initialization, by slave and variable.
@@ -174,6 +185,8 @@ def couple(
         step=step,
         duration=duration,
         tolerance=checks.number("[system], tolerance", tolerance, above=0.0, most=0.1),
+        accuracy=checks.number("[system], accuracy", accuracy, above=0.0, most=1.0),
+        refine=checks.whole("[system], refine", refine, least=0, most=10),
         warnings=tuple(warnings),
     )
 
@@ -194,7 +207,7 @@ def _system(document: dict[str, Any], path: Path) -> System:
     try:
         checks.keys("", document, required=["system", "slave"], optional=["connection"])
         settings = checks.table("[system]", document["system"])
-        checks.keys("[system]", settings, required=["step_s", "duration_s"], optional=["algorithm", "tolerance"])
+        checks.keys("[system]", settings, required=["step_s", "duration_s"], optional=["algorithm", "tolerance", "accuracy", "refine"])
         starts = {}
         for number, table in enumerate(checks.tables("slave", document["slave"]), start=1):
             try:
@@ -230,10 +243,16 @@ def _check_start(slave: Partner, name: str, value: object) -> None:
 
 
 def _slave(table: dict[str, Any], folder: Path) -> Partner:
-    kinds = [kind for kind in ("model", "fmu", "wall") if kind in table]
+    kinds = [kind for kind in KINDS if kind in table]
     if len(kinds) != 1:
-        raise BadInput("model, fmu, wall", Text(" and ".join(kinds) or "none of them"), "one of them")
+        raise BadInput(", ".join(KINDS), Text(" and ".join(kinds) or "none of them"), "one of them")
     kind = kinds[0]
+    if kind in ("signal", "pid", "impedance"):
+        checks.keys("", table, required=[kind, "name"], optional=["start"])
+        try:
+            return from_table(kind, checks.table(kind, table[kind]), checks.text("name", table["name"]), folder)
+        except BadInput as error:
+            raise error if error.file else error.within(place=kind) from None
     if kind == "wall":
         checks.keys("", table, required=["wall", "name"], optional=["start"])
         wall = checks.table("wall", table["wall"])
@@ -285,8 +304,11 @@ def _connection(
     if given.causality != "input":
         raise BadInput("to", Text(f"{'.'.join(target)}, {given.causality}"), "an input")
     for end, variable in zip(ends, (output, given), strict=True):
-        if not variable.is_signal:
-            raise BadInput("from, to", Text(f"{'.'.join(end)} of type {variable.type}"), "numbers of 64 bit")
+        if variable.dimensions or _family(variable) is None:
+            kind = f"an array of {variable.type}" if variable.dimensions else variable.type
+            raise BadInput("from, to", Text(f"{'.'.join(end)}, {kind}"), "scalar numbers or truth values")
+    if _family(output) != _family(given):
+        raise BadInput("from, to", Text(f"{output.type} and {given.type}"), "the same sort of value at both ends")
     label = f"{'.'.join(source)} -> {'.'.join(target)}"
     if output.exponents is None or given.exponents is None:
         warnings.append(f"{label}: units not checked, one of them is not described")
@@ -295,8 +317,19 @@ def _connection(
         raise BadInput("from, to", Text(f"{label}, in {output.unit} and {given.unit}"), "the same dimension at both ends")
     dual, sign = _dual(table.get("dual"), target, slaves)
     within = table.get("within")
+    if _family(given) != "Float":
+        # Between whole numbers there is nothing to hold.
+        return Connection(source, target, checks.choice("within", "start" if within is None else within, ("start", "end")))
     within = _within(target, given, slaves) if within is None else checks.choice("within", within, WITHIN)
     return Connection(source, target, within, dual, sign, output.scale / given.scale)
+
+
+def _family(variable: Variable) -> str | None:
+    """Return the sort of value that may be connected: floating point, whole number, or truth value."""
+    for family in ("Float", "UInt", "Int", "Boolean"):
+        if variable.type.startswith(family):
+            return "Int" if family == "UInt" else family
+    return None
 
 
 def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ from .. import _armrs, checks
 from ..cosim.library import platform_folder
 from ..cosim.partner import Variable
 from ..cosim.slave import Slave
-from ..errors import ArmrsError
+from ..errors import ArmrsError, BadInput
 from ..io import files
 from ..model import Model
 
@@ -84,6 +84,9 @@ def export_fmu(
 
 def contents(slave: Slave, fmi: int) -> dict[str, bytes]:
     """Return the files of an FMU, its description first."""
+    machine = platform.machine().lower()
+    if fmi == 2 and machine not in ("x86_64", "amd64", "i386", "i686"):
+        raise BadInput("fmi", fmi, f"3: FMI 2.0 has no folder for libraries of {machine}")
     description, terminals = slave.compiled.description(fmi)
     place, suffix = platform_folder(fmi)
     icon = resources.files("armrs.fmu").joinpath("icon.png").read_bytes()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -150,13 +152,13 @@ def _life(trial: Trial) -> None:
     slave.enter_initialization_mode(trial.start)
     trial.step("comparing start values")
     _starts(trial, slave)
-    promises.dependencies(trial, slave)
-    promises.directional_derivatives(trial, slave)
+    for promise in (promises.dependencies, promises.directional_derivatives):
+        _guarded(trial, partial(promise, slave=slave))
     slave.exit_initialization_mode()
     _reads(trial, slave)
     first = _steps(trial, slave)
+    _second_instance(trial, slave)
     _tunables(trial, slave)
-    _second_instance(trial)
     trial.step("ending")
     slave.terminate()
     _reset(trial, slave, first)
@@ -246,8 +248,11 @@ def _steps(trial: Trial, slave: ImportedSlave) -> dict[str, list[Any]]:
 def _disturb(trial: Trial, slave: ImportedSlave) -> None:
     """Go on with other inputs, so that a state without inputs or times is seen."""
     for v in trial.readable("input"):
-        if v.is_signal and v.start is not None:
-            slave.set(v.name, v.start + 0.125 * v.nominal if v.max is None or v.start + 0.125 * v.nominal <= v.max else v.start)
+        moved = v.start + 0.125 * v.nominal if v.is_signal and v.start is not None else None
+        if moved is not None and (v.max is None or moved <= v.max):
+            # An input that cannot be set is a finding later.
+            with contextlib.suppress(SlaveError):
+                slave.set(v.name, moved)
     slave.do_step(trial.start + trial.size, trial.size)
 
 
@@ -314,25 +319,24 @@ def _tunables(trial: Trial, slave: ImportedSlave) -> None:
     _set_all(trial, slave, [*inputs, *tunable], "between steps")
 
 
-def _second_instance(trial: Trial) -> None:
+def _second_instance(trial: Trial, slave: ImportedSlave) -> None:
+    """Make a second instance: it begins where the first began, and does not touch it."""
     if trial.flag("canBeInstantiatedOnlyOncePerProcess"):
         return
     trial.step("making a second instance beside the first")
+    before = trial.outputs(slave)
     try:
         other = trial.make()
     except SlaveError as error:
         trial.find("library, instantiate", f"a second instance is refused, and canBeInstantiatedOnlyOncePerProcess is not true: {error}")
         return
-    _starts_of_second(trial, other)
-    other.free()
-
-
-def _starts_of_second(trial: Trial, other: ImportedSlave) -> None:
-    """Compare where a second instance begins with where the first began, whatever the first did since."""
     trial.step("initializing a second instance")
     other.enter_initialization_mode(trial.start)
     _starts(trial, other)
     other.exit_initialization_mode()
+    other.do_step(trial.start, trial.size)
+    _compare(trial, "library, instantiate", before, trial.outputs(slave), "after a second instance made one")
+    other.free()
 
 
 def _reset(trial: Trial, slave: ImportedSlave, first: dict[str, list[Any]]) -> None:

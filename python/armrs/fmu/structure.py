@@ -101,7 +101,7 @@ def _dependencies(unknown: Unknown, description: Description, variables: dict[st
     for name in given or ():
         if name == "?":
             yield "it depends on what is no variable"
-        elif name == unknown.name:
+        elif name == unknown.name and unknown.kind == "InitialUnknown":
             yield "it depends on itself"
     if given is not None and len(set(given)) != len(given):
         yield "a dependency is listed twice"

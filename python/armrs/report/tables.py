@@ -168,6 +168,12 @@ def connections(data: Mapping[str, Any]) -> Table:
     return Table(["connection", "held", "off, most", "rms", "unit", "went through [J]", "created [J]"], rows, left=2)
 
 
+def coupling_errors(data: Mapping[str, Any]) -> Table:
+    """Return how far each variable at an interface, and each angle, is estimated to be off; empty where that was not estimated."""
+    rows = [[e["name"], e["estimated_error"], e["allowed"], e["unit"]] for e in data["errors"]]
+    return Table(["variable", "estimated error", "allowed", "unit"], rows, left=1)
+
+
 def passive(data: Mapping[str, Any]) -> Table:
     """Return the passive moment of every configuration and joint, averaged over the bins."""
     rows = [

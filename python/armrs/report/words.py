@@ -67,7 +67,8 @@ def _simulated(result: Mapping[str, Any]) -> str:
 
 
 def _coupled(result: Mapping[str, Any]) -> str:
-    good = {"good": f"{result['duration_s']:.4g} s coupled; {result['why']}."}
+    coupled = f"{result['duration_s']:.4g} s coupled; {result['why']}."
+    good = {"good": coupled, "stable": f"{coupled} The error is not estimated.", "ended": coupled}
     no_result = f"{result['verdict'].upper()}, no result: {result['why']}."
     return good.get(result["verdict"], no_result)
 
@@ -181,6 +182,7 @@ def coupled(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     head(result, verdict(result))
     show("", tables.coupling(result))
     show("Connections", tables.connections(result))
+    show("Estimated errors", tables.coupling_errors(result))
     for name in result["not_connected"]:
         print(f"not connected: {name}")
     files_written(written)

@@ -1,0 +1,133 @@
+"""A coupled run with an estimate of its error: the run is made again with half the step, and the two are compared."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import CoupledError
+from .master import Coupled, run_system
+from .system import System
+
+_SHARE = 4.0 / 3.0
+"""Error of a run in units of its difference from one with half the step, for a coupling of second order; 2 for the first order, and 1 for
+very high ones, so that this is within a factor of 1.5 of either."""
+_LITTLE = 1e-3
+"""Least change of a variable that errors are compared with, in units of its nominal value."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """How far a variable of a run is off.
+
+    Attributes
+    ----------
+    name : str
+        Slave and variable.
+    unit : str
+    error : float
+        Estimate of the largest error over the run.
+    allowed : float
+        The accuracy of the system times the largest change of the variable in the run.
+    """
+
+    name: str
+    unit: str
+    error: float
+    allowed: float
+
+
+def run_checked(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
+    """Run a system, and once more with half the step; only a run whose error is below the accuracy of the system is good.
+
+    The error of every output that is connected, and of the angles of every arm, is estimated as 4/3 of the difference between the two
+    runs. Where it is too large and the system allows it, the step is halved further.
+
+    Parameters
+    ----------
+    system : System
+    progress : callable, optional
+        Called with the number of communication steps made since the last call, in units of the system's own step.
+
+    Returns
+    -------
+    Coupled
+        The run with the verdict "good", "ended" where a slave asked to end it, or "stable" where its error cannot be estimated, which a
+        warning says.
+
+    Raises
+    ------
+    CoupledError
+        When the run is no result, or its error is above the accuracy.
+    """
+    run = run_system(system, progress=progress)
+    for halvings in range(system.refine + 1):
+        if run.verdict != "stable" or not run.system.slaves:
+            return run
+        if reason := _cannot_halve(run.system):
+            return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
+        finer = dataclasses.replace(run.system, step=0.5 * run.system.step, warnings=())
+        for slave in finer.slaves.values():
+            slave.reset()
+        try:
+            again = run_system(finer, progress=lambda _: None)
+        except CoupledError as error:
+            raise _refused(run, f"with half the step, {finer.step:g} s, the run is {error}") from None
+        if reason := _differs_at_the_start(run, again):
+            return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
+        run = dataclasses.replace(run, estimates=estimates(run, again))
+        worst = max(run.estimates, key=lambda e: e.error / e.allowed, default=None)
+        if worst is None:
+            return run
+        text = f"{worst.name} is off by about {worst.error:.3g} {worst.unit}, allowed is {worst.allowed:.3g} {worst.unit}"
+        if worst.error <= worst.allowed:
+            if halvings:
+                text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
+                run = dataclasses.replace(run, warnings=(*system.warnings, *run.warnings, text_of_step))
+            return dataclasses.replace(run, verdict="good", why=f"the estimated errors are within the accuracy; at most {text}")
+        if halvings == system.refine:
+            raise _refused(run, f"{text}; take a shorter step")
+        run = again
+    raise AssertionError
+
+
+def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
+    """Estimate the errors of a run from one with half its step."""
+    connected = [".".join(c.source) for c in run.system.connections]
+    angles = [name for name in run.columns if name.partition(".")[2].startswith("q[")]
+    found = []
+    for name in dict.fromkeys([*connected, *angles]):
+        if name not in run.columns or name not in finer.columns:
+            continue
+        slave, _, variable = name.partition(".")
+        described = run.system.slaves[slave].variables[variable]
+        coarse, fine = run.columns[name], np.interp(run.t, finer.t, finer.columns[name])
+        change = max(float(np.max(np.abs(fine - fine[0]))), _LITTLE * abs(described.nominal))
+        error = _SHARE * float(np.max(np.abs(coarse - fine)))
+        found.append(Estimate(name, described.unit or "", error, run.system.accuracy * change))
+    return tuple(found)
+
+
+def _cannot_halve(system: System) -> str:
+    for slave in system.slaves.values():
+        inner = slave.internal_step
+        if inner is not None and not slave.can_vary_step and 0.5 * system.step < inner * (1.0 - 1e-9):
+            return f"half the step is less than the inner step of {slave.name}, {inner:g} s"
+    return ""
+
+
+def _differs_at_the_start(run: Coupled, again: Coupled) -> str:
+    """Return which slave is not as before after a reset."""
+    for name, values in run.columns.items():
+        if name in again.columns and values[0] != again.columns[name][0]:
+            return f"{name} does not come back to its start when the slave is reset"
+    return ""
+
+
+def _refused(run: Coupled, why: str) -> CoupledError:
+    result = dataclasses.replace(run, verdict="not accurate", why=why)
+    error = CoupledError(f"{result.verdict}: {why}")
+    error.run = result
+    return error
