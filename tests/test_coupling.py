@@ -333,7 +333,7 @@ def test_run_writes_samples_figures_and_report(folder: Path, capsys: pytest.Capt
     assert cli.main(["fmu", "run", "wall.toml", "-o", "out"]) == 0
     assert "wall.toml: 2 s coupled" in capsys.readouterr().out
     data = json.loads(Path("out/coupled.json").read_text(encoding="utf-8"))
-    assert (data["verdict"], data["samples"], data["file"]) == ("good", 1001, "coupled.csv")
+    assert (data["verdict"], data["samples"], data["file"]) == ("good", 2001, "coupled.csv")
     with Path("out/coupled.csv").open(encoding="utf-8") as file:
         head, first = next(csv.reader(file)), next(csv.reader(file))
     assert head[:2] == ["t_s", "arm.q[1]_rad"]
@@ -372,7 +372,7 @@ def test_a_run_that_is_no_result_writes_its_diagnosis_alone(folder: Path, capsys
             'fmu = "arm.toml"',
             "arm.toml: archive: found File is not a zip file",
         ),
-        ('model = "arm.toml"', "", "model, fmu, wall: found none of them"),
+        ('model = "arm.toml"', "", "impedance: found none of them"),
         ('port = "force"', 'port = "motor"', "port"),
         ('axis = "y"', 'axis = "x"', "axis"),
         ('from = "wall.F"', 'from = "wal.F"', "unknown slave 'wal'"),
@@ -408,7 +408,8 @@ def test_an_fmu_that_refuses_is_one_line(folder: Path, capsys: pytest.CaptureFix
         raise SlaveError("set", 3, "x")
     text = Path("wall.toml").read_text(encoding="utf-8").replace('model = "arm.toml"', 'fmu = "a.fmu"').replace('port = "force"', "")
     Path("fmu.toml").write_text(text.replace("start_deg = [-150.0, 20.0]", '[slave.start]\n"body[1].m" = -1.0'), encoding="utf-8")
-    assert cli.main(["fmu", "run", "fmu.toml"]) == 1
+    assert cli.main(["fmu", "run", "fmu.toml"]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
-    assert "body[1].m is -1, allowed is a finite number, 0 to inf kg" in err
+    assert err.startswith("armrs: fmu.toml: arm, [slave.start]")
+    assert "body[1].m is -1, allowed is a finite number" in err
