@@ -90,6 +90,12 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
         best, place, words = min(others)
         if best < min(_MEETS * own, 0.1 * reach):
             raise BadInput(place, Text(f"angles that put the hand {own:.3g} m from the robot's handle"), words, file=trial.file)
+        best, joint, offset = _other_zero(model, q, handle)
+        if best < min(_MEETS * own, 0.1 * reach):
+            words = f"angles with the model's zero (that of q{joint} is off by {offset:.3g} rad?)"
+            raise BadInput(
+                f"column q{joint}", Text(f"angles that put the hand {own:.3g} m from the robot's handle"), words, file=trial.file
+            )
     if not robot_matters:
         return
     path = _rms(handle - handle.mean(axis=0))
@@ -111,10 +117,60 @@ def _readings(q: np.ndarray, robot_q: np.ndarray) -> Iterator[tuple[str, str, np
             a, b = (q * factor, robot_q) if wrong == "q" else (q, robot_q * factor)
             yield place, f"angles in the unit of their column ({unit}?)", a, b
     yield "columns qr1, qr2", "qr1 of the robot's first joint, qr2 of its second (swapped columns?)", q, robot_q[:, ::-1]
+    yield from ((place, words, a, robot_q) for place, words, a in _conventions(q))
     n = q.shape[1]
     for order in permutations(range(n)) if n <= _MOST_SWAPPED else ():
         if order != tuple(range(n)):
             yield "columns q1 …", "q1 of the first joint, the others outwards (swapped columns?)", q[:, order], robot_q
+
+
+def _conventions(q: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Give angles of other conventions as those of the model: counter-clockwise, the first from +y, the others from the segment before."""
+    relative = np.column_stack([q[:, :1], np.diff(q, axis=1)])
+    quarter = np.zeros(q.shape[1])
+    quarter[0] = np.pi / 2
+    for angles, kind in ((q, ""), (relative, "absolute angles, ")):
+        if kind:
+            yield "columns q1 …", "angles relative to the segment before (absolute angles?)", angles
+        yield "columns q1 …", f"angles counter-clockwise ({kind}mirrored?)", -angles
+        yield "columns q1 …", f"y forward ({kind}seen from the other side?)", 2 * quarter - angles
+        for sign, turned in ((1.0, ""), (-1.0, ", mirrored")):
+            yield "column q1", f"q1 from +y ({kind}from the vertical downwards{turned}?)", sign * angles - quarter
+            yield "column q1", f"q1 from +y ({kind}from the vertical upwards{turned}?)", sign * angles + quarter
+
+
+def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, int, float]:
+    """Return how near one joint's other zero brings hand and handle: the distance [m], the joint from 1, its angle there [rad]."""
+    thin = slice(None, None, max(1, len(q) // 100))
+    found = []
+    for j in range(q.shape[1]):
+        offset = np.zeros(q.shape[1])
+        for width, centre in ((np.pi, 0.0), (np.radians(2.0), None)):
+            middle = offset[j] if centre is None else centre
+            tried = middle + np.linspace(-width, width, 181)
+            sizes = []
+            for value in tried:
+                offset[j] = value
+                sizes.append(_rms(_tip(model, q[thin] + offset) - handle[thin]))
+            offset[j] = tried[int(np.argmin(sizes))]
+        found.append((min(sizes), j + 1, float(offset[j])))
+    return min(found)
+
+
+def hand_meets_handle(dataset: Dataset) -> bool:
+    """Whether the measured angles put the hand where the robot's put its handle, within 5 % of the arm's length, in every trial."""
+    model, robot = dataset.model, dataset.model.robot
+    if robot is None:
+        return False
+    for trial in dataset.trials:
+        if trial.robot_q is None:
+            return False
+        good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
+        if good.any():
+            gap = _tip(model, trial.q[good]) - _handle(robot, trial.robot_q[good])
+            if _rms(gap) > _SUSPECT * sum(s.length for s in model.segments):
+                return False
+    return True
 
 
 def _handle(robot: Robot, q: np.ndarray) -> np.ndarray:

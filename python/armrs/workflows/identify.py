@@ -12,9 +12,9 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..catalogue import catalogue
-from ..errors import BadInput, Text, unknown_name
+from ..errors import BadInput, IdentificationError, Text, unknown_name
 from ..io.dataset import Dataset, Tolerance, load_dataset, naming_trials
-from ..io.plausibility import refuse_implausible
+from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial
 from ..model import Effect, Joint, Model, Segment
 from ..rig import all_effects, core_tolerance, rig
@@ -195,7 +195,8 @@ def identify(
     cutoff : float, optional
         Cutoff of the common low-pass [Hz]; chosen from the data when absent.
     motion : {"auto", "measured", "simulated"}
-        Where the speeds and accelerations come from: simulated along the robot's path where it is known.
+        Where the speeds and accelerations come from. "auto": simulated along the robot's path where it is known, and measured where
+        the arm that was simulated moves elsewhere, which is said in `warnings`.
     level : float
         Probability of the intervals.
 
@@ -230,7 +231,7 @@ def identify(
     configurations = sorted({t.configuration for t in dataset.trials})
     columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     with naming_trials(dataset.trials):
-        raw = _armrs.identify(rig(model, effects), columns, settings)
+        raw, follows = _identified(rig(model, effects), columns, settings, dataset)
     explained = tuple(
         Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
         for trial, e in zip(dataset.trials, raw["explained"], strict=True)
@@ -263,7 +264,7 @@ def identify(
             ),
             *noisy,
         ),
-        left_out=(*_left_out(method, effects), *_unmoved(method, parameters)),
+        left_out=(*follows, *_left_out(method, effects), *_unmoved(method, parameters)),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
         level=level,
@@ -274,6 +275,21 @@ def identify(
         model=_identified_model(model, raw, effects),
         dataset=dataset,
     )
+
+
+def _identified(
+    built: _armrs.Rig, columns: list[dict[str, Any]], settings: dict[str, Any], dataset: Dataset
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return what the core identified, and a line where the measured motion had to take the place of the simulated one."""
+    try:
+        return _armrs.identify(built, columns, settings), ()
+    except IdentificationError as error:
+        # An arm of which little is known moves elsewhere than its model; one whose robot does not fit is refused.
+        if settings["motion"] != "auto" or settings["method"] != "joint" or not hand_meets_handle(dataset):
+            raise
+        why = str(error).split(":")[0] if "differs from" in str(error) else "the arm cannot be simulated"
+    raw = _armrs.identify(built, columns, settings | {"motion": "measured"})
+    return raw, (f"speeds and accelerations are measured, not simulated: with what the model has {why}",)
 
 
 LEVELS: dict[str, Any] = {"least": 0.5, "most": 0.999999}
