@@ -18,6 +18,7 @@ from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial
 from ..model import Effect, Joint, Model, Segment
 from ..rig import all_effects, core_tolerance, rig
+from ..tabular import Tabular, Tidy
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Explained:
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class Identified(Tabular):
     """The result of an identification.
 
     Attributes
@@ -141,6 +142,16 @@ class Identified:
     def __repr__(self) -> str:
         known = f"{self.rank} of {self.unknowns} unknowns determined"
         return f"Identified({self.dataset.name!r}, {self.method} method, {self.status}: {known}; {'; '.join(map(str, self.combinations))})"
+
+    def tidy(self) -> Tidy:
+        """Return the estimates, one a row: parameters, combinations, calibration."""
+        groups = (("parameter", self.parameters), ("combination", self.combinations), ("calibration", self.calibration))
+        rows = [(group, e) for group, listed in groups for e in listed]
+        columns: dict[str, list[Any]] = {"group": [group for group, _ in rows]}
+        columns |= {name: [getattr(e, name) for _, e in rows] for name in ("name", "kind", "joint", "value", "std")}
+        columns |= {"low": [e.interval[0] for _, e in rows], "high": [e.interval[1] for _, e in rows]}
+        columns |= {name: [getattr(e, name) for _, e in rows] for name in ("unit", "decided_by")}
+        return Tidy(columns, {})
 
     @property
     def is_sound(self) -> bool:

@@ -16,6 +16,7 @@ from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..rig import arm
+from ..tabular import Tabular, Tidy
 
 DEFAULT_CUTOFF = 1.0
 """Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
@@ -159,7 +160,7 @@ class PassiveCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class PassiveMoments:
+class PassiveMoments(Tabular):
     """Passive joint moments of a data set.
 
     Attributes
@@ -191,6 +192,20 @@ class PassiveMoments:
     def __repr__(self) -> str:
         parts = [f"joint {c.joint} in {c.configuration!r}: ±{np.nanmean(c.half_width):.3g} N m" for c in self.curves]
         return f"PassiveMoments({self.dataset.name!r}; {'; '.join(parts) or 'no joint moved in both directions'})"
+
+    def tidy(self) -> Tidy:
+        """Return the curves, one angle a row."""
+        rows = [(c, k) for c in self.curves for k in range(len(c.angle))]
+        columns: dict[str, list[Any]] = {"configuration": [c.configuration for c, _ in rows], "joint": [c.joint for c, _ in rows]}
+        columns |= {
+            name: [float(getattr(c, name)[k]) for c, k in rows]
+            for name in ("angle", "elastic", "elastic_std", "half_width", "half_width_std")
+        }
+        return Tidy(columns, {"angle": "rad", **dict.fromkeys(("elastic", "elastic_std", "half_width", "half_width_std"), "N m")})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the curves as plain data."""
+        return {"curves": [c.to_dict() for c in self.curves], "warnings": list(self.warnings)}
 
 
 def passive_moments(

@@ -15,6 +15,7 @@ from ..io import files, tomlfile
 from ..io.dataset import Tolerance
 from ..model import Model
 from ..rig import rig
+from ..tabular import Tabular, Tidy
 from .experiment import Safety
 from .identify import core_settings, effects_of
 from .simulate import Movement, about
@@ -170,7 +171,7 @@ class Slowed:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Tabular):
     """Movements, and what they will show.
 
     Attributes
@@ -206,6 +207,11 @@ class Plan:
 
     def __repr__(self) -> str:
         return f"Plan({len(self.movements)} movements, {self.duration:.4g} s; {'; '.join(map(str, self.predictions))})"
+
+    def tidy(self) -> Tidy:
+        """Return how well each parameter will be known, one a row."""
+        names = list(vars(self.predictions[0])) if self.predictions else []
+        return Tidy({name: [getattr(p, name) for p in self.predictions] for name in names}, {})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with units in the names."""

@@ -18,6 +18,7 @@ from ..io import tomlfile
 from ..io.trial import Trial
 from ..model import Model, load_model
 from ..rig import rig
+from ..tabular import Tabular, Tidy
 
 DEFAULT_DT = 0.25e-3
 """Step of the simulation [s]."""
@@ -133,7 +134,7 @@ class Sensors:
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated:
+class Simulated(Tabular):
     """A recorded run; rows are samples.
 
     Attributes
@@ -166,6 +167,18 @@ class Simulated:
         most = np.max(np.hypot(*self.force_on_arm.T))
         size = f"{len(self.t)} samples, {self.t[-1]:.6g} s, {self.q.shape[1]} joints"
         return f"Simulated({size}; force on the arm up to {most:.4g} N; digest {self.digest})"
+
+    def tidy(self) -> Tidy:
+        """Return the samples, one a row: time, angles, speeds and the force on the arm."""
+        joints = range(self.q.shape[1])
+        columns = {"t": self.t} | {f"q{j + 1}": self.q[:, j] for j in joints} | {f"qd{j + 1}": self.qd[:, j] for j in joints}
+        columns |= {"force_on_arm_y": self.force_on_arm[:, 0], "force_on_arm_z": self.force_on_arm[:, 1]}
+        units = {"t": "s"} | {f"q{j + 1}": "rad" for j in joints} | {f"qd{j + 1}": "rad/s" for j in joints}
+        return Tidy(columns, units | {"force_on_arm_y": "N", "force_on_arm_z": "N"})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the samples and the settings as plain data."""
+        return {"settings": dict(self.settings), "digest": self.digest, **self.tidy().columns}
 
     @cached_property
     def digest(self) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 from ...io.dataset import Dataset
 from ...model import Model
+from ...tabular import Tabular, Tidy
 
 
 @dataclass(frozen=True)
@@ -278,7 +279,7 @@ class Rung:
 
 
 @dataclass(frozen=True, eq=False)
-class GapFound:
+class GapFound(Tabular):
     """The result of the gap workflow.
 
     Attributes
@@ -323,6 +324,19 @@ class GapFound:
     dataset: Dataset
     raw: Mapping[str, Any] = field(repr=False, default_factory=dict)
 
+    def __repr__(self) -> str:
+        named = ", ".join(f"{e.kind}{'' if e.joint is None else f' in joint {e.joint}'}" for e in self.effects) or "no effect named"
+        shown = (f"{name} {g.before:.3g} → {g.after:.3g} (floor {g.floor:.3g})" for name, g in self.gap.items() if _complete(g))
+        return f"GapFound({self.dataset.name!r}: {self.verdict}; {named}; gap on test trials: {', '.join(shown) or 'not measured'})"
+
+    def tidy(self) -> Tidy:
+        """Return the parameters of the named effects, one a row."""
+        rows = [(e, name, value) for e in self.effects for name, value in e.parameters.items()]
+        columns: dict[str, list[Any]] = {name: [getattr(e, name) for e, _, _ in rows] for name in ("kind", "joint", "channel")}
+        columns |= {"parameter": [name for _, name, _ in rows]}
+        columns |= {name: [getattr(value, name) for _, _, value in rows] for name in ("value", "std", "unit")}
+        return Tidy(columns | {"p_value": [e.p_value for e, _, _ in rows], "share": [e.share for e, _, _ in rows]}, {})
+
     def to_dict(self) -> dict[str, Any]:
         """Return the result as it is written to JSON."""
         return {
@@ -338,6 +352,10 @@ class GapFound:
             "warnings": list(self.warnings),
             "model": "amended.toml",
         }
+
+
+def _complete(gap: ChannelGap) -> bool:
+    return None not in (gap.before, gap.after, gap.floor)
 
 
 def _lack(lack: tuple[float, float]) -> dict[str, float | None]:

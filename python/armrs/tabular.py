@@ -1,0 +1,98 @@
+"""Results as tables: in a notebook, as a data frame, as JSON."""
+
+from __future__ import annotations
+
+import html
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .errors import ArmrsError
+from .io import files
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas
+
+_SHOWN = 30
+"""Rows that a notebook shows; `to_dataframe` has all."""
+
+
+@dataclass(frozen=True)
+class Tidy:
+    """A tidy table: one row an observation.
+
+    Attributes
+    ----------
+    columns : mapping of str to sequence
+        All of one length.
+    units : mapping of str to str
+        Of the columns whose unit is the same in every row.
+    """
+
+    columns: Mapping[str, Sequence[Any] | np.ndarray]
+    units: Mapping[str, str]
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows."""
+        return max(map(len, self.columns.values()), default=0)
+
+
+class Tabular:
+    """A result that is also a table. Subclasses say which by `tidy`; those with `to_dict` are also JSON."""
+
+    def tidy(self) -> Tidy:
+        """Return the result as a tidy table."""
+        raise NotImplementedError
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return a tidy pandas DataFrame; `attrs["units"]` has the units of its columns.
+
+        Raises
+        ------
+        ArmrsError
+            When pandas, of the extra `notebook`, is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ArmrsError('data frames need pandas: pip install "armrs[notebook]"') from None
+        table = self.tidy()
+        frame = pandas.DataFrame(dict(table.columns))
+        frame.attrs["units"] = dict(table.units)
+        return frame
+
+    def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
+        """Return the result as JSON text, and write it to `path` where one is given."""
+        data = self.to_dict()  # type: ignore[attr-defined]
+        if path is not None:
+            files.write_json(path, data)
+        return files.json_text(data)
+
+    def _repr_html_(self) -> str:
+        """Return the summary line and the first rows, for notebooks."""
+        table = self.tidy()
+        names = list(table.columns)
+        head = "".join(f"<th>{_text(name)}{_text(_unit(table.units.get(name)))}</th>" for name in names)
+        shown = min(table.n_rows, _SHOWN)
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{_text(_cell(table.columns[name][k]))}</td>" for name in names) + "</tr>" for k in range(shown)
+        )
+        more = f"<p>{table.n_rows - shown} more rows: to_dataframe()</p>" if table.n_rows > shown else ""
+        return f"<p>{_text(repr(self))}</p><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{more}"
+
+
+def _text(value: object) -> str:
+    return html.escape(str(value))
+
+
+def _unit(unit: str | None) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
