@@ -112,6 +112,7 @@ bench-kernels: ## speed of every part by itself
 # ---- the judge of the gap workflow. Seeds from 100000 on are scored, and only here; those below are for development.
 HIDDEN   := out/hidden
 GENERATE := cargo run --quiet --release -p hidden-world -- generate -o $(HIDDEN)
+GENERATE_MUJOCO := $(BIN)/python bench/hidden/mujoco_world -o $(HIDDEN)/mujoco
 
 hidden: build ## the gap workflow against hidden effects: some hours
 	cargo test --quiet --release -p hidden-world
@@ -120,7 +121,14 @@ hidden: build ## the gap workflow against hidden effects: some hours
 	$(GENERATE) --family double --seed 1120000 --count $(or $(HIDDEN_DOUBLE),16)
 	$(GENERATE) --family triple --seed 1130000 --count $(or $(HIDDEN_TRIPLE),12)
 	$(GENERATE) --family outside --seed 1140000 --count $(or $(HIDDEN_OUTSIDE),16)
-	$(BIN)/python bench/hidden/score.py $(HIDDEN)
+	$(GENERATE) --family little_known --seed 1150000 --count $(or $(HIDDEN_LITTLE),75)
+	$(BIN)/python -m pip install "mujoco>=3.2"
+	$(GENERATE_MUJOCO) --family null --seed 1160000 --count $(or $(HIDDEN_NULL),40)
+	$(GENERATE_MUJOCO) --family single --seed 1170000 --count $(or $(HIDDEN_SINGLE),44)
+	$(GENERATE_MUJOCO) --family double --seed 1180000 --count $(or $(HIDDEN_DOUBLE),12)
+	$(GENERATE_MUJOCO) --family outside --seed 1190000 --count $(or $(HIDDEN_OUTSIDE),8)
+	$(GENERATE_MUJOCO) --family little_known --seed 1200000 --count $(or $(HIDDEN_LITTLE),75)
+	$(BIN)/python bench/hidden/score.py $(HIDDEN) $(HIDDEN)/mujoco
 
 sdist: $(STAMPS)/venv ## the source archive, in out/wheels, and a wheel built from it
 	$(BIN)/maturin sdist --out out/wheels
