@@ -2,34 +2,45 @@
 # Builds the firmware example for m4 (Cortex-M4F, single precision), m7 (Cortex-M7, double precision), host-single or
 # host-double, and runs it (in QEMU); prints what it prints. Exits with 77 and the reason where a tool is missing.
 #   scripts/firmware.sh TARGET [size]
+#   MODEL=DIR [TWO_JOINTS=1] scripts/firmware.sh TARGET     the arm that armrs export-c wrote to DIR instead of the closed loop
+# Variables: OPT_LEVEL of the library (2 when absent, or s), CARGO_TARGET_DIR as of cargo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 top=$PWD target=$1
-work=$top/target/crosscheck
+work=$(realpath -m "${CARGO_TARGET_DIR:-target}")/crosscheck
+unset CARGO_TARGET_DIR
 mkdir -p "$work"
+level=${OPT_LEVEL:-2}
+name=$target${TWO_JOINTS:+-two}$([ "$level" = 2 ] || echo "-$level")
 
 need() { command -v "$1" >/dev/null || { echo "firmware: skipped, $1 is missing (Debian: $2)" >&2; exit 77; }; }
 library() { # features, then cargo arguments
-  local features=$1
+  local features=$1${TWO_JOINTS:+,two-joints}
   shift
-  cargo rustc --quiet --profile firmware -p arm-capi --features "$features" --target-dir "$work/$target" --crate-type staticlib "$@"
+  CARGO_PROFILE_FIRMWARE_OPT_LEVEL=$level \
+    cargo rustc --quiet --profile firmware -p arm-capi --features "$features" --target-dir "$work/$name" --crate-type staticlib "$@"
 }
 
-[ -f "$work/stream.bin" ] && [ -z "$(find crates/arm-core/src crates/arm-sim -newer "$work/stream.bin" -name '*.rs' -print -quit)" ] ||
+[ -n "${MODEL:-}" ] || { [ -f "$work/stream.bin" ] && [ -z "$(find crates/arm-core/src crates/arm-sim -newer "$work/stream.bin" -name '*.rs' -print -quit)" ]; } ||
   cargo run --quiet --release -p arm-sim --no-default-features --example stream -- "$work/stream.bin" >&2
 
 case $target in
 m4 | m7)
-  need /usr/bin/rustc rustc-web
-  [ -d "$(/usr/bin/rustc --print sysroot)/lib/rustlib/src/rust/library" ] || { echo "firmware: skipped, no source of Rust's core (Debian: rust-web-src)" >&2; exit 77; }
   need arm-none-eabi-gcc gcc-arm-none-eabi
   need qemu-system-arm qemu-system-arm
-  cpu=cortex-$target features=
+  cpu=cortex-$target features= triple=thumbv7em-none-eabihf
   [ "$target" = m4 ] && features=single
-  scripts/sysroot.sh thumbv7em-none-eabihf "$work/sysroot-$target" -C target-cpu="$cpu"
-  RUSTC=/usr/bin/rustc RUSTFLAGS="--sysroot $work/sysroot-$target -C target-cpu=$cpu" \
-    library "$features${ARMRS_CONTROL:+,panic-control}" --target thumbv7em-none-eabihf
-  lib=$work/$target/thumbv7em-none-eabihf/firmware/libarmrs_c.a
+  features=$features${ARMRS_CONTROL:+,panic-control}
+  if [ -z "${SYSROOT:-}" ] && [ -d "$(rustc --print sysroot)/lib/rustlib/$triple" ]; then
+    # As of `rustup target add`.
+    RUSTFLAGS="-C target-cpu=$cpu" library "$features" --target $triple
+  else
+    need /usr/bin/rustc "rustc-web, or rustup target add $triple"
+    [ -d "$(/usr/bin/rustc --print sysroot)/lib/rustlib/src/rust/library" ] || { echo "firmware: skipped, no source of Rust's core (Debian: rust-web-src)" >&2; exit 77; }
+    scripts/sysroot.sh $triple "$work/sysroot-$target" -C target-cpu="$cpu"
+    RUSTC=/usr/bin/rustc RUSTFLAGS="--sysroot $work/sysroot-$target -C target-cpu=$cpu" library "$features" --target $triple
+  fi
+  lib=$work/$name/$triple/firmware/libarmrs_c.a
   options=(TARGET="$target")
   ;;
 host-single | host-double)
@@ -38,10 +49,15 @@ host-single | host-double)
   options=(TARGET=host)
   [ "$target" = host-single ] && features=single && options+=(SINGLE=1)
   library "$features"
-  lib=$work/$target/firmware/libarmrs_c.a
+  lib=$work/$name/firmware/libarmrs_c.a
   ;;
 *) echo "firmware: $target is none of m4, m7, host-single, host-double" >&2; exit 2 ;;
 esac
-make -s -C firmware "${options[@]}" BUILD="$work/firmware-$target" LIBRARY="$lib" STREAM="$work/stream.bin" >&2 \
-  ${ARMRS_CONTROL:+CONTROL=1}
-make -s -C firmware "${options[@]}" BUILD="$work/firmware-$target" LIBRARY="$lib" STREAM="$work/stream.bin" "${2:-run}"
+options+=(LIBRARY="$lib" STREAM="$work/stream.bin" BUILD="$work/firmware-$name" ${TWO_JOINTS:+TWO_JOINTS=1} ${ARMRS_CONTROL:+CONTROL=1})
+if [ -n "${MODEL:-}" ]; then
+  folder=$(mktemp -d)
+  trap 'rm -rf "$folder"' EXIT
+  options+=(MODEL="$(realpath "$MODEL")" BUILD="$folder")
+fi
+make -s -C firmware "${options[@]}" >&2
+make -s -C firmware "${options[@]}" "${2:-run}"

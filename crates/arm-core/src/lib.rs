@@ -18,6 +18,7 @@
 
 pub mod anthropometry;
 mod body;
+mod calibration;
 mod chain;
 mod check;
 mod compensation;
@@ -49,6 +50,7 @@ mod trajectory;
 mod unroll;
 
 pub use body::{Body, Orthosis};
+pub use calibration::Calibration;
 pub use chain::{Chain, Segment};
 pub use compensation::{Compensation, GravityCompensation};
 pub use contact::Contact;

@@ -5,6 +5,7 @@ mod catalogue;
 mod convert;
 mod cosim;
 mod errors;
+mod firmware;
 mod fit;
 mod gap;
 mod ident;
@@ -43,5 +44,6 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(signal::smooth, m)?)?;
     m.add_function(wrap_pyfunction!(signal::low_pass_both_ways, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
+    m.add_function(wrap_pyfunction!(firmware::firmware, m)?)?;
     Ok(())
 }

@@ -25,6 +25,7 @@ from .analysis import gap, identify, passive
 from .built_in import demo, reproduce
 from .data import convert, effects, report
 from .experiments import plan, record, simulate, sweep
+from .firmware import export_c
 from .own_data import check, import_, init
 
 _VERBS: dict[Callable[..., Any], str] = {
@@ -41,6 +42,7 @@ _VERBS: dict[Callable[..., Any], str] = {
     plan: "Propose movements, and forecast what they show.",
     record: "Run an experiment in the virtual laboratory.",
     sweep: "Simulate and identify many cases.",
+    export_c: "Write the arm as C source for firmware.",
     reproduce: "Compute the tables and figures of the thesis.",
     report: "Make one page of any results.",
 }
@@ -74,7 +76,7 @@ def _root(
 
 
 for _verb, _line in _VERBS.items():
-    app.command(_verb.__name__.rstrip("_"), short_help=_line)(_verb)
+    app.command(_verb.__name__.rstrip("_").replace("_", "-"), short_help=_line)(_verb)
 app.add_typer(fmu.app, short_help="Export the arm for other tools; look at a unit, check it.")
 
 

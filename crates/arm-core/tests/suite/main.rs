@@ -9,6 +9,7 @@ mod common;
 mod contact;
 mod dual;
 mod effects;
+mod faults;
 mod identities;
 mod lanes;
 mod monitor;

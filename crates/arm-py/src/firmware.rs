@@ -1,0 +1,140 @@
+//! What `armrs export-c` needs of the core: the unknowns of a model, its calibration, and torques as the C interface gives them.
+
+use arm_core::effect::{ActsOn, Effect, Kind, Motion, applied, resisting_torque};
+use arm_core::{
+    Calibration, Chain, Equation, Invalid, Pose, inverse_dynamics, joint_force, static_torque,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arm::AnyChain;
+use crate::convert::joints;
+use crate::errors::{bad_input, invalid};
+use crate::rig::Rig;
+
+/// Most effects and unknowns of the C interface.
+const EFFECTS: usize = 12;
+const UNKNOWNS: usize = 18;
+
+/// What a device is told of a model.
+///
+/// Parameters
+/// ----------
+/// rig : Rig
+///     Of two or three segments.
+/// uncertainty : float
+///     Relative standard deviation of masses, centres of mass and inertias.
+/// samples : list of list of float
+///     Angles, speeds, accelerations, then force and moment on the arm at the tip [rad, N, N m].
+///
+/// Returns
+/// -------
+/// dict
+///     `values` and `sd` of the unknowns in use, `torques` of the samples [N m], the calibration of the sensors, and what each
+///     effect acts on: "joints", "arm" or "sensors".
+#[pyfunction]
+pub fn firmware<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    uncertainty: f64,
+    samples: Vec<Vec<f64>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    match &rig.arm.get().chain {
+        AnyChain::Two(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
+        AnyChain::Three(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
+        _ => Err(bad_input(
+            "[[arm.segment]]",
+            rig.arm.get().n_joints(),
+            "2 or 3 segments for firmware",
+        )),
+    }
+}
+
+fn told<'py, const N: usize>(
+    py: Python<'py>,
+    chain: &Chain<f64, N>,
+    effects: &[Effect<f64>],
+    uncertainty: f64,
+    samples: &[Vec<f64>],
+) -> PyResult<Bound<'py, PyDict>> {
+    if let Some(own) = effects.iter().find(|e| matches!(e.kind, Kind::Own(_))) {
+        return Err(refused((0, Invalid::CannotAct { kind: own.kind.info().kind })));
+    }
+    let calibration = Calibration::of(chain, effects).map_err(refused)?;
+    let sensed = |e: &Effect<f64>| e.kind.acts_on() == ActsOn::Sensors;
+    let acting: Vec<_> = effects.iter().filter(|e| !sensed(e)).copied().collect();
+    let arm = applied(chain, &acting).map_err(refused)?;
+    if acting.len() > EFFECTS {
+        return Err(bad_input(
+            "[[effect]]",
+            format!("{} effects of the arm", acting.len()),
+            "at most 12 for firmware",
+        ));
+    }
+    let mut kept = [off(); EFFECTS];
+    for (place, effect) in kept.iter_mut().zip(&acting) {
+        *place = *effect;
+        place.on = effect.kind.acts_on() == ActsOn::Joints;
+    }
+    let equation = Equation::<f64, N, UNKNOWNS, EFFECTS>::new(arm, kept).map_err(invalid)?;
+    let priors = equation.priors(uncertainty);
+    let used = priors.iter().take(equation.used());
+    let result = PyDict::new(py);
+    result.set_item("values", used.clone().map(|p| p.mean).collect::<Vec<_>>())?;
+    result.set_item("sd", used.map(|p| p.sd).collect::<Vec<_>>())?;
+    let torques = samples.iter().map(|s| torque(&equation, s));
+    result.set_item("torques", torques.collect::<Vec<_>>())?;
+    result.set_item("angle_offset", calibration.angle_offset.to_vec())?;
+    result.set_item("force", calibration.force.map(|row| row.to_vec()).to_vec())?;
+    result.set_item("force_offset", calibration.force_offset.to_vec())?;
+    result.set_item("force_delay", calibration.force_delay)?;
+    let acts = effects.iter().map(|e| match e.kind.acts_on() {
+        ActsOn::Joints => "joints",
+        ActsOn::Arm => "arm",
+        _ => "sensors",
+    });
+    result.set_item("acts_on", acts.collect::<Vec<_>>())?;
+    Ok(result)
+}
+
+fn off() -> Effect<f64> {
+    Effect {
+        on: false,
+        ..Effect::new(arm_core::effect::KINDS[0], 0)
+    }
+}
+
+/// Inverse dynamics in the order of operations of `armrs_inverse_dynamics`.
+fn torque<const N: usize>(
+    equation: &Equation<f64, N, UNKNOWNS, EFFECTS>,
+    sample: &[f64],
+) -> Vec<f64> {
+    let at = |k: usize| joints::<f64, N>(&sample[k * N..(k + 1) * N]);
+    let (q, qd, qdd) = (at(0), at(1), at(2));
+    let [y, z, moment] = [0, 1, 2].map(|k| sample[3 * N + k]);
+    let (chain, pose) = (equation.chain(), Pose::new(&q));
+    let mut motion = Motion::new(0.0, q, qd);
+    motion.qdd = qdd;
+    let bearing = joint_force(chain, &pose, (&qd, &qdd), [y, z]);
+    let resisting = resisting_torque(
+        equation.effects(),
+        &motion.with_joint_force(&bearing),
+        &[0.0; EFFECTS],
+    );
+    let moving = inverse_dynamics(chain, &pose, &qd, &qdd);
+    let pushed = static_torque(chain, &pose, [y, z], moment);
+    (0..N)
+        .map(|j| moving[j] + resisting[j] - pushed[j])
+        .collect()
+}
+
+fn refused((_, why): (usize, Invalid)) -> PyErr {
+    match why {
+        Invalid::CannotAct { kind } => bad_input(
+            &format!("[[effect]] ({kind})"),
+            "an effect that a device cannot apply",
+            "effects of the arm, and constant errors of its sensors",
+        ),
+        other => invalid(other),
+    }
+}

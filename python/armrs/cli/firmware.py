@@ -1,0 +1,40 @@
+"""The verb that leads to a device."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .common import JsonFile, OutFolder, present, writable
+
+
+class Precision(str, enum.Enum):
+    """Numbers that the firmware computes with."""
+
+    single = "single"
+    double = "double"
+
+
+def export_c(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml, such as identified.toml")],
+    out: OutFolder,
+    precision: Annotated[Precision, typer.Option(help="Of the library that the firmware links.")] = Precision.double,
+    identified: Annotated[
+        Path | None, typer.Option("--identified", metavar="FILE", help="JSON of armrs identify, for the standard deviations.")
+    ] = None,
+    json: JsonFile = None,
+) -> None:
+    """Write the arm of a model as C source: segments, effects, covariance, calibration of the sensors, and a self-test.
+
+    Refused by name is what a device cannot apply: effects of the contact and of the robot, a drift. See docs/firmware.md.
+    """
+    from ..workflows import export_c as workflow
+
+    folder = writable(out, json)
+    source = workflow.export_c(model, precision=precision.value, identified=identified)
+    written = source.write(folder or out)
+    data = {"verb": "export-c", "files": written, "precision": precision.value, "hash": source.hash, "vectors": len(source.vectors)}
+    present(lambda: data, json, lambda: print(*written, sep="\n"))
