@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"^```(\w+)(?: ([^\n]+))?\n(.*?)^```", flags=re.M | re.S)
 TOOLS = {
-    "/usr/bin/rustc": "rustc-web rust-web-src",
+    "cargo": "from rustup",
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "qemu-system-arm": "qemu-system-arm",
     "make": "make",
@@ -30,6 +30,10 @@ def main() -> int:
         if shutil.which(tool) is None:
             print(f"walkthrough: skipped, {tool} is missing (Debian: {package})", file=sys.stderr)
             return 77
+    sysroot = subprocess.run(["rustc", "--print", "sysroot"], capture_output=True, text=True, check=True).stdout.strip()
+    if not Path(sysroot, "lib", "rustlib", "thumbv7em-none-eabihf").exists():
+        print("walkthrough: skipped, no Rust for the target (rustup target add thumbv7em-none-eabihf)", file=sys.stderr)
+        return 77
     page = (ROOT / "docs" / "firmware.md").read_text(encoding="utf-8")
     section = page[page.index("## Into a C project") : page.index("### What changes")]
     with tempfile.TemporaryDirectory() as folder:

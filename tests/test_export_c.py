@@ -55,9 +55,7 @@ def numbers(lines: list[list[str]], name: str, single: bool) -> np.ndarray:
 @pytest.mark.parametrize("target", ["host-double", "m7", "host-single", "m4"])
 def test_the_torques_of_the_device_are_those_of_the_computer(identified: Path, target: str, tmp_path: Path) -> None:
     single = target in ("host-single", "m4")
-    source = export_c(
-        identified / "identified.toml", precision="single" if single else "double", identified=identified / "identified.json"
-    )
+    source = export_c(identified / "identified.toml", precision="single" if single else "double", identified=identified / "identified.json")
     source.write(tmp_path)
     lines = run(tmp_path, target)
     assert lines[-1] == ["self-test", "passed"]
@@ -118,8 +116,8 @@ def test_the_calibration_takes_back_what_the_sensors_add(tmp_path: Path) -> None
         Effect("time_delay", parameters={"delay": 0.004}),
     )
     source = export_c(plain.replace(effects=sensors))
-    assert f"R({0.02.hex()})" in source.source
-    assert f"R({1.5.hex()})" in source.source
+    assert f"R({(0.02).hex()})" in source.source
+    assert f"R({(1.5).hex()})" in source.source
     assert "ARMRS_MODEL_FORCE_DELAY ((armrs_real)0.004)" in source.header
 
 
@@ -156,7 +154,19 @@ def test_a_library_of_another_precision_does_not_link(identified: Path, tmp_path
     program.write_text('#include "armrs.h"\nint main(void) { armrs_effect e; return armrs_effect_named("coulomb", 0, &e) != ARMRS_OK; }\n')
 
     def link(*flags: str) -> subprocess.CompletedProcess[str]:
-        command = ["cc", "-std=c99", f"-I{INCLUDE}", *flags, str(program), str(library), "-lm", "-lpthread", "-ldl", "-o", str(tmp_path / "a")]
+        command = [
+            "cc",
+            "-std=c99",
+            f"-I{INCLUDE}",
+            *flags,
+            str(program),
+            str(library),
+            "-lm",
+            "-lpthread",
+            "-ldl",
+            "-o",
+            str(tmp_path / "a"),
+        ]
         return subprocess.run(command, capture_output=True, text=True, check=False)
 
     assert link("-DARMRS_TWO_JOINTS").returncode == 0

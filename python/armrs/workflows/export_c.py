@@ -218,8 +218,16 @@ ARMRS_MUST_USE armrs_status armrs_model_self_test(const armrs_arm *arm);
 
     def source(self) -> str:
         """Return `armrs_model.c`."""
-        return "\n".join(["/* See armrs_model.h. */", '#include "armrs_model.h"\n\n#define R(x) ((armrs_real)(x))\n',
-                          self._arm(), self._compensation(), self._calibrate(), self._self_test()])
+        return "\n".join(
+            [
+                "/* See armrs_model.h. */",
+                '#include "armrs_model.h"\n\n#define R(x) ((armrs_real)(x))\n',
+                self._arm(),
+                self._compensation(),
+                self._calibrate(),
+                self._self_test(),
+            ]
+        )
 
     def _arm(self) -> str:
         segments = "".join(
@@ -227,9 +235,7 @@ ARMRS_MUST_USE armrs_status armrs_model_self_test(const armrs_arm *arm);
             for s in self.model.segments
         )
         known = catalogue()
-        effects = "".join(
-            f'    {{"{e.kind}", {(e.joint or 1) - 1}, {_row(self._six(e, known[e.kind]))}}},\n' for e in self.effects
-        )
+        effects = "".join(f'    {{"{e.kind}", {(e.joint or 1) - 1}, {_row(self._six(e, known[e.kind]))}}},\n' for e in self.effects)
         count = len(self.effects)
         return f"""typedef struct {{
   const char *kind;
@@ -292,9 +298,7 @@ armrs_status armrs_model_arm(armrs_arm *arm, armrs_problem *problem) {{
 
     def _self_test(self) -> str:
         columns = 3 * self.model.n_joints + 3
-        close = (
-            f"difference <= R({_SINGLE_TOLERANCE!r}) * largest" if self.precision == "single" else "difference == 0"
-        )
+        close = f"difference <= R({_SINGLE_TOLERANCE!r}) * largest" if self.precision == "single" else "difference == 0"
         return f"""static const armrs_real vectors[ARMRS_MODEL_VECTORS][{columns}] = {_rows(self.vectors)};
 static const armrs_real torques[ARMRS_MODEL_VECTORS][ARMRS_JOINTS] = {_rows(self.told["torques"])};
 

@@ -101,7 +101,7 @@ fn flipped(value: f64, bit: u32) -> f64 {
 /// Every fault of one joint, by family.
 fn faults(arm: &Arm, j: usize) -> Vec<(&'static str, Fault<'_>)> {
     const TURN: f64 = core::f64::consts::TAU;
-    let torque = |s: &Sample<f64, 3>| s.measured.torque[j];
+    let torque = move |s: &Sample<f64, 3>| s.measured.torque[j];
     let mut all: Vec<(&'static str, Fault)> = Vec::new();
     for bias in [0.5, -0.5] {
         all.push((
