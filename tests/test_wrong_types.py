@@ -86,6 +86,7 @@ ROUGH: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
     "Markers": (lambda **k: armrs.Markers(["a"], **k), {"t": np.zeros(3), "positions": np.zeros((3, 1, 3)), "up": "z"}),
     "write_report": (armrs.write_report, {"sources": ["a.json"], "path": "report.html"}),
     "export_fmu": (armrs.export_fmu, {"model": MODEL, "path": "a.fmu", "fmi": 3, "port": "force", "start": None, "rest": False, "name": "a"}),
+    "export_c": (armrs.export_c, {"model": MODEL, "precision": "double", "identified": None}),
     "check_fmu": (armrs.check_fmu, {"path": "a.fmu"}),
     "Trial": (armrs.Trial, {"file": "a", "configuration": "a", "repeat": 1, "role": "fit", "t": TIME, "q": np.zeros((20, 2)), "force_on_arm": np.zeros((20, 2)), "moment_on_arm": np.zeros(20), "robot_q": np.zeros((20, 2)), "tau": np.zeros((20, 2)), "dq": np.zeros((20, 2))}),
     "Dataset": (armrs.Dataset, {"name": "a", "model": MODEL, "trials": (), "force_on": "arm", "sample_rate": 50.0, "subject": armrs.Subject(), "tolerance": armrs.Tolerance(), "synthetic": False, "added": ()}),
@@ -161,7 +162,7 @@ def test_every_public_function_is_asked() -> None:
         "OwnEffect",
         "SimulationFit",
     }
-    made_by_functions |= {"Plan", "Simulated", "GapFound", "Demonstration"}
+    made_by_functions |= {"Plan", "Simulated", "GapFound", "Demonstration", "FirmwareSource"}
     errors = {name for name in armrs.__all__ if name.endswith("Error") or name == "BadInput"}
     texts = {"__version__", "build_profile"}
     asked = {*ROUGH, *OF_A_DATA_SET, "run_demo"}

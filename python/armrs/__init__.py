@@ -59,6 +59,8 @@ if TYPE_CHECKING:
     from .workflows.checking import check_dataset as check_dataset
     from .workflows.demo import Demonstration as Demonstration
     from .workflows.demo import run_demo as run_demo
+    from .workflows.firmware import FirmwareSource as FirmwareSource
+    from .workflows.firmware import export_c as export_c
     from .workflows.gap import GapFound as GapFound
     from .workflows.gap import find_gap as find_gap
     from .workflows.identify import Estimate as Estimate
@@ -98,6 +100,7 @@ _HOMES = {
     "workflows.importing": ("Imported", "import_recordings"),
     "workflows.initialise": ("Expected", "Worn", "initialise", "segment_expectations"),
     "workflows.demo": ("Demonstration", "run_demo"),
+    "workflows.firmware": ("FirmwareSource", "export_c"),
     "workflows.gap": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
     "analysis.fitting": ("SimulationFit", "fit_by_simulation"),

@@ -31,7 +31,7 @@ def export_c(
 
     Refused by name is what a device cannot apply: effects of the contact and of the robot, a drift. See docs/firmware.md.
     """
-    from ..workflows import export_c as workflow
+    from ..workflows import firmware as workflow
 
     folder = writable(out, json)
     source = workflow.export_c(model, precision=precision.value, identified=identified)
