@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
+from armrs.catalogue import catalogue
+from armrs.workflows.gap.found import Missing
 from armrs.workflows.gap.headline import headline, still_open
+from armrs.workflows.gap.summary import marks
 from armrs.workflows.gap.words import gap, left
 
 
@@ -83,3 +88,19 @@ def test_nothing_is_claimed_that_was_not_tested() -> None:
     assert "cannot be tested" in headline(result("nothing_missing", z=None))
     assert headline(result("explained", DRY, gap={})).endswith("there is no test trial to measure the gap on.")
     assert headline(result("unexplained")).startswith("Something is missing that the catalogue has no name for: on held-out trials")
+
+
+@pytest.mark.parametrize(
+    ("kind", "joint", "marked"),
+    [
+        ("elastic", 3, [("joint", 2)]),
+        ("biarticular", 2, [("joint", 0), ("joint", 1), ("across", 1)]),
+        ("gravity_moment", 1, [("segment", 0)]),
+        ("angle_offset", 2, [("joint", 1)]),
+        ("gravity_tilt", None, [("frame", 0)]),
+        ("backlash", None, [("hand", 0)]),
+        ("force_bias", None, [("hand", 0)]),
+    ],
+)
+def test_an_effect_is_drawn_where_it_acts(kind: str, joint: int | None, marked: list[tuple[str, int]]) -> None:
+    assert marks(Missing(kind, joint, None, {}, 0.0, 1.0), catalogue()[kind]) == marked

@@ -336,10 +336,10 @@ def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[
             "The mechanical arm of table 4.3 of the thesis was simulated with its brakes, a robot of two links of 0.45 m and a contact of "
             "10 kN/m and 25 N s/m. The thesis gives no inertias: those of uniform rods were taken.",
             f"The model handed over was {100 * (TOO_HEAVY - 1):.0f} % too heavy and had no brakes.",
-            f"Session with two speeds (`session`): {slow} at {TWO_SPEEDS['slow-low'].speed:g} rad/s, one joint at a time, and {quick} at "
+            f"Two speeds (folder session): {slow} at {TWO_SPEEDS['slow-low'].speed:g} rad/s, one joint at a time, and {quick} at "
             f"{TWO_SPEEDS['quick'].speed:g} rad/s, both joints. {len(session.fit_trials)} trials were fitted, {len(session.test_trials)} "
             "kept apart. The search asked the whole catalogue of effects and was told nothing of the brakes.",
-            f"Session of the thesis (`data`): the robot swung one joint at a time by ±{SWING_DEG:g}° about three postures at {SPEED:g} "
+            f"The thesis (folder data): the robot swung one joint at a time by ±{SWING_DEG:g}° about three postures at {SPEED:g} "
             f"rad/s. {len(data.fit_trials)} trials were fitted with what the search had found; {len(data.test_trials)} were only "
             "checked on, some of them about a posture that was never fitted.",
             f"Sensors read both: 0.1° of noise on angles, 0.2 N on forces, 12 bits over ±110 N, {data.sample_rate:g} Hz. Repeats differ by "

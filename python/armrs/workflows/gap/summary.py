@@ -61,7 +61,7 @@ def sketch(result: GapFound, ax: Axes) -> None:
     reach = float(np.ptp(points, axis=0).max())
     if model.robot is not None:
         _robot(result, points[-1], ax)
-    acting = {place for effect in result.effects for place in _places(effect, catalogue()[effect.kind])}
+    acting = {place for effect in result.effects for place in marks(effect, catalogue()[effect.kind])}
     for k in range(len(steps)):
         marked = ("segment", k) in acting
         ax.plot(*points[k : k + 2].T, color=plotting.BLUE if marked else plotting.INK, lw=6.0, solid_capstyle="round", zorder=2)
@@ -81,7 +81,7 @@ def sketch(result: GapFound, ax: Axes) -> None:
     ax.set_axis_off()
 
 
-def _places(effect: Missing, kind: Kind) -> list[tuple[str, int]]:
+def marks(effect: Missing, kind: Kind) -> list[tuple[str, int]]:
     """Return what of the sketch an effect marks: by where its kind acts, never by its name."""
     if kind.first_joint > 1 and effect.joint is not None:
         return [("joint", effect.joint - 2), ("joint", effect.joint - 1), ("across", effect.joint - 1)]
