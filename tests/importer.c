@@ -48,11 +48,11 @@ int main(int argc, char **argv) {
         if (fmi3GetFloat64_(arm, references, 2, q, 2)) return 10;
         printf("%a %a\n", q[0], q[1]);
 
-        fmi3Int32 whole;
-        if (fmi3GetInt32_(arm, references, 1, &whole, 1) != fmi3Error) return 11;
         fmi3FreeFMUState_(arm, &state);
         fmi3FreeFMUState_(arm, &read);
         if (fmi3Terminate_(arm)) return 12;
+        fmi3Int32 whole;
+        if (fmi3GetInt32_(arm, references, 1, &whole, 1) != fmi3Error) return 11;
         fmi3FreeInstance_(arm);
     }
     if (fmi3InstantiateCoSimulation_("arm", "wrong", argv[3], 0, 0, 0, 0, NULL, 0, &refused, log_message, NULL)) return 13;

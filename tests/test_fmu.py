@@ -176,7 +176,7 @@ MUTANTS: dict[str, tuple[Callable[[Files], Files], str]] = {
     "no binary": (without("binaries/"), "no library for any machine"),
     "wrong modelIdentifier": (xml('modelIdentifier="ArmRs"', 'modelIdentifier="Other"'), "wanted is Other"),
     "negative internal step": (xml('fixedInternalStepSize="', 'fixedInternalStepSize="-'), "fixedInternalStepSize: -0.00025"),
-    "start outside min and max": (xml(r'(name="body\[1\].m".*?min=)"0.0"', r'\1"100.0"'), "variable body[1].m: start is 1.4"),
+    "start outside min and max": (xml(r'(name="body\[1\].m".*?min=)"[^"]*"', r'\1"100.0"'), "variable body[1].m: start is 1.4"),
     "typing error in a capability": (xml("canGetAndSetFMUState", "canGetAndSetFMUStat"), "nearest known: canGetAndSetFMUState"),
     "wrong exponents of a unit": (xml('<BaseUnit kg="1" m="1" s="-2"/>', '<BaseUnit kg="1" m="2" s="-2"/>'), "unit N: kg^1 m^2 s^-2"),
     "broken terminals": (terminals("</Terminals>", ""), "terminalsAndIcons.xml: cannot be read"),

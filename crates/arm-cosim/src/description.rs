@@ -2,6 +2,7 @@
 
 use arm_sim::Port;
 
+use crate::dependencies::{When, dependencies};
 use crate::spec::ArmSpec;
 use crate::status::Refused;
 use crate::units::{Unit, unit};
@@ -38,53 +39,34 @@ pub fn model_description(spec: &ArmSpec, fmi: Fmi) -> Result<String, Refused> {
         Fmi::Two => ("2.0", "guid"),
         Fmi::Three => ("3.0", "instantiationToken"),
     };
+    let exchange = spec.no_exchange().is_none();
+    let indicators: &[(&str, &str)] = match fmi {
+        Fmi::Two if exchange => &[("numberOfEventIndicators", "0")],
+        _ => &[],
+    };
+    let text = format!(
+        "Planar arm of {} joints, {port}. y forward, z up, counter-clockwise positive.",
+        spec.joints()
+    );
+    let tool = format!("armrs {version}");
     xml.open(
         "fmiModelDescription",
         &[
-            ("fmiVersion", fmi_version),
-            ("modelName", &spec.name),
-            (token_name, &token),
-            (
-                "description",
-                &format!(
-                    "Planar arm of {} joints, {port}. y forward, z up, counter-clockwise positive.",
-                    spec.joints()
-                ),
-            ),
-            ("version", version),
-            ("license", "MIT OR Apache-2.0"),
-            ("generationTool", &format!("armrs {version}")),
-            ("variableNamingConvention", "structured"),
-        ],
+            &[
+                ("fmiVersion", fmi_version),
+                ("modelName", &spec.name),
+                (token_name, &token),
+                ("description", &text),
+                ("version", version),
+                ("license", "MIT OR Apache-2.0"),
+                ("generationTool", &tool),
+                ("variableNamingConvention", "structured"),
+            ],
+            indicators,
+        ]
+        .concat(),
     );
-    let step = number(spec.step);
-    let identifier = ("modelIdentifier", MODEL_IDENTIFIER);
-    let varies = ("canHandleVariableCommunicationStepSize", "true");
-    let order = ("maxOutputDerivativeOrder", "1");
-    match fmi {
-        Fmi::Two => xml.leaf(
-            "CoSimulation",
-            &[
-                identifier,
-                varies,
-                order,
-                ("canNotUseMemoryManagementFunctions", "true"),
-                ("canGetAndSetFMUstate", "true"),
-                ("canSerializeFMUstate", "true"),
-            ],
-        ),
-        Fmi::Three => xml.leaf(
-            "CoSimulation",
-            &[
-                identifier,
-                ("canGetAndSetFMUState", "true"),
-                ("canSerializeFMUState", "true"),
-                varies,
-                ("fixedInternalStepSize", &step),
-                order,
-            ],
-        ),
-    }
+    interfaces(&mut xml, spec, fmi, exchange);
     unit_definitions(&mut xml, &units);
     xml.open("LogCategories", &[]);
     xml.leaf(
@@ -112,14 +94,17 @@ pub fn model_description(spec: &ArmSpec, fmi: Fmi) -> Result<String, Refused> {
     );
     xml.open("ModelVariables", &[]);
     for (reference, variable) in table.iter().enumerate() {
+        // Value references are places from one in FMI 2.0, where time is left out.
+        let state = variable.quantity.state().filter(|_| exchange);
+        let state = state.and_then(|s| table.iter().position(|v| v.quantity == s));
         match fmi {
             Fmi::Two if variable.causality == Causality::Independent => {}
-            Fmi::Two => scalar_variable(&mut xml, reference, variable)?,
-            Fmi::Three => float64(&mut xml, reference, variable)?,
+            Fmi::Two => scalar_variable(&mut xml, reference, variable, state)?,
+            Fmi::Three => float64(&mut xml, reference, variable, state)?,
         }
     }
     xml.close("ModelVariables");
-    structure(&mut xml, fmi, &table);
+    structure(&mut xml, fmi, spec, &table);
     xml.close("fmiModelDescription");
     Ok(xml.text)
 }
@@ -257,16 +242,29 @@ fn general(reference: usize, variable: &Variable) -> Vec<(&'static str, String)>
     attributes
 }
 
-fn float64(xml: &mut Xml, reference: usize, variable: &Variable) -> Result<(), Refused> {
+fn float64(
+    xml: &mut Xml,
+    reference: usize,
+    variable: &Variable,
+    state: Option<usize>,
+) -> Result<(), Refused> {
     let mut attributes = general(reference, variable);
     attributes.extend(numeric(variable)?);
+    attributes.extend(state.map(|s| ("derivative", s.to_string())));
     xml.leaf("Float64", &borrowed(&attributes));
     Ok(())
 }
 
-fn scalar_variable(xml: &mut Xml, reference: usize, variable: &Variable) -> Result<(), Refused> {
+fn scalar_variable(
+    xml: &mut Xml,
+    reference: usize,
+    variable: &Variable,
+    state: Option<usize>,
+) -> Result<(), Refused> {
     xml.open("ScalarVariable", &borrowed(&general(reference, variable)));
-    xml.leaf("Real", &borrowed(&numeric(variable)?));
+    let mut real = numeric(variable)?;
+    real.extend(state.map(|s| ("derivative", s.to_string())));
+    xml.leaf("Real", &borrowed(&real));
     xml.close("ScalarVariable");
     Ok(())
 }
@@ -278,37 +276,98 @@ fn borrowed<'a>(attributes: &'a [(&'static str, String)]) -> Vec<(&'static str, 
         .collect()
 }
 
-fn structure(xml: &mut Xml, fmi: Fmi, table: &[Variable]) {
-    let outputs = || {
-        let all = table.iter().enumerate();
-        all.filter(|(_, v)| v.causality == Causality::Output)
+/// The interfaces that are offered, Model Exchange first as the schemas have it.
+fn interfaces(xml: &mut Xml, spec: &ArmSpec, fmi: Fmi, exchange: bool) {
+    let step = number(spec.step);
+    let identifier = ("modelIdentifier", MODEL_IDENTIFIER);
+    let varies = ("canHandleVariableCommunicationStepSize", "true");
+    let order = ("maxOutputDerivativeOrder", "1");
+    let states: &[(&str, &str)] = match fmi {
+        Fmi::Two => &[
+            ("canNotUseMemoryManagementFunctions", "true"),
+            ("canGetAndSetFMUstate", "true"),
+            ("canSerializeFMUstate", "true"),
+            ("providesDirectionalDerivative", "true"),
+        ],
+        Fmi::Three => &[
+            ("canGetAndSetFMUState", "true"),
+            ("canSerializeFMUState", "true"),
+            ("providesDirectionalDerivatives", "true"),
+        ],
     };
-    let calculated = || outputs().filter(|(_, v)| v.initial == Some(Initial::Calculated));
+    if exchange {
+        let steps: &[(&str, &str)] = match fmi {
+            Fmi::Two => &[("completedIntegratorStepNotNeeded", "true")],
+            Fmi::Three => &[],
+        };
+        xml.leaf("ModelExchange", &[&[identifier], steps, states].concat());
+    }
+    let steps: &[(&str, &str)] = match fmi {
+        Fmi::Two => &[varies, order],
+        Fmi::Three => &[varies, ("fixedInternalStepSize", &step), order],
+    };
+    xml.leaf("CoSimulation", &[&[identifier], steps, states].concat());
+}
+
+fn structure(xml: &mut Xml, fmi: Fmi, spec: &ArmSpec, table: &[Variable]) {
+    let exchange = spec.no_exchange().is_none();
+    let rows = |wanted: &dyn Fn(&Variable) -> bool| -> Vec<usize> {
+        let all = table.iter().enumerate();
+        all.filter(|(_, v)| wanted(v)).map(|(k, _)| k).collect()
+    };
+    let outputs = rows(&|v| v.causality == Causality::Output);
+    let derivatives = rows(&|v| exchange && v.quantity.state().is_some());
+    let calculated = rows(&|v| {
+        let computed =
+            v.causality == Causality::Output || (exchange && v.quantity.state().is_some());
+        computed && v.initial == Some(Initial::Calculated)
+    });
     xml.open("ModelStructure", &[]);
-    match fmi {
-        // Indices count from one, and time, the first row of the table, is not listed: they are the value references.
-        Fmi::Two => {
-            xml.open("Outputs", &[]);
-            for (index, _) in outputs() {
-                xml.leaf("Unknown", &[("index", &index.to_string())]);
-            }
-            xml.close("Outputs");
-            xml.open("InitialUnknowns", &[]);
-            for (index, _) in calculated() {
-                xml.leaf("Unknown", &[("index", &index.to_string())]);
-            }
-            xml.close("InitialUnknowns");
+    for (two, three, unknowns, when) in [
+        ("Outputs", "Output", outputs, When::Moving),
+        (
+            "Derivatives",
+            "ContinuousStateDerivative",
+            derivatives,
+            When::Moving,
+        ),
+        (
+            "InitialUnknowns",
+            "InitialUnknown",
+            calculated,
+            When::Starting,
+        ),
+    ] {
+        if unknowns.is_empty() {
+            continue;
         }
-        Fmi::Three => {
-            for (reference, _) in outputs() {
-                xml.leaf("Output", &[("valueReference", &reference.to_string())]);
+        if fmi == Fmi::Two {
+            xml.open(two, &[]);
+        }
+        for reference in unknowns {
+            let listed = dependencies(spec, table, table[reference].quantity, when);
+            // In FMI 2.0 time is no variable; states are known where the importer has them.
+            let listed: Vec<_> = listed
+                .into_iter()
+                .filter(|&k| fmi == Fmi::Three || table[k].causality != Causality::Independent)
+                .filter(|&k| exchange || when == When::Starting || !table[k].quantity.is_state())
+                .map(|k| k.to_string())
+                .collect();
+            let (reference, listed) = (reference.to_string(), listed.join(" "));
+            match fmi {
+                // Indices count from one, and time, the first row of the table, is not listed: they are the value references.
+                Fmi::Two => xml.leaf(
+                    "Unknown",
+                    &[("index", &reference), ("dependencies", &listed)],
+                ),
+                Fmi::Three => xml.leaf(
+                    three,
+                    &[("valueReference", &reference), ("dependencies", &listed)],
+                ),
             }
-            for (reference, _) in calculated() {
-                xml.leaf(
-                    "InitialUnknown",
-                    &[("valueReference", &reference.to_string())],
-                );
-            }
+        }
+        if fmi == Fmi::Two {
+            xml.close(two);
         }
     }
     xml.close("ModelStructure");

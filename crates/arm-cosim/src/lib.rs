@@ -21,11 +21,16 @@
 //! # Ok::<(), arm_cosim::Refused>(())
 //! ```
 
+mod dependencies;
 mod description;
+mod directional;
+mod exchange;
 mod hash;
 mod plant;
+mod quantity;
 mod slave;
 mod spec;
+mod start;
 mod state;
 mod status;
 mod units;
@@ -33,9 +38,10 @@ mod variables;
 
 pub use description::{Fmi, MODEL_IDENTIFIER, model_description, terminals};
 pub use hash::fnv1a;
+pub use quantity::Quantity;
 pub use slave::{Mode, Slave};
 pub use spec::{ArmSpec, EffectSpec, SegmentSpec, StartSpec};
 pub use state::SlaveState;
 pub use status::{Refused, Status};
 pub use units::{Unit, unit};
-pub use variables::{Causality, Initial, Quantity, Variability, Variable, token, variables};
+pub use variables::{Causality, Initial, Variability, Variable, token, variables};

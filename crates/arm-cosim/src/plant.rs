@@ -3,8 +3,8 @@
 use arm_core::Joints;
 use arm_sim::{Outside, Seen, SimulationError, Snapshot, Stepper};
 
+use crate::quantity::Quantity;
 use crate::spec::ArmSpec;
-use crate::variables::Quantity;
 
 /// What the slave needs of a [`Stepper`], whatever its number of joints.
 pub(crate) trait Plant: Send + Sync {
@@ -12,6 +12,10 @@ pub(crate) trait Plant: Send + Sync {
     fn start(&mut self, spec: &ArmSpec, time: f64) -> Result<(), SimulationError>;
     /// Sets an input; any of the handle's starts its motion anew.
     fn set_input(&mut self, quantity: Quantity, value: f64);
+    /// Sets a continuous state.
+    fn set_state(&mut self, quantity: Quantity, value: f64);
+    /// Sets the time \[s\]; the handle is where its input says.
+    fn set_time(&mut self, time: f64);
     /// Advances, and carries the handle along.
     fn advance(&mut self, duration: f64) -> Result<(), SimulationError>;
     /// Time \[s\].
@@ -101,6 +105,26 @@ impl<const N: usize> Plant for Coupled<N> {
         }
     }
 
+    fn set_state(&mut self, quantity: Quantity, value: f64) {
+        let mut state = self.stepper.snapshot();
+        match quantity {
+            Quantity::Angle(j) => state.q[j] = value,
+            Quantity::Speed(j) => state.qd[j] = value,
+            Quantity::Work(which) => state.work[which] = value,
+            _ => {}
+        }
+        self.stepper.restore(&state);
+        self.tip = None;
+    }
+
+    fn set_time(&mut self, time: f64) {
+        let mut state = self.stepper.snapshot();
+        (state.origin, state.ticks) = (time, 0);
+        self.stepper.restore(&state);
+        self.outside.age = 0.0;
+        self.tip = None;
+    }
+
     fn advance(&mut self, duration: f64) -> Result<(), SimulationError> {
         self.stepper.advance(&self.outside, duration)?;
         self.outside.age += duration;
@@ -126,6 +150,9 @@ impl<const N: usize> Plant for Coupled<N> {
                 kinetic + potential + contact
             }
             Quantity::Work(which) => self.stepper.work()[which],
+            Quantity::AngleRate(_) | Quantity::SpeedRate(_) | Quantity::WorkRate(_) => {
+                quantity.state().map_or(0.0, |state| self.derivative(state))
+            }
             _ => 0.0,
         }
     }

@@ -7,7 +7,7 @@ use crate::plant::{Plant, plant};
 use crate::spec::ArmSpec;
 use crate::state::SlaveState;
 use crate::status::{Refused, Status};
-use crate::variables::{Causality, Initial, Variable, fits, put, token, variables};
+use crate::variables::{Causality, Initial, Variability, Variable, fits, put, token, variables};
 
 /// Where a slave is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +23,10 @@ pub enum Mode {
     Terminated = 3,
     /// After an error: it can be read, reset, brought back to a state and freed.
     Failed = 4,
+    /// Model Exchange: between two stretches of integration.
+    Event = 5,
+    /// Model Exchange: integrated by the importer.
+    Continuous = 6,
 }
 
 impl Mode {
@@ -34,6 +38,8 @@ impl Mode {
             Self::Step => "in step mode",
             Self::Terminated => "terminated",
             Self::Failed => "in error",
+            Self::Event => "in event mode",
+            Self::Continuous => "in continuous-time mode",
         }
     }
 
@@ -44,6 +50,8 @@ impl Mode {
             Self::Step,
             Self::Terminated,
             Self::Failed,
+            Self::Event,
+            Self::Continuous,
         ];
         usize::try_from(number)
             .ok()
@@ -54,8 +62,14 @@ impl Mode {
 /// How far apart the importer's time and ours may be, relative to the larger of 1 s and the time.
 const SAME_TIME: f64 = 1e-9;
 
+/// The same relative to the step.
+const SAME_STEP: f64 = 0.25;
+
 /// From which difference on our time is brought back to that of the importer, in the same way.
 const OWN_TIME: f64 = 1e-10;
+
+/// The same relative to the step.
+const OWN_STEP: f64 = 1e-3;
 
 /// An arm as a co-simulation slave.
 ///
@@ -63,13 +77,15 @@ const OWN_TIME: f64 = 1e-10;
 /// [`Discard`](Status::Discard) leaves the slave as it was. Setting several values happens wholly or not at all.
 pub struct Slave {
     spec: ArmSpec,
-    table: Vec<Variable>,
+    pub(crate) table: Vec<Variable>,
     token: String,
-    mode: Mode,
-    values: Vec<f64>,
-    plant: Box<dyn Plant>,
+    pub(crate) mode: Mode,
+    /// Whether the importer integrates it.
+    exchange: bool,
+    pub(crate) values: Vec<f64>,
+    pub(crate) plant: Box<dyn Plant>,
     /// Whether parameters or start values were set since the plant was made.
-    stale: bool,
+    pub(crate) stale: bool,
     start: f64,
     stop: f64,
 }
@@ -80,6 +96,21 @@ impl Slave {
     /// # Errors
     /// [`Refused`] for an arm that the core refuses.
     pub fn new(spec: ArmSpec) -> Result<Self, Refused> {
+        Self::made(spec, false)
+    }
+
+    /// An instantiated arm that the importer integrates: Model Exchange.
+    ///
+    /// # Errors
+    /// [`Refused`] for an arm that the core refuses, or that is not offered so: see [`ArmSpec::no_exchange`].
+    pub fn for_exchange(spec: ArmSpec) -> Result<Self, Refused> {
+        match spec.no_exchange() {
+            Some(why) => Err(Refused::error(why)),
+            None => Self::made(spec, true),
+        }
+    }
+
+    fn made(spec: ArmSpec, exchange: bool) -> Result<Self, Refused> {
         let table = variables(&spec)?;
         let token = token(&spec)?;
         let values = table.iter().map(|v| v.start.unwrap_or(0.0)).collect();
@@ -89,6 +120,7 @@ impl Slave {
             table,
             token,
             mode: Mode::Instantiated,
+            exchange,
             values,
             stale: true,
             start: 0.0,
@@ -122,7 +154,7 @@ impl Slave {
     pub fn time(&self) -> f64 {
         match self.mode {
             Mode::Instantiated | Mode::Initialization => self.start,
-            Mode::Step | Mode::Terminated | Mode::Failed => self.plant.time(),
+            _ => self.plant.time(),
         }
     }
 
@@ -184,7 +216,11 @@ impl Slave {
         if let Err(refused) = self.prepare() {
             return self.failed(refused.message);
         }
-        self.mode = Mode::Step;
+        self.mode = if self.exchange {
+            Mode::Event
+        } else {
+            Mode::Step
+        };
         Ok(())
     }
 
@@ -196,7 +232,13 @@ impl Slave {
     pub fn set(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refused> {
         self.only_in(
             "set variables",
-            &[Mode::Instantiated, Mode::Initialization, Mode::Step],
+            &[
+                Mode::Instantiated,
+                Mode::Initialization,
+                Mode::Step,
+                Mode::Event,
+                Mode::Continuous,
+            ],
         )?;
         if references.len() != values.len() {
             return self.failed(format!(
@@ -242,6 +284,9 @@ impl Slave {
                 self.stale = true;
             }
         }
+        if self.stale && matches!(self.mode, Mode::Step | Mode::Event) {
+            self.tune()?;
+        }
         Ok(())
     }
 
@@ -264,17 +309,17 @@ impl Slave {
         Ok(())
     }
 
-    fn value(&mut self, reference: u32) -> Result<f64, Refused> {
+    pub(crate) fn value(&mut self, reference: u32) -> Result<f64, Refused> {
         let at = reference as usize;
         let Some(variable) = self.table.get(at) else {
             return self.failed(format!("no variable has the value reference {reference}"));
         };
-        let moving =
-            matches!(self.mode, Mode::Step | Mode::Terminated | Mode::Failed) && !self.stale;
+        let before = matches!(self.mode, Mode::Instantiated | Mode::Initialization);
+        let moving = !before && !self.stale;
         match (variable.causality, variable.initial) {
             (Causality::Independent, _) => Ok(self.time()),
             (Causality::Output, Some(Initial::Exact)) if !moving => Ok(self.values[at]),
-            (Causality::Output, _) => {
+            (Causality::Output, _) | (Causality::Local, Some(Initial::Calculated)) => {
                 let quantity = variable.quantity;
                 self.prepared()?;
                 let value = self.plant.output(quantity);
@@ -337,7 +382,11 @@ impl Slave {
         let within = |share: f64, a: f64, b: f64| (a - b).abs() <= share * b.abs().max(1.0);
         // A step that is whole inner steps but for less than 1e-6 of one is not yet brought back, see `Stepper::advance`.
         let lag = 2e-6 * self.spec.step;
-        let near = |a: f64, b: f64| within(SAME_TIME, a, b) || (a - b).abs() <= lag;
+        // Far from zero a share of the time may be more than a step: then a part of the step decides.
+        let near = |a: f64, b: f64| {
+            let apart = (a - b).abs();
+            apart <= lag || (within(SAME_TIME, a, b) && apart <= SAME_STEP * step.max(0.0))
+        };
         if !near(time, own) {
             return self.failed(format!(
                 "a step from {} s was asked for, the slave is at {} s",
@@ -362,11 +411,8 @@ impl Slave {
         }
         // Steps that are nearly whole inner steps, such as 1 ms in single precision, would take us ever further away from the
         // importer's time: we go to where it is. Mere rounding is left alone, for it would change bits.
-        let duration = if step > 0.0 && !within(OWN_TIME, time, own) {
-            end - own
-        } else {
-            step
-        };
+        let same = within(OWN_TIME, time, own) && (time - own).abs() <= OWN_STEP * step.max(0.0);
+        let duration = if step > 0.0 && !same { end - own } else { step };
         match self.plant.advance(duration) {
             Ok(()) => Ok(()),
             Err(error @ SimulationError::Diverged { .. }) => {
@@ -381,7 +427,7 @@ impl Slave {
     /// # Errors
     /// [`Refused`] outside the step mode.
     pub fn terminate(&mut self) -> Result<(), Refused> {
-        self.only_in("terminate", &[Mode::Step])?;
+        self.only_in("terminate", &[Mode::Step, Mode::Event, Mode::Continuous])?;
         self.mode = Mode::Terminated;
         Ok(())
     }
@@ -422,6 +468,12 @@ impl Slave {
                 "the state belongs to {found}, this slave is {allowed}"
             )));
         }
+        let running = matches!(state.mode, Mode::Event | Mode::Continuous);
+        if running != self.exchange && (running || state.mode == Mode::Step) {
+            return Err(Refused::error(
+                "the state is that of the other interface: Model Exchange or co-simulation",
+            ));
+        }
         let fit = |(v, &value): (&Variable, &f64)| v.start.is_none() || fits(v, value);
         let (numbers, (start, stop)) = (&state.plant.numbers, state.span);
         let fits = numbers.len() == self.plant.size()
@@ -451,7 +503,7 @@ impl Slave {
     }
 
     /// Makes the plant from the values, unless that is done.
-    fn prepared(&mut self) -> Result<(), Refused> {
+    pub(crate) fn prepared(&mut self) -> Result<(), Refused> {
         if self.stale { self.prepare() } else { Ok(()) }
     }
 
@@ -475,6 +527,20 @@ impl Slave {
         Ok(spec)
     }
 
+    /// Takes parameters that were changed while the arm moves: its state goes on.
+    fn tune(&mut self) -> Result<(), Refused> {
+        let saved = self.plant.save();
+        match self.remake() {
+            Ok(_) => {
+                self.give_inputs();
+                self.plant.load(&saved);
+                self.stale = false;
+                Ok(())
+            }
+            Err(refused) => self.failed(refused.message),
+        }
+    }
+
     fn give_inputs(&mut self) {
         for (variable, &value) in self.table.iter().zip(&self.values) {
             if variable.causality == Causality::Input {
@@ -483,7 +549,7 @@ impl Slave {
         }
     }
 
-    fn only_in(&mut self, what: &str, modes: &[Mode]) -> Result<(), Refused> {
+    pub(crate) fn only_in(&mut self, what: &str, modes: &[Mode]) -> Result<(), Refused> {
         if modes.contains(&self.mode) {
             return Ok(());
         }
@@ -493,7 +559,11 @@ impl Slave {
         ))
     }
 
-    fn failed<T>(&mut self, message: String) -> Result<T, Refused> {
+    /// Ends as an error: from now on only reading, going back to a state and a reset are possible.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn failed<T>(&mut self, message: String) -> Result<T, Refused> {
         self.mode = Mode::Failed;
         Err(Refused {
             status: Status::Error,
@@ -506,7 +576,10 @@ fn settable(variable: &Variable, mode: Mode) -> bool {
     let before = matches!(mode, Mode::Instantiated | Mode::Initialization);
     match variable.causality {
         Causality::Input => true,
-        Causality::Parameter => before,
+        Causality::Parameter => {
+            let between = matches!(mode, Mode::Step | Mode::Event);
+            before || (between && variable.variability == Variability::Tunable)
+        }
         Causality::Output => before && variable.initial == Some(Initial::Exact),
         Causality::Independent | Causality::Local => false,
     }

@@ -5,9 +5,7 @@ use arm_core::{Chain, Contact, Joints, Segment, Setup, models};
 use arm_sim::{Port, SimulationError};
 use serde::{Deserialize, Serialize};
 
-use crate::plant::plant;
 use crate::status::Refused;
-use crate::variables::Quantity;
 
 /// Longest arm that is compiled in.
 pub(crate) const MOST_SEGMENTS: usize = 6;
@@ -151,37 +149,24 @@ impl ArmSpec {
         Self { start, ..self }
     }
 
-    /// The same arm with the robot's handle where its tip is at the start.
-    ///
-    /// # Errors
-    /// [`Refused`] for an arm that the core refuses.
-    pub fn with_handle_at_tip(mut self) -> Result<Self, Refused> {
-        self.check()?;
-        let mut plant = plant(&self)?;
-        plant.start(&self, 0.0)?;
-        self.start.handle = [0, 1].map(|axis| plant.output(Quantity::TipPosition(axis)));
-        Ok(self)
-    }
-
-    /// The same arm at rest near its start, in equilibrium with what its port gives at the start: on the spring of the
-    /// contact, or hanging from the base without a force.
-    ///
-    /// # Errors
-    /// [`Refused`] where there is no equilibrium.
-    pub fn at_rest(mut self) -> Result<Self, Refused> {
-        self.check()?;
-        let mut plant = plant(&self)?;
-        for axis in 0..2 {
-            plant.set_input(Quantity::RobotPosition(axis), self.start.handle[axis]);
-        }
-        self.start.q = plant.rest(&self)?;
-        self.start.qd.fill(0.0);
-        Ok(self)
-    }
-
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.segments.len()
+    }
+
+    /// Why the arm is not offered for Model Exchange, where the importer integrates it; nothing where it is.
+    ///
+    /// The states of effects that carry one are not among those that an importer would integrate.
+    pub fn no_exchange(&self) -> Option<String> {
+        let carries = |effect: &&EffectSpec| {
+            let mut kinds = KINDS.iter().map(|kind| kind.info());
+            kinds.any(|info| info.kind == effect.kind && info.memory)
+        };
+        let effect = self.effects.iter().find(carries)?;
+        Some(format!(
+            "the effect {} carries a state of its own: co-simulation alone",
+            effect.kind
+        ))
     }
 
     /// Reads what [`ArmSpec::to_json`] has written, and checks it as far as its shape goes.
@@ -204,7 +189,7 @@ impl ArmSpec {
         Ok(text + "\n")
     }
 
-    fn check(&self) -> Result<(), Refused> {
+    pub(crate) fn check(&self) -> Result<(), Refused> {
         let joints = self.joints();
         let refuse = |what: String| Err(Refused::error(what));
         if !(1..=MOST_SEGMENTS).contains(&joints) {

@@ -10,7 +10,7 @@ pub struct Unit {
 }
 
 /// Symbols with their exponents of kg, m, s and rad.
-const SYMBOLS: [(&str, [i32; 4]); 8] = [
+const SYMBOLS: [(&str, [i32; 4]); 9] = [
     ("1", [0, 0, 0, 0]),
     ("kg", [1, 0, 0, 0]),
     ("m", [0, 1, 0, 0]),
@@ -19,6 +19,7 @@ const SYMBOLS: [(&str, [i32; 4]); 8] = [
     ("Hz", [0, 0, -1, 0]),
     ("N", [1, 1, -2, 0]),
     ("J", [1, 2, -2, 0]),
+    ("W", [1, 2, -3, 0]),
 ];
 
 /// Reads a unit such as `N m s/rad` or `kg m²`: factors parted by spaces, what follows the slash divides.

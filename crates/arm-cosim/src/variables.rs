@@ -4,6 +4,7 @@ use arm_core::effect::{KINDS, Parameter, Place};
 use arm_sim::Port;
 
 use crate::hash::fnv1a;
+use crate::quantity::Quantity;
 use crate::spec::{ArmSpec, port_name};
 use crate::status::Refused;
 
@@ -42,6 +43,8 @@ pub enum Variability {
     Constant,
     /// Not after initialization.
     Fixed,
+    /// Between communication steps.
+    Tunable,
     /// At any time.
     Continuous,
 }
@@ -52,6 +55,7 @@ impl Variability {
         match self {
             Self::Constant => "constant",
             Self::Fixed => "fixed",
+            Self::Tunable => "tunable",
             Self::Continuous => "continuous",
         }
     }
@@ -64,57 +68,6 @@ pub enum Initial {
     Exact,
     /// From other variables.
     Calculated,
-}
-
-/// What a variable stands for in the arm; joints, segments and axes count from zero.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Time.
-    Time,
-    /// Force of the environment on the arm at its handle.
-    ForceOnArm(usize),
-    /// Position of the robot's handle.
-    RobotPosition(usize),
-    /// Velocity of the robot's handle.
-    RobotVelocity(usize),
-    /// Torque of a motor in a joint.
-    Torque(usize),
-    /// Angle of a joint.
-    Angle(usize),
-    /// Speed of a joint.
-    Speed(usize),
-    /// Position of the arm's tip.
-    TipPosition(usize),
-    /// Velocity of the arm's tip.
-    TipVelocity(usize),
-    /// Force of the contact on the robot.
-    ForceOnRobot(usize),
-    /// Kinetic, potential and contact energy together.
-    Energy,
-    /// Work since the start: by the port, by motors, against resistance, lost in the contact.
-    Work(usize),
-    /// Length of a segment.
-    Length(usize),
-    /// Mass of a segment.
-    Mass(usize),
-    /// Centre of mass along a segment.
-    Com(usize),
-    /// Centre of mass normal to a segment.
-    ComNormal(usize),
-    /// Moment of inertia of a segment.
-    Inertia(usize),
-    /// Gravity.
-    Gravity,
-    /// First joint.
-    Base(usize),
-    /// Stiffness of the contact.
-    ContactStiffness(usize),
-    /// Damping of the contact.
-    ContactDamping(usize),
-    /// A value of an effect: which effect, which parameter.
-    Effect(usize, usize),
-    /// Inner step.
-    InnerStep,
 }
 
 /// One row of the table.
@@ -169,6 +122,23 @@ impl Variable {
         }
     }
 
+    /// A time derivative, for importers that integrate the arm themselves.
+    fn rate(quantity: Quantity, of: &str, unit: &'static str) -> Self {
+        Self {
+            variability: Variability::Continuous,
+            initial: Some(Initial::Calculated),
+            ..Self::new(quantity, format!("der({of})"), unit, Causality::Local)
+        }
+        .says(format!("Time derivative of {of}."))
+    }
+
+    fn tunable(self) -> Self {
+        Self {
+            variability: Variability::Tunable,
+            ..self
+        }
+    }
+
     fn start(mut self, value: f64) -> Self {
         if self.causality == Causality::Output {
             self.initial = Some(Initial::Exact);
@@ -205,6 +175,7 @@ pub fn variables(spec: &ArmSpec) -> Result<Vec<Variable>, Refused> {
     ];
     inputs(spec, &mut table);
     outputs(spec, &mut table);
+    rates(spec, &mut table);
     parameters(spec, &mut table);
     effects(spec, &mut table)?;
     table.push(
@@ -347,6 +318,35 @@ fn outputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
     }
 }
 
+fn rates(spec: &ArmSpec, table: &mut Vec<Variable>) {
+    let named = |quantity| {
+        let found = table.iter().find(|v| v.quantity == quantity);
+        found.map_or_else(String::new, |v| v.name.clone())
+    };
+    let mut rates = Vec::new();
+    for joint in 0..spec.joints() {
+        let name = named(Quantity::Angle(joint));
+        rates.push(Variable::rate(Quantity::AngleRate(joint), &name, "rad/s"));
+    }
+    for joint in 0..spec.joints() {
+        let name = named(Quantity::Speed(joint));
+        rates.push(Variable::rate(Quantity::SpeedRate(joint), &name, "rad/s²"));
+    }
+    for which in 0..works(spec) {
+        let name = named(Quantity::Work(which));
+        rates.push(Variable::rate(Quantity::WorkRate(which), &name, "W"));
+    }
+    table.extend(rates);
+}
+
+/// How many works the arm counts.
+const fn works(spec: &ArmSpec) -> usize {
+    match spec.port {
+        Port::Force => 3,
+        Port::Motion => 4,
+    }
+}
+
 fn parameters(spec: &ArmSpec, table: &mut Vec<Variable>) {
     let parameter = |quantity, name: String, unit, start| {
         Variable::new(quantity, name, unit, Causality::Parameter).start(start)
@@ -355,12 +355,12 @@ fn parameters(spec: &ArmSpec, table: &mut Vec<Variable>) {
         let (n, at) = (i + 1, format!("body[{}]", i + 1));
         table.extend([
             parameter(Quantity::Length(i), format!("{at}.a"), "m", s.length)
-                .least(0.0)
+                .least(f64::MIN_POSITIVE)
                 .says(format!(
                     "Length of segment {n}, joint to joint or to the handle."
                 )),
             parameter(Quantity::Mass(i), format!("{at}.m"), "kg", s.mass)
-                .least(0.0)
+                .least(f64::MIN_POSITIVE)
                 .says(format!("Mass of segment {n}.")),
             parameter(Quantity::Com(i), format!("{at}.l"), "m", s.com[0]).says(format!(
                 "Centre of mass of segment {n} from its proximal joint, along it."
@@ -407,6 +407,7 @@ fn parameters(spec: &ArmSpec, table: &mut Vec<Variable>) {
                     spec.contact_stiffness[axis],
                 )
                 .least(0.0)
+                .tunable()
                 .nominal(1e4)
                 .says(format!("Stiffness of the contact, along {along}.")),
                 parameter(
@@ -416,6 +417,7 @@ fn parameters(spec: &ArmSpec, table: &mut Vec<Variable>) {
                     spec.contact_damping[axis],
                 )
                 .least(0.0)
+                .tunable()
                 .nominal(10.0)
                 .says(format!("Damping of the contact, along {along}.")),
             ]);
@@ -496,6 +498,9 @@ pub(crate) fn put(spec: &mut ArmSpec, quantity: Quantity, value: f64) {
         | Quantity::ForceOnRobot(_)
         | Quantity::Energy
         | Quantity::Work(_)
+        | Quantity::AngleRate(_)
+        | Quantity::SpeedRate(_)
+        | Quantity::WorkRate(_)
         | Quantity::InnerStep => {}
     }
 }

@@ -1,13 +1,18 @@
-//! FMI 2.0: all functions of `fmi2Functions.h`, those of co-simulation with life, the others refused with a message.
+//! FMI 2.0: all functions of `fmi2Functions.h`, those of co-simulation and Model Exchange with life, the others refused with a message.
 
 use std::ffi::{CString, c_char, c_int, c_void};
 
+use arm_cosim::Slave;
+
+use crate::exchange::exchange;
 use crate::instance::{self, Handle, Instance, Log, guarded, unsupported};
 use crate::pointers::{error, give, read, text, write};
 use crate::refused::{refused, without_variables};
 use crate::resources;
 use crate::shared::shared;
 
+/// `fmi2ModelExchange`.
+const MODEL_EXCHANGE: c_int = 0;
 /// `fmi2CoSimulation`.
 const CO_SIMULATION: c_int = 1;
 /// `fmi2LastSuccessfulTime`.
@@ -30,6 +35,23 @@ pub struct Callbacks {
     pub step_finished: *const c_void,
     /// Handed back to the logger.
     pub environment: Handle,
+}
+
+/// What an update of discrete states comes to.
+#[repr(C)]
+pub struct EventInfo {
+    /// Whether another update is needed.
+    pub again: c_int,
+    /// Whether the run is to end.
+    pub terminate: c_int,
+    /// Whether nominal values changed.
+    pub nominals_changed: c_int,
+    /// Whether continuous states changed.
+    pub values_changed: c_int,
+    /// Whether the next event is known.
+    pub next_event_defined: c_int,
+    /// Its time.
+    pub next_event: f64,
 }
 
 /// Sizes of the types.
@@ -65,13 +87,17 @@ pub unsafe extern "C" fn fmi2Instantiate(
         instance: CString::new(name.unwrap_or_default()).unwrap_or_default(),
     };
     Instance::handle(log, logging != 0, || {
-        if kind != CO_SIMULATION {
-            return Err(error(
-                "model exchange was asked for, this FMU is for co-simulation",
-            ));
-        }
+        let make = match kind {
+            CO_SIMULATION => Slave::new,
+            MODEL_EXCHANGE => Slave::for_exchange,
+            other => {
+                return Err(error(format!(
+                    "the interface {other} was asked for, known are {MODEL_EXCHANGE} and {CO_SIMULATION}"
+                )));
+            }
+        };
         let folder = uri.map(|uri| resources::path_of_uri(&uri)).transpose()?;
-        resources::open(folder, guid)
+        resources::open(folder, guid, make)
     })
 }
 
@@ -204,6 +230,64 @@ pub unsafe extern "C" fn fmi2GetBooleanStatus(
     }
 }
 
+/// Reads directional derivatives.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
+    instance: Handle,
+    unknowns: *const u32,
+    n_unknowns: usize,
+    knowns: *const u32,
+    n_knowns: usize,
+    seed: *const f64,
+    derivative: *mut f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2GetDirectionalDerivative", |s| {
+            s.directional_derivative(
+                read(unknowns, n_unknowns)?,
+                read(knowns, n_knowns)?,
+                read(seed, n_knowns)?,
+                write(derivative, n_unknowns)?,
+            )
+        })
+    }
+}
+
+/// Updates discrete states, of which there are none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2NewDiscreteStates(instance: Handle, info: *mut EventInfo) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2NewDiscreteStates", |s| {
+            s.update_discrete_states()?;
+            let nothing = EventInfo {
+                again: 0,
+                terminate: 0,
+                nominals_changed: 0,
+                values_changed: 0,
+                next_event_defined: 0,
+                next_event: 0.0,
+            };
+            give(info, nothing);
+            Ok(())
+        })
+    }
+}
+
+exchange! {
+    truth: c_int,
+    enter_event: fmi2EnterEventMode,
+    enter_continuous: fmi2EnterContinuousTimeMode,
+    completed_step: fmi2CompletedIntegratorStep,
+    set_time: fmi2SetTime,
+    set_states: fmi2SetContinuousStates,
+    states: fmi2GetContinuousStates,
+    derivatives: fmi2GetDerivatives,
+    indicators: fmi2GetEventIndicators,
+    nominals: fmi2GetNominalsOfContinuousStates,
+}
+
 shared! {
     truth: c_int,
     logging: fmi2SetDebugLogging,
@@ -226,21 +310,10 @@ without_variables! {
     fmi2SetInteger(*const c_int);
     fmi2SetBoolean(*const c_int);
     fmi2SetString(*const *const c_char);
-    fmi2GetDirectionalDerivative(*const u32, usize, *const f64, *mut f64);
     fmi2SetRealInputDerivatives(*const c_int, *const f64);
 }
 
 refused! {
-    fmi2EnterEventMode();
-    fmi2NewDiscreteStates(*mut c_void);
-    fmi2EnterContinuousTimeMode();
-    fmi2CompletedIntegratorStep(c_int, *mut c_int, *mut c_int);
-    fmi2SetTime(f64);
-    fmi2SetContinuousStates(*const f64, usize);
-    fmi2GetDerivatives(*mut f64, usize);
-    fmi2GetEventIndicators(*mut f64, usize);
-    fmi2GetContinuousStates(*mut f64, usize);
-    fmi2GetNominalsOfContinuousStates(*mut f64, usize);
     fmi2CancelStep();
     fmi2GetStatus(c_int, *mut c_int);
     fmi2GetIntegerStatus(c_int, *mut c_int);

@@ -1,10 +1,11 @@
-//! FMI 3.0: all functions of `fmi3Functions.h`, those of co-simulation with life, the others refused with a message.
+//! FMI 3.0: all functions of `fmi3Functions.h`, those of co-simulation and Model Exchange with life, the others refused with a message.
 
 use std::ffi::{c_char, c_int, c_void};
 use std::path::PathBuf;
 
-use arm_cosim::Status;
+use arm_cosim::{Slave, Status};
 
+use crate::exchange::exchange;
 use crate::instance::{self, ERRORS, Handle, Instance, Log, guarded, unsupported};
 use crate::pointers::{error, give, read, text, write};
 use crate::refused::{refused, without_variables};
@@ -52,38 +53,33 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
                 "intermediate update was asked for, this FMU has none",
             ));
         }
-        resources::open(folder.map(PathBuf::from), token)
+        resources::open(folder.map(PathBuf::from), token, Slave::new)
     })
 }
 
-fn no_instance(kind: &str, environment: Handle, message: Message) -> Handle {
+/// Makes an instance of the arm in the resources that the importer integrates; null when it is refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3InstantiateModelExchange(
+    _name: *const c_char,
+    token: *const c_char,
+    resource_path: *const c_char,
+    _visible: u8,
+    logging: u8,
+    environment: Handle,
+    message: Message,
+) -> Handle {
     let log = Log::Three {
         message,
         environment,
     };
-    log.tell(
-        Status::Error,
-        ERRORS,
-        &format!("{kind} was asked for, this FMU is for co-simulation"),
-    );
-    std::ptr::null_mut()
+    // SAFETY: see `pointers`.
+    let (token, folder) = unsafe { (text(token), text(resource_path)) };
+    Instance::handle(log, logging != 0, || {
+        resources::open(folder.map(PathBuf::from), token, Slave::for_exchange)
+    })
 }
 
-/// Refused: this FMU is for co-simulation.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3InstantiateModelExchange(
-    _name: *const c_char,
-    _token: *const c_char,
-    _resource_path: *const c_char,
-    _visible: u8,
-    _logging: u8,
-    environment: Handle,
-    message: Message,
-) -> Handle {
-    no_instance("model exchange", environment, message)
-}
-
-/// Refused: this FMU is for co-simulation.
+/// Refused: this FMU is for co-simulation and Model Exchange.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
     _name: *const c_char,
@@ -97,7 +93,16 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
     _lock: Unused,
     _unlock: Unused,
 ) -> Handle {
-    no_instance("scheduled execution", environment, message)
+    let log = Log::Three {
+        message,
+        environment,
+    };
+    log.tell(
+        Status::Error,
+        ERRORS,
+        "scheduled execution was asked for, this FMU is for co-simulation and Model Exchange",
+    );
+    std::ptr::null_mut()
 }
 
 /// Begins the initialization.
@@ -200,6 +205,105 @@ pub unsafe extern "C" fn fmi3GetOutputDerivatives(
     }
 }
 
+/// Reads directional derivatives.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
+    instance: Handle,
+    unknowns: *const u32,
+    n_unknowns: usize,
+    knowns: *const u32,
+    n_knowns: usize,
+    seed: *const f64,
+    n_seed: usize,
+    derivative: *mut f64,
+    n_derivative: usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3GetDirectionalDerivative", |s| {
+            s.directional_derivative(
+                read(unknowns, n_unknowns)?,
+                read(knowns, n_knowns)?,
+                read(seed, n_seed)?,
+                write(derivative, n_derivative)?,
+            )
+        })
+    }
+}
+
+/// Updates discrete states, of which there are none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3UpdateDiscreteStates(
+    instance: Handle,
+    again: *mut u8,
+    terminate: *mut u8,
+    nominals_changed: *mut u8,
+    values_changed: *mut u8,
+    next_event_defined: *mut u8,
+    next_event: *mut f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3UpdateDiscreteStates", |s| {
+            s.update_discrete_states()?;
+            for flag in [
+                again,
+                terminate,
+                nominals_changed,
+                values_changed,
+                next_event_defined,
+            ] {
+                give(flag, 0);
+            }
+            give(next_event, 0.0);
+            Ok(())
+        })
+    }
+}
+
+/// Tells how many event indicators there are: none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetNumberOfEventIndicators(
+    instance: Handle,
+    number: *mut usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3GetNumberOfEventIndicators", |_| {
+            give(number, 0);
+            Ok(())
+        })
+    }
+}
+
+/// Tells how many continuous states there are.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetNumberOfContinuousStates(
+    instance: Handle,
+    number: *mut usize,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi3GetNumberOfContinuousStates", |s| {
+            give(number, s.states());
+            Ok(())
+        })
+    }
+}
+
+exchange! {
+    truth: u8,
+    enter_event: fmi3EnterEventMode,
+    enter_continuous: fmi3EnterContinuousTimeMode,
+    completed_step: fmi3CompletedIntegratorStep,
+    set_time: fmi3SetTime,
+    set_states: fmi3SetContinuousStates,
+    states: fmi3GetContinuousStates,
+    derivatives: fmi3GetContinuousStateDerivatives,
+    indicators: fmi3GetEventIndicators,
+    nominals: fmi3GetNominalsOfContinuousStates,
+}
+
 shared! {
     truth: u8,
     logging: fmi3SetDebugLogging,
@@ -242,7 +346,6 @@ without_variables! {
     fmi3SetString(*const *const c_char, usize);
     fmi3SetBinary(*const usize, *const *const u8, usize);
     fmi3SetClock(*const u8);
-    fmi3GetDirectionalDerivative(*const u32, usize, *const f64, usize, *mut f64, usize);
     fmi3GetAdjointDerivative(*const u32, usize, *const f64, usize, *mut f64, usize);
     fmi3GetIntervalDecimal(*mut f64, *mut c_int);
     fmi3GetIntervalFraction(*mut u64, *mut u64, *mut c_int);
@@ -255,23 +358,11 @@ without_variables! {
 }
 
 refused! {
-    fmi3EnterEventMode();
     fmi3GetNumberOfVariableDependencies(u32, *mut usize);
     fmi3GetVariableDependencies(u32, *mut usize, *mut u32, *mut usize, *mut c_int, usize);
     fmi3EnterConfigurationMode();
     fmi3ExitConfigurationMode();
     fmi3EvaluateDiscreteStates();
-    fmi3UpdateDiscreteStates(*mut u8, *mut u8, *mut u8, *mut u8, *mut u8, *mut f64);
-    fmi3EnterContinuousTimeMode();
-    fmi3CompletedIntegratorStep(u8, *mut u8, *mut u8);
-    fmi3SetTime(f64);
-    fmi3SetContinuousStates(*const f64, usize);
-    fmi3GetContinuousStateDerivatives(*mut f64, usize);
-    fmi3GetEventIndicators(*mut f64, usize);
-    fmi3GetContinuousStates(*mut f64, usize);
-    fmi3GetNominalsOfContinuousStates(*mut f64, usize);
-    fmi3GetNumberOfEventIndicators(*mut usize);
-    fmi3GetNumberOfContinuousStates(*mut usize);
     fmi3EnterStepMode();
     fmi3ActivateModelPartition(u32, f64);
 }

@@ -190,9 +190,11 @@ fn panic_text(panic: &(dyn Any + Send)) -> String {
 /// # Safety
 /// As [`guarded`].
 pub unsafe fn unsupported(handle: Handle, what: &str, variables: usize) -> c_int {
-    let refuse = |_: &mut Instance| match variables {
+    let refuse = |instance: &mut Instance| match variables {
         0 => Ok(()),
-        _ => Err(error("not supported by this FMU")),
+        _ => instance
+            .slave
+            .failed("not supported by this FMU".to_owned()),
     };
     // SAFETY: as promised.
     unsafe { with(handle, what, refuse) }

@@ -1,4 +1,4 @@
-//! The arm as a functional mock-up unit: the C interfaces of FMI 2.0 and 3.0 for co-simulation.
+//! The arm as a functional mock-up unit: the C interfaces of FMI 2.0 and 3.0 for co-simulation and Model Exchange.
 //!
 //! Everything that computes, and every rule of the standards, is in [`arm_cosim`]; here are pointers, strings and logs. This
 //! is the only crate of an FMU with `unsafe`. No call unwinds into the importer: a panic ends as `Fatal`, and the instance
@@ -10,6 +10,7 @@
     reason = "the contract is that of the standards, see `pointers`"
 )]
 
+mod exchange;
 pub mod fmi2;
 pub mod fmi3;
 mod instance;

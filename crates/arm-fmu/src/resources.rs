@@ -11,11 +11,15 @@ use crate::pointers::error;
 /// Largest file that is read; an arm of six segments with a hundred effects has about 30 kB.
 const MOST_BYTES: u64 = 4 << 20;
 
-/// The slave of the arm in a folder, if it is the one that the token protects.
+/// What is made of the arm in a folder, if it is the one that the token protects.
 ///
 /// The token holds a digest of every value of the arm, and so a missing or edited file, and a description that belongs to
 /// another arm, are refused instead of simulated.
-pub fn open(folder: Option<PathBuf>, token: Option<String>) -> Result<Slave, Refused> {
+pub fn open(
+    folder: Option<PathBuf>,
+    token: Option<String>,
+    make: impl FnOnce(ArmSpec) -> Result<Slave, Refused>,
+) -> Result<Slave, Refused> {
     let token = token.unwrap_or_default();
     let Some(folder) = folder else {
         return Err(error(
@@ -26,7 +30,7 @@ pub fn open(folder: Option<PathBuf>, token: Option<String>) -> Result<Slave, Ref
     let text = read(&file).map_err(|why| error(format!("{}: {why}", file.display())))?;
     let spec = ArmSpec::from_json(&text)
         .map_err(|refused| error(format!("{}: {}", file.display(), refused.message)))?;
-    let slave = Slave::new(spec)?;
+    let slave = make(spec)?;
     if slave.token() != token {
         return Err(error(format!(
             "the description has the token {token:?}, {} is the arm {:?}: one of them was edited, or belongs to another version",

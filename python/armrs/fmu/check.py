@@ -113,7 +113,6 @@ def _schemas(files: zipfile.ZipFile, content: bytes, path: str | os.PathLike[str
 
 
 def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Finding]:
-    identifier = description.identifier
     names = [name.replace("\\", "/") for name in files.namelist()]
     binaries = [name for name in names if name.startswith("binaries/") and not name.endswith("/")]
     if not binaries and not any(name.startswith("sources/") for name in names):
@@ -121,11 +120,11 @@ def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Findin
         return
     place, suffix = platform_folder(description.fmi)
     here = [name for name in binaries if name.startswith(f"binaries/{place}/")]
-    wanted = f"binaries/{place}/{identifier}{suffix}"
-    if wanted not in binaries:
-        there = ", ".join(here[:5]) or "nothing"
-        level = "error" if here else "note"
-        yield Finding(level, f"binaries/{place}", f"{there}, wanted is {identifier}{suffix}, named as modelIdentifier says")
+    for identifier in sorted({attributes.get("modelIdentifier", "") for attributes in description.interfaces.values()}):
+        if f"binaries/{place}/{identifier}{suffix}" not in binaries:
+            there = ", ".join(here[:5]) or "nothing"
+            level = "error" if here else "note"
+            yield Finding(level, f"binaries/{place}", f"{there}, wanted is {identifier}{suffix}, named as modelIdentifier says")
 
 
 def _tried(path: Path, seconds: float) -> list[Finding]:

@@ -66,6 +66,19 @@ CO_SIMULATION = {
     ),
 }
 """Attributes of the element CoSimulation."""
+_EXCHANGE_ATTRIBUTES = {
+    2: """
+        modelIdentifier needsExecutionTool completedIntegratorStepNotNeeded canBeInstantiatedOnlyOncePerProcess
+        canNotUseMemoryManagementFunctions canGetAndSetFMUstate canSerializeFMUstate providesDirectionalDerivative
+    """,
+    3: """
+        modelIdentifier needsExecutionTool canBeInstantiatedOnlyOncePerProcess canGetAndSetFMUState canSerializeFMUState
+        providesDirectionalDerivatives providesAdjointDerivatives providesPerElementDependencies needsCompletedIntegratorStep
+        providesEvaluateDiscreteStates
+    """,
+}
+MODEL_EXCHANGE = {fmi: frozenset(text.split()) for fmi, text in _EXCHANGE_ATTRIBUTES.items()}
+"""Attributes of the element ModelExchange."""
 
 _VARIABLE = "name valueReference description causality variability canHandleMultipleSetPerTimeInstant"
 _REAL = "declaredType quantity unit displayUnit relativeQuantity unbounded min max nominal start derivative reinit"

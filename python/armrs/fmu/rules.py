@@ -51,7 +51,7 @@ def broken(description: Description) -> Iterator[Broken]:
 
 
 def _top(description: Description) -> Iterator[Broken]:
-    fmi, flags = description.fmi, description.flags
+    fmi = description.fmi
     if fmi == 3 and not re.fullmatch(r"3\.\d+(\.\d+)?(-\w+)?", description.version):
         yield "fmiVersion", f"{description.version!r}, allowed is 3.0"
     if not description.token:
@@ -61,10 +61,10 @@ def _top(description: Description) -> Iterator[Broken]:
     for kind, attributes in description.interfaces.items():
         if not _C_NAME.fullmatch(attributes.get("modelIdentifier", "")):
             yield f"{kind}, modelIdentifier", f"{attributes.get('modelIdentifier', '')!r}, allowed is a name as in C"
-    known = names.CO_SIMULATION[fmi]
-    for key in flags:
-        if key not in known and ":" not in key and not key.startswith("{") and (hint := nearest(key, known)):
-            yield "CoSimulation", f"unknown attribute {key}, which importers silently ignore (nearest known: {hint})"
+    for kind, known in (("CoSimulation", names.CO_SIMULATION[fmi]), ("ModelExchange", names.MODEL_EXCHANGE[fmi])):
+        for key in description.interfaces.get(kind, ()):
+            if key not in known and ":" not in key and not key.startswith("{") and (hint := nearest(key, known)):
+                yield kind, f"unknown attribute {key}, which importers silently ignore (nearest known: {hint})"
     yield from _flags(description)
     yield from _experiment(description.experiment)
     independent = [v.name for v in description.variables if v.causality == "independent"]

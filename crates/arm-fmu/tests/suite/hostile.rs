@@ -59,11 +59,11 @@ fn an_instance_that_is_refused_is_null_and_says_why() {
         // Without a logger, too.
         let none = fmi2::fmi2Instantiate(null(), 1, null(), null(), null(), 0, 0);
         assert!(none.is_null());
-        let model_exchange = fmi2::fmi2Instantiate(null(), 0, token, path.as_ptr(), null(), 0, 0);
-        assert!(model_exchange.is_null());
+        let scheduled = fmi2::fmi2Instantiate(null(), 2, token, path.as_ptr(), null(), 0, 0);
+        assert!(scheduled.is_null());
         let environment = 42 as *mut c_void;
         let log = Some(crate::importer::log3 as unsafe extern "C" fn(_, _, _, _));
-        let none = fmi3::fmi3InstantiateModelExchange(
+        let none = fmi3::fmi3InstantiateScheduledExecution(
             null(),
             token,
             path.as_ptr(),
@@ -71,6 +71,9 @@ fn an_instance_that_is_refused_is_null_and_says_why() {
             0,
             environment,
             log,
+            null(),
+            null(),
+            null(),
         );
         assert!(none.is_null());
         assert!(logged()[0].1.contains("co-simulation"));
@@ -135,23 +138,24 @@ fn what_the_arm_has_none_of() {
         ready(instance);
         let reference = [1_u32];
         assert_eq!(fmi3::fmi3GetInt32(instance, null(), 0, null_mut(), 0), 0);
-        assert_eq!(
-            fmi3::fmi3GetInt32(instance, reference.as_ptr(), 1, &mut 0, 1),
-            ERROR
-        );
-        assert_eq!(
-            fmi3::fmi3SetBoolean(instance, reference.as_ptr(), 1, &1, 1),
-            ERROR
-        );
-        assert_eq!(fmi3::fmi3EnterEventMode(instance), ERROR);
-        assert_eq!(fmi3::fmi3SetTime(instance, 1.0), ERROR);
-        assert!(
-            logged()
-                .iter()
-                .all(|(status, text)| *status == ERROR && text.contains("not supported"))
-        );
-        // The instance lives on.
-        assert_eq!(do_step(instance, 0.0, 0.01), 0);
+        let calls: [&dyn Fn() -> i32; 4] = [
+            &|| fmi3::fmi3GetInt32(instance, reference.as_ptr(), 1, &mut 0, 1),
+            &|| fmi3::fmi3SetBoolean(instance, reference.as_ptr(), 1, &1, 1),
+            &|| fmi3::fmi3EnterConfigurationMode(instance),
+            &|| fmi3::fmi3SetTime(instance, 1.0),
+        ];
+        for call in calls {
+            assert_eq!(call(), ERROR);
+            // An error like any other: the instance steps on after a reset alone.
+            assert_eq!(do_step(instance, 0.0, 0.01), ERROR);
+            assert_eq!(fmi3::fmi3Reset(instance), 0);
+            ready(instance);
+            assert_eq!(do_step(instance, 0.0, 0.01), 0);
+        }
+        let texts = logged();
+        assert!(texts.iter().all(|(status, _)| *status == ERROR));
+        let unsupported = texts.iter().filter(|(_, t)| t.contains("not supported"));
+        assert_eq!(unsupported.count(), 3);
         fmi3::fmi3FreeInstance(instance);
     }
 }

@@ -1,0 +1,178 @@
+"""What `armrs fmu check` finds in defective FMUs, and that it finds nothing in good ones of other tools."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fmu_defects
+from armrs.errors import BadInput
+from armrs.fmu.check import check_fmu
+from armrs.fmu.export import export_fmu
+from armrs.workflows.demo import true_model
+
+CASES = [(fmi, name) for fmi in (2, 3) for name in (*fmu_defects.BOTH, *(fmu_defects.TWO if fmi == 2 else fmu_defects.THREE))]
+NEEDS_COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+LIMITED = pytest.mark.skipif(sys.platform != "linux", reason="memory and writing are limited on Linux alone")
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    pytest.importorskip("fmpy")
+    place = tmp_path_factory.mktemp("good")
+    return {fmi: export_fmu(true_model(), place / f"arm{fmi}.fmu", fmi=fmi, start=np.radians([-60.0, 50.0])) for fmi in (2, 3)}
+
+
+def errors(path: Path, **settings: float) -> list[str]:
+    return [str(f) for f in check_fmu(path, **settings) if f.level == "error"]
+
+
+@pytest.mark.parametrize(("fmi", "defect"), CASES)
+def test_every_defect_of_a_description_is_found_and_named(fmi: int, defect: str, good: dict[int, Path], tmp_path: Path) -> None:
+    own = fmu_defects.TWO if fmi == 2 else fmu_defects.THREE
+    change, words = (fmu_defects.BOTH | own)[defect]
+    path = fmu_defects.edited(good[fmi], tmp_path / "edited.fmu", change)
+    found = errors(path, library=False)
+    assert any(words in text for text in found), found
+
+
+@NEEDS_COMPILER
+def test_the_small_fmu_is_good(tmp_path: Path) -> None:
+    assert errors(fmu_defects.small(tmp_path)) == []
+
+
+@NEEDS_COMPILER
+@pytest.mark.parametrize("defect", fmu_defects.LIBRARY)
+def test_every_broken_promise_is_found_and_named(defect: str, tmp_path: Path) -> None:
+    if defect == "EATS" and sys.platform != "linux":
+        pytest.skip("memory is limited on Linux alone")
+    found = errors(fmu_defects.small(tmp_path, defect), seconds=2.0 if defect == "HANGS" else 60.0)
+    assert any(fmu_defects.LIBRARY[defect] in text for text in found), found
+
+
+@NEEDS_COMPILER
+def test_wrong_dependencies_are_found(tmp_path: Path) -> None:
+    description = fmu_defects.SMALL.replace('"4" dependencies="1 2"', '"4" dependencies="2"')
+    [found] = errors(fmu_defects.small(tmp_path, description=description))
+    assert "InitialUnknown z: changes with x, which is not among its dependencies" in found
+
+
+def test_there_are_more_than_120_of_them() -> None:
+    assert len(CASES) + len(fmu_defects.LIBRARY) + 1 >= 120
+
+
+@LIMITED
+@NEEDS_COMPILER
+def test_a_library_writes_nothing_outside_its_folder(tmp_path: Path) -> None:
+    outside = tmp_path / "outside.txt"
+    source = fmu_defects.small(tmp_path)
+    stub = f'#include <stdio.h>\n__attribute__((constructor)) static void write(void) {{ FILE *f = fopen("{outside}", "w"); if (f) fclose(f); }}\n'
+    (tmp_path / "write.c").write_text(stub, encoding="utf-8")
+    library = tmp_path / "small.so"
+    parts = [str(Path(fmu_defects.__file__).parent / "defective.c"), str(tmp_path / "stubs.c"), str(tmp_path / "write.c")]
+    subprocess.run(["cc", "-shared", "-fPIC", "-w", "-o", str(library), *parts, "-lm"], check=True)
+    from armrs.cosim.library import platform_folder
+
+    place, suffix = platform_folder(3)
+    with zipfile.ZipFile(source, "w") as packed:
+        packed.writestr("modelDescription.xml", fmu_defects.SMALL)
+        packed.write(library, f"binaries/{place}/small{suffix}")
+    found = check_fmu(source)
+    if any(f.place == "sandbox" for f in found):
+        pytest.skip("this kernel has no Landlock")
+    assert not [f for f in found if f.level == "error"]
+    assert not outside.exists()
+
+
+@LIMITED
+@NEEDS_COMPILER
+def test_foreign_code_ends_with_its_parent(tmp_path: Path) -> None:
+    """Also while it hangs, and also when the parent is killed."""
+    path = fmu_defects.small(tmp_path, "HANGS")
+    program = "import sys; from armrs.fmu.check import check_fmu; check_fmu(sys.argv[1])"
+    marker = {"ARMRS_TEST_MARKER": str(os.getpid())}
+    parent = subprocess.Popen(
+        [sys.executable, "-c", program, str(path)], env=os.environ | marker | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    )
+    try:
+        assert wait_for(lambda: len(marked(marker)) >= 2), "the process of the FMU does not appear"
+        parent.kill()
+        parent.wait()
+        assert wait_for(lambda: not marked(marker)), marked(marker)
+    finally:
+        parent.kill()
+
+
+def wait_for(condition: object) -> bool:
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        if condition():  # type: ignore[operator]
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def marked(marker: dict[str, str]) -> list[int]:
+    """Processes that have inherited a word of the environment."""
+    [(key, value)] = marker.items()
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/environ"):
+        try:
+            if f"{key}={value}".encode() in entry.read_bytes().split(b"\0"):
+                found.append(int(entry.parent.name))
+        except OSError:  # noqa: PERF203 (processes end meanwhile)
+            continue
+    return found
+
+
+# ---- archives
+def packed(path: Path, *entries: tuple[str, bytes]) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as files:
+        for name, data in entries:
+            files.writestr(name, data)
+    return path
+
+
+def test_a_description_of_millions_of_elements_is_refused_unread(tmp_path: Path) -> None:
+    path = packed(tmp_path / "bomb.fmu", ("modelDescription.xml", b"<a>" + b"<b/>" * 2_000_000 + b"</a>"))
+    [found] = errors(path)
+    assert "allowed at most 1000000" in found
+
+
+def test_a_description_beyond_all_sizes_is_refused_unread(tmp_path: Path) -> None:
+    path = packed(tmp_path / "bomb.fmu", ("modelDescription.xml", b" " * (65 << 20)))
+    [found] = errors(path)
+    assert "allowed at most 67108864 bytes" in found
+
+
+@pytest.mark.parametrize("place", ["/dev/zero", "/dev/null"])
+def test_devices_are_no_files(place: str) -> None:
+    if not Path(place).exists():
+        pytest.skip(f"no {place}")
+    with pytest.raises(BadInput, match="no regular file"):
+        check_fmu(place)
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a\nb", "x" * 300, "\udcff", "C:/evil.txt"])
+def test_names_that_no_file_has_are_findings(name: str, good: dict[int, Path], tmp_path: Path) -> None:
+    path = tmp_path / "names.fmu"
+    shutil.copy(good[3], path)
+    try:
+        with zipfile.ZipFile(path, "a") as files:
+            info = zipfile.ZipInfo("x")
+            info.filename = info.orig_filename = name
+            files.writestr(info, "evil")
+    except (UnicodeError, ValueError):
+        pytest.skip("zipfile does not write such a name")
+    try:
+        assert errors(path)
+    except BadInput as error:
+        assert "\n" not in str(error)
