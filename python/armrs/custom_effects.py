@@ -94,19 +94,9 @@ def own_effect(
     names = [p.name for p in listed]
     count = len([p for p in listed if p.linear])
     _takes(law, names)
-    low, high = checks.pair("angles", angles, least=-50.0, most=50.0, unit="rad", hint="looks like degrees")
-    if not low < high:
-        raise BadInput("angles", Text(f"{low:g} to {high:g} rad"), "the smaller angle first")
+    low, high = _ends(angles)
     fastest = checks.number("speed", speed, above=KNEE, most=1e4, unit="rad/s")
-
-    def at(q: np.ndarray, qd: np.ndarray, values: np.ndarray) -> np.ndarray:
-        answer = np.asarray(law(q, qd, **dict(zip(names, map(float, values), strict=True))), dtype=float)
-        torque = np.broadcast_to(answer, q.shape)
-        if not np.isfinite(torque).all():
-            bad = np.argwhere(~np.isfinite(torque))[0]
-            place = f"{kind}({q[tuple(bad)]:.3g} rad, {qd[tuple(bad)]:.3g} rad/s)"
-            raise BadInput(place, Text(str(torque[tuple(bad)])), "a finite torque")
-        return torque
+    at = _evaluated(kind, law, names)
 
     def tabulate(q: np.ndarray, qd: np.ndarray, values: np.ndarray) -> np.ndarray:
         angle, rate = np.meshgrid(q, qd, indexing="ij")
@@ -132,6 +122,29 @@ def own_effect(
         allowed = f"at most {_ROUGH:.0%} of the largest torque: a smoother law, or narrower angles"
         raise BadInput(f"table of {kind}", Text(f"an error of {error:.1%}"), allowed)
     return OwnEffect(kind, listed, law, error)
+
+
+def _ends(angles: tuple[float, float]) -> tuple[float, float]:
+    """Return the smallest and largest angle of a table [rad]."""
+    low, high = checks.pair("angles", angles, least=-50.0, most=50.0, unit="rad", hint="looks like degrees")
+    if not low < high:
+        raise BadInput("angles", Text(f"{low:g} to {high:g} rad"), "the smaller angle first")
+    return low, high
+
+
+def _evaluated(kind: str, law: Law, names: Sequence[str]) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
+    """Return a law as a function of angles, speeds and the values of its parameters, which refuses a torque that is not finite."""
+
+    def at(q: np.ndarray, qd: np.ndarray, values: np.ndarray) -> np.ndarray:
+        answer = np.asarray(law(q, qd, **dict(zip(names, map(float, values), strict=True))), dtype=float)
+        torque = np.broadcast_to(answer, q.shape)
+        if not np.isfinite(torque).all():
+            bad = np.argwhere(~np.isfinite(torque))[0]
+            place = f"{kind}({q[tuple(bad)]:.3g} rad, {qd[tuple(bad)]:.3g} rad/s)"
+            raise BadInput(place, Text(str(torque[tuple(bad)])), "a finite torque")
+        return torque
+
+    return at
 
 
 def _check(kind: str, parameters: tuple[Parameter, ...]) -> None:

@@ -95,32 +95,15 @@ def fit_by_simulation(
     model = checks.loaded("model", model, Model, load_model)
     checks.instance("drive", drive, Movement, Trial, type(None))
     checks.choice("integrator", integrator, ("rk4", "euler"))
-    for name, value, unit in (
-        ("dt", dt, "s"),
-        ("rate", rate, "Hz"),
-        ("angle_noise", angle_noise, "rad"),
-        ("force_noise", force_noise, "N"),
-    ):
+    positive = {"dt": (dt, "s"), "rate": (rate, "Hz"), "angle_noise": (angle_noise, "rad"), "force_noise": (force_noise, "N")}
+    for name, (value, unit) in positive.items():
         checks.number(name, value, above=0.0, unit=unit)
-    angles = checks.numbers("q", q, "rad")
-    force = checks.numbers("force_on_arm", force_on_arm, "N")
-    joints = len(model.segments)
-    for name, values, columns in (("q", angles, joints), ("force_on_arm", force, 2)):
-        if values.ndim != 2 or values.shape[1] != columns or len(values) != len(angles) or len(values) < 2:
-            raise BadInput(name, f"an array of shape {values.shape}", f"rows of {columns}, as many of q as of force_on_arm, two or more")
+    angles, force = _recorded(q, force_on_arm, len(model.segments))
     effects = all_effects(model)
     names = list(checks.texts("free", list(free) if isinstance(free, Mapping) else free, "parameters"))
     places = [_place(effects, name) for name in names]
     bounds = [_bounds(name, free[name]) if isinstance(free, Mapping) else place[2:] for name, place in zip(names, places, strict=True)]
-    settings: dict[str, Any] = {
-        "engine": "native",
-        "integrator": integrator,
-        "dt": dt,
-        "duration": (len(angles) - 1) / rate,
-        "output_interval": 1.0 / rate,
-        "q": drive.q[0].tolist() if isinstance(drive, Trial) else None,
-        "qd": None,
-    }
+    settings = _settings(integrator, dt, rate, len(angles), drive)
     recorded = {
         "q": np.ascontiguousarray(angles),
         "force_on_arm": np.ascontiguousarray(force),
@@ -142,6 +125,29 @@ def fit_by_simulation(
         settled=raw["settled"],
         effects=tuple(effects),
     )
+
+
+def _settings(integrator: str, dt: float, rate: float, samples: int, drive: Movement | Trial | None) -> dict[str, Any]:
+    """Return how the core simulates the runs of a fit."""
+    return {
+        "engine": "native",
+        "integrator": integrator,
+        "dt": dt,
+        "duration": (samples - 1) / rate,
+        "output_interval": 1.0 / rate,
+        "q": drive.q[0].tolist() if isinstance(drive, Trial) else None,
+        "qd": None,
+    }
+
+
+def _recorded(q: np.ndarray, force_on_arm: np.ndarray, joints: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return recorded angles and forces as arrays with a row for each sample."""
+    angles = checks.numbers("q", q, "rad")
+    force = checks.numbers("force_on_arm", force_on_arm, "N")
+    for name, values, columns in (("q", angles, joints), ("force_on_arm", force, 2)):
+        if values.ndim != 2 or values.shape[1] != columns or len(values) != len(angles) or len(values) < 2:
+            raise BadInput(name, f"an array of shape {values.shape}", f"rows of {columns}, as many of q as of force_on_arm, two or more")
+    return angles, force
 
 
 def _bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -204,13 +204,7 @@ def read_trial(
         raise BadInput("file", Text(f"{samples.n_rows} samples"), f"at least {FEWEST_SAMPLES} samples")
 
     warnings: list[str] = []
-    original: dict[str, np.ndarray] = {}
-    for column, raw in zip(header, samples.values, strict=True):
-        values = raw if column.factor == 1.0 else raw * column.factor
-        _check_size(column, values, samples)
-        if column.quantity is columns.ANGLE:
-            values = _unwrapped(column, values, warnings)
-        original[column.si_name] = values
+    original = _in_si(header, samples, warnings)
     t = original.pop("t_s")
     _check_time(t, samples)
 
@@ -242,6 +236,18 @@ def read_trial(
     if not trial.valid.any():
         raise BadInput("file", Text("no time at which all columns have a sample"), "at least one stretch of complete samples")
     return Reading(trial, tuple(warnings))
+
+
+def _in_si(header: Sequence[columns.Column], samples: Samples, warnings: list[str]) -> dict[str, np.ndarray]:
+    """Return the columns in SI units by name, angles without jumps by whole turns; what was done to them is added to the warnings."""
+    original: dict[str, np.ndarray] = {}
+    for column, raw in zip(header, samples.values, strict=True):
+        values = raw if column.factor == 1.0 else raw * column.factor
+        _check_size(column, values, samples)
+        if column.quantity is columns.ANGLE:
+            values = _unwrapped(column, values, warnings)
+        original[column.si_name] = values
+    return original
 
 
 def _together(channels: Mapping[str, np.ndarray], names: list[str]) -> np.ndarray:

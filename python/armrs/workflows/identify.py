@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -219,6 +219,24 @@ def identify(
         When no solution exists.
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    kinds = _checked(dataset, method, with_effects, cutoff, motion, level)
+    model = dataset.model
+    effects, fitted = effects_of(model, kinds)
+    if not model.segment_uncertainty and not any(fitted):
+        raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
+    settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
+    refuse_implausible(dataset)
+    configurations = sorted({t.configuration for t in dataset.trials})
+    columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
+    with naming_trials(dataset.trials):
+        raw, follows = _identified(rig(model, effects), columns, settings, dataset)
+    return _result(dataset, raw, effects, settings, follows)
+
+
+def _checked(
+    dataset: Dataset, method: str, with_effects: Sequence[str] | str, cutoff: float | None, motion: str, level: float
+) -> tuple[str, ...]:
+    """Refuse what cannot be identified, or not with these settings; return the kinds of effects to fit."""
     if dataset.added:
         raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
     checks.choice("method", method, ("joint", "cascade"))
@@ -228,21 +246,19 @@ def identify(
     slowest = min(trial.rate for trial in dataset.trials)
     if cutoff is not None and checks.number("cutoff", cutoff, above=0.0, unit="Hz") >= 0.4 * slowest:
         raise BadInput("cutoff", Text(f"{cutoff:g} Hz"), f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
-    model = dataset.model
     if method == "cascade":
         cascade_can(kinds, motion)
-    effects, fitted = effects_of(model, kinds)
-    if not model.segment_uncertainty and not any(fitted):
-        raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
-    settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
     for trial in dataset.trials:
         if trial.force_on_arm is None and trial.tau is None:
             raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
-    refuse_implausible(dataset)
-    configurations = sorted({t.configuration for t in dataset.trials})
-    columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
-    with naming_trials(dataset.trials):
-        raw, follows = _identified(rig(model, effects), columns, settings, dataset)
+    return tuple(kinds)
+
+
+def _result(
+    dataset: Dataset, raw: dict[str, Any], effects: list[Effect], settings: Mapping[str, Any], follows: Sequence[str]
+) -> Identified:
+    """Return what the core found, with what is to be said of it."""
+    model, method = dataset.model, settings["method"]
     explained = tuple(
         Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
         for trial, e in zip(dataset.trials, raw["explained"], strict=True)
@@ -278,7 +294,7 @@ def identify(
         left_out=(*follows, *_left_out(method, effects), *_unmoved(method, parameters)),
         trades=tuple(raw["trades"]),
         scale_free=raw["scale_free"],
-        level=level,
+        level=settings["level"],
         cutoff=raw["cutoff"],
         residual_rms=_residuals(explained),
         residual_rms_by_configuration=_residuals_by_configuration(explained),
