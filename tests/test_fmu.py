@@ -344,3 +344,14 @@ def test_a_library_that_crashes_is_a_finding(folder: Path, tmp_path: Path) -> No
     found = check_fmu(path)
     assert any(" when making an instance" in f.text for f in found)
     assert sys.platform != "linux" or any("is killed by signal 6 (SIGABRT)" in f.text for f in found)
+
+
+def test_effects_that_do_not_travel_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    arm = true_model()
+    arm.replace(effects=(*arm.effects, armrs.Effect("time_delay"), armrs.Effect("contact_damping"))).write("arm.toml")
+    assert cli.main(["fmu", "export", "arm.toml", "--json", "e.json"]) == 0
+    assert "left out" in capsys.readouterr().err
+    assert json.loads(Path("e.json").read_text(encoding="utf-8"))["left_out"] == ["contact_damping", "time_delay"]
+    assert cli.main(["fmu", "export", "arm.toml", "--port", "motion", "-o", "motion.fmu", "--json", "m.json"]) == 0
+    assert json.loads(Path("m.json").read_text(encoding="utf-8"))["left_out"] == ["time_delay"]

@@ -55,7 +55,16 @@ def fmu_export(
     start = _angles("--start-deg", start_deg)
     slave = Slave(model, port=port.value, start=start, rest=rest, step=dt, name=model.stem)
     written = export_fmu(slave, target, fmi=int(version.value))
-    data = {"verb": "fmu export", "file": written, "fmi": int(version.value), "port": port.value, "token": slave.token}
+    if slave.left_out:
+        console.warn([f"left out, since they are in the sensors or the contact and not behind this port: {', '.join(slave.left_out)}"])
+    data = {
+        "verb": "fmu export",
+        "file": written,
+        "fmi": int(version.value),
+        "port": port.value,
+        "token": slave.token,
+        "left_out": slave.left_out,
+    }
     present(lambda: data, json, lambda: print(written))
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -88,6 +90,12 @@ class Slave(Partner):
 
     def __repr__(self) -> str:
         return f"Slave({self.name!r}, {self.port} port, {self.mode}, {self.time:g} s)"
+
+    @property
+    def left_out(self) -> list[str]:
+        """Effects of the model that the slave does not have: those in sensors, and behind the force port those in the contact."""
+        inside = Counter(effect["kind"] for effect in json.loads(self.compiled.json)["effects"])
+        return sorted((Counter(effect.kind for effect in self.model.effects) - inside).elements())
 
     @property
     def token(self) -> str:
