@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import fmu_defects
+from armrs import cli
 from armrs.errors import BadInput
 from armrs.fmu.check import check_fmu
 from armrs.fmu.export import export_fmu
@@ -232,3 +233,20 @@ def test_nothing_is_found_in_a_good_fmu_of_another_tool(module: str, source: str
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert (tmp_path / "Small.fmu").exists(), done.stderr
     assert errors(tmp_path / "Small.fmu") == []
+
+
+@NEEDS_COMPILER
+@pytest.mark.parametrize(
+    ("defect", "how"), [("EXITS", "ends the process with status 0"), ("ABORTS", "signal 6"), ("HANGS", "does not return within 2 s")]
+)
+def test_a_partner_that_dies_ends_a_run_with_a_finding(
+    defect: str, how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu_defects.small(tmp_path, defect)
+    monkeypatch.chdir(tmp_path)
+    system = f'[system]\nstep_s = 0.01\nduration_s = 0.1\n[[slave]]\nname = "small"\nfmu = "small{defect}.fmu"\nseconds = 2.0\n'
+    Path("system.toml").write_text(system, encoding="utf-8")
+    assert cli.main(["fmu", "run", "system.toml", "-o", "out"]) == 1
+    assert how in capsys.readouterr().err
+    assert Path("out/coupled.json").exists()
+    assert not Path("out/coupled.csv").exists()
