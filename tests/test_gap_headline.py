@@ -67,12 +67,15 @@ def test_what_the_result_calls_open_counts_with_its_place() -> None:
     assert still_open(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.3, 0.15)}, open=[])) == []
 
 
-def test_what_is_not_decided_is_said_to_be() -> None:
+def test_what_is_not_decided_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
     rival = {"kind": "viscous", "joint": 1, "channel": None}
     torn = effect("coulomb", 1, ("torque", 0.14, 0.01, "N m"), decided=False, family="dry", alternatives=[rival])
     assert headline(result("explained", torn)).startswith(
         "The model lacks coulomb or viscous in joint 1 (shoulder), which these movements cannot tell apart: with it, "
     )
+    monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
+    one_family = headline(result("explained", {**torn, "alternatives": [{**rival, "kind": "stribeck"}]}))
+    assert one_family.startswith("The model lacks dry friction in joint 1 (shoulder) (coulomb or stribeck: not told apart): with it, ")
     elsewhere = {**torn, "alternatives": [{**rival, "joint": 2}]}
     assert "coulomb in joint 1 (shoulder) or viscous in joint 2 (elbow), which" in headline(result("explained", elsewhere))
 

@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ...catalogue import catalogue
 from ...report.tables import number, spread, unit
 
 OPEN = 1.5
 """A channel is open where its gap exceeds so many times its floor; only where the result does not say itself what is open."""
+_FAMILIES = {
+    "dry": "dry friction",
+    "rate": "damping",
+    "elastic": "elasticity",
+    "two_joints": "elasticity over two joints",
+    "muscle": "muscle",
+}
+"""Families as they are called where their members tie."""
 _SIZED = 2
 """Effects whose sizes stand in the sentence; of more it only gives the names."""
 
@@ -89,27 +98,35 @@ def _decided(effect: Mapping[str, Any]) -> bool:
     return effect.get("decided") is not False
 
 
+def family(kind: str) -> str:
+    """Return the family of a kind, empty where the catalogue has none for it."""
+    known = catalogue().get(kind)
+    return str(getattr(known, "family", "") or "")
+
+
+def undecided(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
+    """Return what an effect may be where the data do not decide: a family where all that is stated belongs to one, in one place."""
+    stated = [effect, *effect["alternatives"]]
+    here = {(e["joint"], e["channel"]) for e in stated}
+    families = {family(e["kind"]) for e in stated}
+    kinds = joined([e["kind"].replace("_", " ") for e in stated], "or")
+    if len(here) > 1:
+        return joined([effect_name(e, joints) for e in stated], "or") + ", which these movements cannot tell apart"
+    if len(families) == 1 and (name := _FAMILIES.get(families.pop())):
+        return effect_name({**effect, "kind": name}, joints) + f" ({kinds}: not told apart)"
+    return effect_name({**effect, "kind": kinds}, joints) + ", which these movements cannot tell apart"
+
+
 def _name(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
     """Return an effect in words: where the data do not decide, with what it may be instead."""
     where = f" in {effect['trial']} only" if effect.get("trial") else ""
-    if _decided(effect):
-        return effect_name(effect, joints) + where
-    stated = [effect, *effect["alternatives"]]
-    if len({(e["joint"], e["channel"]) for e in stated}) == 1:
-        # All of them act in one place.
-        kinds = joined([e["kind"].replace("_", " ") for e in stated], "or")
-        named = effect_name({**effect, "kind": kinds}, joints)
-    else:
-        named = joined([effect_name(e, joints) for e in stated], "or")
-    return f"{named}{where}, which these movements cannot tell apart"
+    return (effect_name(effect, joints) if _decided(effect) else undecided(effect, joints)) + where
 
 
 def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
     name = _name(effect, joints)
-    if not _decided(effect):
-        return name
     fitted = [(n, p) for n, p in effect["parameters"].items() if p["std"] is not None]
-    if not fitted:
+    if not _decided(effect) or not fitted:
         return name
     parameter, value = fitted[0]
     return f"{name}, {parameter} {number(value['value'], value['std'])} ± {spread(value['std'])} {unit(value['unit'])}".rstrip()

@@ -154,7 +154,7 @@ def _words(effect: Missing) -> str:
     text = effect.kind.replace("_", " ")
     if getattr(effect, "decided", True) is False:
         rivals = dict.fromkeys(a.kind.replace("_", " ") for a in effect.alternatives)
-        return f"{text}, or {' or '.join(rivals)}: not decided"
+        return f"{text} (or {', '.join(rivals)})"
     name, value = next(((n, v) for n, v in effect.parameters.items() if v.std is not None), (None, None))
     if name is not None and value is not None:
         text += f" {number(value.value, value.std)} ± {spread(value.std)} {unit(value.unit)}".rstrip()
