@@ -39,7 +39,8 @@ def summary(result: GapFound) -> Drawn:
         text = "Left, the arm in the middle of its movements; no effect was named."
     if gaps:
         shrinking(result, gaps, right)
-        text += " Right, simulated less measured on trials that were kept apart, in units of what repeats differ by."
+        one = "what repeats differ by" if all(g.floor for g in gaps.values()) else "what the calibrated model leaves"
+        text += f" Right, simulated less measured on trials that were kept apart, in units of {one}."
         if result.effects:
             text += " The step from calibrated to the named effects is what the names are worth."
     else:
@@ -210,7 +211,7 @@ def _change(name: str, seen: Sequence[tuple[str, float]], one: float, *, opened:
     """Return what is fitted and what is left, `2.4 → 0.16 N`; `seen` are the steps in units of `one`."""
     held_in = name.rsplit("_", 1)[1]
     factor, text = (180.0 / np.pi, "°") if held_in == "rad" else (1.0, " N m" if held_in == "Nm" else f" {held_in}")
-    ends = [f"{value * one * factor:.2g}" for step, value in seen if step != "before"]
+    ends = [f"{v:.2g}" if v < 99.5 else f"{v:.0f}" for v in (value * one * factor for step, value in seen if step != "before")]
     return " → ".join(ends) + text + ("  open" if opened else "")
 
 
