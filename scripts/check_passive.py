@@ -22,8 +22,7 @@ import numpy as np
 import armrs
 from armrs import Dataset, Effect, Joint, Model, Movement, Sensors, Simulated, Subject, Tolerance, Trial
 from armrs.analysis.joint_coupling import Course, fit, together
-from armrs.io.dataset import Added
-from armrs.model import Contact, Robot
+from armrs.model import AddedMass, Contact, Robot
 from armrs.workflows import passive
 from armrs.workflows.experiment import literature_arm
 
@@ -106,7 +105,7 @@ def session(known: list[Configuration], seed: int, scatter: float, coupling: flo
         "robot",
         tolerance=Tolerance(),
         synthetic=True,
-        added=tuple(Added(*item, configurations=names) for item in WORN),
+        added=tuple(AddedMass(*item, configurations=names) for item in WORN),
     )
 
 

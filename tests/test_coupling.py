@@ -24,7 +24,6 @@ from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
 from armrs.fmu.export import export_fmu
 from armrs.model import Segment, load_model
-from armrs.rig import rig
 from markup import assert_escaped
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -71,7 +70,7 @@ class Rig:
         drive = {"kind": "handle", "times": self.t, "values": np.array([self._at(t) for t in self.t]), "shape": "trapezoid"}
         drive |= {"speed": 0.0, "acceleration": 0.0, "pause": 0.0, "rigid": False}
         settings = {"engine": "native", "integrator": "rk4", "dt": 0.25e-3, "duration": DURATION, "output_interval": 1e-3}
-        run = _armrs.simulate(rig(self.model), drive, settings | {"q": list(self.q), "qd": [0.0, 0.0]})
+        run = _armrs.simulate(_armrs.Rig(self.model), drive, settings | {"q": list(self.q), "qd": [0.0, 0.0]})
         self.reference: np.ndarray = run["q"]
 
     def _at(self, time: float) -> list[float]:

@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ FREE = ["viscous1 viscosity", "viscous2 viscosity"]
 
 
 def model(viscosity):
-    joints = tuple(dataclasses.replace(j, viscosity=v, stiffness=0.4) for j, v in zip(true_model().joints, viscosity, strict=True))
+    joints = tuple(j.replace(viscosity=v, stiffness=0.4) for j, v in zip(true_model().joints, viscosity, strict=True))
     return true_model().replace(joints=joints)
 
 

@@ -67,7 +67,7 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
 
 def test_a_joint_may_have_any_name(viscous: armrs.GapFound, tmp_path: Path) -> None:
     data, name = viscous.dataset, r"elbow $\frac{1}$"
-    renamed = data.model.replace(joints=(data.model.joints[0], dataclasses.replace(data.model.joints[1], name=name)))
+    renamed = data.model.replace(joints=(data.model.joints[0], data.model.joints[1].replace(name=name)))
     result = dataclasses.replace(viscous, dataset=data.replace(model=renamed))
     written = write_gap(result, gap_data(result), tmp_path)
     assert sum(path.suffix == ".png" for path in written) == 5

@@ -75,9 +75,9 @@ def led(
     sensors = armrs.Sensors(angle=armrs.Channel(5e-4), force=armrs.Channel(0.1))
     trials = []
     for repeat, phase in enumerate(phases, start=1):
-        own = [dataclasses.replace(e, parameters={**e.parameters, "phase": phase}) if e.kind == "tremor" else e for e in effects]
+        own = [e.replace(parameters={**e.parameters, "phase": phase}) if e.kind == "tremor" else e for e in effects]
         upper, fore = model().segments
-        held = dataclasses.replace(fore, length=fore.length + moved * (-1) ** repeat)
+        held = fore.replace(length=fore.length + moved * (-1) ** repeat)
         true = model(*own).replace(contact=contact, segments=(upper, held))
         read = armrs.simulate(true, movement, engine="rapier", rate=50.0, sensors=sensors, seeds=[repeat]).readings[0]
         columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
@@ -119,7 +119,7 @@ def test_a_handle_beside_the_hand_turns_the_wrist() -> None:
     sensors = armrs.Sensors(angle=armrs.Channel(1e-4), force=armrs.Channel(0.05))
     trials = []
     for repeat in range(1, 5):
-        held = dataclasses.replace(parts[2], length=parts[2].length + 4e-4 * (-1) ** repeat)
+        held = parts[2].replace(length=parts[2].length + 4e-4 * (-1) ** repeat)
         true = given.replace(segments=(*parts[:2], held))
         read = armrs.simulate(true, movement, engine="rapier", rate=50.0, sensors=sensors, seeds=[repeat]).readings[0]
         columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}

@@ -10,7 +10,7 @@ import pytest
 
 import armrs
 from armrs import cli
-from armrs.rig import arm, rig
+from armrs._armrs import Rig
 
 SEGMENTS = (
     armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165),
@@ -36,7 +36,7 @@ STEP, STEPS = 5e-4, 4000
 
 def swing(model: armrs.Model) -> np.ndarray:
     """A free swing of 2 s by the kernels of armrs and fourth-order Runge-Kutta, shape (STEPS + 1, n) [rad]."""
-    kernels, resisting = arm(model), rig(model)
+    kernels, resisting = armrs.Arm.from_model(model), Rig(model)
 
     def rate(state: np.ndarray) -> np.ndarray:
         q, qd = state[None, :3], state[None, 3:]
@@ -151,7 +151,7 @@ def test_opensim_balances_the_exported_arm_as_we_do(tmp_path: Path) -> None:
     opensim = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
     model = opensim.Model(str(armrs.export_model(SMOOTH, tmp_path / "arm.osim").path))
     state = model.initSystem()
-    kernels, resisting = arm(SMOOTH), rig(SMOOTH)
+    kernels, resisting = armrs.Arm.from_model(SMOOTH), Rig(SMOOTH)
     for q in (START, START + 0.5, -START):
         for k, name in enumerate(("shoulder", "elbow", "wrist")):
             model.getCoordinateSet().get(name).setValue(state, float(q[k]), False)

@@ -48,8 +48,9 @@ def test_long_arrays_of_numbers_are_no_bomb(tmp_path: Path) -> None:
 def test_devices_and_pipes_are_no_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.toml")
     for path in ("/dev/zero", str(tmp_path / "pipe.toml")):
-        with pytest.raises(armrs.BadInput, match="a device or a pipe"):
-            tomlfile.read(path)
+        for read in (tomlfile.read, armrs.load_model):
+            with pytest.raises(armrs.BadInput, match="a device or a pipe"):
+                read(path)
 
 
 def csv(content: bytes, tmp_path: Path) -> armrs.BadInput:

@@ -10,7 +10,6 @@ only. The changes are those of the native engine with the catalogue's law.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import sys
@@ -51,7 +50,7 @@ def segments_off(model: Model) -> list[tuple[Model, float]]:
         for name, part in (("mass", 0.5), ("com", -0.5), ("inertia", 0.5)):
             changed = {name: getattr(segment, name) * (1.0 + part * model.segment_uncertainty)}
             others = list(model.segments)
-            others[j] = dataclasses.replace(segment, **changed)
+            others[j] = segment.replace(**changed)
             result.append((model.replace(segments=tuple(others)), part))
     return result
 
@@ -102,7 +101,7 @@ def above_limit(folder: Path) -> float:
             assert base.robot is not None
             place = list(base.robot.base)
             place[axis] += SLIPPED
-            moved = base.replace(robot=dataclasses.replace(base.robot, base=tuple(place)))
+            moved = base.replace(robot=base.robot.replace(base=tuple(place)))
             placing[:, 2 * k + axis] = white(shown(moved, trial) - still, noise, n)
         rows.append(np.hstack([common, placing]))
         changes.append(white(shown(base.replace(effects=(effect,)), trial) - still, noise, n) * math.sqrt(repeats))

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from .fmu.export import export_fmu as export_fmu
     from .io.conversion import convert as convert
     from .io.dataset import Dataset as Dataset
-    from .io.dataset import Subject as Subject
-    from .io.dataset import Tolerance as Tolerance
     from .io.dataset import load_dataset as load_dataset
     from .io.dataset import write_dataset as write_dataset
     from .io.markers import Markers as Markers
@@ -46,6 +44,8 @@ if TYPE_CHECKING:
     from .model import Model as Model
     from .model import Robot as Robot
     from .model import Segment as Segment
+    from .model import Subject as Subject
+    from .model import Tolerance as Tolerance
     from .model import load_model as load_model
     from .montecarlo import Sweep as Sweep
     from .montecarlo import Swept as Swept
@@ -94,7 +94,7 @@ _HOMES = {
     "_armrs": ("Arm", "__version__", "build_profile"),
     "catalogue": ("Parameter",),
     "io.conversion": ("convert",),
-    "io.dataset": ("Dataset", "Subject", "Tolerance", "load_dataset", "write_dataset"),
+    "io.dataset": ("Dataset", "load_dataset", "write_dataset"),
     "io.multibody": ("ExportedModel", "export_model", "import_model"),
     "workflows.checking": ("Checked", "check_dataset"),
     "workflows.importing": ("Imported", "import_recordings"),
@@ -109,7 +109,7 @@ _HOMES = {
     "workflows.identify": ("Estimate", "Identified", "identify"),
     "workflows.record": ("Recorded", "record"),
     "io.markers": ("Markers", "PlanarMotion", "planar_motion"),
-    "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "load_model"),
+    "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "Subject", "Tolerance", "load_model"),
     "workflows.passive": ("PassiveCurve", "PassiveMoments", "passive_moments"),
     "montecarlo": ("Sweep", "Swept", "load_sweep", "sweep"),
     "io.motions": ("convert_markers", "convert_motion", "read_markers"),

@@ -12,6 +12,7 @@ import numpy as np
 from . import _armrs, checks
 from .catalogue import Parameter, catalogue
 from .errors import BadInput, Text
+from .model import Effect, Joint, Model, Segment
 
 Law = Callable[..., np.ndarray]
 
@@ -202,11 +203,12 @@ def _linear(kind: str, at: Law, values: np.ndarray, count: int, angles: tuple[fl
 def _table_error(kind: str, at: Law, values: np.ndarray, count: int, angles: tuple[float, float]) -> float:
     """Return the largest error of the core's table relative to the largest torque, of the worst linear parameter."""
     q, qd = _places(angles)
-    arm = _armrs.Arm([1.0], [1.0], [0.5], [0.1])
+    arm = Model((Segment("arm", 1.0, 1.0, 0.5, 0.1),), (Joint("joint"),))
     worst = 0.0
     for k in range(count):
         one = _one(values, k, count)
-        table = _armrs.Rig(arm, [(kind, 0, list(one))], ((1.0, 1.0), (0.0, 0.0)), None)
+        unit = dict(zip((p.name for p in catalogue()[kind].parameters), map(float, one), strict=True))
+        table = _armrs.Rig(arm, [Effect(kind, 1, parameters=unit)])
         torque = table.resisting(q[:, None], qd[:, None], np.zeros((len(q), 1)), 0.01)[:, 0]
         exact = at(q, qd, one)
         worst = max(worst, float(np.abs(torque - exact).max()) / max(float(np.abs(exact).max()), 1e-300))

@@ -203,45 +203,52 @@ impl Effect {
         } else {
             format!("{place} ({})", shortened(&name))
         };
-        Self::of_kind(&name, fields.rest()).map_err(|refused| refused.within(&named))
+        let site = [fields.take("joint"), fields.take("channel")];
+        Self::of_kind(&name, site, fields.rest()).map_err(|refused| refused.within(&named))
     }
 
-    /// Reads joint, channel and parameters of an effect whose kind is named.
+    /// Reads an effect whose kind is named, from joint, channel and the table of its parameters.
     ///
     /// # Errors
     /// [`Refused`] as of [`Effect::from_value`], with places inside the table.
-    pub fn of_kind(name: &str, table: Table) -> Result<Self, Refused> {
+    pub fn of_kind(
+        name: &str,
+        [joint, channel]: [Option<Value>; 2],
+        parameters: Table,
+    ) -> Result<Self, Refused> {
         let Some(kind) = kind(name) else {
             let known: Vec<&str> = kinds().iter().map(|k| k.info().kind).collect();
             return Err(unknown("kind", name, "kind of effect", &known));
         };
-        let mut fields = Fields::new("", Value::Table(table))?;
-        let joint = fields.whole("joint", 1)?;
-        let channel = fields.choice("channel", &Channel::NAMED)?;
-        let blank = Self {
+        let mut site = Table::new();
+        site.push("joint", joint);
+        site.push("channel", channel);
+        let mut site = Fields::new("", Value::Table(site))?;
+        let joint = site.whole("joint", 1)?;
+        let channel = site.choice("channel", &Channel::NAMED)?;
+        let mut effect = Self {
             kind,
             site: Site::Whole,
             values: arm_core::effect::Effect::<f64>::new(kind, 0).parameters,
         };
-        let mut values = blank.values;
-        for (name, value) in fields.rest().0 {
-            let at = blank
-                .position(&name)
-                .ok_or_else(|| blank.unknown_parameter(&name))?;
-            values[at] = Bounds::of(&kind.info().parameters[at]).read(&name, &value)?;
+        for (name, value) in parameters.0 {
+            let at = effect.position(&name);
+            let at = at.ok_or_else(|| effect.unknown_parameter(&name))?;
+            effect.values[at] = Bounds::of(&kind.info().parameters[at]).read(&name, &value)?;
         }
-        let site = match (joint, channel, kind.info().place.address()) {
-            (Some(joint), Some(_), Some("channel")) => {
-                return Self::new(kind, Site::Joint(index(joint))).map(|_| blank);
-            }
-            (_, Some(channel), _) => Site::Channel(channel),
-            (Some(joint), None, _) => Site::Joint(index(joint)),
-            (None, None, _) => Site::Whole,
+        let joint = joint.map(|number| Site::Joint(index(number)));
+        let channel = channel.map(Site::Channel);
+        let sites = [joint, channel];
+        // Of a joint and a channel at least one is wrong, and is named.
+        let given = match kind.info().place.address() {
+            Some("channel") => sites,
+            _ => [channel, joint],
         };
-        Ok(Self {
-            values,
-            ..Self::new(kind, site)?
-        })
+        for site in given.into_iter().flatten() {
+            effect.site = Self::new(kind, site)?.site;
+        }
+        Self::new(kind, effect.site)?;
+        Ok(effect)
     }
 
     /// Checks the site against the number of joints.

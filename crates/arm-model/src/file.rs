@@ -25,11 +25,17 @@ fn raw(path: &Path, what: &str) -> Result<Vec<u8>, Refused> {
             Refused::new("file", reason, format!("{what} that can be read"))
         }
     };
-    if fs::metadata(path).map_err(unreadable)?.is_dir() {
+    let kind = fs::metadata(path).map_err(unreadable)?;
+    if kind.is_dir() {
         return Err(Refused::new("file", "a folder", what));
     }
+    // A device never ends, and a pipe may never begin.
+    if !kind.is_file() {
+        let allowed = format!("{what} on a disk");
+        return Err(Refused::new("file", "a device or a pipe", allowed));
+    }
     let mut bytes = Vec::new();
-    // Not by the size that the system states: a device has none and never ends.
+    // Not by the size that was stated: the file may grow meanwhile.
     let mut limited = File::open(path).map_err(unreadable)?.take(MAX_SIZE + 1);
     limited.read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_SIZE {

@@ -52,6 +52,30 @@ impl Default for Parts {
     }
 }
 
+impl Parts {
+    /// The same parts with the numbers of the table `[arm]` that are given there.
+    ///
+    /// # Errors
+    /// [`Refused`] for a value out of bounds.
+    pub fn with_numbers(self, mut arm: Fields) -> Result<Self, Refused> {
+        Ok(Self {
+            gravity: arm.number_or("gravity", self.gravity, &Model::GRAVITY)?,
+            base: arm.pair_or("base", self.base, &Model::BASE)?,
+            segment_uncertainty: arm.number_or(
+                "segment_uncertainty",
+                self.segment_uncertainty,
+                &UNCERTAINTY,
+            )?,
+            joint_uncertainty: arm.number_or(
+                "joint_uncertainty",
+                self.joint_uncertainty,
+                &UNCERTAINTY,
+            )?,
+            ..self
+        })
+    }
+}
+
 /// An arm, what acts on it, and the rig that leads it. One that exists is valid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model(Parts);
@@ -207,29 +231,18 @@ impl Model {
         let segments = arm.tables("segment", "arm.segment")?;
         let joints = arm.tables("joint", "arm.joint")?;
         let effects = document.tables("effect", "effect")?;
-        let blank = Parts::default();
-        Self::new(Parts {
+        let parts = Parts {
             segments: each("[[arm.segment]]", "segment", segments, Segment::from_value)?,
             joints: each("[[arm.joint]]", "joint", joints, Joint::from_value)?,
-            gravity: arm.number_or("gravity", blank.gravity, &Self::GRAVITY)?,
-            base: arm.pair_or("base", blank.base, &Self::BASE)?,
-            segment_uncertainty: arm.number_or(
-                "segment_uncertainty",
-                blank.segment_uncertainty,
-                &UNCERTAINTY,
-            )?,
-            joint_uncertainty: arm.number_or(
-                "joint_uncertainty",
-                blank.joint_uncertainty,
-                &UNCERTAINTY,
-            )?,
             robot: optional(&mut document, "robot", Robot::from_value)?,
             contact: optional(&mut document, "contact", Contact::from_value)?,
             effects: (1..)
                 .zip(effects)
                 .map(|(k, table)| Effect::from_value(&format!("[[effect]] {k}"), table))
                 .collect::<Result<_, _>>()?,
-        })
+            ..Parts::default()
+        };
+        Self::new(parts.with_numbers(arm)?)
     }
 
     /// The model as it stands in a file.

@@ -414,6 +414,11 @@ fn files_that_cannot_be_read_are_named() {
             folder.display()
         )
     );
+    #[cfg(unix)]
+    {
+        let refused = Model::load("/dev/zero".as_ref()).unwrap_err();
+        assert_eq!(refused.found, "a device or a pipe");
+    }
     let none = folder.join("no such model.toml");
     let refused = Model::load(&none).unwrap_err().to_string();
     assert_eq!(

@@ -117,6 +117,18 @@ pub struct Arm {
 }
 
 impl Arm {
+    /// The rigid arm of a model.
+    pub fn of(model: &arm_model::Model) -> PyResult<Self> {
+        let segments: Vec<_> = model
+            .segments
+            .iter()
+            .map(arm_model::Segment::core)
+            .collect();
+        let still = vec![0.0; segments.len()];
+        let chain = AnyChain::new(&segments, model.base, [0.0, -model.gravity], &still)?;
+        Ok(Self { chain })
+    }
+
     /// Reads three arguments that have a value for every joint.
     pub fn rows<'a>(
         &self,
@@ -196,6 +208,21 @@ impl Arm {
             .collect();
         let chain = AnyChain::new(&segments, [base[0], base[1]], [0.0, -gravity], &rotor)?;
         Ok(Self { chain })
+    }
+
+    /// Return the rigid arm of a model: its segments, base and gravity, without any effect.
+    ///
+    /// Parameters
+    /// ----------
+    /// model : Model
+    ///
+    /// Returns
+    /// -------
+    /// Arm
+    #[staticmethod]
+    fn from_model(model: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let of = |m: &crate::model::Model| Self::of(m.inner());
+        crate::model::one("model", model, of)?
     }
 
     /// Number of joints.

@@ -1,6 +1,6 @@
 //! The catalogue of effects as Python data.
 
-use arm_core::effect::{KINDS, Kind};
+use arm_core::effect::Kind;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -8,7 +8,7 @@ use pyo3::types::{PyDict, PyList};
 #[pyfunction]
 pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
-    for kind in KINDS.iter().copied().chain(crate::own::declared()) {
+    for kind in arm_model::kinds() {
         let info = kind.info();
         let parameters = PyList::empty(py);
         for p in info.parameters {

@@ -37,7 +37,7 @@ impl Coupling {
         fn of<const N: usize>(chain: &Chain<f64, N>, rig: &Rig, name: &str, port: Port) -> ArmSpec {
             ArmSpec::new(name, port, &rig.setup(chain), &rig.effects)
         }
-        let mut spec = each_length!(&rig.arm.get().chain, c => of(c, rig, &self.name, port));
+        let mut spec = each_length!(&rig.arm.chain, c => of(c, rig, &self.name, port));
         let joints = spec.joints();
         for (name, values) in [("start angles", &self.q), ("start speeds", &self.qd)] {
             if values.len() != joints {

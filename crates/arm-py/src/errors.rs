@@ -21,6 +21,24 @@ pub fn bad_input(place: &str, found: impl std::fmt::Display, allowed: &str) -> P
     })
 }
 
+/// A refusal of a model or a description as `BadInput`.
+pub fn refused(error: arm_model::Refused) -> PyErr {
+    Python::attach(|py| {
+        let made = py.import("armrs.errors").and_then(|errors| {
+            let text = errors.getattr("Text")?.call1((error.found,))?;
+            let named = pyo3::types::PyDict::new(py);
+            named.set_item("file", error.file)?;
+            named.set_item("hint", error.hint)?;
+            let class = errors.getattr("BadInput")?;
+            class.call((error.place, text, error.allowed), Some(&named))
+        });
+        match made {
+            Ok(error) => PyErr::from_value(error),
+            Err(error) => error,
+        }
+    })
+}
+
 /// A refusal of the core as `BadInput`.
 pub fn invalid(error: Invalid) -> PyErr {
     match error {

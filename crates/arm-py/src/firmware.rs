@@ -39,12 +39,12 @@ pub fn firmware<'py>(
     uncertainty: f64,
     samples: Vec<Vec<f64>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    match &rig.arm.get().chain {
+    match &rig.arm.chain {
         AnyChain::Two(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
         AnyChain::Three(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
         _ => Err(bad_input(
             "[[arm.segment]]",
-            rig.arm.get().n_joints(),
+            rig.arm.n_joints(),
             "2 or 3 segments for firmware",
         )),
     }
@@ -58,7 +58,12 @@ fn told<'py, const N: usize>(
     samples: &[Vec<f64>],
 ) -> PyResult<Bound<'py, PyDict>> {
     if let Some(own) = effects.iter().find(|e| matches!(e.kind, Kind::Own(_))) {
-        return Err(refused((0, Invalid::CannotAct { kind: own.kind.info().kind })));
+        return Err(refused((
+            0,
+            Invalid::CannotAct {
+                kind: own.kind.info().kind,
+            },
+        )));
     }
     let calibration = Calibration::of(chain, effects).map_err(refused)?;
     let sensed = |e: &Effect<f64>| e.kind.acts_on() == ActsOn::Sensors;

@@ -80,5 +80,5 @@ pub fn fit_by_simulation<'py>(
         })
         .collect();
     let given = (&drive, &settings, &recorded);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, given, &free))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, given, &free))
 }

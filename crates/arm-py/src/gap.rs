@@ -24,7 +24,8 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::arm::{AnyChain, each_short_length};
 use crate::errors::{bad_input, gap};
-use crate::ident::{Columns, Promised, read_trials};
+use crate::ident::{Columns, read_trials, tolerance};
+use crate::model;
 use crate::own;
 use crate::rig::Rig;
 
@@ -33,7 +34,7 @@ use crate::rig::Rig;
 #[pyo3(from_item_all)]
 pub struct Settings {
     segment_uncertainty: f64,
-    tolerance: Promised,
+    tolerance: Py<model::Tolerance>,
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
     threads: usize,
@@ -64,7 +65,7 @@ impl<'a, 'py> Asked<'a, 'py> {
             contact: rig.contact,
             effects: rig.effects.clone(),
             segment_uncertainty: settings.segment_uncertainty,
-            tolerance: (&settings.tolerance).into(),
+            tolerance: tolerance(settings.tolerance.get()),
             trials: read_trials(self.trials, rig)?,
             comparison: if settings.led {
                 ComparisonMode::Led
@@ -134,7 +135,7 @@ pub fn play<'py>(
         PyList::new(py, plays?)
     }
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, own))
+    each_short_length!(&rig.arm.chain, c => run(py, c, &asked, own))
 }
 
 /// Searches for what a model lacks; see `armrs.find_gap`.
@@ -160,7 +161,7 @@ pub fn find_gap<'py>(
         result(py, &prepared, &finding)
     }
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()))
+    each_short_length!(&rig.arm.chain, c => run(py, c, &asked, progress.as_ref()))
 }
 
 /// Calibrates a model, and asks every candidate alone to first order; see `armrs.gap.calibrate`.
@@ -186,7 +187,7 @@ pub fn look<'py>(
         first_look(py, &prepared, &look)
     }
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, progress.as_ref()))
+    each_short_length!(&rig.arm.chain, c => run(py, c, &asked, progress.as_ref()))
 }
 
 fn first_look<'py, const N: usize>(
@@ -380,7 +381,7 @@ pub fn distances<'py>(
         })
         .collect::<PyResult<Vec<_>>>()?;
     let asked = Asked::of(rig, &trials, &settings);
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, &asked, (&planned, &rivals)))
+    each_short_length!(&rig.arm.chain, c => run(py, c, &asked, (&planned, &rivals)))
 }
 
 fn result<'py, const N: usize>(

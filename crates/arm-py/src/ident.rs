@@ -13,6 +13,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::arm::{AnyChain, each_short_length};
 use crate::convert::rows;
 use crate::errors::{bad_input, identification, invalid};
+use crate::model;
 use crate::rig::Rig;
 
 /// One trial as Python hands it over: SI units, uniform samples, no gaps in the numbers.
@@ -31,26 +32,14 @@ pub struct Columns<'py> {
     valid: PyReadonlyArray1<'py, bool>,
 }
 
-/// What the calibration promises, as standard deviations; see [`Tolerance`].
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-pub struct Promised {
-    angle_offset: f64,
-    force_bias: f64,
-    force_gain: f64,
-    time_delay: f64,
-    handle_placement: f64,
-}
-
-impl From<&Promised> for Tolerance {
-    fn from(promised: &Promised) -> Self {
-        Self {
-            angle_offset: promised.angle_offset,
-            force_bias: promised.force_bias,
-            force_gain: promised.force_gain,
-            time_delay: promised.time_delay,
-            handle_placement: promised.handle_placement,
-        }
+/// What the calibration promises, as the estimation takes it: in radians.
+pub fn tolerance(of: &model::Tolerance) -> Tolerance {
+    Tolerance {
+        angle_offset: of.0.angle_offset(),
+        force_bias: of.0.force_bias,
+        force_gain: of.0.force_gain,
+        time_delay: of.0.time_delay,
+        handle_placement: of.0.handle_placement,
     }
 }
 
@@ -61,7 +50,7 @@ pub struct Settings {
     method: String,
     fitted: Vec<bool>,
     segment_uncertainty: f64,
-    tolerance: Promised,
+    tolerance: Py<model::Tolerance>,
     cutoff: Option<f64>,
     motion: String,
     level: f64,
@@ -70,7 +59,7 @@ pub struct Settings {
 impl Settings {
     /// What the calibration promises.
     pub fn tolerance(&self) -> Tolerance {
-        (&self.tolerance).into()
+        tolerance(self.tolerance.get())
     }
 }
 
@@ -219,7 +208,7 @@ pub fn identify<'py>(
         .map_err(identification)?;
         outcome(py, &result)
     }
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&trials, &settings)))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&trials, &settings)))
 }
 
 fn outcome<'py, const N: usize>(

@@ -83,7 +83,8 @@ pub fn control<'py>(
         py.detach(|| arm_sim::control(&experiment, settings, fault, watch.seed))
             .map_err(simulation)
     }
-    let done = each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, &watch)))?;
+    let done =
+        each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, &watch)))?;
     let out = PyDict::new(py);
     out.set_item("time", done.time.to_pyarray(py))?;
     let angles = done.robot_q.to_pyarray(py);

@@ -11,6 +11,7 @@ mod gap;
 mod ident;
 mod kernel;
 mod lab;
+mod model;
 mod own;
 mod plan;
 mod rig;
@@ -24,6 +25,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("build_profile", env!("BUILD_PROFILE"))?;
     m.add_class::<arm::Arm>()?;
+    model::add(m)?;
     m.add_class::<rig::Rig>()?;
     m.add_class::<cosim::ArmSlave>()?;
     m.add_class::<cosim::ArmState>()?;

@@ -1,6 +1,6 @@
 //! Kinds of effects of one's own: laws that are Python callables.
 
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::{Mutex, PoisonError};
 
 use arm_core::effect::{
     Info, Kind, MAX_PARAMETERS, Own, Parameter, Place, Probe, Question, Values,
@@ -10,25 +10,14 @@ use numpy::ndarray::Array1;
 use numpy::{IntoPyArray, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::errors::{bad_input, invalid};
+use crate::errors::{bad_input, invalid, refused};
 
-/// The kinds that were declared; a later one of the same name takes the place of an earlier one.
-static DECLARED: RwLock<Vec<Kind>> = RwLock::new(Vec::new());
 /// What a callable raised while the core asked it.
 static FAILED: Mutex<Option<PyErr>> = Mutex::new(None);
 
-/// The kinds of one's own that were declared.
-pub fn declared() -> Vec<Kind> {
-    DECLARED
-        .read()
-        .unwrap_or_else(PoisonError::into_inner)
-        .clone()
-}
-
 /// The kind of a name: of the catalogue or of one's own.
 pub fn kind(name: &str) -> PyResult<Kind> {
-    let own = declared().into_iter().find(|k| k.info().kind == name);
-    own.map_or_else(|| Kind::named(name).map_err(invalid), Ok)
+    arm_model::kind(name).map_or_else(|| Kind::named(name).map_err(invalid), Ok)
 }
 
 /// Raises what a callable has raised meanwhile.
@@ -61,13 +50,6 @@ pub fn declare(
     grid: (f64, f64, f64, f64, usize, usize),
     tabulate: Py<PyAny>,
 ) -> PyResult<()> {
-    if Kind::named(&name).is_ok() {
-        return Err(bad_input(
-            "kind",
-            &name,
-            "a name that the catalogue does not have",
-        ));
-    }
     if parameters.len() > MAX_PARAMETERS {
         return Err(bad_input(
             "parameters",
@@ -125,11 +107,7 @@ pub fn declare(
     };
     let probe = Probe::lasting(leak(vec![question]));
     let law = Box::leak(Box::new(Tabulated::new(info, probe, grid, Box::new(ask))));
-    let kind = Kind::Own(Own::new(law));
-    let mut declared = DECLARED.write().unwrap_or_else(PoisonError::into_inner);
-    declared.retain(|k| *k != kind);
-    declared.push(kind);
-    Ok(())
+    arm_model::declare(Kind::Own(Own::new(law))).map_err(refused)
 }
 
 fn leak<T>(list: Vec<T>) -> &'static [T] {

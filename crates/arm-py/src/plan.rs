@@ -116,7 +116,7 @@ pub fn forecast_py<'py>(
             })?;
         plain(py, &found)
     }
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &tasks)))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&settings, &sensing, &tasks)))
 }
 
 /// Movements that show every parameter well; see `armrs.plan`.
@@ -181,7 +181,7 @@ pub fn design_py<'py>(
         out.set_item("tasks", list)?;
         Ok(out)
     }
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&settings, &sensing, &bounds)))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&settings, &sensing, &bounds)))
 }
 
 /// A limit by its name in `armrs.Limits`, and what would be found at the pace asked for.

@@ -1,72 +1,55 @@
 //! `Rig`: an arm with everything that acts on it, as the core computes with it.
 
 use arm_core::effect::{Effect, Motion, Place};
-use arm_core::{Chain, Contact, Elbow, Joints, Pose, Robot, Setup, joint_force};
+use arm_core::{Chain, Contact, Joints, Pose, Robot, Setup, joint_force};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, Arm, each_length};
 use crate::convert::{Numbers, in_order, joints};
-use crate::errors::{bad_input, invalid};
-use crate::own;
+use crate::errors::invalid;
+use crate::{model, own};
 
-/// An arm, its effects, its contact with the robot and the robot itself.
+/// A model as the core computes with it: the arm, its effects, its contact with the robot and the robot itself.
 ///
 /// Parameters
 /// ----------
-/// arm : Arm
-/// effects : list of (kind, index, values)
-///     Zero-based joint, segment or channel; values in the order of the catalogue.
-/// contact : ((float, float), (float, float))
-///     Stiffness [N/m] and damping [N s/m] in y and z.
-/// robot : ((float, float), (float, float), str), optional
-///     Lengths [m], base [m], elbow "up" or "down".
+/// model : Model
+///     Where it states no contact, that of `Contact.assumed`.
+/// effects : sequence of Effect, optional
+///     What acts, in place of `model.all_effects`.
+///
+/// Raises
+/// ------
+/// BadInput
+///     For an effect at a joint that the model does not have.
 #[pyclass(frozen, module = "armrs._armrs")]
 pub struct Rig {
-    pub arm: Py<Arm>,
+    pub arm: Arm,
     pub effects: Vec<Effect<f64>>,
     pub contact: Contact<f64>,
     pub robot: Option<Robot<f64>>,
 }
 
-type Pair = (f64, f64);
-
 #[pymethods]
 impl Rig {
     #[new]
-    #[pyo3(signature = (arm, effects, contact, robot=None))]
-    fn new(
-        py: Python<'_>,
-        arm: Py<Arm>,
-        effects: Vec<(String, usize, Vec<f64>)>,
-        contact: (Pair, Pair),
-        robot: Option<(Pair, Pair, String)>,
-    ) -> PyResult<Self> {
-        let joints = arm.borrow(py).n_joints();
-        let effects = effects
-            .into_iter()
-            .map(|(kind, index, values)| {
-                let effect = Effect::new(own::kind(&kind)?, index).with(&values);
-                effect.validate(joints).map_err(invalid)?;
-                Ok(effect)
-            })
-            .collect::<PyResult<Vec<_>>>()?;
-        let (stiffness, damping) = contact;
-        let robot = robot
-            .map(|(lengths, base, elbow)| {
-                let elbow = match elbow.as_str() {
-                    "up" => Elbow::Up,
-                    "down" => Elbow::Down,
-                    other => return Err(bad_input("robot elbow", other, "up or down")),
-                };
-                Robot::new(lengths.into(), base.into(), elbow).map_err(invalid)
-            })
-            .transpose()?;
+    #[pyo3(signature = (model, effects=None))]
+    fn new(model: &Bound<'_, PyAny>, effects: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let model = model::one("model", model, |m: &model::Model| m.inner().clone())?;
+        let effects = match effects {
+            Some(effects) => model::each("effects", effects, |e: &model::Effect| e.0.core())?,
+            None => model.core_effects(),
+        };
+        for effect in &effects {
+            effect.validate(model.n_joints()).map_err(invalid)?;
+        }
+        let robot = model.robot.map(|robot| robot.core()).transpose();
         Ok(Self {
-            arm,
+            arm: Arm::of(&model)?,
             effects,
-            contact: Contact::new(stiffness.into(), damping.into()),
-            robot,
+            contact: model.core_contact(),
+            robot: robot.map_err(invalid)?,
         })
     }
 
@@ -91,9 +74,9 @@ impl Rig {
         qdd: Numbers<'py>,
         interval: f64,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let chain = &self.arm.get().chain;
+        let chain = &self.arm.chain;
         each_length!(chain, c => {
-            let rows = self.arm.get().rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
+            let rows = self.arm.rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
             let mut along = Along::new(c, &self.effects, interval);
             let torques = in_order(py, rows, self.effects.len(), |[q, qd, qdd], out| {
                 along.next(&joints(q), &joints(qd), &joints(qdd), out);

@@ -122,7 +122,7 @@ pub fn simulate<'py>(
         }
         Ok(out)
     }
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
 }
 
 /// Simulates an experiment and calls `take` with the columns of every so many samples; what it raises ends the run.
@@ -161,7 +161,7 @@ pub fn simulate_in_pieces<'py>(
         raised.map_or(Ok(()), Err)?;
         outcome.map_err(simulation)
     }
-    each_short_length!(&rig.arm.get().chain, c => run(py, c, rig, (&drive, &settings), (samples, &take)))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings), (samples, &take)))
 }
 
 /// The experiment that Python describes.

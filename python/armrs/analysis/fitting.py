@@ -14,7 +14,6 @@ from ..catalogue import catalogue
 from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
-from ..rig import all_effects, rig
 from ..workflows.simulate import DEFAULT_DT, DEFAULT_RATE, Movement, driven
 
 
@@ -99,7 +98,7 @@ def fit_by_simulation(
     for name, (value, unit) in positive.items():
         checks.number(name, value, above=0.0, unit=unit)
     angles, force = _recorded(q, force_on_arm, len(model.segments))
-    effects = all_effects(model)
+    effects = list(model.all_effects)
     names = list(checks.texts("free", list(free) if isinstance(free, Mapping) else free, "parameters"))
     places = [_place(effects, name) for name in names]
     bounds = [_bounds(name, free[name]) if isinstance(free, Mapping) else place[2:] for name, place in zip(names, places, strict=True)]
@@ -111,7 +110,7 @@ def fit_by_simulation(
         "force_noise": force_noise,
     }
     limits = [(effect, parameter, float(low), float(high)) for (effect, parameter, *_), (low, high) in zip(places, bounds, strict=True)]
-    raw = _armrs.fit_by_simulation(rig(model), driven(drive, "compliant"), settings, recorded, limits)
+    raw = _armrs.fit_by_simulation(_armrs.Rig(model), driven(drive, "compliant"), settings, recorded, limits)
     for (index, parameter, *_), value in zip(places, raw["values"], strict=True):
         effect = effects[index]
         key = catalogue()[effect.kind].parameters[parameter].name

@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 from ..catalogue import catalogue
 from ..model import Model, Segment
-from ..rig import all_effects
 
 _FACTOR = re.compile(r"([mlaIn])([1-9][0-9]?)(?:\^([1-9]))?")
 _BRACKET = re.compile(r"((?:[^\s+*]+\*)+)\(([^()]*)\)")
@@ -44,7 +43,7 @@ def value_in(model: Model, name: str, *, kind: str = "segment", joint: int | Non
         return _sum(model, name)
     if kind not in catalogue():
         return None
-    own = [e.parameters[name] for e in all_effects(model) if e.kind == kind and e.joint == joint and name in e.parameters]
+    own = [e.parameters[name] for e in model.all_effects if e.kind == kind and e.joint == joint and name in e.parameters]
     return sum(own)
 
 

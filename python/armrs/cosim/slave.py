@@ -13,7 +13,6 @@ import numpy as np
 from .. import _armrs, checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from ..model import Model, load_model
-from ..rig import rig
 from ..workflows.simulate import DEFAULT_DT
 from .partner import Partner, Status, StepResult, Variable, listed
 
@@ -85,7 +84,7 @@ class Slave(Partner):
             "rest": checks.flag("rest", rest),
         }
         self.port = port
-        self.compiled = _armrs.ArmSlave(rig(model), coupling)
+        self.compiled = _armrs.ArmSlave(_armrs.Rig(model), coupling)
         self.variables = {row["name"]: _variable(row) for row in self.compiled.variables()}
 
     def __repr__(self) -> str:

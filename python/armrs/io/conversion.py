@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from .. import checks
 from ..errors import BadInput, Text
 from ..model import load_model
 from . import files
-from .dataset import FILE, describe, description_text, output_names
+from .dataset import FILE, describe, name_of, output_names
 from .samples import NUMBER, SUFFIXES, csv_place, explain_csv, header_of, parquet_table, write_table
 
 _EXACT = 2.0**53
@@ -61,19 +61,21 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
         target = out / path.with_suffix(suffix).name
         files.not_an_input([target], [path])
         return [_write(_job(path, target))]
-    description = describe(path)
-    load_model(description.model_path)  # a data set without a sound model is not worth converting
-    names = output_names([entry.file for entry in description.entries], suffix)
-    sources = [description.trial_path(entry) for entry in description.entries]
+    described, description = describe(path)
+    model_path = described.parent / description.model
+    load_model(model_path)  # a data set without a sound model is not worth converting
+    names = output_names([entry.file for entry in description.trials], suffix)
+    sources = [described.parent / entry.file for entry in description.trials]
     targets = [out / name for name in names]
-    files.not_an_input([*targets, out / FILE, out / "model.toml"], [*sources, description.path, description.model_path])
-    model = description.model_path.read_text(encoding="utf-8")
-    entries = [replace(entry, file=name) for entry, name in zip(description.entries, names, strict=True)]
+    files.not_an_input([*targets, out / FILE, out / "model.toml"], [*sources, described, model_path])
+    model = model_path.read_text(encoding="utf-8")
+    entries = [entry.replace(file=name) for entry, name in zip(description.trials, names, strict=True)]
+    content = description.replace(name=name_of(described, description), model="model.toml", trials=entries).to_toml()
 
     def write(part: Path) -> list[Path]:
         written = [_write(_job(source, part / name)) for source, name in zip(sources, names, strict=True)]
         files.write_text(part / "model.toml", model, kind=".toml")
-        files.write_text(part / FILE, description_text(description, "model.toml", entries), kind=".toml")
+        files.write_text(part / FILE, content, kind=".toml")
         return [*written, part / "model.toml", part / FILE]
 
     return files.write_whole(out, write)

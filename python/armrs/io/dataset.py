@@ -3,127 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import checks
-from ..errors import ArmrsError, BadInput, Text, unknown_name
-from ..model import Model, load_model, part_of
-from . import files, tomlfile
+from ..errors import ArmrsError, BadInput, Text
+from ..model import AddedMass, Description, Model, Subject, Tolerance, TrialEntry, load_model
+from . import files
 from .muscle_activity import comparable, mark_activity
 from .plausibility import still_angles
 from .samples import SUFFIXES, write_samples
-from .trial import FEWEST_SAMPLES, Trial, read_trial
+from .trial import FEWEST_SAMPLES, Reading, Trial, read_trial
 
 FILE = "dataset.toml"
-
-
-@dataclass(frozen=True)
-class Subject:
-    """Whose arm it is; body mass, height and sex are used for the literature values, the name for a history.
-
-    Attributes
-    ----------
-    name : str, optional
-    body_mass : float, optional
-        [kg]
-    height : float, optional
-        [m]
-    sex : {"male", "female"}, optional
-    """
-
-    body_mass: float | None = None
-    height: float | None = None
-    sex: str | None = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.name is not None:
-            checks.text("name", self.name)
-        if self.body_mass is not None:
-            mass = checks.number("body_mass", self.body_mass, least=1.0, most=500.0, unit="kg")
-            object.__setattr__(self, "body_mass", mass)
-        if self.height is not None:
-            height = checks.number("height", self.height, least=0.3, most=3.0, unit="m", hint="centimetres?")
-            object.__setattr__(self, "height", height)
-        if self.sex is not None:
-            checks.choice("sex", self.sex, ("male", "female"))
-
-
-_MOST = {"angle_offset_deg": 180.0, "force_bias_N": 1e4, "force_gain": 10.0, "time_delay_s": 10.0, "handle_placement_m": 10.0}
-"""What no calibration promises less than."""
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """What the calibration promises. Smaller deviations are absorbed and reported, larger ones are named.
-
-    Attributes
-    ----------
-    angle_offset_deg : float
-        [deg]; `angle_offset` is the same in radians.
-    force_bias_N : float
-        [N]
-    force_gain : float
-        Relative.
-    time_delay_s : float
-        Force against angles [s].
-    handle_placement_m : float
-        [m]
-    """
-
-    angle_offset_deg: float = 0.3
-    force_bias_N: float = 0.2
-    force_gain: float = 0.01
-    time_delay_s: float = 0.005
-    handle_placement_m: float = 0.001
-
-    def __post_init__(self) -> None:
-        for f in dataclasses.fields(self):
-            object.__setattr__(self, f.name, checks.number(f.name, getattr(self, f.name), least=0.0, most=_MOST[f.name]))
-
-    @property
-    def angle_offset(self) -> float:
-        """Offset of an angle sensor [rad]."""
-        return math.radians(self.angle_offset_deg)
-
-
-@dataclass(frozen=True)
-class Added:
-    """A mass that is fixed to a segment in some configurations, such as one part of an orthosis.
-
-    Attributes
-    ----------
-    segment : int
-        Number of the segment, from 1.
-    mass : float
-        [kg]
-    at : float
-        From the segment's proximal joint [m].
-    configurations : tuple of str
-        Where it is worn.
-    """
-
-    segment: int
-    mass: float
-    at: float
-    configurations: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        checks.whole("segment", self.segment, least=1)
-        object.__setattr__(self, "mass", checks.number("mass", self.mass, above=0.0, most=20.0, unit="kg"))
-        object.__setattr__(self, "at", checks.number("at", self.at, least=0.0, most=2.0, unit="m", hint="millimetres?"))
-        names: object = self.configurations
-        if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
-            raise BadInput("configurations", names, "a list of names")
-        object.__setattr__(self, "configurations", tuple(names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +48,7 @@ class Dataset:
         What the user should know, one line each.
     synthetic : bool
         Whether the trials were simulated; reports say so.
-    added : tuple of Added
+    added : tuple of AddedMass
         Masses that are worn in some configurations besides the model.
     """
 
@@ -159,13 +57,13 @@ class Dataset:
     trials: tuple[Trial, ...]
     force_on: str | None = None
     sample_rate: float | None = None
-    subject: Subject = Subject()
-    tolerance: Tolerance = Tolerance()
+    subject: Subject = field(default_factory=Subject)
+    tolerance: Tolerance = field(default_factory=Tolerance)
     folder: Path | None = None
     model_path: Path | None = None
     warnings: tuple[str, ...] = ()
     synthetic: bool = False
-    added: tuple[Added, ...] = ()
+    added: tuple[AddedMass, ...] = ()
 
     def __post_init__(self) -> None:
         checks.instance("model", self.model, Model)
@@ -186,7 +84,7 @@ class Dataset:
         object.__setattr__(self, "trials", trials)
         object.__setattr__(self, "warnings", checks.instances("warnings", self.warnings, str))
         object.__setattr__(self, "synthetic", checks.flag("synthetic", self.synthetic))
-        object.__setattr__(self, "added", checks.instances("added", self.added, Added))
+        object.__setattr__(self, "added", checks.instances("added", self.added, AddedMass))
 
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
@@ -215,41 +113,6 @@ class Dataset:
         return dataclasses.replace(self, **changes)
 
 
-@dataclass(frozen=True)
-class Entry:
-    """What `dataset.toml` says of one trial."""
-
-    file: str
-    configuration: str
-    repeat: int
-    role: str
-
-
-@dataclass(frozen=True)
-class Description:
-    """The content of `dataset.toml`, before any trial is read."""
-
-    path: Path
-    name: str
-    model: str
-    entries: tuple[Entry, ...]
-    force_on: str | None
-    sample_rate: float | None
-    subject: Subject
-    tolerance: Tolerance
-    synthetic: bool
-    added: tuple[Added, ...]
-
-    @property
-    def model_path(self) -> Path:
-        """Where the model is."""
-        return self.path.parent / self.model
-
-    def trial_path(self, entry: Entry) -> Path:
-        """Where a trial is."""
-        return self.path.parent / entry.file
-
-
 def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     """Read a data set: check it, bring it to SI units, to forces on the arm, and to uniform time.
 
@@ -272,44 +135,36 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     Uneven time stamps are resampled at the median rate, see `armrs.io.resample`; the samples as read stay in `Trial.original`.
     Missing samples are bridged over at most 0.25 s; longer gaps stay NaN and are reported in `warnings`.
     """
-    description = describe(source)
-    model_path = description.model_path
+    path, description = describe(source)
+    folder = path.parent
+    model_path = folder / description.model
     model = load_model(model_path)
     for number, item in enumerate(description.added, start=1):
-        _on(model, item, f"[[added]] {number}", description.path)
+        _on(model, item, f"[[added]] {number}", path)
     trials: list[Trial] = []
     warnings = list(model.warnings)
-    for entry in description.entries:
-        path = description.trial_path(entry)
-        try:
-            reading = read_trial(
-                path,
-                n_joints=model.n_joints,
-                force_on=description.force_on,
-                sample_rate=description.sample_rate,
-                **dataclasses.asdict(entry),
-            )
-            if reading is None:
-                refusal = BadInput("file", Text("no samples below the header"), f"at least {FEWEST_SAMPLES} samples")
-                if entry.role == "fit":
-                    raise refusal
-                warnings.append(f"{refusal.within(file=entry.file)}: this test trial is left out")
-                continue
-        except BadInput as error:
-            raise error.within(file=path) from None
+    for entry in description.trials:
+        trial_path = folder / entry.file
+        reading = read_entry(trial_path, entry, model.n_joints, description)
+        if reading is None:
+            refusal = BadInput("file", Text("no samples below the header"), f"at least {FEWEST_SAMPLES} samples")
+            if entry.role == "fit":
+                raise refusal.within(file=trial_path)
+            warnings.append(f"{refusal.within(file=entry.file)}: this test trial is left out")
+            continue
         trials.append(reading.trial)
         warnings += [f"{entry.file}: {line}" for line in reading.warnings]
     marked, lines = mark_activity(trials)
     warnings += lines
     return Dataset(
-        name=description.name,
+        name=name_of(path, description),
         model=model,
         trials=comparable(marked),
         force_on=description.force_on,
         sample_rate=description.sample_rate,
         subject=description.subject,
         tolerance=description.tolerance,
-        folder=description.path.parent,
+        folder=folder,
         model_path=model_path,
         warnings=(*warnings, *still_angles(tuple(trials))),
         synthetic=description.synthetic,
@@ -317,7 +172,29 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     )
 
 
-def _on(model: Model, item: Added, place: str, file: Path) -> None:
+def read_entry(path: Path, entry: TrialEntry, n_joints: int, description: Description) -> Reading | None:
+    """Return the trial of an entry as it was read, None without samples; a refusal names its file."""
+    try:
+        return read_trial(
+            path,
+            n_joints=n_joints,
+            force_on=description.force_on,
+            sample_rate=description.sample_rate,
+            file=entry.file,
+            configuration=entry.configuration,
+            repeat=entry.repeat,
+            role=entry.role,
+        )
+    except BadInput as error:
+        raise error.within(file=path) from None
+
+
+def name_of(path: Path, description: Description) -> str:
+    """Return the name of a data set; one that states none is called after its folder."""
+    return description.name or path.resolve().parent.name or "data set"
+
+
+def _on(model: Model, item: AddedMass, place: str, file: Path) -> None:
     """Refuse a mass that is on no segment of a model."""
     try:
         checks.whole("segment", item.segment, least=1, most=model.n_joints)
@@ -338,8 +215,8 @@ def naming_trials(trials: Sequence[Trial]) -> Iterator[None]:
         raise error.within(file=file) if isinstance(error, BadInput) else type(error)(f"{file}: {error}") from None
 
 
-def describe(source: str | os.PathLike[str]) -> Description:
-    """Read `dataset.toml` alone."""
+def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
+    """Return the path of a `dataset.toml` and what it says."""
     path = checks.path("source", source)
     if not os.path.lexists(path):
         raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)
@@ -352,69 +229,7 @@ def describe(source: str | os.PathLike[str]) -> Description:
     path = path / FILE if path.is_dir() else path
     with suppress(OSError):  # a data set may lie where nothing can be written
         files.recover(path.parent)
-    return tomlfile.load(path, _description)
-
-
-def _description(document: dict[str, Any], path: Path) -> Description:
-    optional = ["name", "force_on", "sample_rate", "synthetic", "subject", "tolerance", "added"]
-    checks.keys("", document, required=["model", "trial"], optional=optional)
-    tables = checks.tables("trial", document["trial"])
-    entries = tuple(_entry(f"[[trial]] {k}", table) for k, table in enumerate(tables, 1))
-    _check_entries(entries)
-    rate = document.get("sample_rate")
-    force_on = document.get("force_on")
-    return Description(
-        path=path,
-        name=checks.text("name", document.get("name", path.resolve().parent.name or "data set")),
-        model=checks.text("model", document["model"]),
-        entries=entries,
-        force_on=None if force_on is None else checks.choice("force_on", force_on, ("robot", "arm")),
-        sample_rate=None if rate is None else checks.number("sample_rate", rate, above=0.0, most=1e6, unit="Hz"),
-        subject=part_of(Subject, "[subject]", document.get("subject", {})),
-        tolerance=part_of(Tolerance, "[tolerance]", document.get("tolerance", {})),
-        added=_added(document.get("added", []), entries),
-        synthetic=checks.flag("synthetic", document.get("synthetic", False)),
-    )
-
-
-def _added(tables: object, entries: tuple[Entry, ...]) -> tuple[Added, ...]:
-    known = {entry.configuration for entry in entries}
-    added: list[Added] = []
-    for number, table in enumerate(checks.tables("added", tables), start=1):
-        item: Added = part_of(Added, f"[[added]] {number}", table)
-        for name in item.configurations:
-            if name not in known:
-                raise unknown_name(f"[[added]] {number}, configurations", name, known, what="configuration")
-        added.append(item)
-    return tuple(added)
-
-
-def _entry(place: str, table: dict[str, Any]) -> Entry:
-    checks.keys(place, table, required=["file", "configuration", "role"], optional=["repeat"])
-    try:
-        return Entry(
-            file=checks.text("file", table["file"]),
-            configuration=checks.text("configuration", table["configuration"]),
-            repeat=checks.whole("repeat", table.get("repeat", 1), least=1),
-            role=checks.choice("role", table["role"], ("fit", "test")),
-        )
-    except BadInput as error:
-        raise error.within(place=place) from None
-
-
-def _check_entries(entries: tuple[Entry, ...]) -> None:
-    by_file: dict[str, int] = {}
-    by_repeat: dict[tuple[str, int], int] = {}
-    for number, entry in enumerate(entries, start=1):
-        first = by_file.setdefault(os.path.normpath(entry.file), number)
-        if first != number:
-            raise BadInput(f"[[trial]] {number}, file", entry.file, f"each file once: [[trial]] {first} has it already")
-        first = by_repeat.setdefault((entry.configuration, entry.repeat), number)
-        if first != number:
-            found = Text(f'repeat {entry.repeat} of "{entry.configuration}"')
-            raise BadInput(f"[[trial]] {number}, repeat", found, f"each repeat once: [[trial]] {first} has it already")
-    if not any(entry.role == "fit" for entry in entries):
-        raise BadInput("[[trial]]", Text('no trial with role = "fit"'), "at least one")
+    return path, Description.load(path)
 
 
 def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: str | None = None) -> Path:
@@ -447,8 +262,18 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     inputs = [] if dataset.folder is None else [dataset.folder / FILE, *(dataset.folder / t.file for t in dataset.trials)]
     inputs += [dataset.model_path] if dataset.model_path else []
     files.not_an_input([out / FILE, out / "model.toml", *(out / name for name in names)], inputs)
-    entries = [Entry(name, t.configuration, t.repeat, t.role) for t, name in zip(dataset.trials, names, strict=True)]
-    content = description_text(dataset, "model.toml", entries)
+    entries = [TrialEntry(name, t.configuration, t.repeat, t.role) for t, name in zip(dataset.trials, names, strict=True)]
+    content = Description(
+        dataset.name,
+        "model.toml",
+        entries,
+        force_on=dataset.force_on,
+        sample_rate=dataset.sample_rate,
+        subject=dataset.subject,
+        tolerance=dataset.tolerance,
+        synthetic=dataset.synthetic,
+        added=dataset.added,
+    ).to_toml()
 
     def write(part: Path) -> list[Path]:
         for trial, name in zip(dataset.trials, names, strict=True):
@@ -494,19 +319,3 @@ def trial_columns(trial: Trial, force_on: str | None) -> dict[str, np.ndarray]:
     add("tau{}_Nm", trial.tau)
     table.update(trial.emg)
     return {name: np.where(trial.filled_columns[name], np.nan, v) if name in trial.filled_columns else v for name, v in table.items()}
-
-
-def description_text(source: Dataset | Description, model: str, entries: list[Entry]) -> str:
-    """Return the text of `dataset.toml`."""
-    head: dict[str, object] = {"name": source.name, "model": model, "force_on": source.force_on, "sample_rate": source.sample_rate}
-    if source.synthetic:
-        head["synthetic"] = True
-    blocks = [tomlfile.lines(head)]
-    subject = tomlfile.lines(dataclasses.asdict(source.subject))
-    if subject:
-        blocks.append(["[subject]", *subject])
-    if source.tolerance != Tolerance():
-        blocks.append(["[tolerance]", *tomlfile.lines(dataclasses.asdict(source.tolerance))])
-    blocks += [["[[added]]", *tomlfile.lines(dataclasses.asdict(item))] for item in source.added]
-    blocks += [["[[trial]]", *tomlfile.lines(dataclasses.asdict(entry))] for entry in entries]
-    return "\n\n".join("\n".join(block) for block in blocks) + "\n"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
-from ..model import Effect, Model
+from ..model import Contact, Effect, Joint, Model, Segment
 
 Path = tuple[str | int, ...]
 """Names and positions, from 1."""
@@ -176,15 +175,15 @@ def _changed(item: Any, path: Path, new: Callable[[Any], Any], key: str) -> Any:
         changed = [_changed(part, rest, new, key) if k == head else part for k, part in enumerate(item, start=1)]
         return changed if isinstance(item, list) else tuple(changed)
     if isinstance(item, Effect):
-        return dataclasses.replace(item, parameters=_changed(dict(item.parameters), path, new, key))
+        return item.replace(parameters=_changed(dict(item.parameters), path, new, key))
     if isinstance(item, Mapping):
         # A table whose values all have their defaults need not stand there; what nobody knows is refused when it is read.
         there = item.get(head, {} if rest and isinstance(rest[0], str) else None)
         return {**item, head: _changed(there, rest, new, key)}
-    if dataclasses.is_dataclass(item) and not isinstance(item, type):
+    if isinstance(item, (Model, Segment, Joint, Contact)):
         name = _PLURAL.get(head, head) if isinstance(item, Model) else head
-        fields = [f.name for f in dataclasses.fields(item) if f.name != "name"]
-        if name not in fields:
-            raise unknown_name("key", head, fields)
-        return dataclasses.replace(item, **{name: _changed(getattr(item, name), rest, new, key)})
+        attributes = [n for n in item.__match_args__ if n != "name"]
+        if name not in attributes:
+            raise unknown_name("key", head, attributes)
+        return item.replace(**{name: _changed(getattr(item, name), rest, new, key)})
     raise BadInput("key", key, f"no {head} below a single value")

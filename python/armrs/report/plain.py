@@ -11,7 +11,7 @@ import numpy as np
 from .. import _armrs
 from ..analysis.quantities import value_in
 from ..io.dataset import Dataset
-from ..rig import NO_CONTACT
+from ..model import Contact
 from ..workflows.identify import Estimate, Identified
 from ..workflows.passive import LEVEL, PassiveMoments
 from ..workflows.simulate import Simulated
@@ -107,7 +107,8 @@ def _assumed(result: Simulated) -> list[str]:
     if result.columns.get("handle") is None:
         return lines
     if result.model.contact is None and result.settings["coupling"] == "compliant":
-        (stiffness, _), (damping, _) = NO_CONTACT
+        assumed = Contact.assumed()
+        (stiffness, _), (damping, _) = assumed.stiffness, assumed.damping
         lines.append(f"The model has no [contact]: {stiffness:g} N/m and {damping:g} N s/m along y and z were taken.")
     if result.model.robot is None:
         lines.append("The model has no [robot]: its angles were not computed, and whether it reaches the path was not checked.")

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .. import _armrs
 from ..model import Joint, Model, Segment
 from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table
-from ..rig import arm as kernel
 from ..workflows.experiment import THESIS_CONTACT
 from ..workflows.simulate import Movement, Simulated, simulate
 from . import drawing
@@ -255,7 +255,7 @@ def printed_equations() -> Found:
     model = arm(TABLE_4_10)
     (a1, a2, _), (_, l2, l3), m3 = (s.length for s in TABLE_4_10), (s.com for s in TABLE_4_10), TABLE_4_10[2].mass
     q, qd, force = np.radians([-40.0, 50.0, 10.0]), np.array([0.2, 0.5, 0.3]), np.array([5.0, 10.0])
-    chain = kernel(model)
+    chain = _armrs.Arm.from_model(model)
     b11, excess = chain.inertia(q)[0, 0], m3 * (l2**2 - l3**2)
     s3, s23 = np.sin(q[2]), np.sin(q[1] + q[2])
     last = l3 * m3 * np.array([a2 * s3 + a1 * s23, a2 * s3]) * (qd.sum() - q[0] * qd[2]) * qd[2]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..io.dataset import Dataset, Subject
-from ..model import Model, Segment
+from ..io.dataset import Dataset
+from ..model import Model, Segment, Subject
 from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table, minus

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..io.dataset import Dataset, Tolerance
-from ..model import Joint, Model
+from ..io.dataset import Dataset
+from ..model import Joint, Model, Tolerance
 from ..report import plotting, tables
 from ..report.figures import Drawn
 from ..report.tables import Table

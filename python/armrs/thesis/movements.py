@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import _armrs
 from ..analysis.passivity_checks import muscles_silent
 from ..io.trial import Trial
 from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table
-from ..rig import arm as kernel
 from ..workflows.record import muscle_activity
 from ..workflows.simulate import Simulated
 from . import drawing
@@ -81,7 +81,7 @@ def muscles() -> Found:
     """Let electrodes read an arm that is led, and the same movement made by its own muscles."""
     run = subject_one().runs[holding("shoulder", SHOULDER_HELD[0])]
     acceleration = np.gradient(run.qd, run.t, axis=0)
-    needed = kernel(run.model).inverse_dynamics(run.q, run.qd, acceleration) + run.columns["torque.resisting"]
+    needed = _armrs.Arm.from_model(run.model).inverse_dynamics(run.q, run.qd, acceleration) + run.columns["torque.resisting"]
     draw = np.random.default_rng([SEED, 36])
     ways = {"voluntary movement": muscle_activity(needed, draw), "led by the robot": muscle_activity(np.zeros_like(needed), draw)}
     names = [f"emg_{joint}_{side}_uV" for joint in ("elbow", "shoulder") for side in ("flexor", "extensor")]

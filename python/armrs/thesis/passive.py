@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import _armrs
 from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table, minus
-from ..rig import arm as kernel
 from ..workflows.passive import PassiveCurve
 from . import drawing
 from .item import Found, Group, Sheet
@@ -61,7 +61,7 @@ def hysteresis() -> Found:
     left.set(xlabel="elbow [°]", ylabel="passive moment of the elbow [N m]")
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper left", ncols=3)
     drawing.stick(right, found.runs[name].model, found.runs[name].q[: len(found.runs[name].q) // 2])
-    gravity = kernel(found.runs[name].model).gravity(found.runs[name].q[[0, len(first.q) // 2]])[:, 1]
+    gravity = _armrs.Arm.from_model(found.runs[name].model).gravity(found.runs[name].q[[0, len(first.q) // 2]])[:, 1]
     tilt = -0.1 * float(gravity[1] - gravity[0])
     error = float(np.sqrt(np.mean((ours - elastic)[there] ** 2)))
     return Found(

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..io.dataset import Subject
+from .. import _armrs
 from ..io.trial import Trial
-from ..model import Effect, Joint, Model, Robot, Segment
-from ..rig import arm as kernel
+from ..model import Effect, Joint, Model, Robot, Segment, Subject
 from ..workflows import demo
 from ..workflows.experiment import JOINTS, THESIS_CONTACT, literature_arm
 from ..workflows.simulate import Movement, Sensors, Simulated, simulate
@@ -107,4 +106,4 @@ def points(model: Model, q: np.ndarray) -> np.ndarray:
 def static_torque(model: Model, trial: Trial) -> np.ndarray:
     """Return Jᵀ F of the force on the arm, shape (n, n_joints): τ_j of equations 3.23 to 3.25, weight and passive moments [N m]."""
     assert trial.force_on_arm is not None
-    return kernel(model).static_torque(trial.q, trial.force_on_arm)
+    return _armrs.Arm.from_model(model).static_torque(trial.q, trial.force_on_arm)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..io.dataset import Added, Dataset, Subject
-from ..model import Effect, Joint, Model, Segment
+from ..io.dataset import Dataset
+from ..model import AddedMass, Effect, Joint, Model, Segment, Subject
 from ..report.tables import minus
 from ..workflows.passive import PassiveMoments, passive_moments
 from ..workflows.simulate import Movement, Simulated
@@ -99,7 +99,7 @@ def session(number: int, tone: bool = True) -> Session:
         "robot",
         sample_rate=people.RATE,
         synthetic=True,
-        added=tuple(Added(*item, configurations=names) for item in worn),
+        added=tuple(AddedMass(*item, configurations=names) for item in worn),
     )
     return Session(number, runs, dataset, passive_moments(dataset))
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..io.dataset import Dataset, Subject, Tolerance
-from ..model import Effect, Joint, Model
+from ..io.dataset import Dataset
+from ..model import Effect, Joint, Model, Subject, Tolerance
 from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table, minus

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..errors import ArmrsError, BadInput, BadInputs, Text
 from ..io import plausibility
-from ..io.dataset import Dataset, Description, Entry, describe
-from ..io.trial import Reading, Trial, read_trial
-from ..model import Model, load_model
+from ..io.dataset import Dataset, describe, name_of, read_entry
+from ..io.trial import Trial
+from ..model import Description, Model, load_model
 from .gap import suspicion
 from .importing import conventions
 
@@ -95,18 +95,19 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
     True
     """
     problems: list[Problem] = []
-    description = _caught(lambda: describe(source), problems)
-    if description is None:
+    described = _caught(lambda: describe(source), problems)
+    if described is None:
         return Checked(
             tuple(problems), tuple(Ability(verb, False, "the data set cannot be read") for verb in ("identify", "passive", "gap"))
         )
-    model = _caught(lambda: load_model(description.model_path), problems)
-    trials = _trials(description, model, problems)
+    path, description = described
+    model = _caught(lambda: load_model(path.parent / description.model), problems)
+    trials = _trials(path.parent, description, model, problems)
     if model is None or not trials:
         why = "no model" if model is None else "no trial can be read"
         return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
     problems += [Problem("warning", line) for line in model.warnings]
-    dataset = Dataset(description.name, model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
+    dataset = Dataset(name_of(path, description), model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
     problems += [Problem("warning", line) for line in plausibility.still_angles(dataset.trials)]
     _plausible(dataset, problems)
     _balanced(dataset, problems)
@@ -127,30 +128,16 @@ def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
     return None
 
 
-def _trials(description: Description, model: Model | None, problems: list[Problem]) -> list[Trial]:
+def _trials(folder: Path, description: Description, model: Model | None, problems: list[Problem]) -> list[Trial]:
     trials = []
-    for entry in description.entries:
-        path = description.trial_path(entry)
+    for entry in description.trials:
+        path = folder / entry.file
         joints = model.n_joints if model is not None else 1
-
-        def read(path: Any = path, entry: Any = entry, joints: int = joints) -> Any:
-            try:
-                return read_trial(path, n_joints=joints, force_on=description.force_on, sample_rate=description.sample_rate, **vars(entry))
-            except BadInput as error:
-                raise error.within(file=path) from None
-
-        reading = _caught(read, problems)
+        reading = _caught(partial(read_entry, path, entry, joints, description), problems)
         if reading is not None and model is not None:
             problems += [Problem("warning", f"{path}: {line}") for line in reading.warnings]
             trials.append(reading.trial)
     return trials
-
-
-def _read(path: Path, joints: int, description: Description, entry: Entry) -> Reading | None:
-    try:
-        return read_trial(path, n_joints=joints, force_on=description.force_on, sample_rate=description.sample_rate, **vars(entry))
-    except BadInput as error:
-        raise error.within(file=path) from None
 
 
 def _plausible(dataset: Dataset, problems: list[Problem]) -> None:

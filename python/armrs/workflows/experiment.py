@@ -14,8 +14,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io import tomlfile
-from ..io.dataset import Added, Subject, Tolerance
-from ..model import Contact, Effect, Joint, Model, Robot, Segment, effect_of, load_model, part_of
+from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Segment, Subject, Tolerance, load_model
 from .simulate import Movement, movement_of
 
 THESIS_ROBOT = Robot(lengths=(0.45, 0.45), base=(1.05, -0.10))
@@ -144,7 +143,7 @@ class Run:
     movement : Movement
     repeats, tests : int
         Trials to fit and trials to check on.
-    worn : tuple of Added
+    worn : tuple of AddedMass
         What is fixed to the arm meanwhile.
     """
 
@@ -152,7 +151,7 @@ class Run:
     movement: Movement
     repeats: int
     tests: int
-    worn: tuple[Added, ...]
+    worn: tuple[AddedMass, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,7 +290,7 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
         devices=_devices(document.get("sensors", {})),
         variation_Nm=np.array([checks.number("[variation], moment_Nm", v, least=0.0, unit="N m") for v in moments]),
         faults=faults,
-        tolerance=part_of(Tolerance, "[tolerance]", document.get("tolerance", {})),
+        tolerance=Tolerance.from_dict(document.get("tolerance", {}), "[tolerance]"),
         file=str(path),
     )
 
@@ -300,7 +299,7 @@ def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[M
     """Return the subject, the arm that is simulated and the arm that is handed over."""
     table = checks.table("[subject]", document.get("subject", {}))
     own: dict[str, Any] = {key: table.pop(key) for key in ("segments", "lengths_m", "spread") if key in table}
-    subject = part_of(Subject, "[subject]", table)
+    subject = Subject.from_dict(table, "[subject]")
     if "model" in document:
         for key in [*own, *(k for k in ("joint", "robot", "contact") if k in document)]:
             raise BadInput(key, Text("a value beside model"), "either model, or a subject with joints, robot and contact")
@@ -317,7 +316,7 @@ def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[M
             raise BadInput("believed", Text("a value without model"), "model as well; of a subject the literature is believed")
         truth, believed = _person(document, subject, own, seed)
     given = checks.tables("effect", document.get("effect", []))
-    truth = truth.replace(effects=(*truth.effects, *(effect_of(f"[[effect]] {k}", t) for k, t in enumerate(given, 1))))
+    truth = truth.replace(effects=(*truth.effects, *(Effect.from_dict(t, f"[[effect]] {k}") for k, t in enumerate(given, 1))))
     believed = believed.replace(robot=truth.robot, contact=truth.contact)
     truth = alter(truth)
     handle = checks.table("[handle]", document.get("handle", {}))
@@ -353,9 +352,9 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
     tables = checks.tables("joint", document.get("joint", []))
     if tables and len(tables) != count:
         raise BadInput("[[joint]]", Text(f"{len(tables)} joints"), f"none, or one a segment: {count}")
-    joints = tuple(part_of(Joint, f"[[joint]] {k}", t, JOINTS[k - 1]) for k, t in enumerate(tables, 1))
-    robot = part_of(Robot, "[robot]", document["robot"]) if "robot" in document else THESIS_ROBOT
-    contact = part_of(Contact, "[contact]", document["contact"]) if "contact" in document else THESIS_CONTACT
+    joints = tuple(Joint.from_dict({"name": JOINTS[k - 1], **t}, f"[[joint]] {k}") for k, t in enumerate(tables, 1))
+    robot = Robot.from_dict(document["robot"], "[robot]") if "robot" in document else THESIS_ROBOT
+    contact = Contact.from_dict(document["contact"], "[contact]") if "contact" in document else THESIS_CONTACT
     plain = tuple(Joint(name) for name in JOINTS[:count])
     return (
         Model(tuple(_segments(true_parts, lengths)), joints or plain, segment_uncertainty=0.0, robot=robot, contact=contact),
@@ -363,11 +362,23 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
     )
 
 
+def _part_of(kind: Any, place: str, value: object) -> Any:
+    """Return the dataclass `kind` that a table describes; `place` names the table in refusals."""
+    table = checks.table(place, value)
+    own = dataclasses.fields(kind)
+    optional = [f.name for f in own if f.default is not dataclasses.MISSING]
+    checks.keys(place, table, required=[f.name for f in own if f.name not in optional], optional=optional)
+    try:
+        return kind(**table)
+    except BadInput as error:
+        raise error.within(place=place) from None
+
+
 def _run(place: str, table: Mapping[str, Any], n_joints: int) -> Run:
     fields = dict(table)
     own = {key: fields.pop(key) for key in ("configuration", "repeats", "tests", "worn") if key in fields}
     try:
-        worn = tuple(part_of(Added, f"worn {k}", t) for k, t in enumerate(checks.tables("worn", own.get("worn", [])), 1))
+        worn = tuple(AddedMass.from_dict(t, f"worn {k}") for k, t in enumerate(checks.tables("worn", own.get("worn", [])), 1))
         for item in worn:
             checks.whole("worn, segment", item.segment, least=1, most=n_joints)
         return Run(
@@ -382,7 +393,7 @@ def _run(place: str, table: Mapping[str, Any], n_joints: int) -> Run:
 
 
 def _fault(place: str, table: Mapping[str, Any], configurations: list[str]) -> Fault:
-    fault: Fault = part_of(Fault, place, table)
+    fault: Fault = _part_of(Fault, place, table)
     try:
         checks.choice("kind", fault.kind, FAULTS)
         checks.number("at_s", fault.at_s, least=0.0, unit="s")
@@ -398,7 +409,7 @@ def _fault(place: str, table: Mapping[str, Any], configurations: list[str]) -> F
 
 
 def _settings(kind: Any, place: str, table: object) -> Any:
-    made = part_of(kind, place, table)
+    made = _part_of(kind, place, table)
     for field in dataclasses.fields(kind):
         checks.number(f"{place}, {field.name}", getattr(made, field.name), above=0.0)
     return made
@@ -406,7 +417,7 @@ def _settings(kind: Any, place: str, table: object) -> Any:
 
 def _devices(table: object) -> Devices:
     place = "[sensors]"
-    made: Devices = part_of(Devices, place, table)
+    made: Devices = _part_of(Devices, place, table)
     checks.whole(f"{place}, force_bits", made.force_bits, least=1, most=52)
     checks.flag(f"{place}, emg", made.emg)
     checks.number(f"{place}, rate_Hz", made.rate_Hz, least=10.0, most=1000.0, unit="Hz")

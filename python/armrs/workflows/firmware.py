@@ -16,7 +16,6 @@ from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import files
 from ..model import Effect, Model, load_model
-from ..rig import all_effects, rig
 
 _POSTURES = 12
 """Test vectors."""
@@ -89,8 +88,8 @@ def export_c(
     loaded = checks.loaded("model", model, Model, load_model)
     digest = hashlib.sha256(loaded.to_toml().encode()).hexdigest()
     vectors = _vectors(loaded.n_joints)
-    told = _armrs.firmware(rig(loaded), loaded.segment_uncertainty, vectors.tolist())
-    placed = list(zip(all_effects(loaded), told["acts_on"], strict=True))
+    told = _armrs.firmware(_armrs.Rig(loaded), loaded.segment_uncertainty, vectors.tolist())
+    placed = list(zip(loaded.all_effects, told["acts_on"], strict=True))
     effects = [e for e, acts_on in placed if acts_on != "sensors"]
     sd = _deviations(loaded, told["sd"], [e for e, acts_on in placed if acts_on == "joints"], identified)
     parts = _Parts(loaded, precision, digest, told, effects, sd, vectors)

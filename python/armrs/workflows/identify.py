@@ -13,11 +13,10 @@ import numpy as np
 from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import BadInput, IdentificationError, Text, unknown_name
-from ..io.dataset import Dataset, Tolerance, load_dataset, naming_trials
+from ..io.dataset import Dataset, load_dataset, naming_trials
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial
-from ..model import Effect, Joint, Model, Segment
-from ..rig import all_effects, core_tolerance, rig
+from ..model import Effect, Model, Segment, Tolerance
 from ..tabular import Tabular, Tidy
 
 
@@ -229,7 +228,7 @@ def identify(
     configurations = sorted({t.configuration for t in dataset.trials})
     columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     with naming_trials(dataset.trials):
-        raw, follows = _identified(rig(model, effects), columns, settings, dataset)
+        raw, follows = _identified(_armrs.Rig(model, effects), columns, settings, dataset)
     return _result(dataset, raw, effects, settings, follows)
 
 
@@ -279,16 +278,13 @@ def _result(
         calibration=calibration,
         contradictions=(
             *_contradictions(parameters),
-            *_beyond_tolerance(calibration, settings["tolerance"], _BEYOND, np.inf),
+            *_beyond_tolerance(calibration, dataset.tolerance, _BEYOND, np.inf),
             *_misfits(shares, _NO_FIT, np.inf),
         ),
         misfits=(
             *_misfits(shares, _POOR, _NO_FIT),
             *_beyond_segment(model, parameters),
-            *(
-                f"{line}: what the model lacks may be in it"
-                for line in _beyond_tolerance(calibration, settings["tolerance"], _FAR, _BEYOND)
-            ),
+            *(f"{line}: what the model lacks may be in it" for line in _beyond_tolerance(calibration, dataset.tolerance, _FAR, _BEYOND)),
             *noisy,
         ),
         left_out=(*follows, *_left_out(method, effects), *_unmoved(method, parameters)),
@@ -351,7 +347,7 @@ def _unmoved(method: str, parameters: Sequence[Estimate]) -> tuple[str, ...]:
 
 def effects_of(model: Model, with_effects: Sequence[str]) -> tuple[list[Effect], list[bool]]:
     """Return the effects of a model with those wanted besides, and which of them are fitted."""
-    effects = [*all_effects(model), *_added(model, checks.texts("with_effects", with_effects, "kinds of effects"))]
+    effects = [*model.all_effects, *_added(model, checks.texts("with_effects", with_effects, "kinds of effects"))]
     return effects, [e.kind in _joint_kinds() for e in effects]
 
 
@@ -361,7 +357,7 @@ def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dic
         "method": "joint",
         "fitted": fitted,
         "segment_uncertainty": model.segment_uncertainty,
-        "tolerance": core_tolerance(tolerance),
+        "tolerance": tolerance,
         "cutoff": None,
         "motion": "auto",
         "level": 0.95,
@@ -402,11 +398,11 @@ def _beyond_segment(model: Model, parameters: Sequence[Estimate]) -> tuple[str, 
     return tuple(lines)
 
 
-def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: dict[str, float], above: float, to: float) -> tuple[str, ...]:
+def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: Tolerance, above: float, to: float) -> tuple[str, ...]:
     """Return the calibrations that came out larger than promised, more than `above` and up to `to` times, a line each."""
     lines = []
     for e in calibration:
-        promised = next(tolerance[key] for key in _TOLERANCES if e.name.startswith(key.replace("_", " ")))
+        promised = next(getattr(tolerance, key) for start, key in _TOLERANCES.items() if e.name.startswith(start))
         if above * promised < abs(e.value) <= to * promised:
             lines.append(f"{e.name} came out as {e.value:.3g} {e.unit}, {abs(e.value) / promised:.1f} times the declared tolerance")
     return tuple(lines)
@@ -443,7 +439,13 @@ def _noisy_speeds(shares: Sequence[float], allowed: float) -> tuple[str, ...]:
     )
 
 
-_TOLERANCES = ("angle_offset", "force_bias", "force_gain", "time_delay", "handle_placement")
+_TOLERANCES = {
+    "angle offset": "angle_offset",
+    "force bias": "force_bias_N",
+    "force gain": "force_gain",
+    "time delay": "time_delay_s",
+    "handle placement": "handle_placement_m",
+}
 
 
 def _joint_kinds() -> dict[str, Any]:
@@ -453,7 +455,7 @@ def _joint_kinds() -> dict[str, Any]:
 def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
     """Return an effect of every wanted kind at every joint where the model has none yet."""
     known = _joint_kinds()
-    present = {(e.kind, e.joint) for e in all_effects(model)}
+    present = {(e.kind, e.joint) for e in model.all_effects}
     added = []
     for place, kind in enumerate(kinds):
         if kind not in known:
@@ -525,30 +527,13 @@ def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) 
         Segment(old.name, length, mass, min(max(com, 0.0), length), _not_rounding(inertia, mass * length**2), com_normal=normal)
         for old, (length, mass, com, normal, inertia) in zip(model.segments, raw["segments"], strict=True)
     )
-    joints = [dataclasses.asdict(j) | {"stiffness": 0.0, "rest": 0.0, "viscosity": 0.0, "coulomb": 0.0} for j in model.joints]
-    listed = []
     fitted = [Effect(kind, index + 1, parameters=catalogue()[kind].values(values)) for kind, index, values in raw["effects"]]
     # What an effect did to the segments is in them now.
     absorbed = {name for name, kind in catalogue().items() if kind.where in ("segment", "hand")}
     held = [e for e in effects if e.kind not in _joint_kinds() and e.kind not in absorbed]
-    for effect in fitted:
-        joint, values = joints[(effect.joint or 1) - 1], effect.parameters
-        # A joint of a model has no negative spring; a fit may find one, and an effect may say it.
-        if effect.kind == "elastic" and not joint["stiffness"] and values["stiffness"] >= 0.0:
-            joint.update(stiffness=values["stiffness"], rest=values["rest"])
-        elif effect.kind == "viscous" and not joint["viscosity"]:
-            joint["viscosity"] = values["viscosity"]
-        elif effect.kind == "coulomb" and not joint["coulomb"] and "smoothing" not in _changed(effect):
-            joint["coulomb"] = values["torque"]
-        else:
-            listed.append(effect)
-    return model.replace(segments=segments, joints=tuple(Joint(**j) for j in joints), effects=(*listed, *held))
+    return model.replace(segments=segments).with_joint_effects(fitted, held)
 
 
 def _not_rounding(value: float, scale: float) -> float:
     """Return a value, or zero where it is what rounding left of a bound at zero."""
     return value if abs(value) > _ROUNDING * scale else 0.0
-
-
-def _changed(effect: Effect) -> set[str]:
-    return {p.name for p in catalogue()[effect.kind].parameters if effect.parameters.get(p.name, p.default) != p.default}

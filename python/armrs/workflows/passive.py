@@ -15,7 +15,6 @@ from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import FEWEST_SAMPLES, Trial
-from ..rig import arm
 from ..tabular import Tabular, Tidy
 
 DEFAULT_CUTOFF = 1.0
@@ -272,7 +271,7 @@ def passive_moments(
 def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
     if trial.force_on_arm is None and trial.tau is None:
         raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
-    chain, n = arm(dataset.model_of(trial.configuration)), dataset.model.n_joints
+    chain, n = _armrs.Arm.from_model(dataset.model_of(trial.configuration)), dataset.model.n_joints
     q, qd, moment, inertial, sign = (np.full((len(trial), n), np.nan) for _ in range(5))
     seen = None if trial.force_on_arm is None else np.full((len(trial), 2), np.nan)
     for piece in trial.pieces():
@@ -467,7 +466,7 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
             )
         if m.force is None or not there.any():
             continue
-        weight = arm(dataset.model_of(m.trial.configuration)).gravity(m.q[there])
+        weight = _armrs.Arm.from_model(dataset.model_of(m.trial.configuration)).gravity(m.q[there])
         share = float(np.sum((m.moment + m.inertial)[there] * weight) / max(np.sum(weight**2), 1e-300)) + 1.0
         if np.mean(np.sum(weight**2, axis=1)) > LEAST_WEIGHT**2 and not CARRIED[0] <= share <= CARRIED[1]:
             lines.append(

@@ -12,9 +12,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io import files, tomlfile
-from ..io.dataset import Tolerance
-from ..model import Model
-from ..rig import rig
+from ..model import Model, Tolerance
 from ..tabular import Tabular, Tidy
 from .experiment import Safety
 from .identify import core_settings, effects_of
@@ -401,7 +399,7 @@ class _Question:
         checks.instance("instruments", instruments, Instruments)
         self.model, self.repeats = model, checks.whole("repeats", repeats, least=1, most=10_000)
         self.effects, fitted = effects_of(model, with_effects)
-        self.rig = rig(model, self.effects)
+        self.rig = _armrs.Rig(model, self.effects)
         self.settings = core_settings(model, fitted, instruments.tolerance)
         self.sensing = {name: getattr(instruments, name) for name in ("rate", "cutoff", "force", "angle")}
 

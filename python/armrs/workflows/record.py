@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,11 +13,10 @@ import numpy as np
 from .. import _armrs, checks
 from ..errors import ArmrsError, BadInput, Text
 from ..io import files
-from ..io.dataset import Added, Dataset, write_dataset
+from ..io.dataset import Dataset, write_dataset
 from ..io.markers import Markers, planar_motion
 from ..io.trial import FEWEST_SAMPLES, Trial
-from ..model import Effect, Model
-from ..rig import rig
+from ..model import AddedMass, Effect, Model
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .simulate import DEFAULT_DT, Channel, Movement, Sensors, Simulated, driven, simulate
 
@@ -231,7 +229,7 @@ class _Session:
             "seed": seed,
         }
         start = {"q": [float(v) for v in movement.waypoints[0]], "qd": None}
-        return _armrs.control(rig(model), driven(movement, "compliant"), settings | start, watch)
+        return _armrs.control(_armrs.Rig(model), driven(movement, "compliant"), settings | start, watch)
 
     def _read(self, run: Run, repeat: int, true: Simulated, state: tuple[np.random.Generator, dict[str, Any]]) -> _Seen:
         """Let every device read the run."""
@@ -359,7 +357,7 @@ def _stop(led: dict[str, Any]) -> dict[str, Any] | None:
     }
 
 
-def _wearing(model: Model, worn: tuple[Added, ...]) -> Model:
+def _wearing(model: Model, worn: tuple[AddedMass, ...]) -> Model:
     for item in worn:
         model = model.with_mass(item.segment, item.mass, item.at)
     return model
@@ -367,19 +365,17 @@ def _wearing(model: Model, worn: tuple[Added, ...]) -> Model:
 
 def _with_lengths(model: Model, lengths: np.ndarray) -> Model:
     """Return a model with lengths as the markers show them."""
-    segments = tuple(
-        dataclasses.replace(s, length=float(a), com=min(s.com, float(a))) for s, a in zip(model.segments, lengths, strict=True)
-    )
+    segments = tuple(s.replace(length=float(a), com=min(s.com, float(a))) for s, a in zip(model.segments, lengths, strict=True))
     return model.replace(segments=segments)
 
 
-def _added(runs: tuple[Run, ...], kept: set[str]) -> tuple[Added, ...]:
+def _added(runs: tuple[Run, ...], kept: set[str]) -> tuple[AddedMass, ...]:
     by_item: dict[tuple[int, float, float], list[str]] = {}
     for run in runs:
         for item in run.worn:
             if run.configuration in kept:
                 by_item.setdefault((item.segment, item.mass, item.at), []).append(run.configuration)
-    return tuple(Added(*key, configurations=tuple(names)) for key, names in by_item.items())
+    return tuple(AddedMass(*key, configurations=tuple(names)) for key, names in by_item.items())
 
 
 def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path, ...]:

@@ -17,7 +17,6 @@ from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..io.trial import Trial
 from ..model import Model, load_model
-from ..rig import rig
 from ..tabular import Tabular, Tidy
 
 DEFAULT_DT = 0.25e-3
@@ -300,7 +299,7 @@ def simulate(
     checks.instance("sensors", sensors, Sensors, type(None))
     sensing = None if sensors is None else _sensing(sensors, seeds)
     with asked.about_drive():
-        raw = _armrs.simulate(rig(asked.model), asked.led, asked.core, sensing)
+        raw = _armrs.simulate(_armrs.Rig(asked.model), asked.led, asked.core, sensing)
     return asked.recorded(raw)
 
 
@@ -328,7 +327,7 @@ def simulate_in_pieces(
         model, drive, engine=engine, integrator=integrator, dt=dt, rate=rate, duration=duration, coupling=coupling, start=(None, None)
     )
     with asked.about_drive():
-        _armrs.simulate_in_pieces(rig(model), asked.led, asked.core, samples, lambda raw: take(asked.recorded(raw)))
+        _armrs.simulate_in_pieces(_armrs.Rig(model), asked.led, asked.core, samples, lambda raw: take(asked.recorded(raw)))
 
 
 @dataclass(frozen=True, eq=False)

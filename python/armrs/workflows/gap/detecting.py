@@ -10,7 +10,6 @@ from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.trial import Trial
 from ...model import Model
-from ...rig import all_effects, rig
 from ..plan import Instruments
 from ..simulate import Channel, Movement, Sensors, simulate
 from .found import Limit
@@ -72,7 +71,7 @@ def detectable(
             columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
             trials.append(Trial(f"planned {number + 1}, {repeat}", f"planned {number + 1}", repeat, "fit", read["time"], **columns))
     data = Dataset("planned", model, tuple(trials), force_on="arm", synthetic=True, tolerance=instruments.tolerance)
-    raw = _armrs.look(rig(model, all_effects(model)), core_trials(data), core_settings(data, True, threads))
+    raw = _armrs.look(_armrs.Rig(model, model.all_effects), core_trials(data), core_settings(data, True, threads))
     found = [suspect(item) for item in raw["suspects"]]
     limits = [
         Limit(s.kind, s.joint, s.channel, next(iter(s.parameters)), s.smallest, s.unit, s.gain, s.price)

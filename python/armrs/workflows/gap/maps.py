@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ... import _armrs
 from ...io.dataset import Dataset
 from ...io.trial import Trial
-from ...rig import arm
 from .found import Place
 
 _MOVING = 0.1
@@ -62,7 +62,7 @@ def discrepancies(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any]
     For a led arm the forces and angles are carried to the joints as if it stood: what is left of inertia when simulation and
     measurement nearly agree is neglected.
     """
-    n, body, listed = dataset.model.n_joints, arm(dataset.model), []
+    n, body, listed = dataset.model.n_joints, _armrs.Arm.from_model(dataset.model), []
 
     def carried(channels: np.ndarray) -> np.ndarray:
         q, force = np.ascontiguousarray(channels[:, :n]), channels[:, n:]

@@ -12,7 +12,6 @@ import numpy as np
 from ...catalogue import catalogue
 from ...io.dataset import Dataset
 from ...model import Contact, Effect, Joint, Model, Segment
-from ...rig import all_effects
 from . import maps
 from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Rung, Tried, Value
 
@@ -152,7 +151,7 @@ def absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
         if what in ("mass", "com", "inertia"):
             items.append(Absorbed(f"{what} of segment {index + 1}", value, 2 * before, "of its value"))
         elif what == "known":
-            own = all_effects(dataset.model)[index]
+            own = dataset.model.all_effects[index]
             parameter = catalogue()[own.kind].parameters[part]
             name = f"{parameter.name} of {_worded(own.kind, own.joint, own.channel)}"
             given = own.parameters.get(parameter.name, parameter.default)
@@ -205,14 +204,14 @@ def amended(model: Model, fitted: Mapping[str, Any], *, joints: bool = True, rhy
     rest = iter([effect(entry) for entry in fitted["known"]])
     listed = []
     for joint in model.joints:
-        values = dataclasses.asdict(joint)
+        values = {}
         if joint.stiffness:
             values["stiffness"] = next(rest).parameters["stiffness"]
         if joint.viscosity:
             values["viscosity"] = next(rest).parameters["viscosity"]
         if joint.coulomb:
             values["coulomb"] = next(rest).parameters["torque"]
-        listed.append(Joint(**values))
+        listed.append(joint.replace(**values))
     effects = (*rest, *map(effect, fitted["named"]), *map(effect, rhythms))
     return model.replace(segments=segments, joints=tuple(listed), contact=contact, effects=effects)
 

@@ -9,7 +9,6 @@ from typing import Any
 from ... import _armrs, checks
 from ...custom_effects import OwnEffect
 from ...io.dataset import Dataset, load_dataset, naming_trials
-from ...rig import all_effects, core_tolerance, rig
 from ..identify import core_columns
 from . import reading, suspicion
 from .found import GapFound
@@ -60,7 +59,7 @@ def find_gap(
     led = reading.is_led(dataset)
     settings = core_settings(dataset, led, threads, [e.kind for e in effects])
     columns = core_trials(dataset)
-    built = rig(dataset.model, all_effects(dataset.model))
+    built = _armrs.Rig(dataset.model, dataset.model.all_effects)
     warnings = suspicion.examine(dataset, led)
     with naming_trials(dataset.trials):
         suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
@@ -79,7 +78,7 @@ def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequenc
     """Return what is known beforehand, for the core."""
     return {
         "segment_uncertainty": dataset.model.segment_uncertainty,
-        "tolerance": core_tolerance(dataset.tolerance),
+        "tolerance": dataset.tolerance,
         "led": led,
         "own": list(own),
         "threads": (os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),

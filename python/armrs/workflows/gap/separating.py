@@ -13,7 +13,6 @@ from ...catalogue import catalogue
 from ...errors import ArmrsError
 from ...io.trial import Trial
 from ...model import Model
-from ...rig import all_effects, rig
 from ..identify import core_columns
 from ..simulate import Movement, Sensors, simulate
 from .found import Alternative, GapFound, Missing, Separation
@@ -82,10 +81,10 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
         return effect
     model = lasting(result)
     own = [e for e in model.effects if (e.kind, e.joint, e.channel) == (effect.kind, effect.joint, effect.channel)][-1]
-    others = [e for e in all_effects(model) if e is not own]
+    others = [e for e in model.all_effects if e is not own]
     rivals = [(entry[0], entry[1], list(entry[2]), list(free)) for (entry, free), *_ in raw["alternatives"]]
     rows = _armrs.distances(
-        rig(model, [*others, own]),
+        _armrs.Rig(model, [*others, own]),
         core_trials(result.dataset),
         core_settings(result.dataset, True, threads),
         [core_columns(c.trial) | {"configuration": 0} for c in family],

@@ -9,7 +9,6 @@ import numpy as np
 from ... import _armrs
 from ...catalogue import catalogue
 from ...model import Effect
-from ...rig import all_effects, rig
 from . import maps
 from .found import GapFound, Missing
 from .reading import channel_names, in_file, is_led
@@ -102,7 +101,7 @@ def _ends(effect: Missing, own: Effect) -> list[Effect]:
     if size is None:
         return [own, own]
     interval = effect.parameters[size].interval or (own.parameters[size],) * 2
-    return [replace(own, parameters=_values(effect, {**own.parameters, size: end})) for end in interval]
+    return [own.replace(parameters=_values(effect, {**own.parameters, size: end})) for end in interval]
 
 
 def _law(result: GapFound, effect: Missing, own: Effect, shown: Portrait) -> Portrait:
@@ -115,7 +114,7 @@ def _law(result: GapFound, effect: Missing, own: Effect, shown: Portrait) -> Por
     ]
     if not found:
         return shown
-    built = rig(result.model, [own, *_ends(effect, own)])
+    built = _armrs.Rig(result.model, [own, *_ends(effect, own)])
     torques = [built.resisting(d.q, d.qd, np.gradient(d.qd, 1.0 / d.trial.rate, axis=0), 1.0 / d.trial.rate)[d.valid()] for d in found]
     axes = {
         "speed": [d.qd[d.valid(), joint] for d in found],
@@ -180,12 +179,12 @@ def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.nd
     k = files.index(effect.trial) if effect.trial is not None else telling_trial(result)
     trial = data.trials[k]
     t = trial.t - trial.t[0]
-    others = [e for e in all_effects(result.model) if e != own]
+    others = [e for e in result.model.all_effects if e != own]
     columns = [core_trials(data)[k] | {"role": "fit"}]
     settings = core_settings(data, led, 1)
     plays = []
     for listed in ([*others, own], others):
-        given = _armrs.play(rig(result.model, listed), columns, settings)[0]["given"]
+        given = _armrs.play(_armrs.Rig(result.model, listed), columns, settings)[0]["given"]
         if given is None:
             return trial.file, t, None
         plays.append(given)

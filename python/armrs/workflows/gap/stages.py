@@ -13,7 +13,6 @@ from ...custom_effects import OwnEffect
 from ...io.dataset import Dataset, load_dataset, naming_trials
 from ...model import Contact, Model, Robot
 from ...report.plain import data_of, origin
-from ...rig import NO_CONTACT, all_effects, rig
 from . import maps, reading, suspicion
 from .found import Absorbed, ChannelGap, GapFound, Place, Suspect
 from .search import core_settings, core_trials
@@ -100,7 +99,7 @@ def compare(dataset: Source, model: Model | None = None) -> Compared:
     data = _loaded(dataset, model)
     led = reading.is_led(data)
     warnings = suspicion.examine(data, led)
-    plays = _armrs.play(rig(data.model), core_trials(data), core_settings(data, led, 1))
+    plays = _armrs.play(_armrs.Rig(data.model), core_trials(data), core_settings(data, led, 1))
     suspicion.refuse_mislabelled(data, led, plays)
     known = [p for p in plays if p["given"] is not None]
     trials = [t for t, p in zip(data.trials, plays, strict=True) if p["given"] is not None]
@@ -135,7 +134,7 @@ def calibrate(
     led = reading.is_led(data)
     warnings = suspicion.examine(data, led)
     settings = core_settings(data, led, threads, [e.kind for e in effects])
-    built, columns = rig(data.model, all_effects(data.model)), core_trials(data)
+    built, columns = _armrs.Rig(data.model, data.model.all_effects), core_trials(data)
     with naming_trials(data.trials):
         suspicion.refuse_mislabelled(data, led, _armrs.play(built, columns, settings))
         raw = _armrs.look(built, columns, settings, progress)
@@ -173,7 +172,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
     columns, settings = [t | {"role": "fit"} for t in core_trials(data)], core_settings(data, led, 1)
     model, raw = result.dataset.model, result.raw
     plays = {
-        "given": _armrs.play(rig(data.model), columns, settings),
+        "given": _armrs.play(_armrs.Rig(data.model), columns, settings),
         "calibrated": _armrs.play(as_fitted(model, raw["calibrated"]), columns, settings, own=True),
         "amended": _armrs.play(as_fitted(model, raw["amended"], raw["rhythms"]), columns, settings, own=True),
     }
@@ -187,14 +186,14 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
 def as_fitted(model: Model, fitted: Mapping[str, Any], rhythms: Sequence[Any] = ()) -> _armrs.Rig:
     """Return a model for the core with everything that was fitted, the imperfections of its sensors included."""
     if model.contact is None:
-        model = model.replace(contact=Contact(*NO_CONTACT))
+        model = model.replace(contact=Contact.assumed())
     robot = model.robot
     if robot is not None:
         base = (robot.base[0] + fitted["shift"][0], robot.base[1] + fitted["shift"][1])
         robot = Robot(robot.lengths, base, robot.elbow)
     bare = reading.amended(model, {**fitted, "known": [], "named": []}, joints=False).replace(robot=robot)
     effects = [*fitted["known"], *fitted["named"], *rhythms, *fitted["calibration"]]
-    return rig(bare, [reading.effect(entry) for entry in effects])
+    return _armrs.Rig(bare, [reading.effect(entry) for entry in effects])
 
 
 def suspect(item: Sequence[Any]) -> Suspect:

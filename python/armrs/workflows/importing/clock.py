@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ... import _armrs
 from ...errors import BadInput, Text
 from ...model import Model
-from ...rig import arm
 
 _RATE = 50.0
 """Rate at which signals are compared [Hz]."""
@@ -91,7 +91,7 @@ def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, forc
     angles = _smoothed(np.column_stack([np.interp(grid, t[good], column) for column in q[good].T]))
     speeds = np.gradient(angles, grid, axis=0)
     accelerations = np.gradient(speeds, grid, axis=0)
-    kernels = arm(model)
+    kernels = _armrs.Arm.from_model(model)
     rows = kernels.regressor(angles, speeds, accelerations)
     n, joints = angles.shape
     own = np.zeros((n, joints, 4 * joints))
