@@ -87,6 +87,13 @@ ROUGH: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
     "write_report": (armrs.write_report, {"sources": ["a.json"], "path": "report.html"}),
     "export_fmu": (armrs.export_fmu, {"model": MODEL, "path": "a.fmu", "fmi": 3, "port": "force", "start": None, "rest": False, "name": "a"}),
     "export_c": (armrs.export_c, {"model": MODEL, "precision": "double", "identified": None}),
+    "check_dataset": (armrs.check_dataset, {"source": "data"}),
+    "import_recordings": (armrs.import_recordings, {"sources": ["raw.csv"], "out": "out", "model": MODEL, "columns_map": "", "angles": None, "zero": None, "clockwise": None, "force_on": None, "points": ()}),
+    "segment_expectations": (armrs.segment_expectations, {"body_mass": 70.0, "height": 1.8, "sex": "male", "lengths": (0.3, None)}),
+    "initialise": (armrs.initialise, {"folder": "out", "body_mass": 70.0, "height": 1.8, "sex": "male", "lengths": (0.3, None), "worn": (), "replace": True}),
+    "Worn": (armrs.Worn, {"segment": 1, "mass": 0.1, "at": 0.1}),
+    "export_model": (armrs.export_model, {"model": MODEL, "path": "arm.urdf"}),
+    "import_model": (armrs.import_model, {"path": "arm.urdf"}),
     "check_fmu": (armrs.check_fmu, {"path": "a.fmu"}),
     "Trial": (armrs.Trial, {"file": "a", "configuration": "a", "repeat": 1, "role": "fit", "t": TIME, "q": np.zeros((20, 2)), "force_on_arm": np.zeros((20, 2)), "moment_on_arm": np.zeros(20), "robot_q": np.zeros((20, 2)), "tau": np.zeros((20, 2)), "dq": np.zeros((20, 2))}),
     "Dataset": (armrs.Dataset, {"name": "a", "model": MODEL, "trials": (), "force_on": "arm", "sample_rate": 50.0, "subject": armrs.Subject(), "tolerance": armrs.Tolerance(), "synthetic": False, "added": ()}),
@@ -163,6 +170,7 @@ def test_every_public_function_is_asked() -> None:
         "SimulationFit",
     }
     made_by_functions |= {"Plan", "Simulated", "GapFound", "Demonstration", "FirmwareSource"}
+    made_by_functions |= {"Checked", "Expected", "ExportedModel", "Imported"}
     errors = {name for name in armrs.__all__ if name.endswith("Error") or name == "BadInput"}
     texts = {"__version__", "build_profile"}
     asked = {*ROUGH, *OF_A_DATA_SET, "run_demo"}

@@ -62,6 +62,12 @@ class Worn:
     mass: float
     at: float | None = None
 
+    def __post_init__(self) -> None:
+        checks.whole("segment", self.segment, least=1)
+        object.__setattr__(self, "mass", checks.number("mass", self.mass, above=0.0, most=20.0, unit="kg"))
+        if self.at is not None:
+            object.__setattr__(self, "at", checks.number("at", self.at, least=0.0, most=2.0, unit="m", hint="millimetres?"))
+
 
 @dataclass(frozen=True)
 class Initialised:
@@ -118,6 +124,7 @@ def segment_expectations(
     body_mass = checks.number("body_mass", body_mass, least=1.0, most=500.0, unit="kg")
     height = checks.number("height", height, least=0.3, most=3.0, unit="m", hint="centimetres?")
     checks.choice("sex", sex, ("male", "female"))
+    checks.instance("lengths", lengths, list, tuple)
     if not 1 <= len(lengths) <= len(SEGMENTS):
         raise BadInput("lengths", Text(f"{len(lengths)} lengths"), f"1 to {len(SEGMENTS)}: {', '.join(SEGMENTS)}")
     for k, length in enumerate(lengths, start=1):
@@ -163,6 +170,8 @@ def initialise(
     No joint has a law: stiffness, damping and friction are unknown, and belong to what `identify` and `gap` find.
     """
     target = files.output_folder(folder)
+    checks.flag("replace", replace)
+    worn = checks.instances("worn", worn, Worn)
     for name in ("dataset.toml", "model.toml"):
         if (target / name).exists() and not replace:
             raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)

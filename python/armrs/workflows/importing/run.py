@@ -110,7 +110,12 @@ def import_recordings(
     BadInput
         With every problem that was found (`BadInputs.problems`); nothing is written then.
     """
+    checks.instance("sources", sources, list, tuple)
     paths = [checks.path("sources", source) for source in sources]
+    checks.instance("columns_map", columns_map, str)
+    points = checks.instances("points", points, str)
+    if not paths:
+        raise BadInput("sources", Text("nothing"), "one recording or more")
     loaded = model if isinstance(model, Model) else load_model(model)
     if len(paths) == 1 and paths[0].suffix.lower() == ".toml":
         recipe = load_recipe(paths[0])
@@ -119,7 +124,7 @@ def import_recordings(
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
         recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points))
-    folder = _write(Path(out), loaded, recipe, reads)
+    folder = _write(files.output_folder(out), loaded, recipe, reads)
     return Imported(folder, recipe, tuple(notes))
 
 
@@ -130,6 +135,7 @@ def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None
     if zero is not None:
         given["zero"] = checks.choice("zero", zero, ("horizontal", "hanging"))
     if clockwise is not None:
+        checks.instance("clockwise", clockwise, list, tuple)
         numbers = [checks.whole("clockwise", j, least=1, most=n_joints) for j in clockwise]
         given["signs"] = tuple(-1 if j in numbers else 1 for j in range(1, n_joints + 1))
     if force_on is not None:
