@@ -64,6 +64,8 @@ class Kind:
     """What else an effect of this kind must say: "joint", "channel" or nothing (None)."""
     first_joint: int = 1
     """Lowest joint at which it can stand; 2 where it also acts in the joint before."""
+    family: str = ""
+    """The family of effects that it belongs to: of its members movements may not tell one from another."""
     own: bool = False
     """Whether it was declared by `armrs.own_effect`, and is no part of the catalogue that every installation has."""
 

@@ -117,6 +117,8 @@ fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
         trials,
         comparison: ComparisonMode::Led,
         own: Vec::new(),
+        base: Vec::new(),
+        start: [[0.0; 3]; 2],
     }
 }
 

@@ -12,11 +12,13 @@ use arm_gap::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use arm_gap::measurement_model::prediction::{Channels, Course};
 use arm_gap::selection::first_order_screening::Look;
 use arm_gap::selection::fit::Fitted;
+use arm_gap::selection::held_out::{Left, Open, held_out as open_gaps};
 use arm_gap::selection::lack_of_fit::LackOfFit;
 use arm_gap::selection::model_discrimination::Contest;
 use arm_gap::selection::model_selection::Named;
 use arm_gap::selection::search::Finding;
 use arm_gap::trial_specific::component::TrialSpecific;
+use arm_numerics::statistics::distributions::chi_square_tail;
 use numpy::ToPyArray;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -77,6 +79,8 @@ impl<'a, 'py> Asked<'a, 'py> {
                 .iter()
                 .map(|kind| own::kind(kind))
                 .collect::<PyResult<_>>()?,
+            base: Vec::new(),
+            start: [[0.0; 3]; N],
         })
     }
 
@@ -155,6 +159,7 @@ pub fn find_gap<'py>(
         progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let session = asked.session(chain)?;
+        let session = py.detach(|| session.with_base());
         let callback = ProgressCallback::of(progress);
         let done = asked.studied(py, &session, |s| s.search(&|w, s| callback.tell(w, s)));
         let (prepared, finding) = callback.or_raised(done)?;
@@ -298,7 +303,7 @@ fn played<'py, const N: usize>(
     prepared: &PreparedSession<'_, N>,
     plays: &[(&str, &[Hypothesis<N>])],
 ) -> PyResult<Bound<'py, PyList>> {
-    let given = prepared.session.given();
+    let given = rigid(prepared.session);
     let trials = std::iter::zip(0.., &prepared.courses)
         .map(|(i, course)| {
             let own = plays.iter().map(|(name, beliefs)| (*name, &beliefs[i]));
@@ -430,6 +435,8 @@ fn result<'py, const N: usize>(
         .iter()
         .map(|r| (asked(&r.candidate), r.gain, r.price, r.smallest))
         .collect();
+    out.set_item("base", base(finding))?;
+    out.set_item("explained", finding.explained)?;
     out.set_item("ruled", ruled)?;
     let search_trace: Vec<_> = finding
         .search_trace
@@ -451,6 +458,55 @@ fn result<'py, const N: usize>(
     ];
     out.set_item("trials", played(py, prepared, &plays)?)?;
     Ok(out)
+}
+
+/// The model as given, without the passive base.
+fn rigid<const N: usize>(session: &Session<N>) -> Hypothesis<N> {
+    let mut given = session.given();
+    given.known.truncate(session.effects.len());
+    given
+}
+
+/// Named laws of the passive base: effect, standard deviations, what it gains, probability of that by chance.
+type Base = Vec<(Entry, Vec<(usize, f64)>, f64, f64)>;
+
+fn base<const N: usize>(finding: &Finding<N>) -> Base {
+    let each = finding.base.iter().map(|term| {
+        let effect = &finding.amended.hypothesis.known[term.known];
+        let chance = chi_square_tail(term.gain, term.sd.len());
+        (entry(effect), term.sd.clone(), term.gain, chance)
+    });
+    each.collect()
+}
+
+/// What a model leaves of a trial: movement, whether it is a test, rate, residuals by channel, samples that count.
+type LeftColumns = (usize, bool, f64, Option<Vec<Vec<f64>>>, Vec<bool>);
+/// The gap of a channel: size, floor, its standard deviation, and trial, start, end and size where it is open.
+type GapColumns = (
+    Option<f64>,
+    Option<f64>,
+    Option<f64>,
+    Option<(usize, f64, f64, f64)>,
+);
+
+/// The test of each channel's gap on the trials that were kept apart.
+#[pyfunction]
+pub fn held_out(py: Python<'_>, trials: Vec<LeftColumns>) -> Vec<GapColumns> {
+    let trials: Vec<Left> = trials
+        .into_iter()
+        .map(|(group, test, rate, residuals, counted)| Left {
+            group,
+            test,
+            rate,
+            residuals,
+            counted,
+        })
+        .collect();
+    let gaps = py.detach(|| open_gaps(&trials));
+    let open = |o: Open| (o.trial, o.span.0, o.span.1, o.size);
+    gaps.into_iter()
+        .map(|g| (g.size, g.floor, g.floor_std, g.open.map(open)))
+        .collect()
 }
 
 fn named<'py, const N: usize>(

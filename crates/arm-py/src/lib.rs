@@ -33,6 +33,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(fit::fit_by_simulation, m)?)?;
     m.add_function(wrap_pyfunction!(gap::find_gap, m)?)?;
+    m.add_function(wrap_pyfunction!(gap::held_out, m)?)?;
     m.add_function(wrap_pyfunction!(gap::distances, m)?)?;
     m.add_function(wrap_pyfunction!(gap::look, m)?)?;
     m.add_function(wrap_pyfunction!(gap::play, m)?)?;

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Probe, Question, Values};
+use super::probe::{Family, Probe, Question, Values};
 use crate::Scalar;
 
 /// A spring over two adjacent joints, as of a muscle that crosses both; its joint is the distal one.
@@ -25,7 +25,7 @@ impl Law for Biarticular {
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[1.0, 0.5]))])
         .resting(2)
-        .refining(&[1])]);
+        .refining(&[1])]).in_family(Family::TwoJoints).typically(1.0);
     const CROSSES: bool = true;
 
     #[inline]

@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Probe, Question};
+use super::probe::{Family, Probe, Question};
 use crate::Scalar;
 
 /// Dry friction: a torque against the direction of motion, whatever the speed.
@@ -21,7 +21,7 @@ impl Law for Coulomb {
         ],
         memory: false,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03);
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03).in_family(Family::Dry).typically(0.1).passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -21,7 +21,7 @@ impl Law for CubicElastic {
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Middle)])
         .refining(&[1])])
-    .missing(0.002);
+    .missing(0.002).typically(2.0);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -20,7 +20,7 @@ impl Law for Elastic {
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Middle)])
-        .resting(1)]);
+        .resting(1)]).typically(1.0).passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

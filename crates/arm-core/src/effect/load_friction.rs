@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Probe, Question};
+use super::probe::{Family, Probe, Question};
 use crate::Scalar;
 
 /// Dry friction that grows with the force through the joint, as in a plain bearing.
@@ -24,7 +24,7 @@ impl Law for LoadFriction {
         memory: false,
     };
     const FEELS_FORCE: bool = true;
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03);
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03).in_family(Family::Dry);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

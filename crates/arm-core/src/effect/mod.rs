@@ -17,7 +17,7 @@ pub use law::{ActsOn, Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, P
 pub use own::Own;
 #[cfg(feature = "own")]
 pub use own::OwnLaw;
-pub use probe::{Nature, Probe, Promise, Question, Values};
+pub use probe::{Family, Nature, Probe, Promise, Question, Values};
 
 use crate::{Chain, Contact, Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
 
@@ -53,6 +53,10 @@ macro_rules! catalogue {
             /// What it acts on.
             pub const fn acts_on(self) -> ActsOn {
                 match self { $(Self::$law => <$module::$law as Law>::ACTS_ON,)* Self::Own(_) => ActsOn::Joints }
+            }
+            /// The family of effects that it belongs to.
+            pub fn family(self) -> Family {
+                self.probe().family.unwrap_or(Family::of_place(self.info().place))
             }
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {

@@ -1,5 +1,5 @@
 use super::law::{ActsOn, Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Probe, Question};
+use super::probe::{Family, Probe, Question};
 use crate::{Scalar, Setup};
 
 /// The rotor of a drive, as felt at the joint: its inertia times the square of the gear ratio.
@@ -19,7 +19,7 @@ impl Law for MotorInertia {
         memory: false,
     };
     const ACTS_ON: ActsOn = ActsOn::Arm;
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]);
+    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]).in_family(Family::Segment);
 
     fn gradient<T: Scalar>(_p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
         leading([at.qdd])

@@ -1,5 +1,7 @@
 //! How a search asks whether a kind is there.
 
+use super::law::Place;
+
 /// What a kind tells those who look for it in data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
@@ -11,6 +13,63 @@ pub struct Probe {
     pub promise: Option<Promise>,
     /// Share of what it shows (as a sum of squares) that its law may miss: much for laws that stand for a family of shapes.
     pub missed: f64,
+    /// Its family, where its place does not decide it.
+    pub family: Option<Family>,
+    /// Typical size of its first parameter, for one N m of the arm's weight moment; zero where nothing is known.
+    pub typical: f64,
+    /// Whether it belongs to every passive joint, so that a joint without any law is asked for it first.
+    pub passive: bool,
+}
+
+/// Effects that answer one question, of which movements may not tell the members apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Dry friction.
+    Dry,
+    /// Torques that grow with the speed.
+    Rate,
+    /// Springs of one joint.
+    Elastic,
+    /// Springs over two joints.
+    TwoJoints,
+    /// Masses and lengths.
+    Segment,
+    /// What the arm is fixed to.
+    Frame,
+    /// Between hand and robot.
+    Contact,
+    /// Sensors.
+    Sensor,
+    /// Muscles.
+    Muscle,
+}
+
+impl Family {
+    /// The word for it in results.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dry => "dry",
+            Self::Rate => "rate",
+            Self::Elastic => "elastic",
+            Self::TwoJoints => "two_joints",
+            Self::Segment => "segment",
+            Self::Frame => "frame",
+            Self::Contact => "contact",
+            Self::Sensor => "sensor",
+            Self::Muscle => "muscle",
+        }
+    }
+
+    /// The family of what acts at a place and has no other.
+    pub(crate) const fn of_place(place: Place) -> Self {
+        match place {
+            Place::Joint => Self::Elastic,
+            Place::Segment | Place::Hand => Self::Segment,
+            Place::Frame => Self::Frame,
+            Place::Contact => Self::Contact,
+            Place::AngleSensor | Place::ForceSensor | Place::Sensors => Self::Sensor,
+        }
+    }
 }
 
 /// How an effect comes and goes.
@@ -111,6 +170,9 @@ impl Probe {
             nature: Nature::Lasting,
             promise: None,
             missed: 2e-5,
+            family: None,
+            typical: 0.0,
+            passive: false,
         }
     }
 
@@ -126,6 +188,27 @@ impl Probe {
     pub const fn promised(self, promise: Promise) -> Self {
         Self {
             promise: Some(promise),
+            ..self
+        }
+    }
+
+    /// In a family that its place does not decide.
+    pub const fn in_family(self, family: Family) -> Self {
+        Self {
+            family: Some(family),
+            ..self
+        }
+    }
+
+    /// With a typical size of its first parameter, for one N m of the arm's weight moment.
+    pub const fn typically(self, typical: f64) -> Self {
+        Self { typical, ..self }
+    }
+
+    /// Of every passive joint.
+    pub const fn passive(self) -> Self {
+        Self {
+            passive: true,
             ..self
         }
     }

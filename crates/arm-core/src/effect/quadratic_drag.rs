@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Family, Probe};
 use crate::Scalar;
 
 /// Resistance with the square of the joint's speed, as of a body in air or water.
@@ -14,6 +15,7 @@ impl Law for QuadraticDrag {
         parameters: &[Parameter::linear("drag", "N m s²/rad²", 0.0, 100.0, 0.0)],
         memory: false,
     };
+    const PROBE: Probe = Probe::FIRST.in_family(Family::Rate).typically(0.2);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -23,7 +23,7 @@ impl Law for Relaxation {
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[0.3, 1.0, 3.0]))])
         .refining(&[1])])
-    .missing(0.002);
+    .missing(0.002).typically(1.0);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Probe, Question, Values};
+use super::probe::{Family, Probe, Question, Values};
 use crate::Scalar;
 
 /// Resistance to stretch faster than a threshold, as in spasticity.
@@ -27,7 +27,7 @@ impl Law for StretchReflex {
             (2, Values::Each(&[1.0, -1.0, 0.0])),
         ])
         .refining(&[1])])
-    .missing(0.1);
+    .missing(0.1).in_family(Family::Muscle).typically(0.2);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

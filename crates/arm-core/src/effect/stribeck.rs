@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Probe, Question, Values};
+use super::probe::{Family, Probe, Question, Values};
 use crate::Scalar;
 
 /// The excess of dry friction at low speed, which fades as the joint moves faster.
@@ -27,7 +27,7 @@ impl Law for Stribeck {
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])
         .refining(&[1, 2])])
-    .missing(0.05);
+    .missing(0.05).in_family(Family::Dry).typically(0.1);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

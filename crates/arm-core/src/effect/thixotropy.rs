@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Probe, Question, Values};
+use super::probe::{Family, Probe, Question, Values};
 use crate::Scalar;
 
 /// Friction and stiffness of a structure that breaks down in motion and builds up again at rest.
@@ -33,7 +33,7 @@ impl Law for Thixotropy {
             (4, Values::Each(&[1.0, 3.0, 10.0])),
         ])
         .refining(&[3, 4])])
-    .missing(0.05);
+    .missing(0.05).in_family(Family::Dry).typically(0.1);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Nature, Probe};
+use super::probe::{Family, Nature, Probe};
 use crate::Scalar;
 
 /// A rhythmic torque of the muscles.
@@ -21,7 +21,7 @@ impl Law for Tremor {
         ],
         memory: false,
     };
-    const PROBE: Probe = Probe::FIRST.of_nature(Nature::Rhythm);
+    const PROBE: Probe = Probe::FIRST.of_nature(Nature::Rhythm).in_family(Family::Muscle);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,4 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::probe::{Family, Probe};
 use crate::Scalar;
 
 /// Resistance in proportion to the joint's speed.
@@ -14,6 +15,7 @@ impl Law for Viscous {
         parameters: &[Parameter::linear("viscosity", "N m s/rad", 0.0, 100.0, 0.0)],
         memory: false,
     };
+    const PROBE: Probe = Probe::FIRST.in_family(Family::Rate).typically(0.2).passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Nature, Probe};
+use super::probe::{Family, Nature, Probe};
 use crate::Scalar;
 
 /// A burst of muscle torque: a smooth pulse that starts and ends with zero slope and is highest in its middle.
@@ -22,7 +22,7 @@ impl Law for Voluntary {
         ],
         memory: false,
     };
-    const PROBE: Probe = Probe::FIRST.of_nature(Nature::Burst);
+    const PROBE: Probe = Probe::FIRST.of_nature(Nature::Burst).in_family(Family::Muscle);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

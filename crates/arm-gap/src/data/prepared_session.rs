@@ -11,7 +11,7 @@ use crate::data::noise::{Noise, dot};
 use crate::data::repeats::groups;
 use crate::data::session::{ComparisonMode, Session};
 use crate::data::valid_segments::{ObservableForce, ValidSegments, widened};
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::factor;
@@ -53,6 +53,10 @@ pub struct PreparedSession<'a, const N: usize> {
     resting: Vec<Rest>,
     /// What disturbances have touched: trial, start and end \[s\].
     touched: Vec<(usize, f64, f64)>,
+    /// Which laws of the passive base are dropped.
+    pub(crate) dropped: Vec<bool>,
+    /// Where calibration starts, once the base was calibrated.
+    pub(crate) start: Option<Hypothesis<N>>,
     /// Threads.
     pub threads: usize,
 }
@@ -65,12 +69,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
         let noise = Noise::unknown(session.channels())?;
         let mut prepared = Self::with_noise(session, noise, threads)?;
-        let mut given = prepared.linearize(&session.given())?;
+        let mut given = prepared.linearize(&session.starting())?;
         let all = prepared.fitted.clone();
         prepared.leave_out_rest(&given);
         if prepared.fitted != all {
             // A trial in which nothing is left to compare has no place among the residuals either.
-            given = prepared.linearize(&session.given())?;
+            given = prepared.linearize(&session.starting())?;
         }
         prepared.measure_noise(&given)?;
         Ok(prepared)
@@ -117,6 +121,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             dry: [false; N],
             resting: Vec::new(),
             touched: Vec::new(),
+            dropped: vec![false; session.base.len()],
+            start: None,
             threads,
         })
     }
@@ -400,6 +406,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             }
         }
         rest
+    }
+
+    /// What is refitted with every question; see [`Session::nuisances`]. Dropped laws of the base are not.
+    pub fn nuisances(&self) -> Vec<Coordinate> {
+        let first = self.session.effects.len();
+        let mut all = self.session.nuisances();
+        all.retain(|c| match c.target {
+            Target::Known(e, _) if e >= first => !self.dropped[e - first],
+            _ => true,
+        });
+        all
     }
 
     /// Results of jobs in their order, whatever the number of threads.

@@ -7,6 +7,7 @@ use arm_sim::{SimulationError, altered};
 
 use crate::GapError;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::selection::passive_base::Passive;
 
 /// A data set as the workflow sees it.
 #[derive(Clone, Debug)]
@@ -27,6 +28,10 @@ pub struct Session<const N: usize> {
     pub comparison: ComparisonMode,
     /// Kinds of one's own that are asked besides those of the catalogue.
     pub own: Vec<Kind>,
+    /// Laws of joints that the model leaves without one; see [`crate::selection::passive_base`].
+    pub base: Vec<Passive>,
+    /// Relative changes of the segments from which calibration starts.
+    pub start: [[f64; 3]; N],
 }
 
 /// What is compared with the data.
@@ -110,10 +115,24 @@ impl<const N: usize> Session<N> {
             shift: [0.0; 2],
             placement: [0.0; 2],
             eccentricity: [[0.0; 2]; N],
-            known: self.effects.clone(),
+            known: self.known(),
             calibration,
             named: Vec::new(),
         }
+    }
+
+    /// The model as given, with its base and the segments that measured motion suggests.
+    pub fn starting(&self) -> Hypothesis<N> {
+        Hypothesis {
+            segments: self.start,
+            ..self.given()
+        }
+    }
+
+    /// The effects of the model, then those of its passive base.
+    fn known(&self) -> Vec<Effect<f64>> {
+        let base = self.base.iter().map(|passive| passive.effect);
+        self.effects.iter().copied().chain(base).collect()
     }
 
     fn promised(&self, promise: Promise) -> f64 {
@@ -184,6 +203,24 @@ impl<const N: usize> Session<N> {
                 // A contact that damps much more cannot be stepped through.
                 add(Target::Contact(1, axis), DAMPED, -0.9, 0.5);
                 add(Target::Shift(axis), sd, f64::NEG_INFINITY, f64::INFINITY);
+            }
+        }
+        list.extend(self.coordinates_of_base());
+        list
+    }
+
+    fn coordinates_of_base(&self) -> Vec<Coordinate> {
+        let mut list = Vec::new();
+        for (b, passive) in self.base.iter().enumerate() {
+            for own in &passive.free {
+                let parameter = &passive.effect.kind.info().parameters[own.parameter];
+                list.push(Coordinate {
+                    target: Target::Known(self.effects.len() + b, own.parameter),
+                    prior: Some((own.mean, own.sd)),
+                    lower: parameter.min.max(own.lower),
+                    upper: parameter.max,
+                    step: own.step,
+                });
             }
         }
         list

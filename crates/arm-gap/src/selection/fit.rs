@@ -78,7 +78,7 @@ pub fn departure<const N: usize>(hypothesis: &Hypothesis<N>, coordinates: &[Coor
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// A hypothesis near an anchor with its residuals and their cost.
-    fn state(
+    pub(crate) fn state(
         &self,
         point: &LinearizationPoint<N>,
         hypothesis: Hypothesis<N>,

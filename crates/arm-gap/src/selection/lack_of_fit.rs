@@ -83,7 +83,7 @@ pub fn lack_of_fit<const N: usize>(
         common_dof += free;
         apart_dof += free * (n - 1.0);
     }
-    let unknowns = prepared.session.nuisances().len() + fitted.asked.len();
+    let unknowns = prepared.nuisances().len() + fitted.asked.len();
     let common_dof = (common_dof - unknowns as f64).max(1.0);
     if apart_dof < 1.0 {
         return LackOfFit {

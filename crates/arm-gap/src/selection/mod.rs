@@ -2,9 +2,11 @@
 
 pub mod first_order_screening;
 pub mod fit;
+pub mod held_out;
 pub mod lack_of_fit;
 pub mod model_discrimination;
 pub mod model_selection;
+pub mod passive_base;
 pub mod score_test;
 pub mod score_variance;
 pub mod search;

@@ -10,6 +10,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::{Fitted, Precision, enough};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::model_selection::{FLOOR, Named, mimicked_by_any};
+use crate::selection::passive_base::Term;
 use crate::selection::score_test::{Choice, ScoreTest};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
@@ -74,6 +75,10 @@ pub struct Finding<const N: usize> {
     pub precision: Precision,
     /// Lack of fit of the calibrated and of the amended model.
     pub lack: [LackOfFit; 2],
+    /// Laws of the passive base that are named.
+    pub base: Vec<Term>,
+    /// What all named effects together explain.
+    pub explained: f64,
     /// What else was asked.
     pub ruled: Vec<Ruled>,
     /// Misfit for each degree of freedom.
@@ -139,10 +144,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// [`GapError`] where the model as given cannot be simulated or fitted.
     pub fn search(&mut self, progress: Progress<'_>) -> Result<Finding<N>, GapError> {
         progress("calibrating", 0.0)?;
-        let mut settled = self.calibrate()?;
+        let mut settled = self.calibrate_base()?;
         if !self.repeated {
             self.measure_noise(&settled.1)?;
-            settled = self.calibrate()?;
+            settled = self.calibrate_base()?;
         }
         let led = self.session.comparison == ComparisonMode::Led;
         let mut trial_specific: Vec<TrialSpecific> = Vec::new();
@@ -250,11 +255,20 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             scale,
             ..
         } = state;
+        progress("judging the passive base", 0.88)?;
+        let ((fitted, point), base) = self.judged_base((amended, point), scale)?;
+        amended = fitted;
         progress("measuring what is left", 0.9)?;
         let mut precision = self.precision(&point, &amended, scale)?;
         for one in &named {
             let missed = amended.asked[one.slot].kind().probe().missed;
             precision.widen(one.slot, missed, one.gain);
+        }
+        let mut explained = calibrated.cost - amended.cost;
+        let mut before = before;
+        if let Some((rigid, lack)) = self.rigid(&base) {
+            explained = rigid.cost - amended.cost;
+            (calibrated, before) = (rigid, lack);
         }
         let lack = [before, lack_of_fit(self, &point, &amended)];
         if let Some((hypothesis, _)) = self.refined(&calibrated) {
@@ -294,6 +308,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             search_trace,
             precision,
             lack,
+            base,
+            explained,
             ruled,
             scale,
         })
@@ -395,7 +411,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         let start = Hypothesis {
             named: fitted.hypothesis.named.clone(),
-            ..self.session.given()
+            ..self.given()
         };
         match self.settle(start, fitted.asked.clone()) {
             Ok(again) if again.0.cost < fitted.cost => again,
@@ -427,12 +443,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// # Errors
     /// As [`PreparedSession::settle`].
     pub fn calibrate(&self) -> Result<Settled<'a, N>, GapError> {
-        self.settle(self.session.given(), Vec::new())
+        self.settle(self.given(), Vec::new())
     }
 
     /// The same after the data have changed, with the noise read anew.
     fn calibrate_anew(&mut self) -> Result<Settled<'a, N>, GapError> {
-        let given = self.linearize(&self.session.given())?;
+        let given = self.linearize(&self.given())?;
         self.measure_noise(&given)?;
         self.calibrate()
     }

@@ -78,7 +78,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             lines,
             shown: Vec::new(),
             residuals: Vec::new(),
-            coordinates: self.session.nuisances(),
+            coordinates: self.nuisances(),
             own: Vec::new(),
             rows: Rows::default(),
         };

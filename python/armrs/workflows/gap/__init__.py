@@ -4,7 +4,7 @@
 """
 
 from .detecting import detectable
-from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Place, Rung, Separation, Suspect, Value
+from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Open, Place, Rung, Separation, Suspect, Value
 from .search import find_gap
 from .separating import separate
 from .stages import Calibrated, Compared, calibrate, compare, confirm
@@ -18,6 +18,7 @@ __all__ = [
     "GapFound",
     "Limit",
     "Missing",
+    "Open",
     "Place",
     "Rung",
     "Separation",

@@ -111,6 +111,11 @@ class Missing:
         Where it was in one trial only, its file; None for what is in all of them.
     span : (float, float) or None
         When it acted there [s].
+    family : str
+        The family of effects that it belongs to: `dry`, `rate`, `elastic`, `two_joints`, `segment`, `frame`, `contact`, `sensor` or
+        `muscle`.
+    decided : bool
+        False where an alternative explains the data as well.
     """
 
     kind: str
@@ -122,6 +127,8 @@ class Missing:
     alternatives: tuple[Alternative, ...] = ()
     trial: str | None = None
     span: tuple[float, float] | None = None
+    family: str = ""
+    decided: bool = True
 
     def __str__(self) -> str:
         place = f" joint {self.joint}" if self.joint else f" {self.channel}" if self.channel else ""
@@ -159,6 +166,25 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Open:
+    """Where the gap of a channel is open on the test trials.
+
+    Attributes
+    ----------
+    trial : str
+    t_start, t_end : float
+        The piece of the trial that exceeds the floor by most [s].
+    size : float or None
+        Root mean square of simulated less measured there; None for a trial that cannot be simulated.
+    """
+
+    trial: str
+    t_start: float
+    t_end: float
+    size: float | None
+
+
+@dataclass(frozen=True)
 class ChannelGap:
     """Root mean square difference of simulation and data in one channel, over the test trials.
 
@@ -168,12 +194,18 @@ class ChannelGap:
         With the model as given, after refitting what the tolerances allow, and with the named effects.
     floor : float or None
         What repeats of one movement differ by; None without repeats.
+    floor_std : float or None
+        Standard deviation of `after` less `floor` where nothing is missing: both are estimates.
+    open : Open or None
+        Where `after` exceeds the floor by more than these allow.
     """
 
     before: float | None
     calibrated: float | None
     after: float | None
     floor: float | None
+    floor_std: float | None = None
+    open: Open | None = None
 
     @property
     def closed(self) -> float | None:
@@ -343,7 +375,8 @@ class GapFound(Tabular):
             "verdict": self.verdict,
             "effects": [_without_none(dataclasses.asdict(e), keep=("joint", "channel")) for e in self.effects],
             "where": [dataclasses.asdict(w) for w in self.where],
-            "gap": {name: dataclasses.asdict(g) for name, g in self.gap.items()},
+            "gap": {name: gap_to_dict(g) for name, g in self.gap.items()},
+            "open": [{"channel": name, **dataclasses.asdict(g.open)} for name, g in self.gap.items() if g.open is not None],
             "would_have_seen": [dataclasses.asdict(w) for w in self.would_have_seen],
             "unexplained": {"share": self.unexplained, "looks_like": self.looks_like},
             "calibration": [dataclasses.asdict(a) for a in self.absorbed],
@@ -356,6 +389,11 @@ class GapFound(Tabular):
 
 def _complete(gap: ChannelGap) -> bool:
     return None not in (gap.before, gap.after, gap.floor)
+
+
+def gap_to_dict(gap: ChannelGap) -> dict[str, float | None]:
+    """Return the numbers of a channel's gap as they are written to JSON."""
+    return {key: value for key, value in vars(gap).items() if key != "open"}
 
 
 def _lack(lack: tuple[float, float]) -> dict[str, float | None]:

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ... import _armrs
 from ...catalogue import catalogue
 from ...io.dataset import Dataset
 from ...model import Contact, Effect, Joint, Model, Segment
 from . import maps
-from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Rung, Tried, Value
+from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Open, Rung, Tried, Value
 
 MISFIT = 6.0
 """Lack of fit beyond which something is left, in standard deviations of white rows.
@@ -30,10 +31,12 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
     """Return what the core found in a data set as objects."""
     together = tuple(_missing(item, dataset) for item in raw["named"])
     apart = tuple(_apart(item, dataset, raw) for item in raw["apart"])
-    effects = tuple(sorted((*together, *apart), key=lambda e: -e.share))
+    effects = tuple(sorted(map(_in_family, (*together, *apart, *_passive_base(raw))), key=lambda e: -e.share))
     (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
-    if after_z >= MISFIT and not (effects and share < _NEGLIGIBLE and after_ratio < _NEAR_NOISE):
+    gap = gaps(dataset, led, raw)
+    is_open = any(g.open is not None for g in gap.values())
+    if is_open or (after_z >= MISFIT and not (effects and share < _NEGLIGIBLE and after_ratio < _NEAR_NOISE)):
         verdict = "unexplained"
         # An interval rests on the structure, and that was rejected.
         effects = tuple(_without_intervals(effect) for effect in effects)
@@ -43,7 +46,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         verdict=verdict,
         effects=effects,
         where=maps.places(maps.discrepancies(dataset, led, raw["trials"], "calibrated")),
-        gap=gaps(dataset, led, raw),
+        gap=gap,
         would_have_seen=_limits(raw),
         unexplained=min(share, 1.0) if verdict == "unexplained" or effects else 0.0,
         looks_like=maps.shape(maps.discrepancies(dataset, led, raw["trials"], "amended")) if verdict == "unexplained" else None,
@@ -55,6 +58,10 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         dataset=dataset,
         raw=raw,
     )
+
+
+def _in_family(effect: Missing) -> Missing:
+    return dataclasses.replace(effect, family=catalogue()[effect.kind].family, decided=not effect.alternatives)
 
 
 def _without_intervals(effect: Missing) -> Missing:
@@ -97,6 +104,22 @@ def _missing(item: Mapping[str, Any], dataset: Dataset) -> Missing:
     return Missing(name, *kind.place(index), parameters, item["p_value"], item["share"], tuple(alternatives))
 
 
+def _passive_base(raw: Mapping[str, Any]) -> list[Missing]:
+    """Return the laws of joints that the model left without one."""
+    everything = raw["explained"]
+    if not math.isfinite(everything):
+        everything = sum(gain for *_, gain, _ in raw["base"])
+    effects = []
+    for (name, index, values), sd, gain, chance in raw["base"]:
+        kind = catalogue()[name]
+        known = dict(sd)
+        parameters = {
+            p.name: Value.of(v, known.get(k), p.unit, (p.min, p.max)) for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
+        }
+        effects.append(Missing(name, *kind.place(index), parameters, chance, min(gain / max(everything, gain), 1.0)))
+    return effects
+
+
 def _apart(item: Sequence[Any], dataset: Dataset, raw: Mapping[str, Any]) -> Missing:
     """Return a rhythm, or what happened in one trial."""
     (name, index, values), sd, trial, (start, end), gain, rivals = item
@@ -114,7 +137,9 @@ def _apart(item: Sequence[Any], dataset: Dataset, raw: Mapping[str, Any]) -> Mis
     )
     explained = gain + raw["calibrated"]["cost"] - raw["amended"]["cost"]
     chance = math.exp(-min(gain / 2.0, 700.0))
-    where, span = (None, None) if trial is None else (dataset.trials[trial].file, (float(start), float(end)))
+    where, span = (
+        (None, None) if trial is None else (dataset.trials[trial].file, (float(start), min(float(end), float(dataset.trials[trial].t[-1]))))
+    )
     return Missing(name, *kind.place(index), parameters, chance, gain / explained, alternatives, where, span)
 
 
@@ -147,11 +172,15 @@ def _rung(tried: Sequence[Any], before: float, after: float) -> Rung:
 def absorbed(dataset: Dataset, raw: Mapping[str, Any]) -> tuple[Absorbed, ...]:
     """Return what was refitted, from the core's list of unknowns."""
     items = []
+    modelled = dataset.model.all_effects
     for what, index, part, value, before, _after in raw["unknowns"]:
         if what in ("mass", "com", "inertia"):
             items.append(Absorbed(f"{what} of segment {index + 1}", value, 2 * before, "of its value"))
         elif what == "known":
-            own = dataset.model.all_effects[index]
+            if index >= len(modelled):
+                # A law of the passive base, which is named.
+                continue
+            own = modelled[index]
             parameter = catalogue()[own.kind].parameters[part]
             name = f"{parameter.name} of {_worded(own.kind, own.joint, own.channel)}"
             given = own.parameters.get(parameter.name, parameter.default)
@@ -233,9 +262,11 @@ def gaps(dataset: Dataset, led: bool, raw: Mapping[str, Any], last: str = "amend
     tests = [k for k, t in enumerate(dataset.trials) if t.role == "test"]
     plays = [raw["trials"][k] for k in tests]
     result = {}
+    tested = held_out(dataset, raw["trials"], raw["groups"], last)
     for c, name in enumerate(channel_names(dataset, led)):
         given, calibrated, after = (size(plays, version, c) for version in ("given", "calibrated", "amended"))
-        result[name] = ChannelGap(given, calibrated, after, _floor(dataset, raw, c, last))
+        floor, floor_std, opened = tested[c] if tested else (None, None, None)
+        result[name] = ChannelGap(given, calibrated, after, floor, floor_std, opened)
     if not led:
         for j in range(dataset.model.n_joints):
             given, calibrated, after = (_free_size(dataset, raw, version, j) for version in ("given", "calibrated", "amended"))
@@ -261,29 +292,24 @@ def size(plays: Sequence[Mapping[str, Any]], version: str, channel: int) -> floa
     return float(np.sqrt(np.mean(np.square(np.concatenate(rows))))) if rows and sum(map(len, rows)) else None
 
 
-def _floor(dataset: Dataset, raw: Mapping[str, Any], channel: int, version: str) -> float | None:
-    """Return what test trials differ by from repeats of them, after their own simulated differences; None without repeats.
+def held_out(
+    dataset: Dataset, plays: Sequence[Mapping[str, Any]], groups: Sequence[int], version: str
+) -> list[tuple[float | None, float | None, Open | None]]:
+    """Return floor, its standard deviation and where the gap is open, for each channel; nothing where no trial can be simulated.
 
-    Their own noise, and not that of all trials: it is in what is left on them as well, so that the difference of both means something.
-    Where no test trial has a repeat, what the repeats of other movements differ by.
+    The floor is what test trials differ by from repeats of them, after their own simulated differences: their own noise, and not that of
+    all trials, for it is in what is left on them as well. Where no test trial has a repeat, what the repeats of other movements differ by.
     """
-    groups = np.asarray(raw["groups"])
-    known = np.array([trial[version] is not None for trial in raw["trials"]])
-    test = np.array([trial.role == "test" for trial in dataset.trials])
-    for of in (test, ~test):
-        square, count = 0.0, 0
-        for group in np.unique(groups[of & known]):
-            members = np.flatnonzero((groups == group) & known)
-            n = len(members)
-            if n < 2:
-                continue
-            length = min(len(dataset.trials[k]) for k in members)
-            rows = np.array([(raw["trials"][k]["measured"] - raw["trials"][k][version])[:length, channel] for k in members])
-            valid = np.all([raw["trials"][k]["counted"][:length] for k in members], axis=0)
-            # The mean took one of n parts of the freedom.
-            deviation = math.sqrt(n / (n - 1)) * (rows - rows.mean(axis=0))[of[members]][:, valid]
-            square += float(np.sum(deviation**2))
-            count += deviation.size
-        if count:
-            return math.sqrt(square / count)
-    return None
+    columns = []
+    for trial, play, group in zip(dataset.trials, plays, groups, strict=True):
+        shown = play.get(version)
+        left = None if shown is None else np.ascontiguousarray((play["measured"] - shown).T).tolist()
+        columns.append((group, trial.role == "test", trial.rate, left, play["counted"].tolist()))
+    result = []
+    for _, floor, floor_std, opened in _armrs.held_out(columns):
+        place = None
+        if opened is not None:
+            number, start, end, size = opened
+            place = Open(dataset.trials[number].file, start, end, size if math.isfinite(size) else None)
+        result.append((floor, floor_std, place))
+    return result

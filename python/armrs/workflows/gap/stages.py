@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ from ...io.dataset import Dataset, load_dataset, naming_trials
 from ...model import Contact, Model, Robot
 from ...report.plain import data_of, origin
 from . import maps, reading, suspicion
-from .found import Absorbed, ChannelGap, GapFound, Place, Suspect
+from .found import Absorbed, ChannelGap, GapFound, Place, Suspect, gap_to_dict
 from .search import core_settings, core_trials
 
 Source = Dataset | str | os.PathLike[str]
@@ -72,7 +73,7 @@ class Calibrated:
         """Return the result as it is written to JSON."""
         return {
             "verb": "gap --quick",
-            "gap": {name: dict(vars(g)) for name, g in self.gap.items()},
+            "gap": {name: gap_to_dict(g) for name, g in self.gap.items()},
             "suspects": [dict(vars(s)) for s in self.suspects],
             "calibration": [dict(vars(a)) for a in self.absorbed],
             "lack_of_fit": {"calibrated": {"ratio": self.lack[0], "z": self.lack[1]}},
@@ -163,7 +164,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
     Returns
     -------
     dict of ChannelGap
-        By channel; `floor` is that of the result.
+        By channel; `floor` is that of the result, and `open` says where these trials exceed what their own repeats differ by.
     """
     data = result.dataset if dataset is None else _loaded(dataset, result.dataset.model)
     led = reading.is_led(data)
@@ -176,10 +177,16 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
         "calibrated": _armrs.play(as_fitted(model, raw["calibrated"]), columns, settings, own=True),
         "amended": _armrs.play(as_fitted(model, raw["amended"], raw["rhythms"]), columns, settings, own=True),
     }
+    configurations = sorted({t.configuration for t in data.trials})
+    groups = [configurations.index(t.configuration) for t in data.trials]
+    tests_only = data.replace(trials=tuple(dataclasses.replace(t, role="test") for t in data.trials))
+    tested = reading.held_out(tests_only, plays["amended"], groups, "given")
     gap = {}
     for c, name in enumerate(reading.channel_names(data, led)):
         size = {version: reading.size(listed, "given", c) for version, listed in plays.items()}
-        gap[name] = ChannelGap(size["given"], size["calibrated"], size["amended"], result.gap[name].floor)
+        known = result.gap[name]
+        opened = tested[c][2] if tested else None
+        gap[name] = ChannelGap(size["given"], size["calibrated"], size["amended"], known.floor, known.floor_std, opened)
     return gap
 
 

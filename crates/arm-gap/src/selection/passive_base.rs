@@ -1,0 +1,403 @@
+//! The passive base of an arm: the laws of joints that the model leaves without one, identified from measured motion before
+//! anything is simulated.
+//!
+//! A rigid model of literature values cannot follow a person: its free wrist falls. What every passive joint may have, springs with
+//! a rest angle, viscosity and dry friction ([`arm_core::effect::Probe::passive`]), is linear in the equation of motion of the
+//! measured angles, and is identified there together with the segments. The closed chain is simulated from that on. Its numbers
+//! stay free with every question, and are judged last.
+
+use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
+use arm_ident::inference::joint_method::{MotionSource, Options, identify};
+use arm_ident::regression::trial::{Model, Role};
+use arm_ident::regression::unknown::Source;
+
+use crate::GapError;
+use crate::data::prepared_session::PreparedSession;
+use crate::data::session::Session;
+use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::selection::fit::Fitted;
+use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
+use crate::selection::search::Settled;
+use crate::sensitivity::linearization_point::LinearizationPoint;
+
+/// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
+const LIKELY: f64 = 2.0;
+/// Square of the same beyond which a law stays once it was refitted by simulation: 2 standard deviations,
+const STAYS: f64 = 4.0;
+/// and beyond which it is named: with nine such laws an arm without any has one false name in two hundred sessions.
+pub const NAMED: f64 = 12.0;
+/// Part of the whole arm's weight moment that each joint's typical sizes are read off at least: muscles that cross a wrist are made
+/// for more than the weight of a hand.
+const OF_THE_ARM: f64 = 0.3;
+/// Standard deviation of a rest angle about the middle of the angles that were reached \[rad\].
+const REST_SD: f64 = 1.0;
+/// Distance between the two rest angles at which a spring is regressed \[rad\].
+const APART: f64 = 6.0;
+/// Times that laws are dropped and the others refitted.
+const TURNS: usize = 4;
+/// Furthest start of a segment from its literature values, in standard deviations.
+const FURTHEST_START: f64 = 3.0;
+
+/// A law of a joint that the model leaves without one.
+#[derive(Clone, Debug)]
+pub struct Passive {
+    /// The law as it was identified from measured motion.
+    pub effect: Effect<f64>,
+    /// Its numbers that are fitted.
+    pub free: Vec<Free>,
+}
+
+/// A number of a law, with what is known of it beforehand.
+#[derive(Clone, Copy, Debug)]
+pub struct Free {
+    /// Its position among the parameters.
+    pub parameter: usize,
+    /// Value expected.
+    pub mean: f64,
+    /// Standard deviation: the typical size that follows from the weight of the arm.
+    pub sd: f64,
+    /// Smallest value allowed.
+    pub lower: f64,
+    /// A change that is small and yet seen.
+    pub step: f64,
+}
+
+/// A law of the passive base as it was judged.
+#[derive(Clone, Debug)]
+pub struct Term {
+    /// Its place among the known effects.
+    pub known: usize,
+    /// Square of its first parameter in standard deviations.
+    pub gain: f64,
+    /// Standard deviations of its free parameters.
+    pub sd: Vec<(usize, f64)>,
+}
+
+/// What a joint law is asked with in the regression: one column, or two with a rest angle.
+struct Column {
+    joint: usize,
+    kind: Kind,
+    rest: Option<usize>,
+}
+
+impl<const N: usize> Session<N> {
+    /// The same session with the passive base of joints without any law, as measured motion has it.
+    ///
+    /// Where the regression cannot be made the session stays as it is, and the search starts from the model as given.
+    pub fn with_base(mut self) -> Self {
+        let joints: Vec<usize> = (0..N).filter(|&j| !self.has_law(j)).collect();
+        let forces = self.trials.iter().all(|t| t.force_on_arm.is_some());
+        if joints.is_empty() || !forces || self.swings_freely() {
+            return self;
+        }
+        let (columns, fitted) = self.columns(&joints);
+        let model = Model {
+            chain: self.chain,
+            segment_uncertainty: self.segment_uncertainty,
+            fitted,
+            held: self.effects.clone(),
+            contact: self.contact,
+        };
+        let options = Options {
+            motion: MotionSource::Measured,
+            tolerance: self.tolerance,
+            ..Options::default()
+        };
+        let Ok(found) = identify(&model, &self.trials, &options) else {
+            return self;
+        };
+        let estimate = |place: usize| {
+            let own = |e: &&arm_ident::inference::estimate::Estimate| {
+                e.source == Some(Source::Effect(place, 0))
+            };
+            let e = found.parameters.iter().find(own);
+            e.map_or((0.0, f64::INFINITY), |e| (e.value, e.std))
+        };
+        let mut place = 0;
+        for column in &columns {
+            let (value, sd) = estimate(place);
+            let effect = model.fitted[place];
+            let mut passive = self.passive(effect, column);
+            place += 1;
+            let mut size = value;
+            if let Some(rest) = column.rest {
+                let (second, _) = estimate(place);
+                let beyond = model.fitted[place].parameters[rest] - effect.parameters[rest];
+                place += 1;
+                size += second;
+                if size > 0.0 {
+                    let moved = effect.parameters[rest] + second * beyond / size;
+                    let middle = effect.parameters[rest];
+                    passive.effect.parameters[rest] =
+                        moved.clamp(middle - 2.0 * REST_SD, middle + 2.0 * REST_SD);
+                }
+            }
+            passive.effect.parameters[0] = size;
+            if size > 0.0 && size > LIKELY * sd {
+                self.base.push(passive);
+            }
+        }
+        let (chain, nominal) = (found.chain, self.chain);
+        for k in 0..N {
+            let (own, given) = (&chain.segments()[k], &nominal.segments()[k]);
+            let ratio = |own: f64, given: f64| if given > 0.0 { own / given - 1.0 } else { 0.0 };
+            let far = FURTHEST_START * self.segment_uncertainty;
+            self.start[k] = [
+                ratio(own.mass, given.mass),
+                ratio(own.com[0], given.com[0]),
+                ratio(own.inertia, given.inertia),
+            ]
+            .map(|change| change.clamp(-far, far));
+        }
+        self
+    }
+
+    /// Whether the model has a law of a joint.
+    fn has_law(&self, joint: usize) -> bool {
+        self.effects.iter().any(|e| {
+            let crosses = usize::from(e.kind.crosses());
+            let here = e.index == joint || e.index == joint + crosses;
+            let law = !matches!(e.kind.family(), Family::Segment | Family::Muscle);
+            e.kind.info().place == Place::Joint && here && law
+        })
+    }
+
+    /// The columns of the regression, and the effects that they are the linear parameters of.
+    fn columns(&self, joints: &[usize]) -> (Vec<Column>, Vec<Effect<f64>>) {
+        let (mut columns, mut effects) = (Vec::new(), Vec::new());
+        for &joint in joints {
+            for &kind in KINDS.iter().filter(|k| k.probe().passive) {
+                let rest = kind.probe().questions.first().and_then(|q| q.rest);
+                let mut effect = Effect::<f64>::new(kind, joint);
+                effect.parameters[0] = 0.0;
+                if let Some(rest) = rest {
+                    let middle = self.middle(joint);
+                    effect.parameters[rest] = middle;
+                    effects.push(effect);
+                    effect.parameters[rest] += if middle > 0.0 { -APART } else { APART };
+                }
+                effects.push(effect);
+                columns.push(Column { joint, kind, rest });
+            }
+        }
+        (columns, effects)
+    }
+
+    /// The middle of the angles that a joint reached in the fit trials \[rad\].
+    fn middle(&self, joint: usize) -> f64 {
+        let trials = self.trials.iter().filter(|t| t.role == Role::Fit);
+        let angles = trials.flat_map(|t| &t.q).map(|q| q[joint]);
+        let (low, high) = angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
+            (f64::min(a, q), f64::max(b, q))
+        });
+        0.5 * (low + high)
+    }
+
+    /// A law with what is known of its numbers beforehand.
+    fn passive(&self, effect: Effect<f64>, column: &Column) -> Passive {
+        /// Change of a law's size that a response is taken with, as a share of its typical size.
+        const STEP: f64 = 0.01;
+        let sd = column.kind.probe().typical * self.weight_moment(column.joint);
+        let size = Free {
+            parameter: 0,
+            mean: 0.0,
+            sd,
+            lower: 0.0,
+            step: STEP * sd,
+        };
+        let rest = column.rest.map(|parameter| Free {
+            parameter,
+            mean: effect.parameters[parameter],
+            sd: REST_SD,
+            lower: f64::NEG_INFINITY,
+            step: 1e-3,
+        });
+        Passive {
+            effect,
+            free: std::iter::once(size).chain(rest).collect(),
+        }
+    }
+
+    /// The weight moment that typical sizes of a joint are read off \[N m\]: of all segments from that joint on, stretched out.
+    pub fn weight_moment(&self, joint: usize) -> f64 {
+        let [y, z] = self.chain.gravity();
+        let g = libm::sqrt(y * y + z * z);
+        let beyond = |joint: usize| {
+            let mut reach = 0.0;
+            let mut sum = 0.0;
+            for segment in &self.chain.segments()[joint..] {
+                sum += segment.mass * g * (reach + segment.com[0]);
+                reach += segment.length;
+            }
+            sum
+        };
+        f64::max(beyond(joint), OF_THE_ARM * beyond(0))
+    }
+}
+
+impl<'a, const N: usize> PreparedSession<'a, N> {
+    /// The laws of the base that are not dropped, as they stand in a fitted hypothesis.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::precision`].
+    pub fn base_terms(
+        &self,
+        anchor: &LinearizationPoint<N>,
+        fitted: &Fitted<N>,
+        scale: f64,
+    ) -> Result<Vec<Term>, GapError> {
+        let mut precision = self.precision(anchor, fitted, scale)?;
+        let first = self.session.effects.len();
+        let sizes = |known: usize| fitted.hypothesis.known[known].parameters[0];
+        let mut terms = Vec::new();
+        for b in (0..self.session.base.len()).filter(|&b| !self.dropped[b]) {
+            let known = first + b;
+            let of = |target: Target| match target {
+                Target::Known(e, p) if e == known => Some(p),
+                _ => None,
+            };
+            let own = std::iter::zip(&precision.coordinates, &mut precision.sd);
+            let sd: Vec<(usize, f64)> = own
+                .filter_map(|(c, sd)| Some((of(c.target)?, *sd)))
+                .collect();
+            let ratio = sd
+                .iter()
+                .find(|(p, _)| *p == 0)
+                .map_or(0.0, |(_, sd)| sizes(known) / sd);
+            terms.push(Term {
+                known,
+                gain: ratio * ratio,
+                sd,
+            });
+        }
+        Ok(terms)
+    }
+
+    /// Drops the weakest law of each joint that gains less than asked for; whether there was one.
+    fn dropped_weak(&mut self, terms: &[Term], least: f64) -> bool {
+        let first = self.session.effects.len();
+        let joint = |t: &Term| self.session.base[t.known - first].effect.index;
+        let mut weak = Vec::new();
+        for j in 0..N {
+            let own = terms.iter().filter(|t| joint(t) == j && t.gain < least);
+            weak.extend(
+                own.min_by(|a, b| a.gain.total_cmp(&b.gain))
+                    .map(|t| t.known - first),
+            );
+        }
+        for &b in &weak {
+            self.dropped[b] = true;
+        }
+        !weak.is_empty()
+    }
+
+    /// Calibrates with the passive base: what measured motion suggested and the simulation does not need is dropped.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::calibrate`].
+    pub(crate) fn calibrate_base(&mut self) -> Result<Settled<'a, N>, GapError> {
+        let mut settled = self.calibrate()?;
+        for _ in 0..TURNS {
+            let terms = self.base_terms(&settled.1, &settled.0, 1.0)?;
+            self.start = Some(settled.0.hypothesis.clone());
+            if !self.dropped_weak(&terms, STAYS) {
+                break;
+            }
+            self.read_anew()?;
+            settled = self.calibrate()?;
+        }
+        if !self.session.base.is_empty() {
+            self.start = Some(settled.0.hypothesis.clone());
+        }
+        Ok(settled)
+    }
+
+    /// Chooses the samples and reads the noise anew from where the next calibration starts.
+    fn read_anew(&mut self) -> Result<(), GapError> {
+        let anchor = self.linearize(&self.given())?;
+        self.leave_out_rest(&anchor);
+        let anchor = self.linearize(&self.given())?;
+        self.measure_noise(&anchor)
+    }
+
+    /// Judges the base once everything is named: laws that do not earn their names are dropped one after the other, and the rest is
+    /// refitted.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::settle`].
+    pub(crate) fn judged_base(
+        &mut self,
+        mut settled: Settled<'a, N>,
+        scale: f64,
+    ) -> Result<(Settled<'a, N>, Vec<Term>), GapError> {
+        loop {
+            let terms = self.base_terms(&settled.1, &settled.0, scale)?;
+            if !self.dropped_weak(&terms, NAMED) {
+                return Ok((settled, terms));
+            }
+            let (fitted, _) = settled;
+            let start = self.without_dropped(fitted.hypothesis);
+            settled = self.settle(start, fitted.asked)?;
+        }
+    }
+
+    /// A hypothesis in which dropped laws do nothing.
+    pub(crate) fn without_dropped(&self, mut hypothesis: Hypothesis<N>) -> Hypothesis<N> {
+        let first = self.session.effects.len();
+        for (b, _) in self.dropped.iter().enumerate().filter(|(_, d)| **d) {
+            hypothesis.known[first + b].parameters[0] = 0.0;
+        }
+        hypothesis
+    }
+
+    /// Where calibration starts: the model as given with its base, or where the base was calibrated.
+    pub(crate) fn given(&self) -> Hypothesis<N> {
+        let start = match &self.start {
+            Some(start) => start.clone(),
+            None => self.session.starting(),
+        };
+        self.without_dropped(start)
+    }
+
+    /// The model as given, refitted without its base, and what it leaves; `None` where there is no base.
+    ///
+    /// Where it cannot be simulated the model as given stands for it, and what the laws of the base explain is its cost.
+    pub(crate) fn rigid(&self, base: &[Term]) -> Option<(Fitted<N>, LackOfFit)> {
+        if base.is_empty() {
+            return None;
+        }
+        let session = Session {
+            base: Vec::new(),
+            start: [[0.0; 3]; N],
+            ..self.session.clone()
+        };
+        let refitted = PreparedSession::with_noise(&session, self.noise.of_others(), self.threads)
+            .and_then(|study| study.settle(session.given(), Vec::new()))
+            .map(|(fitted, _)| fitted.hypothesis);
+        let mut hypothesis = refitted.unwrap_or_else(|_| session.given());
+        hypothesis.known = self.session.given().known;
+        for passive in &mut hypothesis.known[session.effects.len()..] {
+            passive.parameters[0] = 0.0;
+        }
+        let simulated = self.linearize(&hypothesis).and_then(|anchor| {
+            let fitted = self.state(&anchor, hypothesis.clone(), Vec::new())?;
+            let lack = lack_of_fit(self, &anchor, &fitted);
+            Ok((fitted, lack))
+        });
+        let alone: f64 = base.iter().map(|t| t.gain).sum();
+        Some(simulated.unwrap_or_else(|_| {
+            let lack = LackOfFit {
+                ratio: f64::INFINITY,
+                z: f64::INFINITY,
+                excess: alone,
+            };
+            let fitted = Fitted {
+                hypothesis,
+                asked: Vec::new(),
+                cost: f64::INFINITY,
+                residuals: Vec::new(),
+            };
+            (fitted, lack)
+        }))
+    }
+}
