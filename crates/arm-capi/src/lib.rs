@@ -1,12 +1,4 @@
-//! The C interface of `arm-core` for firmware. `include/armrs.h` is generated from it by cbindgen.
-//!
-//! Every function returns an [`armrs_status`] and writes its result through a pointer; nothing is allocated, nothing is
-//! kept between calls but in the structs that the caller owns. Structs that hold a state are opaque storage of fixed size,
-//! are made by their `_init` function, and are refused before. The only `unsafe` code of the firmware side lives here: it
-//! turns pointers into references and storage into state.
-//!
-//! One library serves one scalar and one arm: `armrs_real` is `double`, or `float` with the feature `single`; arms have three
-//! joints, or two with `two-joints`. In C the macros `ARMRS_SINGLE` and `ARMRS_TWO_JOINTS` say the same to the header.
+#![doc = include_str!("../README.md")]
 #![no_std]
 
 #[cfg(not(any(target_os = "none", target_os = "unknown")))]

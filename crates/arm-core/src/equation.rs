@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::effect::{ActsOn, Effect, Motion, Place, resisting_torque};
+use crate::effect::{ActsOn, Effect, Motion, Place, advance_states, resisting_torque};
 use crate::scalar::Real;
 use crate::{
     Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, regressor, static_torque,
@@ -261,19 +261,9 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     }
 
     /// The states of the effects one period later, the motion taken as constant in it.
-    ///
-    /// Linearly implicit Euler (Rosenbrock 1963): all laws are linear in their state and forget it, so that no period and no
-    /// speed makes a state run away.
+    /// No period and no speed makes a state run away, see [`advance_states`].
     pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [T; E], period: T) {
-        for (effect, state) in self.effects.iter().zip(memory) {
-            if effect.on && effect.kind.info().memory {
-                let [at_zero, at_one] =
-                    [T::ZERO, T::ONE].map(|s| effect.memory_rate(&motion.local(effect.index, s)));
-                let slope = at_one - at_zero;
-                let rate = at_zero + slope * *state;
-                *state += rate * period / (T::ONE - slope * period);
-            }
-        }
+        advance_states(&self.effects, (motion, motion), memory, period);
     }
 
     fn inertial(

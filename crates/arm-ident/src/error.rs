@@ -8,7 +8,7 @@ pub enum IdentError {
     #[error(transparent)]
     Numerics(#[from] arm_numerics::NumericsError),
     /// The constrained problem has no usable solution.
-    #[error("the fit has no solution: {status:?}")]
+    #[error("the fit has no solution: {}", .status.name())]
     NoSolution {
         /// How the solver ended.
         status: arm_numerics::least_squares::outcome::Status,
@@ -21,7 +21,7 @@ pub enum IdentError {
         /// Movements tried.
         evaluations: usize,
         /// What the movement that comes nearest still exceeds when it is slowed as far as may be.
-        nearest: crate::experiment_design::design::Excess,
+        nearest: crate::experiment_design::limit::Excess,
     },
     /// The simulated arm moves elsewhere than the measured one.
     #[error(

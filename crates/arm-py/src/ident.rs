@@ -2,7 +2,7 @@
 
 use arm_core::effect::{Effect, Place};
 use arm_core::{Chain, Joints};
-use arm_ident::inference::estimate::{Estimate, Explained, Identified};
+use arm_ident::inference::estimate::{Estimate, Explained, Identified, Quantity};
 use arm_ident::inference::joint_method::{MotionSource, Options};
 use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
 use arm_ident::regression::unknown::Source;
@@ -216,12 +216,13 @@ fn outcome<'py, const N: usize>(
     result: &Identified<N>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    out.set_item("status", format!("{:?}", result.status).to_lowercase())?;
+    out.set_item("status", result.status.name())?;
     out.set_item("rank", result.rank)?;
     out.set_item("unknowns", result.unknowns)?;
     out.set_item("scale_free", result.scale_free)?;
     out.set_item("cutoff", result.cutoff)?;
     out.set_item("clusters", result.clusters)?;
+    out.set_item("neglected_inertia", &result.neglected_inertia)?;
     out.set_item("speed_noise", &result.speed_noise)?;
     out.set_item(
         "speed_noise_allowed",
@@ -273,15 +274,20 @@ fn estimate<'py>(
     e: &Estimate,
     fitted: &[Effect<f64>],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (name, kind) = match e.source {
-        Some(Source::Effect(i, p)) => {
+    let own = e.name.as_str();
+    let (name, kind) = match e.quantity {
+        Quantity::Unknown(Source::Effect(i, p)) | Quantity::EffectParameter(i, p) => {
             let info = fitted[i].kind.info();
             (info.parameters[p].name, info.kind)
         }
-        Some(Source::Calibration(_)) => (e.name.as_str(), "calibration"),
-        Some(Source::Segment(..)) => (e.name.as_str(), "segment"),
-        None if e.name.contains('+') => (e.name.as_str(), "combination"),
-        None => (e.name.as_str(), "segment"),
+        // "elastic1 stiffness*rest": the kind and the joint stand in fields of their own.
+        Quantity::Unknown(Source::RestTorque(i, _)) => (
+            own.split_once(' ').map_or(own, |(_, name)| name),
+            fitted[i].kind.info().kind,
+        ),
+        Quantity::Unknown(Source::Calibration(_)) => (own, "calibration"),
+        Quantity::Unknown(Source::Segment(..)) | Quantity::Segment => (own, "segment"),
+        Quantity::Combination => (own, "combination"),
     };
     let out = PyDict::new(py);
     out.set_item("name", name)?;

@@ -2,8 +2,9 @@
 
 use arm_core::{Chain, Joints, Shape};
 use arm_ident::IdentError;
-use arm_ident::experiment_design::design::{Allowed, Excess, design};
+use arm_ident::experiment_design::design::{Allowed, design};
 use arm_ident::experiment_design::forecast::{Accuracy, Forecast, Question, Task, forecast};
+use arm_ident::experiment_design::limit::Excess;
 use numpy::{PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

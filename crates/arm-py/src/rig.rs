@@ -1,6 +1,6 @@
 //! `Rig`: an arm with everything that acts on it, as the core computes with it.
 
-use arm_core::effect::{Effect, Motion, Place};
+use arm_core::effect::{Effect, Motion, Place, advance_states};
 use arm_core::{Chain, Contact, Joints, Pose, Robot, Setup, joint_force};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -94,6 +94,8 @@ struct Along<'a, const N: usize> {
     memory: Vec<f64>,
     interval: f64,
     time: f64,
+    /// Where the states stand.
+    last: Option<Motion<f64, N>>,
 }
 
 impl<'a, const N: usize> Along<'a, N> {
@@ -105,6 +107,7 @@ impl<'a, const N: usize> Along<'a, N> {
             memory,
             interval,
             time: 0.0,
+            last: None,
         }
     }
 
@@ -115,23 +118,20 @@ impl<'a, const N: usize> Along<'a, N> {
         qdd: &Joints<f64, N>,
         out: &mut [f64],
     ) {
-        const PARTS: usize = 10;
         let through = joint_force(self.chain, &Pose::new(q), (qd, qdd), [0.0; 2]);
         let mut motion = Motion::new(self.time, *q, *qd).with_joint_force(&through);
         motion.qdd = *qdd;
-        let step = self.interval / PARTS as f64;
-        for ((effect, memory), out) in self.effects.iter().zip(&mut self.memory).zip(out) {
+        if let Some(before) = self.last.replace(motion) {
+            let between = (&before, &motion);
+            advance_states(self.effects, between, &mut self.memory, self.interval);
+        }
+        for ((effect, memory), out) in self.effects.iter().zip(&self.memory).zip(out) {
             let joint = effect.kind.info().place == Place::Joint;
             *out = if joint {
                 effect.torque(&motion.local(effect.index, *memory))
             } else {
                 0.0
             };
-            if effect.kind.info().memory {
-                for _ in 0..PARTS {
-                    *memory += step * effect.memory_rate(&motion.local(effect.index, *memory));
-                }
-            }
         }
         self.time += self.interval;
     }

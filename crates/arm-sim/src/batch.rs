@@ -5,8 +5,8 @@ use std::mem::discriminant;
 use arm_core::effect::Effect;
 use arm_core::{Contact, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup};
 
-use crate::breaks::step_in_pieces;
-use crate::feed::{Ahead, Feed};
+use crate::discontinuities::step_in_pieces;
+use crate::input_buffer::{Ahead, InputBuffer};
 use crate::model::{Input, Link, Model, Plain, State};
 use crate::native::{PlainSteps, diverged};
 use crate::prepare::{Prepared, add_ripple, commands, has_ripple};
@@ -147,10 +147,13 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
             }
         };
     sample(0, &state, &memory.state, &stopped);
-    let (mut common, mut feed) = (Feed::new(integrator), Feed::new(integrator));
+    let (mut common, mut feed) = (InputBuffer::new(integrator), InputBuffer::new(integrator));
     let plain = first.plain().and_then(|_| model.plain());
     // Where the drive of any lane breaks, every lane makes its own step.
-    let mut broken: Vec<usize> = prepared.iter().flat_map(|p| p.breaks.steps()).collect();
+    let mut broken: Vec<usize> = prepared
+        .iter()
+        .flat_map(|p| p.discontinuities.steps())
+        .collect();
     broken.sort_unstable();
     broken.dedup();
     let mut broken = broken.into_iter().peekable();

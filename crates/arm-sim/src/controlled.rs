@@ -451,7 +451,13 @@ impl Supervisor {
             force,
         ];
         Ok(Self {
-            monitor: Monitor::new(channels, Times { oldest: period, period: 2 * period })?,
+            monitor: Monitor::new(
+                channels,
+                Times {
+                    oldest: period,
+                    period: 2 * period,
+                },
+            )?,
             period: controller.period,
             encoder_step: encoder_step(controller),
             seen: [required[0].q; 2],

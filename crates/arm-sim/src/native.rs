@@ -1,7 +1,7 @@
 //! The native engine: minimal coordinates, one run at a time.
 
-use crate::breaks::step_in_pieces;
-use crate::feed::{Ahead, Feed};
+use crate::discontinuities::step_in_pieces;
+use crate::input_buffer::{Ahead, InputBuffer};
 use crate::model::{Plain, State};
 use crate::prepare::Prepared;
 use crate::recorder::{Instant, Pieces, Recorder, Row};
@@ -35,10 +35,10 @@ pub(crate) fn run<const N: usize>(
         recorder.push(&row, |value| *value)
     };
     let mut wanted = sample(0, &state, &memory.state).is_continue();
-    let mut feed = Feed::new(prepared.integrator());
+    let mut feed = InputBuffer::new(prepared.integrator());
     let plain = prepared.plain();
     let mut stopped = None;
-    let mut broken = prepared.breaks.steps().peekable();
+    let mut broken = prepared.discontinuities.steps().peekable();
     let (mut done, mut sampled) = (0, 0);
     while wanted && done < schedule.steps {
         let next = done + 1;

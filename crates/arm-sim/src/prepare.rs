@@ -6,7 +6,7 @@ use std::ops::Range;
 use arm_core::effect::{Effect, Place};
 use arm_core::{Joints, Scalar, Setup};
 
-use crate::breaks::Breaks;
+use crate::discontinuities::Discontinuities;
 use crate::model::{Input, Link, Model, Plain};
 use crate::{
     Coupling, Drive, Experiment, Handle, HandlePath, Integrator, JointMotion, SimulationError,
@@ -102,7 +102,7 @@ pub(crate) struct Prepared<'a, const N: usize> {
     pub model: Model<f64, N>,
     pub schedule: Schedule,
     /// Where the drive is not smooth.
-    pub breaks: Breaks,
+    pub discontinuities: Discontinuities,
     /// Angles and speeds at the start.
     pub start: (Joints<f64, N>, Joints<f64, N>),
     /// Commanded robot motion at each sample, where it is kept; empty without a robot.
@@ -137,7 +137,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
             setup,
             model,
             schedule,
-            breaks: Breaks::of(experiment, &schedule),
+            discontinuities: Discontinuities::of(experiment, &schedule),
             start: (Joints::zeros(), Joints::zeros()),
             robot,
         };

@@ -85,7 +85,7 @@ class Identified(Tabular):
     ----------
     method : {"joint", "cascade"}
     status : str
-        How the solver ended: "solved", "almostsolved".
+        How the solver ended: "solved", "almost_solved".
     rank, unknowns : int
         How many combinations of the unknowns the data determine.
     parameters : tuple of Estimate
@@ -286,6 +286,7 @@ def _result(
             *_beyond_segment(model, parameters),
             *(f"{line}: what the model lacks may be in it" for line in _beyond_tolerance(calibration, dataset.tolerance, _FAR, _BEYOND)),
             *noisy,
+            *_not_quasi_static(raw["neglected_inertia"]),
         ),
         left_out=(*follows, *_left_out(method, effects), *_unmoved(method, parameters)),
         trades=tuple(raw["trades"]),
@@ -313,6 +314,20 @@ def _identified(
         why = str(error).split(":")[0] if "differs from" in str(error) else "the arm cannot be simulated"
     raw = _armrs.identify(built, columns, settings | {"motion": "measured"})
     return raw, (f"speeds and accelerations are measured, not simulated: with what the model has {why}",)
+
+
+_INERTIA_FELT = 1.0
+"""Standard deviations by which neglected inertia may move a first moment before it is reported: as much as everything else together."""
+
+
+def _not_quasi_static(moved: Sequence[float]) -> list[str]:
+    """Return a line for each joint whose first moment the inertia that the cascade neglects moves noticeably."""
+    return [
+        f"not quasi-static: inertia, which the cascade neglects, moves the first moment of joint {j} by {shift:.1f} standard deviations; "
+        "its interval allows for that, the joint method does without"
+        for j, shift in enumerate(moved, 1)
+        if shift > _INERTIA_FELT
+    ]
 
 
 LEVELS: dict[str, Any] = {"least": 0.5, "most": 0.999999}
@@ -365,7 +380,7 @@ def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dic
 
 
 _FAR = 2.0
-"""A calibration this many times its tolerance, four standard deviations of what was believed beforehand, stands for something else."""
+"""A calibration this many times its tolerance, which is its standard deviation beforehand, may stand for something else."""
 _BEYOND = 5.0
 """A calibration this many times its tolerance is no calibration."""
 _POOR = 0.2

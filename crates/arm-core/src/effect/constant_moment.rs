@@ -14,6 +14,7 @@ impl Law for ConstantMoment {
         parameters: &[Parameter::linear("moment", "N m", -100.0, 100.0, 0.0)],
         memory: false,
     };
+    const RATE_INDEPENDENT: bool = true;
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, _at: &Local<T>) -> T {

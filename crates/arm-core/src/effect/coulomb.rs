@@ -21,6 +21,7 @@ impl Law for Coulomb {
         ],
         memory: false,
     };
+    const RATE_INDEPENDENT: bool = true;
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03).in_family(Family::Dry).typically(0.1).passive();
 
     #[inline]

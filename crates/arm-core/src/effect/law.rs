@@ -180,6 +180,8 @@ pub trait Law {
     const FEELS_FORCE: bool = false;
     /// What it acts on.
     const ACTS_ON: ActsOn = ActsOn::at(Self::INFO.place);
+    /// Whether its torque is a constant, or one whose sign alone follows the motion: what a quasi-static analysis can find.
+    const RATE_INDEPENDENT: bool = false;
     /// How a search asks for it.
     const PROBE: Probe = Probe::FIRST;
 

@@ -12,12 +12,14 @@ mod law;
 #[cfg_attr(not(feature = "own"), path = "own_absent.rs")]
 mod own;
 mod probe;
+mod state;
 
 pub use law::{ActsOn, Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
 pub use own::Own;
 #[cfg(feature = "own")]
 pub use own::OwnLaw;
 pub use probe::{Family, Nature, Probe, Promise, Question, Values};
+pub use state::{advance_states, any_state};
 
 use crate::{Chain, Contact, Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
 
@@ -61,6 +63,10 @@ macro_rules! catalogue {
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::CROSSES,)* Self::Own(_) => false }
+            }
+            /// Whether its torque is a constant, or one whose sign alone follows the motion.
+            pub const fn is_rate_independent(self) -> bool {
+                match self { $(Self::$law => <$module::$law as Law>::RATE_INDEPENDENT,)* Self::Own(_) => false }
             }
             /// Whether it depends on the force through the joint.
             pub fn feels_force(self) -> bool {

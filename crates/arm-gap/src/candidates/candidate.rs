@@ -1,7 +1,7 @@
 //! The questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
 
 use arm_core::effect::{
-    Effect, Kind, Local, Motion, Nature, Place, Question, Values, resisting_torque,
+    Effect, Kind, Local, Motion, Nature, Place, Question, Values, advance_states, resisting_torque,
 };
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 
@@ -9,7 +9,6 @@ use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::measurement_model::internal_state;
 use crate::sensitivity::linearization_point::{Change, LinearizationPoint, Response};
 
 /// Share of a joint's torque that an effect has in the change with which its response is taken.
@@ -508,7 +507,7 @@ fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate)
         let mut before: Option<&Motion<f64, N>> = None;
         for at in &movement.motion {
             if let Some(from) = before.replace(at) {
-                internal_state::advance(&[effect], (from, at), &mut memory, movement.interval);
+                advance_states(&[effect], (from, at), &mut memory, movement.interval);
             }
             let torque = resisting_torque(&[effect], at, &memory)[joint];
             square += torque * torque;

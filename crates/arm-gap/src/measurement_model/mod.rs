@@ -2,5 +2,4 @@
 
 pub mod hypothesis;
 pub mod in_trial;
-pub mod internal_state;
 pub mod prediction;

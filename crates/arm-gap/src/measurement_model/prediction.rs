@@ -1,8 +1,8 @@
 //! What the channels would read if a hypothesis were true.
 
-use arm_core::effect::{Effect, Motion, Place, resisting_torque};
+use arm_core::effect::{Effect, Motion, Place, advance_states, resisting_torque};
 use arm_core::{Joints, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque};
-use arm_ident::regression::equation::Kinematics;
+use arm_ident::regression::kinematics::Kinematics;
 use arm_ident::regression::measured_motion::{is_quiet, low_pass, measured, relative_speed_noise};
 use arm_ident::regression::trial::Trial;
 use arm_sim::{
@@ -12,7 +12,6 @@ use arm_sim::{
 use crate::GapError;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
-use crate::measurement_model::internal_state;
 
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
 pub type Channels = Vec<Vec<f64>>;
@@ -343,7 +342,7 @@ impl<const N: usize> Session<N> {
             let mut at = Motion::new(time, q, qd).with_joint_force(&through);
             at.qdd = qdd;
             if let Some(from) = before.replace(at) {
-                internal_state::advance(&effects, (&from, &at), &mut states, 1.0 / course.rate);
+                advance_states(&effects, (&from, &at), &mut states, 1.0 / course.rate);
             }
             let torque = inverse_dynamics(&chain, &pose, &qd, &qdd)
                 + resisting_torque(&effects, &at, &states);

@@ -7,6 +7,7 @@
 //! stay free with every question, and are judged last.
 
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
+use arm_ident::inference::estimate::{Estimate, Quantity};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::regression::trial::{Model, Role};
 use arm_ident::regression::unknown::Source;
@@ -107,9 +108,7 @@ impl<const N: usize> Session<N> {
             return self;
         };
         let estimate = |place: usize| {
-            let own = |e: &&arm_ident::inference::estimate::Estimate| {
-                e.source == Some(Source::Effect(place, 0))
-            };
+            let own = |e: &&Estimate| e.quantity == Quantity::Unknown(Source::Effect(place, 0));
             let e = found.parameters.iter().find(own);
             e.map_or((0.0, f64::INFINITY), |e| (e.value, e.std))
         };

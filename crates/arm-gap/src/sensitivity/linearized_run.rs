@@ -7,7 +7,7 @@
 //! The same scheme, with Newton's method in every step, follows a change that is not small ([`Linear::play`]): what it
 //! gives is the run itself and, on top, what two coarse solutions differ by, so that their common error drops out.
 
-use arm_core::effect::{Effect, Motion, Place, resisting_torque};
+use arm_core::effect::{Effect, Motion, Place, advance_states, any_state, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Placement, Plane, Pose, Reading, Scalar, Setup, inverse_dynamics,
     jacobian, joint_force, static_torque, tip,
@@ -18,7 +18,6 @@ use std::sync::Arc;
 
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::internal_state;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
 
 /// Steps of the solution for each sample of the trial.
@@ -269,7 +268,7 @@ impl<'a, const N: usize> Linear<'a, N> {
 
     /// The states of effects that have one, along the run; nothing where none has.
     fn memories(&self, plant: &Plant<N>) -> Vec<Vec<f64>> {
-        if !internal_state::is_needed(&plant.resisting) {
+        if !any_state(&plant.resisting) {
             return Vec::new();
         }
         let mut now = vec![0.0; plant.resisting.len()];
@@ -278,7 +277,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         for (i, state) in self.states.iter().enumerate() {
             if i > 0 {
                 let before = motion(&self.states[i - 1]);
-                internal_state::advance(
+                advance_states(
                     &plant.resisting,
                     (&before, &motion(state)),
                     &mut now,
@@ -454,7 +453,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         /// Distance from the run at which an arm is lost \[rad\].
         const ASTRAY: f64 = 1.0;
         let h = self.step;
-        let remembers = internal_state::is_needed(&plant.resisting);
+        let remembers = any_state(&plant.resisting);
         let mut memory = vec![0.0; if remembers { plant.resisting.len() } else { 0 }];
         let zero = Joints::<f64, N>::zeros();
         let (mut q, mut qd, mut qdd) = (zero, zero, zero);
@@ -490,7 +489,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                 };
                 let carry = |to: &State<N>, memory: &mut Vec<f64>| {
                     let motions = (&before.motion(), &to.motion());
-                    internal_state::advance(&plant.resisting, motions, memory, h);
+                    advance_states(&plant.resisting, motions, memory, h);
                 };
                 let free =
                     -(self.inverse[i] * (self.damping[i] * speed + self.stiffness[i] * angle));

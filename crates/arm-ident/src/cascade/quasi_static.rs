@@ -6,8 +6,10 @@
 
 use arm_core::{Chain, Joints, Lanes, Plane, Pose, Scalar, static_torque};
 
-use crate::cascade::{bounded, own, unknowns, weighed};
+use crate::cascade::step::bounded;
+use crate::cascade::unknowns::{is_dissipative, own, unknowns};
 use crate::error::IdentError;
+use crate::inference::weighted_fit::weighed;
 use crate::regression::trial::Model;
 use crate::regression::unknown::{Moment, Source, Unknown};
 use arm_core::simd_dispatch::{Computation, dispatch};
@@ -179,7 +181,7 @@ impl<const N: usize> Condensed<N> {
     pub fn solve(&self, model: &Model<N>, bound_width: f64) -> Result<Cascade<N>, IdentError> {
         let mut unknowns = unknowns(model, bound_width);
         unknowns.retain(|u| match u.source {
-            Source::Effect(e, _) => model.fitted[e].kind == arm_core::effect::Kind::ConstantMoment,
+            Source::Effect(e, _) => !is_dissipative(&model.fitted[e]),
             _ => true,
         });
         check_least("samples", self.samples(), N + 2)?;

@@ -3,24 +3,28 @@
 //! The search is a (1+1) evolution strategy over waypoints with restarts (Rechenberg's rule
 //! for its step), for trapezoids at two speeds come within a few percent of optimised Fourier series.
 
-use arm_core::{Joints, Shape};
-use arm_sim::Normal;
-
 use crate::error::IdentError;
 use crate::experiment_design::forecast::{Demand, Forecast, Question, Seen, Task, said};
+use crate::experiment_design::limit::{Excess, Limit};
+use arm_core::{Joints, Shape};
 use arm_numerics::NumericsError;
+use arm_sim::Normal;
 
 /// Step of the search at its start, in ranges of a joint.
 const FIRST_STEP: f64 = 0.25;
+
 /// Evaluations after which a search that gets nowhere starts anew.
 const PATIENCE: usize = 60;
 
 /// Runs of a movement that is slowed until it fits; the last is as slow as may be.
 const MOST_RUNS: usize = 8;
+
 /// Share of a limit that is aimed at: the contact gives way, and what it adds does not scale.
 const AIM: f64 = 0.99;
+
 /// The contact gives way: the arm may be this much faster than it is led.
 const GIVING: f64 = 1.1;
+
 /// Slowest pace, relative to the one asked for: what is left of a force there, holding the arm takes.
 const LEAST_PACE: f64 = 0.1;
 
@@ -51,80 +55,6 @@ pub struct Allowed<const N: usize> {
     pub evaluations: usize,
     /// Of the search.
     pub seed: u64,
-}
-
-/// What a movement may exceed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Limit {
-    /// [`Allowed::force`].
-    Force,
-    /// [`Allowed::speed`].
-    Speed,
-    /// [`Allowed::robot_speed`].
-    RobotSpeed,
-    /// [`Allowed::robot_acceleration`].
-    RobotAcceleration,
-    /// [`Allowed::duration`], which no slower movement respects.
-    Duration,
-}
-
-impl Limit {
-    /// Its field of [`Allowed`].
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Force => "force",
-            Self::Speed => "speed",
-            Self::RobotSpeed => "robot_speed",
-            Self::RobotAcceleration => "robot_acceleration",
-            Self::Duration => "duration",
-        }
-    }
-
-    /// What is limited, and its unit.
-    pub const fn words(self) -> [&'static str; 2] {
-        match self {
-            Self::Force => ["force on the arm", "N"],
-            Self::Speed => ["speed of a joint", "rad/s"],
-            Self::RobotSpeed => ["speed of a joint of the robot", "rad/s"],
-            Self::RobotAcceleration => ["acceleration of a joint of the robot", "rad/s²"],
-            Self::Duration => ["duration of a trial", "s"],
-        }
-    }
-}
-
-/// A limit that a movement exceeds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Excess {
-    /// Which.
-    pub limit: Limit,
-    /// What was found, in the unit of the limit.
-    pub found: f64,
-    /// At which pace, relative to the one asked for.
-    pub pace: f64,
-    /// What is allowed.
-    pub allowed: f64,
-}
-
-impl Excess {
-    /// What was found and, of a slowed movement, at which pace.
-    pub fn found_text(&self) -> String {
-        let (found, [_, unit]) = (self.found, self.limit.words());
-        // Four digits.
-        let decimals = (3.0 - libm::floor(libm::log10(found))).clamp(0.0, 9.0) as usize;
-        let pace = 100.0 * self.pace;
-        if self.pace < 1.0 {
-            format!("{found:.decimals$} {unit} at {pace:.0} % of the pace asked for")
-        } else {
-            format!("{found:.decimals$} {unit}")
-        }
-    }
-}
-
-impl core::fmt::Display for Excess {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let ([name, unit], found) = (self.limit.words(), self.found_text());
-        write!(f, "{name}: found {found}, allowed {} {unit}", self.allowed)
-    }
 }
 
 /// Movements within what is allowed.

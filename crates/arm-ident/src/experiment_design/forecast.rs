@@ -10,7 +10,9 @@ use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Recording, Star
 use crate::error::IdentError;
 use crate::inference::constraint::base_parameters;
 use crate::inference::summary::base_name;
-use crate::regression::equation::{Instrument, Kinematics, Memory};
+use crate::regression::instrument::Instrument;
+use crate::regression::internal_state::InternalStates;
+use crate::regression::kinematics::Kinematics;
 use crate::regression::preprocessing::{Pieces, filtered};
 use crate::regression::sensitivity::{Course, parts};
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
@@ -173,7 +175,7 @@ pub(crate) fn said<const N: usize>(
     let covariance = covariance(&bread, &meat, &unknowns, |u| u.sd)?;
     let data_only = self::covariance(&bread, &meat, &unknowns, |u| match u.source {
         Source::Calibration(_) => u.sd,
-        Source::Effect(..) => ANY_EFFECT,
+        Source::Effect(..) | Source::RestTorque(..) => ANY_EFFECT,
         Source::Segment(..) => HARDLY_KNOWN * u.mean.abs().max(u.sd),
     })?;
     let mut predicted = Vec::new();
@@ -323,7 +325,7 @@ fn noise_of<const N: usize>(
     let model = &question.model;
     let chain = &model.chain;
     let Accuracy { force, angle, .. } = question.accuracy;
-    let mut memory = Memory::new(model);
+    let mut memory = InternalStates::new(model);
     let forces = trial.force_on_arm.as_deref().unwrap_or_default();
     motion
         .q

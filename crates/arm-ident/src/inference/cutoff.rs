@@ -1,10 +1,10 @@
 //! The cutoff of the common low-pass, chosen from the data.
 
-use crate::cascade::weighed;
 use crate::error::IdentError;
 use crate::inference::independent_blocks::clusters;
-use crate::inference::joint_method::{FIRST_GUESS, estimated, widened};
+use crate::inference::weighted_fit::{FIRST_GUESS, estimated, weighed};
 use crate::regression::equation::Building;
+use crate::regression::measured_motion::widened;
 use crate::regression::measured_motion::{candidates_of_measured, measured};
 use crate::regression::preprocessing::{LEAST_SHARE, Noise, Thinning};
 use crate::regression::trial::{Model, Trial};

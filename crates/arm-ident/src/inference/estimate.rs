@@ -7,13 +7,26 @@ use arm_core::{Chain, Joints};
 use crate::regression::unknown::Source;
 use arm_numerics::least_squares::program::Status;
 
+/// What an estimate is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// An unknown of the fit.
+    Unknown(Source),
+    /// A parameter of a fitted effect that follows from several unknowns: index of the effect, index of the parameter.
+    EffectParameter(usize, usize),
+    /// A property of a segment that follows from several unknowns.
+    Segment,
+    /// A linear combination of unknowns, such as a base parameter.
+    Combination,
+}
+
 /// One estimated quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     /// Name as printed, joints counted from one.
     pub name: String,
-    /// What it is an estimate of, where it is an unknown of the fit and not derived from several.
-    pub source: Option<Source>,
+    /// What it is an estimate of.
+    pub quantity: Quantity,
     /// Zero-based joint or segment, where it belongs to one.
     pub joint: Option<usize>,
     /// SI unit.
@@ -75,6 +88,8 @@ pub struct Identified<const N: usize> {
     pub cutoff: f64,
     /// Number of independent clusters behind the standard deviations.
     pub clusters: usize,
+    /// By how many standard deviations the inertia that the cascade neglects moves each first moment `X_j`; zeros for the joint method.
+    pub neglected_inertia: Vec<f64>,
     /// Noise of each joint's speed relative to the speed itself, where the motion was measured; zero where it was simulated.
     /// Above a few tenths friction, viscosity and inertia are biased in a way that no interval shows.
     pub speed_noise: Vec<f64>,

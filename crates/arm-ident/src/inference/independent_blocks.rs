@@ -3,8 +3,8 @@
 use core::ops::Range;
 
 use crate::error::IdentError;
-use crate::regression::equation::Rows;
 use crate::regression::preprocessing::Pieces;
+use crate::regression::rows::Rows;
 use arm_numerics::NumericsError;
 use arm_numerics::statistics::sandwich_covariance::blocks;
 

@@ -1,36 +1,29 @@
 //! The joint method: all joints at once, all linear effects, physical consistency, honest intervals.
 
-use arm_core::Chain;
-use arm_core::effect::Effect;
-
 use crate::error::IdentError;
-use crate::inference::constraint::{binding_gradients, common_scale, program};
 use crate::inference::cutoff::best_cutoff;
-use crate::inference::estimate::{Explained, Identified};
-use crate::inference::independent_blocks::cluster_ranges;
+use crate::inference::estimate::Identified;
 use crate::inference::multistart::{Ended, best};
 use crate::inference::summary::{Fit, summarise};
-use crate::regression::equation::{Building, Instrument, value_of};
-use crate::regression::measured_motion::{
-    candidates, measured, motion_cutoff, relative_speed_noise, speed_noise,
-};
+use crate::inference::weighted_fit::{Solved, explain, weighted};
+use crate::regression::equation::{Building, effect_value, value_of};
+use crate::regression::instrument::Instrument;
+use crate::regression::measured_motion::widened;
+use crate::regression::measured_motion::{candidates, measured, relative_speed_noise};
 use crate::regression::preprocessing::{Noise, Pieces, filtered, repeat_deviations, residual};
 use crate::regression::sensitivity::{HELD, damped};
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
-use crate::regression::unknown::{Imperfection, Moment, Source, Unknown, unknowns};
+use crate::regression::unknown::{Imperfection, Moment, Source, Unknown, spring, unknowns};
+use arm_core::Chain;
+use arm_core::effect::Effect;
 use arm_numerics::NumericsError;
-use arm_numerics::least_squares::outcome::Outcome;
-use arm_numerics::{Condenser, Factor, Matrix};
 
 /// Most rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
 const MOST_ROUNDS: usize = 15;
+
 /// The estimate stands when a round moves it by less than this, in units of its noise.
 const SETTLED: f64 = 1e-2;
-/// Dry friction is smoothed over this many standard deviations of the speed's noise.
-const DEAD_BAND: f64 = 3.0;
-/// Residual, relative to the torques, assumed before the first fit.
-pub(crate) const FIRST_GUESS: f64 = 0.05;
 
 /// Where the motion in the regressors comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,16 +116,7 @@ pub fn identify<const N: usize>(
     let mut found = task.settle(first.clone())?;
     // Where the robot holds every joint the motion is known, and the problem has one minimum.
     if simulate && N > HELD {
-        let from = values(&first, &unknowns);
-        let start: Vec<f64> = of_effects(&unknowns).map(|(k, _)| from[k]).collect();
-        let limits: Vec<[f64; 2]> = of_effects(&unknowns).map(|(_, u)| [u.min, u.max]).collect();
-        found = best(found, &start, &limits, |other, effects| {
-            let mut x = values(&other.model, &unknowns);
-            for ((k, _), value) in of_effects(&unknowns).zip(effects) {
-                x[k] = *value;
-            }
-            task.settle(updated(&other.model, &unknowns, &x).ok()?).ok()
-        });
+        found = task.restarted(found, &first);
     }
     let Settled {
         model: current,
@@ -202,6 +186,21 @@ fn of_effects(unknowns: &[Unknown]) -> impl Iterator<Item = (usize, &Unknown)> {
 }
 
 impl<const N: usize> Task<'_, N> {
+    /// The best of further starts where a fit may have ended in the wrong minimum.
+    fn restarted(&self, found: Settled<N>, first: &Model<N>) -> Settled<N> {
+        let unknowns = self.unknowns;
+        let from = values(first, unknowns);
+        let start: Vec<f64> = of_effects(unknowns).map(|(k, _)| from[k]).collect();
+        let limits: Vec<[f64; 2]> = of_effects(unknowns).map(|(_, u)| [u.min, u.max]).collect();
+        best(found, &start, &limits, |other, effects| {
+            let mut x = values(&other.model, unknowns);
+            for ((k, _), value) in of_effects(unknowns).zip(effects) {
+                x[k] = *value;
+            }
+            self.settle(updated(&other.model, unknowns, &x).ok()?).ok()
+        })
+    }
+
     /// Fits, linearises again and, where the motion is simulated, simulates again until the estimate stands.
     fn settle(&self, start: Model<N>) -> Result<Settled<N>, IdentError> {
         let Self {
@@ -358,36 +357,6 @@ fn fit_trials<const N: usize>(trials: &[Trial<N>]) -> impl Iterator<Item = &Tria
     trials.iter().filter(|t| t.role == Role::Fit)
 }
 
-/// The model with dry friction that changes its sign no faster than the noise of measured speeds.
-pub(crate) fn widened<'a, const N: usize>(
-    model: &Model<N>,
-    trials: impl Iterator<Item = &'a Trial<N>>,
-    cutoff: f64,
-) -> Model<N> {
-    let mut model = model.clone();
-    for trial in trials {
-        let noise = speed_noise(trial, motion_cutoff(cutoff, trial.rate));
-        for effect in model.fitted.iter_mut().chain(&mut model.held) {
-            let noise = noise.get(effect.index).copied().unwrap_or(0.0);
-            widen(effect, DEAD_BAND * noise);
-        }
-    }
-    model
-}
-
-/// Raises the smoothing speed of an effect that has one, within its bounds.
-fn widen(effect: &mut Effect<f64>, least: f64) {
-    for (value, parameter) in effect
-        .parameters
-        .iter_mut()
-        .zip(effect.kind.info().parameters)
-    {
-        if parameter.name == "smoothing" {
-            *value = value.max(least).min(parameter.max);
-        }
-    }
-}
-
 /// Scatter between the repeats of every movement; empty where too few movements were repeated.
 fn deviations<const N: usize>(fit: &[&Trial<N>], pieces: &[&Pieces]) -> Vec<Vec<f64>> {
     let mut configurations: Vec<usize> = fit.iter().map(|t| t.configuration).collect();
@@ -407,141 +376,6 @@ fn deviations<const N: usize>(fit: &[&Trial<N>], pieces: &[&Pieces]) -> Vec<Vec<
         }
     }
     all
-}
-
-/// A solved weighted problem and what is needed to say how certain it is.
-pub(crate) struct Solved {
-    /// The solution.
-    pub outcome: Outcome,
-    /// Factor of the weighed data, without prior.
-    pub data: Factor,
-    /// The same with the prior.
-    pub posterior: Factor,
-    /// Factors of the independent clusters.
-    pub clusters: Vec<Factor>,
-    /// Gradients of the inequalities and cones that bind, bounds excepted.
-    pub binding: Vec<Vec<f64>>,
-    /// Rows of the equalities.
-    pub equalities: Vec<Vec<f64>>,
-}
-
-/// Iteratively weighted least squares: the weights of the joints and the estimate in turn.
-fn weighted<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
-    fit: &[&Pieces],
-    (deviations, scale_free): (&[Vec<f64>], bool),
-) -> Result<Solved, IdentError> {
-    let (mut solved, level) = first_solution::<N>(model, unknowns, fit, scale_free)?;
-    // Repeats of a simulation without noise do not scatter, and tell nothing.
-    let repeated = root_mean_square(deviations.iter().flatten()) > 1e-6 * level;
-    for _ in 0..2 {
-        let rest = |x: &[f64]| -> Vec<Vec<f64>> {
-            fit.iter()
-                .flat_map(|p| p.iter())
-                .map(|r| residual(r, x))
-                .collect()
-        };
-        let residuals = rest(&solved.outcome.x);
-        // Data without any noise (a check on exact values) would make infinite weights.
-        if root_mean_square(residuals.iter().flatten()) <= 1e-9 * level {
-            break;
-        }
-        let noise = if repeated {
-            Noise::<N>::of_repeats(deviations)?.at_least(&residuals)
-        } else {
-            Noise::of_residuals(&residuals)?
-        };
-        solved = solve(model, unknowns, fit, &noise, scale_free)?;
-    }
-    Ok(solved)
-}
-
-/// The estimate under a first guess of white noise, and the size of the torques.
-fn first_solution<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
-    fit: &[&Pieces],
-    scale_free: bool,
-) -> Result<(Solved, f64), IdentError> {
-    let torque = root_mean_square(fit.iter().flat_map(|p| p.iter()).flat_map(|r| r.rhs.iter()));
-    // Without a load the torques of the known model tell what is large.
-    let x0: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
-    let rest: Vec<Vec<f64>> = fit
-        .iter()
-        .flat_map(|p| p.iter())
-        .map(|r| residual(r, &x0))
-        .collect();
-    let level = torque.max(root_mean_square(rest.iter().flatten()));
-    let noise = Noise::<N>::even((FIRST_GUESS * level).max(f64::MIN_POSITIVE.sqrt()));
-    Ok((solve(model, unknowns, fit, &noise, scale_free)?, level))
-}
-
-pub(crate) fn root_mean_square<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
-    if count > 0.0 {
-        libm::sqrt(sum / count)
-    } else {
-        0.0
-    }
-}
-
-fn solve<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
-    fit: &[&Pieces],
-    noise: &Noise<N>,
-    scale_free: bool,
-) -> Result<Solved, IdentError> {
-    let p = unknowns.len();
-    let clusters = cluster_ranges(fit)?
-        .iter()
-        .map(|cluster| {
-            let mut condenser = Condenser::new(p);
-            for (rows, range) in cluster {
-                noise.condense(&mut condenser, rows, range.clone())?;
-            }
-            Ok(condenser.finish())
-        })
-        .collect::<Result<Vec<_>, IdentError>>()?;
-    let mut all = Condenser::new(p);
-    for cluster in &clusters {
-        all.merge_factor(cluster)?;
-    }
-    let data = all.finish();
-    let (posterior, outcome) = estimated(&data, (model, unknowns), scale_free)?;
-    let binding = binding_gradients(&outcome, unknowns, model);
-    let equalities = if scale_free {
-        vec![common_scale(unknowns, model)]
-    } else {
-        Vec::new()
-    };
-    Ok(Solved {
-        outcome,
-        data,
-        posterior,
-        clusters,
-        binding,
-        equalities,
-    })
-}
-
-/// The estimate from a factor of weighed data, and that factor with the prior.
-pub(crate) fn estimated<const N: usize>(
-    data: &Factor,
-    (model, unknowns): (&Model<N>, &[Unknown]),
-    scale_free: bool,
-) -> Result<(Factor, Outcome), IdentError> {
-    let mean: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
-    let sd: Vec<f64> = unknowns.iter().map(|u| u.sd).collect();
-    let posterior = data.with_prior(&mean, &sd)?;
-    let outcome = program(&posterior, unknowns, model, scale_free)?.solve()?;
-    if outcome.x.iter().any(|v| !v.is_finite()) {
-        return Err(IdentError::NoSolution {
-            status: outcome.status,
-        });
-    }
-    Ok((posterior, outcome))
 }
 
 /// The model with estimates in place of its own values.
@@ -576,10 +410,26 @@ fn updated<const N: usize>(
             next.fitted[e].parameters[p] = x[u];
         }
     }
+    for (u, unknown) in unknowns.iter().enumerate() {
+        if let Source::RestTorque(e, rest) = unknown.source {
+            set_rest(&mut next.fitted[e], rest, x[u]);
+        }
+    }
     next.chain = Chain::new(segments, model.chain.base(), model.chain.gravity())
         .and_then(|c| c.with_rotor_inertia(*model.chain.rotor_inertia()))
         .map_err(IdentError::Model)?;
     Ok(next)
+}
+
+/// The rest angle of a spring from amplitude · rest, within its bounds; a spring without amplitude keeps its own.
+fn set_rest(effect: &mut Effect<f64>, rest: usize, torque: f64) {
+    let bounds = effect.kind.info().parameters[rest];
+    if let Some((amplitude, _)) = spring(effect)
+        && effect.parameters[amplitude] != 0.0
+    {
+        let angle = torque / effect.parameters[amplitude];
+        effect.parameters[rest] = angle.clamp(bounds.min, bounds.max);
+    }
 }
 
 /// The model half way between two.
@@ -602,35 +452,7 @@ fn values<const N: usize>(model: &Model<N>, unknowns: &[Unknown]) -> Vec<f64> {
         .iter()
         .map(|u| match u.source {
             Source::Segment(k, moment) => value_of(&model.chain, k, moment),
-            Source::Effect(e, p) => model.fitted[e].parameters[p],
-            Source::Calibration(_) => 0.0,
+            source => effect_value(model, source),
         })
         .collect()
-}
-
-/// How rows are explained by values of the unknowns.
-pub(crate) fn explain<const N: usize>(pieces: &Pieces, x: &[f64]) -> Explained<N> {
-    let mut out = Explained {
-        samples: Vec::new(),
-        measured: Vec::new(),
-        fitted: Vec::new(),
-    };
-    for piece in pieces {
-        out.samples.extend(&piece.samples);
-        let rest = residual(piece, x);
-        for (m, r) in piece.rhs.chunks_exact(N).zip(rest.chunks_exact(N)) {
-            out.measured.push(arm_core::Joints::from_column_slice(m));
-            out.fitted
-                .push(arm_core::Joints::from_fn(|j, _| m[j] - r[j]));
-        }
-    }
-    out
-}
-
-/// The design matrix that the weighed data leave, without the calibration columns.
-pub(crate) fn physical_columns(data: &Factor, unknowns: &[Unknown]) -> Matrix {
-    let keep: Vec<usize> = (0..unknowns.len())
-        .filter(|&u| !matches!(unknowns[u].source, Source::Calibration(_)))
-        .collect();
-    data.r.select_columns(&keep)
 }

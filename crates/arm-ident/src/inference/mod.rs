@@ -9,3 +9,4 @@ pub mod joint_method;
 pub(crate) mod multistart;
 pub mod rank;
 pub(crate) mod summary;
+pub(crate) mod weighted_fit;

@@ -2,21 +2,22 @@
 
 use crate::error::IdentError;
 use crate::inference::constraint::base_parameters;
-use crate::inference::estimate::{Decision, Estimate, Explained, Identified};
-use crate::inference::joint_method::{Solved, physical_columns};
+use crate::inference::estimate::{Decision, Estimate, Explained, Identified, Quantity};
 use crate::inference::rank::{RankOptions, RankReport, analyse};
+use crate::inference::weighted_fit::{Solved, physical_columns};
 use crate::regression::trial::Model;
-use crate::regression::unknown::{Moment, Source, Unknown};
-use arm_numerics::NumericsError;
+use crate::regression::unknown::{Moment, Source, Unknown, spring};
+use arm_core::effect::Effect;
 use arm_numerics::linalg::matrix::Matrix;
 use arm_numerics::statistics::distributions::student_t_quantile;
 use arm_numerics::statistics::sandwich_covariance::{
     SandwichCovariance, information_ratio, standard_error,
 };
+use arm_numerics::{Factor, NumericsError};
 
 /// Relative singular value below which a combination does not act on the data. Filtering and whitening leave exact
 /// dependencies exact to rounding; inertia in a slow movement is many orders above.
-pub(crate) const RANK_TOLERANCE: f64 = 1e-8;
+const RANK_TOLERANCE: f64 = 1e-8;
 /// Share in the null space below which a quantity counts as determined.
 const DETERMINED: f64 = 1e-4;
 /// A quantity with a prior counts as measured when the data took away this share of the prior variance.
@@ -81,19 +82,8 @@ pub(crate) fn summarise<const N: usize>(
     let Fit {
         solved, unknowns, ..
     } = *fit;
-    let r = physical_columns(&solved.data, unknowns);
-    let physical = r.cols();
-    let options = RankOptions {
-        scale: None,
-        rows: solved.data.rows,
-        tolerance: Some(RANK_TOLERANCE),
-    };
-    let report = analyse(&r, &options)?;
-    let names: Vec<&str> = unknowns[..physical]
-        .iter()
-        .map(|u| u.name.as_str())
-        .collect();
-    let trades = report.describe_trades(&names)?;
+    let (report, trades) = rank_of(&solved.data, unknowns)?;
+    let physical = physical(unknowns);
     let rank = report.rank - usize::from(fit.scale_free);
     let clusters = solved.clusters.len();
     let certainty = Certainty {
@@ -114,19 +104,7 @@ pub(crate) fn summarise<const N: usize>(
         dof: (clusters - 1) as f64,
         level: fit.level,
     };
-    let mut parameters = Vec::new();
-    for (u, unknown) in unknowns[..physical].iter().enumerate() {
-        parameters.push(certainty.unknown(u)?);
-        if let Source::Segment(k, Moment::Inertia) = unknown.source {
-            let length = fit.model.chain.segments()[k].length;
-            parameters.extend(derived(&certainty, k, length)?);
-        }
-    }
-    for e in &mut parameters {
-        if let Some(Source::Effect(i, _)) = e.source {
-            e.joint = Some(fit.model.fitted[i].index);
-        }
-    }
+    let parameters = parameters(&certainty, fit.model)?;
     let calibration = (physical..unknowns.len())
         .map(|u| certainty.unknown(u))
         .collect::<Result<_, _>>()?;
@@ -149,11 +127,61 @@ pub(crate) fn summarise<const N: usize>(
         scale_free: fit.scale_free,
         cutoff,
         clusters,
+        neglected_inertia: vec![0.0; N],
         speed_noise: vec![0.0; N],
         explained,
         chain: fit.model.chain,
         fitted: fit.model.fitted.clone(),
     })
+}
+
+/// Number of unknowns that are not calibration; they come first.
+pub(crate) fn physical(unknowns: &[Unknown]) -> usize {
+    let is_physical = |u: &&Unknown| !matches!(u.source, Source::Calibration(_));
+    unknowns.iter().filter(is_physical).count()
+}
+
+/// What weighed data determine of the unknowns that are not calibration, and in words which of these trade against each other.
+pub(crate) fn rank_of(
+    data: &Factor,
+    unknowns: &[Unknown],
+) -> Result<(RankReport, Vec<String>), IdentError> {
+    let options = RankOptions {
+        scale: None,
+        rows: data.rows,
+        tolerance: Some(RANK_TOLERANCE),
+    };
+    let report = analyse(&physical_columns(data, unknowns), &options)?;
+    let physical = unknowns[..physical(unknowns)].iter();
+    let names: Vec<&str> = physical.map(|u| u.name.as_str()).collect();
+    let trades = report.describe_trades(&names)?;
+    Ok((report, trades))
+}
+
+/// The unknowns and what follows from them.
+fn parameters<const N: usize>(
+    certainty: &Certainty<'_>,
+    model: &Model<N>,
+) -> Result<Vec<Estimate>, IdentError> {
+    let mut parameters = Vec::new();
+    for (u, unknown) in certainty.unknowns[..certainty.physical].iter().enumerate() {
+        parameters.push(certainty.unknown(u)?);
+        if let Source::Segment(k, Moment::Inertia) = unknown.source {
+            let length = model.chain.segments()[k].length;
+            parameters.extend(derived(certainty, k, length)?);
+        }
+        if let Source::RestTorque(e, rest) = unknown.source {
+            parameters.extend(rest_angle(certainty, &model.fitted[e], (e, rest))?);
+        }
+    }
+    for e in &mut parameters {
+        if let Quantity::Unknown(Source::Effect(i, _) | Source::RestTorque(i, _))
+        | Quantity::EffectParameter(i, _) = e.quantity
+        {
+            e.joint = Some(model.fitted[i].index);
+        }
+    }
+    Ok(parameters)
 }
 
 /// `H⁻¹ (Σ s sᵀ n/(n−1) + prior) H⁻¹`: scatter of the clusters for the data, the prior's own variance for the prior.
@@ -201,7 +229,7 @@ impl Certainty<'_> {
         w[u] = 1.0;
         let unknown = &self.unknowns[u];
         let mut estimate = self.linear(&w, unknown.name.clone(), unknown.unit)?;
-        estimate.source = Some(unknown.source);
+        estimate.quantity = Quantity::Unknown(unknown.source);
         estimate.interval = estimate
             .interval
             .map(|end| end.clamp(unknown.min, unknown.max));
@@ -239,7 +267,7 @@ impl Certainty<'_> {
         };
         Ok(Estimate {
             name,
-            source: None,
+            quantity: Quantity::Combination,
             joint: None,
             unit,
             value,
@@ -291,6 +319,7 @@ impl Certainty<'_> {
         let [low, high] = estimate.interval;
         let reach = 0.5 * (high - low);
         estimate.value = value;
+        estimate.quantity = Quantity::Segment;
         estimate.interval = [value - reach, value + reach];
         for (u, _) in gradient.iter().enumerate().filter(|(_, g)| **g != 0.0) {
             match self.unknown(u)?.decided_by {
@@ -300,6 +329,38 @@ impl Certainty<'_> {
         }
         Ok(estimate)
     }
+}
+
+/// The rest angle of a fitted spring; none for a spring without amplitude.
+fn rest_angle(
+    certainty: &Certainty<'_>,
+    effect: &Effect<f64>,
+    (e, rest): (usize, usize),
+) -> Result<Option<Estimate>, IdentError> {
+    let place = |source| certainty.unknowns.iter().position(|u| u.source == source);
+    let amplitude = spring(effect).and_then(|(p, _)| place(Source::Effect(e, p)));
+    let (Some(k), Some(w)) = (amplitude, place(Source::RestTorque(e, rest))) else {
+        return Ok(None);
+    };
+    let x = certainty.x;
+    if x[k] == 0.0 {
+        return Ok(None);
+    }
+    let parameter = &effect.kind.info().parameters[rest];
+    let mut gradient = vec![0.0; x.len()];
+    gradient[w] = 1.0 / x[k];
+    gradient[k] = -x[w] / (x[k] * x[k]);
+    let name = format!(
+        "{}{} {}",
+        effect.kind.info().kind,
+        effect.index + 1,
+        parameter.name
+    );
+    let estimate = certainty.nonlinear(x[w] / x[k], &gradient, name, parameter.unit)?;
+    Ok(Some(Estimate {
+        quantity: Quantity::EffectParameter(e, rest),
+        ..estimate
+    }))
 }
 
 /// Centre of mass and inertia about it, which follow from the unknowns of a segment.

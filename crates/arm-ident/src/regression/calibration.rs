@@ -5,9 +5,10 @@
 //! would explain that noise, and the fit would buy it with a wrong gain and parameters shrunk to match.
 
 use arm_core::effect::{Motion, resisting_torque};
-use arm_core::{Joints, Plane, Pose, Scalar, inverse_dynamics, jacobian, static_torque};
+use arm_core::{Joints, Plane, Pose, Scalar, gravity, inverse_dynamics, jacobian, static_torque};
 
-use crate::regression::equation::{Kinematics, Memory};
+use crate::regression::internal_state::InternalStates;
+use crate::regression::kinematics::Kinematics;
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Imperfection, Source, Unknown};
 
@@ -16,7 +17,7 @@ use crate::regression::unknown::{Imperfection, Source, Unknown};
 /// Least squares of `Jᵀ F = B q̈ + C q̇ + G + R − τ − M` over the two components of the force; in a pose in which a component
 /// does no work (a stretched arm) that component is zero. Zero where the arm is not led by a force.
 pub(crate) struct Prediction<const N: usize> {
-    memory: Memory,
+    memory: InternalStates<N>,
     near: Nearby,
     /// Samples of which the force is known.
     known: usize,
@@ -37,7 +38,7 @@ impl<const N: usize> Prediction<N> {
     pub fn of_unknowns(unknowns: &[Unknown], model: &Model<N>) -> Option<Self> {
         let is_calibration = |u: &Unknown| matches!(u.source, Source::Calibration(_));
         unknowns.iter().any(is_calibration).then(|| Self {
-            memory: Memory::new(model),
+            memory: InternalStates::new(model),
             near: Nearby::default(),
             known: 0,
         })
@@ -99,7 +100,7 @@ pub(crate) fn influence<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
     motion: &Kinematics<N>,
-    (force, memory, i): (&Nearby, &Memory, usize),
+    (force, memory, i): (&Nearby, &InternalStates<N>, usize),
     what: Imperfection,
 ) -> Joints<f64, N> {
     let pose = Pose::new(&motion.q[i]);
@@ -123,6 +124,10 @@ pub(crate) fn influence<const N: usize>(
             let rate = [0, 1].map(|c| (force.after[c] - force.before[c]) / span);
             -static_torque(&model.chain, &pose, rate, 0.0)
         }
+        Imperfection::NeglectedInertia => {
+            inverse_dynamics(&model.chain, &pose, &motion.qd[i], &motion.qdd[i])
+                - gravity(&model.chain, &pose)
+        }
         Imperfection::HandlePlacement(axis) => {
             // A displaced handle lengthens the lever of the last segment; every joint feels the same moment.
             let angle = motion.q[i].iter().fold(0.0, |sum, q| sum + q);
@@ -138,7 +143,7 @@ pub(crate) fn influence<const N: usize>(
 fn angle_offset<const N: usize>(
     model: &Model<N>,
     motion: &Kinematics<N>,
-    (force, memory, i, time): (Plane<f64>, &Memory, usize, f64),
+    (force, memory, i, time): (Plane<f64>, &InternalStates<N>, usize, f64),
     joint: usize,
 ) -> Joints<f64, N> {
     const STEP: f64 = 1e-5;

@@ -6,10 +6,11 @@
 //! ([`relative_speed_noise`]).
 
 use arm_core::Joints;
+use arm_core::effect::Effect;
 
 use crate::error::IdentError;
-use crate::regression::equation::Kinematics;
-use crate::regression::trial::Trial;
+use crate::regression::kinematics::Kinematics;
+use crate::regression::trial::{Model, Trial};
 use arm_numerics::signal::derivative;
 use arm_numerics::signal::filter::Butterworth;
 
@@ -189,4 +190,37 @@ pub fn candidates_of_measured<const N: usize>(
 /// Whether what is read from speeds with this relative noise can be trusted, see [`QUIET`].
 pub fn is_quiet(relative_noise: &[f64]) -> bool {
     relative_noise.iter().all(|&share| share <= QUIET)
+}
+
+/// Dry friction is smoothed over this many standard deviations of the speed's noise.
+const DEAD_BAND: f64 = 3.0;
+
+/// The model with dry friction that changes its sign no faster than the noise of measured speeds.
+pub(crate) fn widened<'a, const N: usize>(
+    model: &Model<N>,
+    trials: impl Iterator<Item = &'a Trial<N>>,
+    cutoff: f64,
+) -> Model<N> {
+    let mut model = model.clone();
+    for trial in trials {
+        let noise = speed_noise(trial, motion_cutoff(cutoff, trial.rate));
+        for effect in model.fitted.iter_mut().chain(&mut model.held) {
+            let noise = noise.get(effect.index).copied().unwrap_or(0.0);
+            widen(effect, DEAD_BAND * noise);
+        }
+    }
+    model
+}
+
+/// Raises the smoothing speed of an effect that has one, within its bounds.
+fn widen(effect: &mut Effect<f64>, least: f64) {
+    for (value, parameter) in effect
+        .parameters
+        .iter_mut()
+        .zip(effect.kind.info().parameters)
+    {
+        if parameter.name == "smoothing" {
+            *value = value.max(least).min(parameter.max);
+        }
+    }
 }

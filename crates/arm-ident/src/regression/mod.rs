@@ -2,8 +2,12 @@
 
 pub mod calibration;
 pub mod equation;
+pub(crate) mod instrument;
+pub(crate) mod internal_state;
+pub mod kinematics;
 pub mod measured_motion;
 pub mod preprocessing;
+pub mod rows;
 pub(crate) mod sensitivity;
 pub mod simulated_motion;
 pub mod trial;

@@ -1,8 +1,8 @@
 //! From raw rows to those that are fitted: the common low-pass, decimation, and weights.
 
 use crate::error::IdentError;
-use crate::regression::equation::Rows;
 use crate::regression::measured_motion::low_pass;
+use crate::regression::rows::Rows;
 use crate::regression::trial::Trial;
 use arm_numerics::Condenser;
 use arm_numerics::error::check_least;

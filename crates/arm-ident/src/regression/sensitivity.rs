@@ -6,12 +6,14 @@
 //! along the run, `M q̈ + D q̇ + (K + Jᵀ S J) q = −Y`, which is solved implicitly, so that a stiff contact and dry friction need
 //! no short steps.
 
-use arm_core::effect::{Kind, Motion, resisting_torque};
+use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{Joints, Plane, Pose, inertia, inverse_dynamics, jacobian, static_torque};
 use arm_sim::Recording;
 use nalgebra::SMatrix;
 
-use crate::regression::equation::{Building, Kinematics, Memory};
+use crate::regression::equation::Building;
+use crate::regression::internal_state::InternalStates;
+use crate::regression::kinematics::Kinematics;
 use crate::regression::trial::{Model, Role, Trial};
 use crate::regression::unknown::{Source, Unknown};
 
@@ -32,13 +34,19 @@ pub(crate) fn damped<const N: usize>(model: &Model<N>, cutoff: f64) -> Model<N> 
     let stretched = inertia(&model.chain, &Pose::new(&Joints::zeros()));
     let mut start = model.clone();
     for effect in &mut start.fitted {
-        if effect.kind == Kind::Viscous && (HELD..N).contains(&effect.index) {
+        if is_viscous(effect) && (HELD..N).contains(&effect.index) {
             let enough = stretched[(effect.index, effect.index)] * core::f64::consts::TAU * cutoff;
             let most = effect.kind.info().parameters[0].max;
             effect.parameters[0] = effect.parameters[0].max(enough).min(most);
         }
     }
     start
+}
+
+/// Whether its torque is proportional to the speed.
+fn is_viscous(effect: &Effect<f64>) -> bool {
+    let slopes = effect.with(&[1.0]).affine();
+    slopes.is_some_and(|[constant, angle, speed]| constant == 0.0 && angle == 0.0 && speed > 0.0)
 }
 
 /// Steps for each sample of a trial.
@@ -144,7 +152,7 @@ impl<const N: usize> Course<N> {
             course: self,
             model,
             direct: Building::new((model, &unknowns[..count]), &self.fine, &self.motion),
-            memory: Memory::new(model),
+            memory: InternalStates::new(model),
             moved: vec![Moved::default(); count],
             done: 0,
         }
@@ -157,7 +165,7 @@ pub(crate) struct Answers<'a, const N: usize> {
     model: &'a Model<N>,
     /// What each adds directly.
     direct: Building<'a, N>,
-    memory: Memory,
+    memory: InternalStates<N>,
     /// What one unit of each has changed of the motion.
     moved: Vec<Moved<N>>,
     /// Samples of the course that are behind.

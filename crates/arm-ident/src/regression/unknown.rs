@@ -1,6 +1,6 @@
 //! The unknowns of an identification and what is known of each beforehand.
 
-use arm_core::effect::Place;
+use arm_core::effect::{Effect, Place};
 
 use crate::regression::trial::{Model, Tolerance, Trial};
 
@@ -33,6 +33,8 @@ pub enum Imperfection {
     TimeDelay,
     /// Displacement of the handle along (0) or normal to (1) the last segment \[m\].
     HandlePlacement(usize),
+    /// The torque of the model's inertia, as a share; for a method that takes the movement for quasi-static.
+    NeglectedInertia,
 }
 
 /// What a column of the regression stands for.
@@ -42,6 +44,8 @@ pub enum Source {
     Segment(usize, Moment),
     /// A linear parameter of a fitted effect: index of the effect, index of the parameter.
     Effect(usize, usize),
+    /// Amplitude times rest angle of a fitted spring: index of the effect, index of its rest angle.
+    RestTorque(usize, usize),
     /// A calibration that is refitted within its tolerance.
     Calibration(Imperfection),
 }
@@ -93,9 +97,47 @@ pub fn unknowns<const N: usize>(
                 max: parameter.max,
             });
         }
+        list.extend(rest_torque(model, i));
     }
     list.extend(calibration::<N>(tolerance, trials));
     list
+}
+
+/// Amplitude and rest angle among the parameters of a spring whose torque is linear in both amplitude and amplitude · rest.
+pub(crate) fn spring(effect: &Effect<f64>) -> Option<(usize, usize)> {
+    let probe = effect.kind.probe();
+    let mut questions = probe.questions.iter();
+    questions.find_map(|question| question.rest.map(|rest| (question.free[0], rest)))
+}
+
+/// The unknown that a spring's rest angle is: amplitude · rest. A constant moment fitted in the same joint takes its place, and so do
+/// two springs of one kind, whose stiffnesses span every rest angle between and beyond their own.
+fn rest_torque<const N: usize>(model: &Model<N>, index: usize) -> Option<Unknown> {
+    let effect = &model.fitted[index];
+    let (amplitude, rest) = spring(effect)?;
+    let is_constant = |e: &Effect<f64>| e.kind.is_rate_independent() && e.affine().is_some();
+    let spans =
+        |(i, e): (usize, &Effect<f64>)| i != index && e.kind == effect.kind || is_constant(e);
+    let mut others = model.fitted.iter().enumerate();
+    if others.any(|(i, e)| e.index == effect.index && spans((i, e))) {
+        return None;
+    }
+    let info = effect.kind.info();
+    Some(Unknown {
+        source: Source::RestTorque(index, rest),
+        name: format!(
+            "{}{} {}*{}",
+            info.kind,
+            effect.index + 1,
+            info.parameters[amplitude].name,
+            info.parameters[rest].name
+        ),
+        unit: "N m",
+        mean: 0.0,
+        sd: f64::INFINITY,
+        min: -f64::INFINITY,
+        max: f64::INFINITY,
+    })
 }
 
 fn segment<const N: usize>(model: &Model<N>, k: usize) -> Vec<Unknown> {

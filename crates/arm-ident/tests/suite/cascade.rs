@@ -124,3 +124,63 @@ fn friction_of_a_joint_that_never_moves_is_not_identified() {
     // Its own rows tell nothing of what it carries either.
     assert_eq!(named(&result, "m2*l2").decided_by, Decision::Prior);
 }
+
+/// A swing of both joints with the largest speed [rad/s] and acceleration [rad/s²] of the shoulder, with noise.
+fn swinging(seed: u64, speed: f64, acceleration: f64) -> Trial<2> {
+    let path = |t: f64| {
+        let mut state = [Joints::<f64, 2>::zeros(); 3];
+        for j in 0..2 {
+            let w = acceleration / speed * [1.0, 1.31][j];
+            let a = speed * speed / acceleration;
+            state[0][j] = [-0.6, 1.1][j] + a * libm::sin(w * t);
+            state[1][j] = a * w * libm::cos(w * t);
+            state[2][j] = -a * w * w * libm::sin(w * t);
+        }
+        state
+    };
+    let recipe = Recipe {
+        rate: 50.0,
+        duration: 16.0 * speed / acceleration * core::f64::consts::TAU,
+        ..Recipe::new(models::mechanical_arm())
+    };
+    let mut trial = recipe.torque_trial(&path, &[]);
+    let mut noise = Noise::new(seed);
+    for torque in trial.torque.iter_mut().flatten() {
+        for value in torque.iter_mut() {
+            *value += 0.2 * NOISE[1] * noise.normal();
+        }
+    }
+    trial
+}
+
+/// Intervals that took inertia for nothing missed the truth by ten of their widths and said "by data".
+#[test]
+fn inertia_widens_the_intervals_of_a_movement_that_is_not_quasi_static() {
+    let truth = models::mechanical_arm();
+    let mut model = wrong(&truth, [[1.1, 1.0, 1.1], [1.1, 1.0, 1.1]], 0.3);
+    model.fitted = at_every_joint::<2>(&["coulomb", "constant_moment"]);
+    let run = |speed, acceleration| {
+        identify(&model, &[swinging(3, speed, acceleration)], &OPTIONS).expect("a solution")
+    };
+    let (fast, slow) = (run(0.37, 0.28), run(0.037, 0.0028));
+    for j in 0..2 {
+        let x = truth.first_moments()[j];
+        let (fast, slow) = (&fast.combinations[j], &slow.combinations[j]);
+        assert!(
+            fast.interval[0] <= x && x <= fast.interval[1],
+            "{fast:?}, not {x}"
+        );
+        assert!(
+            slow.interval[0] <= x && x <= slow.interval[1],
+            "{slow:?}, not {x}"
+        );
+        assert!(slow.std < 0.3 * fast.std, "{slow:?} {fast:?}");
+    }
+    assert!(
+        fast.neglected_inertia[0] > 3.0,
+        "{:?}",
+        fast.neglected_inertia
+    );
+    let (quick, still) = (&fast.neglected_inertia, &slow.neglected_inertia);
+    assert!(still[0] < 0.5 * quick[0], "{still:?} {quick:?}");
+}

@@ -3,8 +3,9 @@
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Contact, Elbow, Joints, Robot, Shape, models};
 use arm_ident::IdentError;
-use arm_ident::experiment_design::design::{Allowed, Excess, Limit, design};
+use arm_ident::experiment_design::design::{Allowed, design};
 use arm_ident::experiment_design::forecast::{Accuracy, Question, Task, forecast};
+use arm_ident::experiment_design::limit::{Excess, Limit};
 use arm_ident::regression::trial::{Model, Tolerance};
 
 fn question(tolerance: Tolerance) -> Question<2> {

@@ -74,6 +74,37 @@ fn base_parameters_and_joint_parameters_are_recovered_from_a_wrong_start() {
 }
 
 #[test]
+fn the_rest_angle_of_a_spring_is_an_unknown() {
+    let truth = human();
+    let path = sines([-0.6, 0.9, 0.2], 0.35, 1.0);
+    let springs = [[1.2, -0.5], [-0.4, 0.7], [0.5, 0.1]];
+    let effects: Vec<_> = (0..3).map(|j| effect("elastic", j, &springs[j])).collect();
+    let trial = Recipe::new(truth).torque_trial(&path, &effects);
+    let mut model = wrong(
+        &truth,
+        [[1.1, 0.92, 0.8], [0.9, 1.08, 1.3], [1.2, 0.9, 0.7]],
+        0.3,
+    );
+    model.fitted = at_every_joint::<3>(&["elastic"]);
+    let result = identify(&model, std::slice::from_ref(&trial), &exactly()).expect("a solution");
+    for (j, [stiffness, rest]) in springs.into_iter().enumerate() {
+        let of = |name: &str| named(&result, &format!("elastic{} {name}", j + 1));
+        close(of("stiffness").value, stiffness, 50.0 * BY_SAMPLING);
+        close(of("rest").value, rest, 100.0 * BY_SAMPLING);
+        assert_eq!((of("rest").joint, of("rest").unit), (Some(j), "rad"));
+        assert_eq!(result.fitted[j].parameters[1], of("rest").value);
+    }
+    // A constant moment in the same joint is the same column.
+    model.fitted = at_every_joint::<3>(&["elastic", "constant_moment"]);
+    let result = identify(&model, &[trial], &exactly()).expect("a solution");
+    assert!(result.parameters.iter().all(|e| !e.name.contains("rest")));
+    for (j, [stiffness, rest]) in springs.into_iter().enumerate() {
+        let moment = named(&result, &format!("constant_moment{} moment", j + 1));
+        close(moment.value, -stiffness * rest, 100.0 * BY_SAMPLING);
+    }
+}
+
+#[test]
 fn forces_at_the_tip_tell_as_much_as_torques() {
     let truth = models::mechanical_arm();
     let path = sines([-0.6, 1.2], 0.3, 1.0);

@@ -230,7 +230,11 @@ fn virtual_arm_comes_to_the_batch_estimate() {
         let (model, trial, lead) = virtual_arm(seed);
         let found =
             identify(&model, std::slice::from_ref(&trial), &Options::default()).expect("a fit");
-        let online = learned(&model, &settings::<f64>(&model.chain, 1e-3), &whole(&trial, &lead));
+        let online = learned(
+            &model,
+            &settings::<f64>(&model.chain, 1e-3),
+            &whole(&trial, &lead),
+        );
         let off = distances(&found, &online);
         if seed == 0 {
             assert!(off.iter().all(|o| o.abs() <= 1.0), "{off:.2?}");
@@ -241,7 +245,11 @@ fn virtual_arm_comes_to_the_batch_estimate() {
                     .all(|e| e.decided_by == Decision::Data)
             );
             // Single precision comes to the same.
-            let single = learned(&model, &settings::<f32>(&model.chain, 1e-3), &whole(&trial, &lead));
+            let single = learned(
+                &model,
+                &settings::<f32>(&model.chain, 1e-3),
+                &whole(&trial, &lead),
+            );
             for (a, b) in single.estimates().iter().zip(online.estimates()) {
                 assert!(
                     (f64::from(a.value) - b.value).abs() <= 0.05 * b.sd,

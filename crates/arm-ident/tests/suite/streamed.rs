@@ -6,9 +6,9 @@ use super::synthetic::{Recipe, at_every_joint, effect, sines, wrong};
 use arm_core::{Joints, models};
 use arm_ident::IdentError;
 use arm_ident::inference::joint_method::identify;
-use arm_ident::regression::equation::Rows;
 use arm_ident::regression::measured_motion::low_pass;
 use arm_ident::regression::preprocessing::filtered;
+use arm_ident::regression::rows::Rows;
 use arm_ident::regression::trial::{Role, Trial};
 use arm_numerics::NumericsError;
 

@@ -7,3 +7,4 @@ pub mod outcome;
 mod polish;
 pub mod program;
 mod scaled;
+pub mod solve;

@@ -13,6 +13,22 @@ pub enum Status {
     Failed(Reason),
 }
 
+impl Status {
+    /// Stable name in results.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Solved => "solved",
+            Self::AlmostSolved => "almost_solved",
+            Self::Infeasible => "infeasible",
+            Self::Failed(Reason::Iterations) => "iteration_limit",
+            Self::Failed(Reason::Numerical) => "numerical_breakdown",
+            Self::Failed(Reason::Progress) => "insufficient_progress",
+            Self::Failed(Reason::Unbounded) => "unbounded",
+            Self::Failed(Reason::Other) => "failed",
+        }
+    }
+}
+
 /// Why the interior-point solver gave up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]

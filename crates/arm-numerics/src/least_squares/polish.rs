@@ -4,7 +4,7 @@
 //! the curvature of `λ(‖Ax+b‖ − cᵀx − d)` is a sum of squares, so each step is again such a least-squares problem and `R` is never squared.
 
 use crate::least_squares::equality::{Equality, Solved};
-use crate::least_squares::scaled::{Scaled, sides};
+use crate::least_squares::scaled::{Active, Scaled, sides};
 use crate::linalg::matrix::{Matrix, add_scaled, dot, max_abs, norm};
 
 /// Newton steps on binding cones.
@@ -21,13 +21,6 @@ const FEASIBLE: f64 = 1e-10;
 
 /// A multiplier may be this negative, relative to the size of the gradient's terms, and count as zero.
 const ZERO_MULTIPLIER: f64 = 1e-10;
-
-/// Which inequalities and cones bind.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Active {
-    pub(crate) rows: Vec<bool>,
-    pub(crate) cones: Vec<bool>,
-}
 
 /// Refines `start`. `None` if no set of binding constraints near the guess gives a feasible point with multipliers of the right sign.
 pub(crate) fn polish(scaled: &Scaled, start: &[f64], guess: &Active) -> Option<(Vec<f64>, Active)> {

@@ -1,7 +1,6 @@
 //! A [`Program`] in scaled variables, every constraint with a gradient of about unit length.
 
 use crate::error::{NumericsError, check_finite};
-use crate::least_squares::polish::Active;
 use crate::least_squares::program::{Cone, Program};
 use crate::linalg::matrix::{Matrix, add_scaled, dot, norm};
 
@@ -187,4 +186,11 @@ fn cone(cone: &Cone, scale: &[f64]) -> Cone {
         c: c.iter().map(|v| v / unit).collect(),
         d: cone.d / unit,
     }
+}
+
+/// Which inequalities and cones bind.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Active {
+    pub(crate) rows: Vec<bool>,
+    pub(crate) cones: Vec<bool>,
 }

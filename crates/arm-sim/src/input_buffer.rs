@@ -10,7 +10,7 @@ use crate::step::Inputs;
 const AHEAD: usize = 16;
 
 /// The drive at the points of time that the steps of an integrator need.
-pub(crate) struct Feed<T, const N: usize> {
+pub(crate) struct InputBuffer<T, const N: usize> {
     /// From the start of step `first` on.
     block: Vec<Input<T, N>>,
     first: usize,
@@ -39,7 +39,7 @@ impl<T: Scalar, const N: usize> Ahead<'_, T, N> {
     }
 }
 
-impl<T: Scalar, const N: usize> Feed<T, N> {
+impl<T: Scalar, const N: usize> InputBuffer<T, N> {
     pub fn new(integrator: Integrator) -> Self {
         let points = match integrator {
             Integrator::SemiImplicitEuler => 1,

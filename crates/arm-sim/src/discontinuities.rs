@@ -18,7 +18,7 @@ const INWARD: f64 = 1e-6;
 
 /// The steps of a run that a break touches.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Breaks(Vec<Break>);
+pub(crate) struct Discontinuities(Vec<Break>);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Break {
@@ -28,7 +28,7 @@ struct Break {
     inside: f64,
 }
 
-impl Breaks {
+impl Discontinuities {
     /// The breaks of an experiment.
     ///
     /// On the grid they matter only where a value jumps that the arm feels at once: the acceleration of a handle that holds it
@@ -93,7 +93,7 @@ pub(crate) fn step_in_pieces<const N: usize>(
         step(model, prepared.integrator(), h, inputs, (state, memory));
     };
     let (begin, end) = (schedule.time(number - 1), schedule.time(number));
-    let touched = prepared.breaks.within(number);
+    let touched = prepared.discontinuities.within(number);
     if touched.is_empty() {
         let middle = prepared.input(schedule.half_time(2 * number - 1));
         let (start, end) = (prepared.input(begin), prepared.input(end));

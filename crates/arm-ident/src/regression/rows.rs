@@ -1,0 +1,34 @@
+//! Rows of a regression.
+
+/// Rows of a regression over a whole trial, column by column.
+///
+/// `columns[u][i * N + j]` belongs to unknown `u`, sample `i`, joint `j`; the right-hand side `rhs` is laid out alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rows {
+    /// One column for each unknown.
+    pub columns: Vec<Vec<f64>>,
+    /// Measured torque that the columns explain \[N m\].
+    pub rhs: Vec<f64>,
+    /// Index in the trial of each sample.
+    pub samples: Vec<usize>,
+    /// Which rows the cascade fits, laid out like `rhs`; all where there is none.
+    pub fits: Option<Vec<bool>>,
+}
+
+impl Rows {
+    /// Whether the row at a place in `rhs` is fitted.
+    pub fn fits(&self, at: usize) -> bool {
+        self.fits.as_ref().is_none_or(|fits| fits[at])
+    }
+
+    /// Rows of zeros.
+    pub(crate) fn zeros<const N: usize>(unknowns: usize, samples: Vec<usize>) -> Self {
+        let length = samples.len() * N;
+        Self {
+            columns: vec![vec![0.0; length]; unknowns],
+            rhs: vec![0.0; length],
+            samples,
+            fits: None,
+        }
+    }
+}
