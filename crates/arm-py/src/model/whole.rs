@@ -370,13 +370,13 @@ pub(super) fn path_of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<PathBuf
 }
 
 /// The objects of one class in a sequence.
-pub fn each<C: PyClass + PyTypeInfo + Sync, T>(
+pub fn each<C, T>(
     place: &str,
     given: &Bound<'_, PyAny>,
     inner: impl Fn(&C) -> T,
 ) -> PyResult<Vec<T>>
 where
-    C: PyClass<Frozen = pyo3::pyclass::boolean_struct::True>,
+    C: PyClass<Frozen = pyo3::pyclass::boolean_struct::True> + PyTypeInfo + Sync,
 {
     let name = C::type_object(given.py()).name()?.to_string();
     let sequence = || {
