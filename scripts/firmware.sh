@@ -53,11 +53,13 @@ host-single | host-double)
   ;;
 *) echo "firmware: $target is none of m4, m7, host-single, host-double" >&2; exit 2 ;;
 esac
-options+=(LIBRARY="$lib" STREAM="$work/stream.bin" BUILD="$work/firmware-$name" ${TWO_JOINTS:+TWO_JOINTS=1} ${ARMRS_CONTROL:+CONTROL=1})
+options+=(LIBRARY="$lib" BUILD="$work/firmware-$name" ${TWO_JOINTS:+TWO_JOINTS=1} ${ARMRS_CONTROL:+CONTROL=1})
 if [ -n "${MODEL:-}" ]; then
   folder=$(mktemp -d)
   trap 'rm -rf "$folder"' EXIT
   options+=(MODEL="$(realpath "$MODEL")" BUILD="$folder")
+else
+  options+=(STREAM="$work/stream.bin")
 fi
 make -s -C firmware "${options[@]}" >&2
 make -s -C firmware "${options[@]}" "${2:-run}"

@@ -65,7 +65,7 @@ def cases() -> list[tuple[int, str, float]]:
     drawn = [(int(rng.integers(1, 4)), "iterated" if k % 3 else "gauss-seidel", float(rng.choice([1e-3, 2e-3, 4e-3]))) for k in range(30)]
     # An explicit coupling is stable with much shorter steps alone.
     return [
-        (joints, algorithm, step) if algorithm == "iterated" else (1 + joints % 2, algorithm, step / 16)
+        (joints, algorithm, step) if algorithm == "iterated" else (1 + joints % 2, algorithm, step / 32)
         for joints, algorithm, step in drawn
     ]
 

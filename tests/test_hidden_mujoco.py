@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs.simulation import Sensors
-from armrs.trial import Trial
+from armrs import Sensors, Trial
 
 pytest.importorskip("mujoco", reason="the MuJoCo world needs `pip install mujoco`")
 

@@ -66,7 +66,7 @@ def test_every_command_of_the_readme_exists() -> None:
 
     from armrs.cli import app
 
-    named = set(re.findall(r"^\| `armrs ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.M))
+    named = set(re.findall(r"^\| `armrs ([a-z-]+)", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.M))
     assert named == set(get_command(app).commands)
 
 

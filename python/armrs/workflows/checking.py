@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs, Text
 from ..io import plausibility
 from ..io.dataset import Dataset, describe, name_of, read_entry
@@ -95,6 +96,7 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
     True
     """
     problems: list[Problem] = []
+    checks.path("source", source)
     described = _caught(lambda: describe(source), problems)
     if described is None:
         return Checked(

@@ -233,7 +233,10 @@ def _insert(connection: sqlite3.Connection, result: Identified, date: str) -> No
     key = (result.dataset.name, date, result.method)
     connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
     made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints))
-    estimates = {(e.name, e.kind, e.joint or 0): e for e in (*result.parameters, *result.combinations)}
+    # A combination of one parameter alone is that parameter.
+    alone = {(e.name, e.joint) for e in result.parameters}
+    combinations = [e for e in result.combinations if (e.name, e.joint) not in alone]
+    estimates = {(e.name, e.kind, e.joint or 0): e for e in (*result.parameters, *combinations)}
     rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)]
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
 
