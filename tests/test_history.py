@@ -38,9 +38,9 @@ def test_a_change_is_found_and_the_rest_is_not(identified: Identified, tmp_path:
     file = tmp_path / "subject.sqlite"
     std = next(sessions._deviation(e, 0.95) for e in identified.combinations if e.name == "m2*l2")
     for k, date in enumerate(("2026-01-05", "2026-02-03", "2026-03-04")):
-        courses = sessions.add(file, moved(identified, {"m2*l2": 0.2 * k * std}), date)
+        courses = sessions.add(file, moved(identified, {"m2*l2": 0.2 * k * std}), date).courses
         assert not any(c.changed for c in courses)
-    courses = sessions.add(file, moved(identified, {"m2*l2": 8.0 * std}), "2026-04-02")
+    courses = sessions.add(file, moved(identified, {"m2*l2": 8.0 * std}), "2026-04-02").courses
     assert [c.label for c in courses if c.changed] == ["m2*l2"]
     course = next(c for c in courses if c.name == "m2*l2")
     assert course.dates == ("2026-01-05", "2026-02-03", "2026-03-04", "2026-04-02")
@@ -61,7 +61,7 @@ def test_sessions_compare_when_the_data_decided_the_same(identified: Identified,
     file = tmp_path / "subject.sqlite"
     bound = tuple(dataclasses.replace(e, decided_by="bound") if (e.name, e.joint) == ("torque", 2) else e for e in identified.parameters)
     sessions.add(file, dataclasses.replace(identified, parameters=bound), "2026-01-05")
-    courses = sessions.add(file, identified, "2026-02-03")
+    courses = sessions.add(file, identified, "2026-02-03").courses
     alone = [(c.kind, c.joint) for c in courses if np.isnan(c.change)]
     assert ("coulomb", 2) in alone and ("coulomb", 1) not in alone and ("combination", None) not in alone
 
@@ -70,7 +70,7 @@ def test_the_same_session_replaces_itself_and_order_is_by_date(identified: Ident
     file = tmp_path / "subject.sqlite"
     sessions.add(file, identified, "2026-03-01")
     sessions.add(file, identified, "2026-03-01")
-    courses = sessions.add(file, identified, "2026-01-01")
+    courses = sessions.add(file, identified, "2026-01-01").courses
     assert all(c.dates == ("2026-01-01", "2026-03-01") and c.change == 0.0 for c in courses)
 
 
@@ -93,8 +93,8 @@ def named(result: Identified, name: str, subject: str | None = None) -> Identifi
 def test_the_history_of_another_subject_is_refused(identified: Identified, tmp_path: Path) -> None:
     file = tmp_path / "s1.sqlite"
     sessions.add(file, named(identified, "S1 2026-03-14"), "2026-03-14")
-    assert len(sessions.add(file, named(identified, "2026-04-11 (S1)"), "2026-04-11")[0].dates) == 2
-    assert len(sessions.add(file, named(identified, "follow-up", "S1"), "2026-05-09")[0].dates) == 3
+    assert len(sessions.add(file, named(identified, "2026-04-11 (S1)"), "2026-04-11").courses[0].dates) == 2
+    assert len(sessions.add(file, named(identified, "follow-up", "S1"), "2026-05-09").courses[0].dates) == 3
     before = file.read_bytes()
     for other in (named(identified, "S2 2026-03-14"), named(identified, "S1 2026-03-14", "S2")):
         with pytest.raises(BadInput, match=r"s1\.sqlite: history: found the history of 'S1', allowed that of 'S2': one subject a file"):
@@ -140,10 +140,10 @@ def test_a_session_stays_only_if_everything_else_was_written(identified: Identif
     assert not (tmp_path / "a").exists()
     file = tmp_path / "s.sqlite"
     sessions.add(file, identified, "2026-01-01")
-    with pytest.raises(OSError, match="full"), sessions.adding(file, identified, "2026-02-01") as courses:
-        assert courses[0].dates == ("2026-01-01", "2026-02-01")
+    with pytest.raises(OSError, match="full"), sessions.adding(file, identified, "2026-02-01") as followed:
+        assert followed.courses[0].dates == ("2026-01-01", "2026-02-01")
         raise OSError("full")
-    assert all(course.dates == ("2026-01-01",) for course in sessions.read(file))
+    assert all(course.dates == ("2026-01-01",) for course in sessions.read(file).courses)
 
 
 def test_refuses_other_files(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -254,7 +254,7 @@ def test_additions_at_the_same_time_all_stay(identified: Identified, tmp_path: P
     dates = [f"2026-03-{day:02d}" for day in range(1, 13)]
     with ThreadPoolExecutor(max_workers=len(dates)) as pool:
         list(pool.map(lambda date: sessions.add(file, identified, date), dates))
-    assert set(sessions.read(file)[0].dates) == set(dates)
+    assert set(sessions.read(file).courses[0].dates) == set(dates)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
@@ -270,4 +270,4 @@ def test_a_kill_while_a_history_is_made_leaves_one_that_is_accepted(identified: 
         os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(child, 0)
     sessions.add(file, identified, "2026-03-02")
-    assert sessions.read(file)[0].dates == ("2026-03-02",)
+    assert sessions.read(file).courses[0].dates == ("2026-03-02",)

@@ -1,14 +1,22 @@
-"""Results in a notebook: one screen, escaped, and tidy data frames with units."""
+"""Results in Python: one screen in a notebook, escaped; data frames and labelled arrays with units; figures and reports."""
 
 from __future__ import annotations
 
+import base64
 import json
+import re
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import matplotlib
 import numpy as np
+import pandas as pd
 import pytest
+from matplotlib.axes import Axes
 
 import armrs
+from armrs.workflows import history
 from armrs.workflows.demo import true_model
 
 
@@ -17,34 +25,120 @@ def run() -> armrs.Simulated:
     return armrs.simulate(true_model(), armrs.Movement(np.radians([[-60, 60], [-48, 60]]), speed=0.5, acceleration=2.0))
 
 
+@pytest.fixture(scope="module")
+def identified(slow_arm: Path) -> armrs.Identified:
+    return armrs.identify(slow_arm, with_effects="coulomb")
+
+
+@pytest.fixture(autouse=True)
+def pyplot() -> Iterator[None]:
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    yield
+    pyplot.close("all")
+
+
 def test_a_run_is_a_data_frame_with_units(run: armrs.Simulated) -> None:
     frame = run.to_dataframe()
     assert list(frame.columns[:3]) == ["t", "q1", "q2"]
     assert frame.attrs["units"]["force_on_arm_y"] == "N"
     assert np.array_equal(frame["q2"], run.q[:, 1])
+    pd.testing.assert_frame_equal(pd.DataFrame(run), frame)
 
 
-def test_estimates_are_a_tidy_frame_and_json(slow_arm: Path) -> None:
-    result = armrs.identify(slow_arm)
-    frame = result.to_dataframe()
+def test_a_run_is_a_labelled_data_set_with_units(run: armrs.Simulated) -> None:
+    data = run.to_xarray()
+    assert data["torque.gravity"].dims == ("time", "joint") and data["torque.gravity"].attrs["units"] == "N m"
+    assert np.array_equal(data["q"].sel(joint="elbow"), run.q[:, 1])
+    assert np.array_equal(data["force_on_arm"].sel(axis="z"), run.force_on_arm[:, 1])
+    assert data.time.attrs["units"] == "s" and data["energy.kinetic"].dims == ("time",)
+    # Whatever is recorded and has numbers is in it, but for what belongs to single effects and inner states.
+    left = {name for name, values in run.columns.items() if isinstance(values, np.ndarray)} - set(data.variables)
+    assert left == {"resisting", "memory", "energy_error"}
+
+
+def test_without_xarray_the_refusal_names_the_extra(run: armrs.Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, method in (("xarray", run.to_xarray), ("pandas", run.to_dataframe)):
+        monkeypatch.setitem(sys.modules, name, None)
+        with pytest.raises(armrs.ArmrsError, match=rf'{name}: pip install "armrs\[notebook\]"'):
+            method()
+
+
+def test_estimates_are_a_tidy_frame_and_json(identified: armrs.Identified) -> None:
+    frame = identified.to_dataframe()
     assert set(frame["group"]) >= {"parameter", "combination"}
-    first = result.combinations[0]
+    first = identified.combinations[0]
     row = frame[(frame["group"] == "combination") & (frame["name"] == first.name)].iloc[0]
     assert (row["value"], row["low"], row["high"]) == (first.value, *first.interval)
-    assert json.loads(result.to_json())["combinations"][0]["name"] == first.name
+    assert json.loads(identified.to_json())["combinations"][0]["name"] == first.name
 
 
-def test_a_notebook_shows_one_screen_and_no_markup_of_files(run: armrs.Simulated, slow_arm: Path) -> None:
+def test_a_notebook_shows_one_screen_and_no_markup_of_files(run: armrs.Simulated, identified: armrs.Identified) -> None:
     shown = run._repr_html_()
     assert shown.count("<tr>") == 31 and "more rows: to_dataframe()" in shown
-    result = armrs.identify(slow_arm)
-    named = result.dataset.replace(name="<script>alert(1)</script>")
-    html = type(result)(**{**vars(result), "dataset": named})._repr_html_()
+    named = identified.dataset.replace(name="<script>alert(1)</script>")
+    html = type(identified)(**{**vars(identified), "dataset": named})._repr_html_()
     assert "<script>" not in html and "&lt;script&gt;" in html
     assert len(html) < 20_000
 
 
-def test_passive_curves_and_plans_are_tidy(slow_arm: Path) -> None:
+def test_passive_curves_are_tidy(slow_arm: Path) -> None:
     frame = armrs.passive_moments(slow_arm).to_dataframe()
     assert {"configuration", "joint", "angle", "half_width"} <= set(frame.columns)
     assert frame.attrs["units"]["angle"] == "rad"
+
+
+def results(identified: armrs.Identified, run: armrs.Simulated, folder: Path) -> dict[str, object]:
+    """A result of every kind but those that take long, which have tests of their own."""
+    movement = armrs.Movement(np.radians([[-60, 60], [-20, 90], [-60, 60]]), speed=1.0, acceleration=4.0)
+    for day in (1, 2):
+        followed = history.add(folder / "s1.sqlite", identified, f"2026-01-0{day}")
+    return {
+        "parameters": identified,
+        "simulated": run,
+        "passive-slow": armrs.passive_moments(identified.dataset),
+        "predictions": armrs.forecast(true_model(), [movement], repeats=2),
+        "history": followed,
+    }
+
+
+def test_every_result_draws_and_writes_the_figures_of_its_report(
+    identified: armrs.Identified, run: armrs.Simulated, tmp_path: Path
+) -> None:
+    from matplotlib import pyplot
+
+    for name, result in results(identified, run, tmp_path).items():
+        before = dict(matplotlib.rcParams)
+        axes = result.plot()
+        assert dict(matplotlib.rcParams) == before
+        assert len(axes) > 0 and all(isinstance(ax, Axes) for ax in axes)
+        assert pyplot.gcf() is axes[0].figure and pyplot.get_fignums() == [1]
+        with pytest.raises(armrs.BadInput, match=rf"name: found unknown figure 'nothing', allowed .*{name}"):
+            result.plot("nothing")
+        pyplot.close("all")
+        page = result.report(tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        assert pyplot.get_fignums() == []
+        pictures = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
+        assert pictures and all(base64.b64decode(text).startswith(b"\x89PNG") for text in pictures)
+        assert "<h1>" in page and not re.search(r"\bnan\b|None|Markup", page)
+
+
+def test_a_figure_is_chosen_by_its_name(identified: armrs.Identified) -> None:
+    axes = identified.plot("torques-slow")
+    assert [ax.get_title(loc="left") for ax in axes[:2]] == ["shoulder", "elbow"]
+    assert np.array_equal(axes[0].lines[1].get_ydata()[:5], next(e for e in identified.explained if e.trial.role == "test").fitted[:5, 0])
+
+
+def test_a_report_is_a_page_of_html(run: armrs.Simulated, tmp_path: Path) -> None:
+    with pytest.raises(armrs.BadInput, match=r"allowed the name of a file that ends with \.html"):
+        run.report(tmp_path / "report.pdf")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_history_is_a_tidy_frame(identified: armrs.Identified, tmp_path: Path) -> None:
+    history.add(tmp_path / "s1.sqlite", identified, "2026-01-01")
+    followed = history.add(tmp_path / "s1.sqlite", identified, "2026-02-01")
+    frame = followed.to_dataframe()
+    assert set(frame["date"]) == {"2026-01-01", "2026-02-01"} and len(frame) == 2 * len(followed.courses)
+    assert "nothing changed in the last session" in repr(followed)

@@ -1,12 +1,14 @@
-"""Results as tables: in a notebook, as a data frame, as JSON."""
+"""Results as tables and pictures: in a notebook, as a data frame, as labelled arrays, as JSON, as a report."""
 
 from __future__ import annotations
 
 import html
+import importlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from .errors import ArmrsError
 from .io import files
@@ -14,6 +16,7 @@ from .io import files
 if TYPE_CHECKING:
     import numpy as np
     import pandas
+    import xarray
 
 _SHOWN = 30
 """Rows that a notebook shows; `to_dataframe` has all."""
@@ -41,7 +44,12 @@ class Tidy:
 
 
 class Tabular:
-    """A result that is also a table. Subclasses say which by `tidy`; those with `to_dict` are also JSON."""
+    """A result that is also a table. Subclasses say which by `tidy`; those with `to_dict` are also JSON.
+
+    `VIEW` names the module below `armrs` that draws the result, and the `View` in it: it is loaded when something is drawn.
+    """
+
+    VIEW: ClassVar[tuple[str, str]]
 
     def tidy(self) -> Tidy:
         """Return the result as a tidy table."""
@@ -64,6 +72,48 @@ class Tabular:
         frame.attrs["units"] = dict(table.units)
         return frame
 
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Give the rows of the table, so that `pandas.DataFrame(result)` works."""
+        columns = self.tidy().columns
+        for row in zip(*columns.values(), strict=True):
+            yield dict(zip(columns, row, strict=True))
+
+    def plot(self, name: str | None = None) -> np.ndarray:
+        """Draw a figure of the report where notebooks and windows show it.
+
+        Parameters
+        ----------
+        name : str, optional
+            Which figure; the first when absent. A name that is unknown is refused with the list of names.
+
+        Returns
+        -------
+        ndarray of matplotlib Axes, shape (n,)
+            `axes[0].figure` is the figure.
+
+        Raises
+        ------
+        BadInput
+            For a name that is unknown, and a result without anything to draw.
+        """
+        axes: np.ndarray = self._view().plot(self, name)
+        return axes
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the report that the command writes below `-o`, as one self-contained HTML page; return its path.
+
+        Raises
+        ------
+        BadInput
+            When the name does not end with `.html`, or cannot be written.
+        """
+        written: Path = self._view().report(self, path)
+        return written
+
+    def _view(self) -> Any:
+        module, name = self.VIEW
+        return getattr(importlib.import_module(f"{__package__}.{module}"), name)
+
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return the result as JSON text, and write it to `path` where one is given."""
         data = self.to_dict()  # type: ignore[attr-defined]
@@ -82,6 +132,41 @@ class Tabular:
         )
         more = f"<p>{table.n_rows - shown} more rows: to_dataframe()</p>" if table.n_rows > shown else ""
         return f"<p>{_text(repr(self))}</p><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{more}"
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """An array with a name for each of its dimensions, and a unit."""
+
+    dims: tuple[str, ...]
+    values: np.ndarray
+    unit: str
+
+
+class Series(Tabular):
+    """A result whose table is a series over time, of quantities that have several components."""
+
+    def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
+        """Return coordinates by dimension, and quantities by name."""
+        raise NotImplementedError
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return an xarray Dataset; each variable has its unit in `attrs["units"]`.
+
+        Raises
+        ------
+        ArmrsError
+            When xarray, of the extra `notebook`, is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ArmrsError('labelled arrays need xarray: pip install "armrs[notebook]"') from None
+        coordinates, quantities = self.labelled()
+        variables = {name: (q.dims, q.values, {"units": q.unit}) for name, q in quantities.items()}
+        made = xarray.Dataset(variables, coords=dict(coordinates))
+        made["time"].attrs["units"] = "s"
+        return made
 
 
 def _text(value: object) -> str:

@@ -88,7 +88,7 @@ def identify(
     with contextlib.ExitStack() as kept:
         # What is added to the history stays only if everything else could be written.
         if history is not None and result.is_sound:
-            plain["history"] = [course.to_dict() for course in kept.enter_context(sessions.adding(history, result, day))]
+            plain["history"] = kept.enter_context(sessions.adding(history, result, day)).to_dict()["courses"]
         written = []
         if folder:
             from ..report.results import write_identified

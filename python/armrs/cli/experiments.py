@@ -108,6 +108,7 @@ def simulate(
 
 
 def plan(
+    context: typer.Context,
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml: the arm as it is believed to be, and the robot.")],
     angles_deg: Annotated[str, typer.Option(metavar="LOW:HIGH,…", help="Range of each joint [deg], first joint first.")],
     out: MaybeFolder = None,
@@ -162,10 +163,10 @@ def plan(
     if arm.robot is not None and repeats > 1:
         with console.progress("looking for the smallest effects that they would show"):
             smallest = detectable(arm, found.movements, repeats=repeats)
-    plain = planning.plan_data(found, beside, smallest)
+    plain = planning.plan_data(found, beside, smallest, name=f"a plan for {model.name}", command=command_line(context))
     written = planning.write_plan(found, plain, folder) if folder else []
     present(lambda: plain, json, lambda: words.planned(plain, written))
-    return 0 if found.worst <= 0.5 else 1
+    return 0 if found.worst <= planning.MOST_UNCERTAIN else 1
 
 
 def record(

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..report import plotting, tables
-from ..report.figures import Drawn, quantity_name
+from ..report.figures import Drawn, Figures, quantity_name
 from .summary import Quantity, Summary
 
 MOST_PANELS = 12
 
 
-def sweep(summary: Summary, data: Mapping[str, Any]) -> list[Drawn]:
-    """Draw every quantity over the cases, and the coverage of the intervals where the truth is known."""
+def sweep(summary: Summary, data: Mapping[str, Any]) -> Figures:
+    """Return the figures of a sweep: every quantity over the cases, and the coverage of the intervals where the truth is known."""
     if not summary.quantities:
-        return []
+        return {}
     joints = data["data"]["joints"]
-    with plotting.style():
-        drawn = [_values(summary.quantities, joints)]
-        known = [q for q in data["quantities"] if q["coverage"] is not None]
-        if known:
-            drawn.append(_coverage(known, joints, data["level"]))
-    return drawn
+    values: Figures = {"estimates": partial(_values, summary.quantities, joints)}
+    known = [q for q in data["quantities"] if q["coverage"] is not None]
+    return {**values, "coverage": partial(_coverage, known, joints, data["level"])} if known else values
 
 
 def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:

@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from ..io import files
+from ..report.figures import draw
 from ..report.plain import origin
 from ..report.results import write_result
+from ..report.view import View
 from . import figures
 from .change import Vary
 from .spec import Sweep
 from .store import KINDS, Store
-from .summary import Summary
+from .summary import Summary, summarise
 
 
 def sweep_data(sweep: Sweep, summary: Summary, command: str | None = None) -> dict[str, Any]:
@@ -42,6 +44,12 @@ def _varied(vary: Vary) -> dict[str, Any]:
 
 def write_sweep(store: Store, data: dict[str, Any], summary: Summary) -> list[Path]:
     """Write `sweep.json`, figures and `report.html` beside the tables; return all files, the report last."""
-    drawn = figures.sweep(summary, data)
+    drawn = draw(figures.sweep(summary, data))
     written = files.write_whole(store.folder, lambda out: write_result(out, "sweep", data, drawn))
     return [*(store.final(kind) for kind in KINDS), store.mark, *written]
+
+
+SWEPT = View(
+    lambda swept: swept.data,
+    lambda swept, data: figures.sweep(summarise(Store(swept.sweep, swept.cases.parent)), data),
+)

@@ -11,6 +11,8 @@ from typing import Any
 
 from .. import checks
 from ..io import files
+from ..io.samples import parquet_table
+from ..tabular import Tabular, Tidy
 from ..workflows.record import check_required
 from . import results, workers
 from .spec import Sweep, load_sweep
@@ -21,7 +23,7 @@ MOST_JOBS = 1024
 
 
 @dataclass(frozen=True, eq=False)
-class Swept:
+class Swept(Tabular):
     """A sweep that is done.
 
     Attributes
@@ -42,6 +44,20 @@ class Swept:
     data: dict[str, Any]
     files: tuple[Path, ...]
     run: dict[str, Any]
+
+    VIEW = ("montecarlo.results", "SWEPT")
+
+    def __repr__(self) -> str:
+        return f"Swept({self.sweep.name!r}: {self.sweep.cases} cases, {self.failed} failed, {len(self.data['quantities'])} quantities)"
+
+    def tidy(self) -> Tidy:
+        """Return the estimates, one quantity of one case a row, as in `estimates.parquet`."""
+        table = parquet_table(self.estimates)
+        return Tidy({name: table.column(name).to_pylist() for name in table.column_names}, {})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the summary, as in `sweep.json`."""
+        return self.data
 
     @property
     def failed(self) -> int:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..analysis.joint_coupling import LEAST_HELD, Dependence
 from ..io.trial import Trial
 from ..workflows.identify import Explained, Identified
 from ..workflows.passive import PassiveMoments
+from ..workflows.plan import MOST_UNCERTAIN
 from ..workflows.simulate import Simulated
 from . import plotting, tables
 
@@ -39,11 +41,22 @@ class Drawn:
     section: str = ""
 
 
-def identified(result: Identified, data: Mapping[str, Any]) -> list[Drawn]:
-    """Draw an identification: parameters with intervals, and torques measured and fitted for every movement."""
-    joints = data["data"]["joints"]
+Figures = Mapping[str, Callable[[], Drawn]]
+"""The figures of a result by their names, each drawn when it is called."""
+
+
+def draw(figures: Figures) -> list[Drawn]:
+    """Draw all figures of a result."""
     with plotting.style():
-        return [parameters([*data["parameters"], *data["combinations"]], joints, data["level"]), *_torques(result, joints)]
+        return [one() for one in figures.values()]
+
+
+def identified(result: Identified, data: Mapping[str, Any]) -> Figures:
+    """Return the figures of an identification: parameters with intervals, and torques measured and fitted for every movement."""
+    joints = data["data"]["joints"]
+    names = list(dict.fromkeys(e.trial.configuration for e in result.explained))[:MOST_CONFIGURATIONS]
+    first: Figures = {"parameters": partial(parameters, [*data["parameters"], *data["combinations"]], joints, data["level"])}
+    return {**first, **{f"torques-{slug(name)}": partial(_torques, result, name, joints) for name in names}}
 
 
 def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level: float) -> Drawn:
@@ -56,14 +69,11 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
     split = _balanced(sizes, columns)
     height = max(sum(sizes[k] for k in column) for column in split)
     figure = plotting.figure(5.4 * columns, 0.36 * height + 0.9)
-    for place, column in zip(figure.subfigures(1, columns, squeeze=False)[0], split, strict=True):
+    for place, column in zip(figure.add_gridspec(1, columns), split, strict=True):
         spare = height - sum(sizes[k] for k in column)
         ratios = [sizes[k] for k in column] + ([spare] if spare > 0.5 else [])
-        axes = place.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0]
-        for ax, k in zip(axes, column, strict=False):
-            plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], ax)
-        for ax in axes[len(column) :]:
-            ax.set_axis_off()
+        for cell, k in zip(place.subgridspec(len(ratios), 1, height_ratios=ratios), column, strict=False):
+            plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], figure.add_subplot(cell))
     plotting.interval_legend(figure, unique)
     text = (
         f"Bars are {100 * level:g} % intervals. A full marker rests on the measurement. A hollow one does not: where the movements leave a "
@@ -72,28 +82,64 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
     return Drawn("parameters", "Parameters with intervals", text, figure)
 
 
-def history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
+def history(courses: Sequence[Mapping[str, Any]]) -> Figures:
+    """Return the figure of a history; nothing where no parameter was followed."""
+    return {"history": partial(_history, courses)} if courses else {}
+
+
+def _history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
     """Draw every parameter over sessions, with twice its standard deviation."""
     columns = min(3, max(1, len(courses)))
     rows = max(1, -(-len(courses) // columns))
-    with plotting.style():
-        figure = plotting.figure(3.6 * columns, 2.4 * rows)
-        axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, course in zip(axes, courses, strict=False):
-            place = np.arange(len(course["dates"]))
-            colour = plotting.ORANGE if course["changed"] else plotting.BLUE
-            ax.errorbar(place, course["values"], 2.0 * np.asarray(course["stds"]), fmt="o-", color=colour, capsize=3)
-            ax.set_xticks(place, [date[2:] for date in course["dates"]], rotation=45, fontsize="small")
-            name = course["name"] if course["joint"] is None else f"{course['kind']} {course['joint']} {course['name']}"
-            ax.set(title=f"{name}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
-            ax.title.set_fontsize("small")
-        for ax in axes[len(courses) :]:
-            ax.set_axis_off()
+    figure = plotting.figure(3.6 * columns, 2.4 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, course in zip(axes, courses, strict=False):
+        place = np.arange(len(course["dates"]))
+        colour = plotting.ORANGE if course["changed"] else plotting.BLUE
+        ax.errorbar(place, course["values"], 2.0 * np.asarray(course["stds"]), fmt="o-", color=colour, capsize=3)
+        ax.set_xticks(place, [date[2:] for date in course["dates"]], rotation=45, fontsize="small")
+        ax.set(title=f"{tables.course_label(course)}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
+        ax.title.set_fontsize("small")
+    for ax in axes[len(courses) :]:
+        ax.remove()
     text = (
         "Parameters that the data decided, over the sessions; bars are twice the standard deviation. "
         "An orange one differs in the last session."
     )
     return Drawn("history", "Over the sessions", text, figure)
+
+
+def planned(data: Mapping[str, Any]) -> Figures:
+    """Return the figure of a plan: how well each parameter will be known."""
+    return {"predictions": partial(_planned, data["predictions"], data["data"]["joints"], data.get("compared"))}
+
+
+def _planned(predictions: Sequence[Mapping[str, Any]], joints: Sequence[str], compared: Mapping[str, Any] | None) -> Drawn:
+    """Draw the relative standard deviation to be expected of every parameter."""
+    from matplotlib.ticker import LogLocator
+
+    figure = plotting.figure(7.4, 0.34 * len(predictions) + 1.2)
+    ax = figure.subplots()
+    place = np.arange(len(predictions))
+    ax.plot([100.0 * p["relative"] for p in predictions], place, "o", color=plotting.BLUE, ms=8, label="these movements")
+    if compared is not None:
+        ax.plot(
+            [100.0 * p["relative"] for p in compared["predictions"]], place, "o", color=plotting.GREY, mfc="white", ms=8, label="compared"
+        )
+    ax.axvline(100.0 * MOST_UNCERTAIN, color=plotting.ORANGE, label="uncertain by half its value")
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    ax.minorticks_off()
+    ax.set_yticks(place, [quantity_name(p, joints) for p in predictions])
+    ax.set_ylim(len(predictions) - 0.4, -0.6)
+    ax.set_xlabel("standard deviation from the data alone [% of the value]")
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+    text = (
+        "How well each parameter will be known from the data alone, relative to its value; a small parameter of an effect counts as "
+        "0.05. Simulated before the experiment: what the model lacks is not in it."
+    )
+    return Drawn("predictions", "How well each parameter will be known", text, figure)
 
 
 def quantity_name(item: Mapping[str, Any], joints: Sequence[str]) -> str:
@@ -111,25 +157,22 @@ def _balanced(sizes: Sequence[float], columns: int) -> list[list[int]]:
     return sorted(sorted(column) for column in split)
 
 
-def _torques(result: Identified, joints: Sequence[str]) -> list[Drawn]:
-    drawn = []
-    names = list(dict.fromkeys(e.trial.configuration for e in result.explained))
-    for configuration in names[:MOST_CONFIGURATIONS]:
-        own = [e for e in result.explained if e.trial.configuration == configuration]
-        shown = next((e for e in own if e.trial.role == "test"), own[0])
-        n = len(joints)
-        figure = plotting.figure(5.0 * max(n, 1) + 0.4, 4.6)
-        axes = figure.subplots(2, n, squeeze=False, sharex=True, height_ratios=(2.0, 1.0))
-        for j, name in enumerate(joints):
-            plotting.torque(_elapsed(shown), shown.measured[:, j], shown.fitted[:, j], axes[0, j], title=name)
-            plotting.residual([(_elapsed(e), e.measured[:, j] - e.fitted[:, j], e.trial.role) for e in own], axes[1, j])
-            axes[0, j].set_xlabel("")
-        text = (
-            f"Above, joint torques of {shown.trial.file} ({shown.trial.role} trial): what the measured forces and motion ask for, and what "
-            f"the fitted model gives. Below, what is left in all {len(own)} repeats."
-        )
-        drawn.append(Drawn(f"torques-{slug(configuration)}", f"Torques of the movement {configuration}", text, figure))
-    return drawn
+def _torques(result: Identified, configuration: str, joints: Sequence[str]) -> Drawn:
+    """Draw torques of a trial, and what is left in all repeats of its movement."""
+    own = [e for e in result.explained if e.trial.configuration == configuration]
+    shown = next((e for e in own if e.trial.role == "test"), own[0])
+    n = len(joints)
+    figure = plotting.figure(5.0 * max(n, 1) + 0.4, 4.6)
+    axes = figure.subplots(2, n, squeeze=False, sharex=True, height_ratios=(2.0, 1.0))
+    for j, name in enumerate(joints):
+        plotting.torque(_elapsed(shown), shown.measured[:, j], shown.fitted[:, j], axes[0, j], title=name)
+        plotting.residual([(_elapsed(e), e.measured[:, j] - e.fitted[:, j], e.trial.role) for e in own], axes[1, j])
+        axes[0, j].set_xlabel("")
+    text = (
+        f"Above, joint torques of {shown.trial.file} ({shown.trial.role} trial): what the measured forces and motion ask for, and what "
+        f"the fitted model gives. Below, what is left in all {len(own)} repeats."
+    )
+    return Drawn(f"torques-{slug(configuration)}", f"Torques of the movement {configuration}", text, figure)
 
 
 def _elapsed(explained: Explained) -> np.ndarray:
@@ -180,62 +223,67 @@ def _extremes(piece: Simulated, together: int) -> Simulated:
     return piece.with_columns({name: of(name, piece.columns[name]) for name in kept})
 
 
-def simulated(result: Simulated, trial: Trial | None = None) -> list[Drawn]:
-    """Draw a run: angles, force and every torque of each joint. A trial that drove it is drawn behind the angles."""
+def simulated(result: Simulated, trial: Trial | None = None) -> Figures:
+    """Return the figure of a run: angles, force and every torque of each joint. A trial that drove it is drawn behind the angles."""
+    return {"simulated": partial(_simulated, result, trial)}
+
+
+def _simulated(result: Simulated, trial: Trial | None) -> Drawn:
     names = [joint.name for joint in result.model.joints]
     n = len(names)
     columns = max(n, 2)
-    with plotting.style():
-        figure = plotting.figure(4.6 * columns, 6.4)
-        grid = figure.add_gridspec(2, 2 * columns)
-        top = [figure.add_subplot(grid[0, k * columns : (k + 1) * columns]) for k in range(2)]
-        measured = None if trial is None else np.column_stack([np.interp(result.t, trial.t - trial.t[0], q) for q in trial.q.T])
-        plotting.angles(result.t, result.q, names, top[0], measured=measured)
-        plotting.force(result.t, result.force_on_arm, top[1])
-        largest = {key: np.abs(result.columns[f"torque.{key}"]).max(axis=0) for key in _TORQUES}
-        limit = _VISIBLE * np.max(list(largest.values()), axis=0)
-        visible = {key: label for key, label in _TORQUES.items() if (largest[key] > limit).any()}
-        for j, name in enumerate(names):
-            share = 2 * columns // n
-            ax = figure.add_subplot(grid[1, j * share : (j + 1) * share])
-            shown = {label: result.columns[f"torque.{key}"][:, j] for key, label in visible.items()}
-            plotting.contributions(result.t, shown, ax, title=f"Torques: {name}")
+    figure = plotting.figure(4.6 * columns, 6.4)
+    grid = figure.add_gridspec(2, 2 * columns)
+    top = [figure.add_subplot(grid[0, k * columns : (k + 1) * columns]) for k in range(2)]
+    measured = None if trial is None else np.column_stack([np.interp(result.t, trial.t - trial.t[0], q) for q in trial.q.T])
+    plotting.angles(result.t, result.q, names, top[0], measured=measured)
+    plotting.force(result.t, result.force_on_arm, top[1])
+    largest = {key: np.abs(result.columns[f"torque.{key}"]).max(axis=0) for key in _TORQUES}
+    limit = _VISIBLE * np.max(list(largest.values()), axis=0)
+    visible = {key: label for key, label in _TORQUES.items() if (largest[key] > limit).any()}
+    for j, name in enumerate(names):
+        share = 2 * columns // n
+        ax = figure.add_subplot(grid[1, j * share : (j + 1) * share])
+        shown = {label: result.columns[f"torque.{key}"][:, j] for key, label in visible.items()}
+        plotting.contributions(result.t, shown, ax, title=f"Torques: {name}")
     text = (
         "Inertial, centrifugal, Coriolis, gravity and resisting torques stand on the left of the equation of motion, those of motors and "
         "contact on the right. Torques that would be a line on the axis are left out."
     )
     if trial is not None:
         text += f" The broad lines are the angles measured in {trial.file}."
-    return [Drawn("simulated", "Angles, force and torques", text, figure)]
+    return Drawn("simulated", "Angles, force and torques", text, figure)
 
 
-def passive(result: PassiveMoments) -> list[Drawn]:
-    """Draw passive moments: for each configuration the samples by direction of motion, elastic mean and half width."""
+def passive(result: PassiveMoments) -> Figures:
+    """Return the figures of passive moments: one a configuration, and one for each joint that depends on its neighbour."""
     names = [joint.name for joint in result.dataset.model.joints]
-    drawn = []
-    with plotting.style():
-        for configuration in list(dict.fromkeys(c.configuration for c in result.curves))[:MOST_CONFIGURATIONS]:
-            curves = [c for c in result.curves if c.configuration == configuration]
-            own = [m for m in result.trials if m.trial.configuration == configuration]
-            figure = plotting.figure(4.9 * len(curves) + 0.4, 5.6)
-            axes = figure.subplots(2, len(curves), squeeze=False, sharex="col", height_ratios=(1.7, 1.0))
-            for (above, below), curve in zip(axes.T, curves, strict=True):
-                j = curve.joint - 1
-                rising, falling = ([(m.q[d, j], m.moment[d, j]) for m in own for d in [m.direction[:, j] == sign]] for sign in (1, -1))
-                plotting.hysteresis(rising, falling, above, title=names[j])
-                plotting.mean_and_spread(curve.angle, curve.elastic, curve.elastic_std, above, label="elastic mean")
-                plotting.mean_and_spread(
-                    curve.angle, curve.half_width, curve.half_width_std, below, label="half width (dissipative)", colour=plotting.PURPLE
-                )
-                above.set(ylabel="passive moment [N m]", xlabel="")
-                below.set_ylim(bottom=min(0.0, below.get_ylim()[0]))
-            text = (
-                f"Above, samples of {len(own)} repeats by direction of motion and the mean of both directions. Below, half the difference "
-                "of both directions. Bands are one standard deviation over the repeats."
-            )
-            drawn.append(Drawn(f"passive-{slug(configuration)}", f"Passive moments of the movement {configuration}", text, figure))
-        drawn += [_dependence(result, d, names) for d in result.dependence]
-    return drawn
+    configurations = list(dict.fromkeys(c.configuration for c in result.curves))[:MOST_CONFIGURATIONS]
+    first: Figures = {f"passive-{slug(name)}": partial(_hysteresis, result, name, names) for name in configurations}
+    return {**first, **{f"dependence-{d.joint}": partial(_dependence, result, d, names) for d in result.dependence}}
+
+
+def _hysteresis(result: PassiveMoments, configuration: str, names: Sequence[str]) -> Drawn:
+    """Draw the samples of a configuration by direction of motion, elastic mean and half width."""
+    curves = [c for c in result.curves if c.configuration == configuration]
+    own = [m for m in result.trials if m.trial.configuration == configuration]
+    figure = plotting.figure(4.9 * len(curves) + 0.4, 5.6)
+    axes = figure.subplots(2, len(curves), squeeze=False, sharex="col", height_ratios=(1.7, 1.0))
+    for (above, below), curve in zip(axes.T, curves, strict=True):
+        j = curve.joint - 1
+        rising, falling = ([(m.q[d, j], m.moment[d, j]) for m in own for d in [m.direction[:, j] == sign]] for sign in (1, -1))
+        plotting.hysteresis(rising, falling, above, title=names[j])
+        plotting.mean_and_spread(curve.angle, curve.elastic, curve.elastic_std, above, label="elastic mean")
+        plotting.mean_and_spread(
+            curve.angle, curve.half_width, curve.half_width_std, below, label="half width (dissipative)", colour=plotting.PURPLE
+        )
+        above.set(ylabel="passive moment [N m]", xlabel="")
+        below.set_ylim(bottom=min(0.0, below.get_ylim()[0]))
+    text = (
+        f"Above, samples of {len(own)} repeats by direction of motion and the mean of both directions. Below, half the difference "
+        "of both directions. Bands are one standard deviation over the repeats."
+    )
+    return Drawn(f"passive-{slug(configuration)}", f"Passive moments of the movement {configuration}", text, figure)
 
 
 def _dependence(result: PassiveMoments, fitted: Dependence, names: Sequence[str]) -> Drawn:

@@ -17,7 +17,7 @@ from ..io import files
 
 TEMPLATES = Path(__file__).with_name("templates")
 
-__all__ = ["Environment", "Picture", "TemplateError", "environment", "picture", "render", "source", "write_page"]
+__all__ = ["Environment", "Picture", "TemplateError", "data_uri", "environment", "picture", "render", "source", "write_page"]
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,12 @@ def picture(entry: Mapping[str, Any], folder: Path) -> Picture:
         return Picture(file, title, text, None)
     if not raw.startswith(b"\x89PNG"):
         raise BadInput("figures", Text(f"{file} is no PNG image"), "PNG images", file=path)
-    return Picture(file, title, text, "data:image/png;base64," + base64.b64encode(raw).decode("ascii"))
+    return Picture(file, title, text, data_uri(raw))
+
+
+def data_uri(png: bytes) -> str:
+    """Return a PNG image as it stands in a page."""
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
 
 
 def write_page(

@@ -19,6 +19,7 @@ from markupsafe import Markup
 
 from .. import checks
 from ..errors import BadInput, Text
+from ..io import files
 from ..io.tomlfile import read_text
 from . import html, tables, words
 
@@ -52,6 +53,8 @@ KINDS = {
     "simulate": Kind("Simulation", "simulate.html.j2"),
     "passive": Kind("Passive joint moments", "passive.html.j2"),
     "demo": Kind("Demonstration", "demo.html.j2"),
+    "plan": Kind("Plan of an experiment", "plan.html.j2"),
+    "history": Kind("Over the sessions", "history.html.j2"),
     "gap": Kind("Gap between model and measurement", "gap.html.j2", "armrs.workflows.gap.words"),
     "fmu run": Kind("Co-simulation", "fmu_run.html.j2"),
     "sweep": Kind(
@@ -108,22 +111,31 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
     return target
 
 
+def write_page_of(data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], path: Path) -> Path:
+    """Write one page about a result that is in memory; `figures` are its pictures by the section that they belong to."""
+    engine = html.environment()
+    # What a file would hold: NaN is absent there, and arrays are lists.
+    plain = json.loads(files.json_text(data))
+    html.write_page(engine, path, [_result(engine, plain, defaultdict(list, figures))], title="armrs report")
+    return path
+
+
 def _part(engine: html.Environment, source: Path) -> Markup:
     """Return one result as it stands in a page."""
     data = read_result(source)
     try:
-        return _result(engine, data, source.parent)
+        figures: defaultdict[str, list[html.Picture]] = defaultdict(list)
+        for entry in data.get("figures", []):
+            figures[entry.get("section", "")].append(html.picture(entry, source.parent))
+        return _result(engine, data, figures)
     except BadInput:
         raise
     except (KeyError, TypeError, AttributeError, ValueError, IndexError, html.TemplateError) as error:
         raise BadInput("content", Text(f"not what a result holds ({error})"), "a whole result", file=source) from None
 
 
-def _result(engine: html.Environment, data: Mapping[str, Any], folder: Path) -> Markup:
+def _result(engine: html.Environment, data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]]) -> Markup:
     kind = KINDS[data["verb"]]
-    figures: defaultdict[str, list[html.Picture]] = defaultdict(list)
-    for entry in data.get("figures", []):
-        figures[entry.get("section", "")].append(html.picture(entry, folder))
     values = {
         "kind": kind.title,
         "digest_of": kind.digest_of,

@@ -6,9 +6,11 @@ Angles come in radians and are shown in degrees. Colours tell quantities apart a
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -68,14 +70,37 @@ def style() -> AbstractContextManager[None]:
     return matplotlib.rc_context(look)
 
 
+_IN_PYPLOT = ContextVar("_IN_PYPLOT", default=False)
+
+
+@contextmanager
+def in_pyplot() -> Iterator[None]:
+    """Make new figures known to pyplot, so that notebooks and windows show them."""
+    before = _IN_PYPLOT.set(True)
+    try:
+        yield
+    finally:
+        _IN_PYPLOT.reset(before)
+
+
 def figure(width: float, height: float) -> Figure:
-    """Return an empty figure that no window and no global state knows [inches]."""
+    """Return an empty figure [inches]; but for `in_pyplot`, no window and no global state knows it."""
+    if _IN_PYPLOT.get():
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=(width, height), layout="constrained")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     made = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(made)
     return made
+
+
+def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
+    """Write a figure as the PNG image that stands in reports."""
+    with style():
+        figure.savefig(target, format="png", dpi=130)
 
 
 def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:

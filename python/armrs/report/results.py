@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,9 +13,27 @@ from ..io.samples import write_pieces
 from ..io.trial import Trial
 from ..workflows.identify import Identified
 from ..workflows.passive import PassiveMoments
+from ..workflows.plan import plan_data
 from ..workflows.simulate import Simulated
 from ..workflows.streamed import Run
-from . import figures, pages, plotting
+from . import figures, pages, plain, plotting
+from .view import View
+
+if TYPE_CHECKING:
+    from ..workflows.history import History
+
+
+def history_data(result: History) -> dict[str, Any]:
+    """Return a history as a report reads it."""
+    data = {"name": result.subject or "a subject without a name", "joints": []}
+    return {"verb": "history", **result.to_dict(), "data": data, "made_by": plain.origin(None)}
+
+
+IDENTIFIED = View(plain.identified_data, figures.identified)
+SIMULATED = View(lambda run: plain.simulated_data(run, "a simulated run"), lambda run, _: figures.simulated(figures.outline(run)))
+PASSIVE = View(plain.passive_data, lambda result, _: figures.passive(result))
+PLANNED = View(plan_data, lambda _, data: figures.planned(data))
+HISTORY = View(history_data, lambda _, data: figures.history(data["courses"]))
 
 
 def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> list[Path]:
@@ -25,9 +43,9 @@ def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> 
     """
     name = "identified.toml"
     files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
-    drawn = figures.identified(result, data)
+    drawn = figures.draw(figures.identified(result, data))
     if "history" in data:
-        drawn.append(figures.history(data["history"]))
+        drawn += figures.draw(figures.history(data["history"]))
 
     def write(out: Path) -> list[Path]:
         result.model.write(out / name)
@@ -42,8 +60,8 @@ def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figu
     for item in drawn:
         path = folder / "figures" / f"{item.name}.png"
         files.may_replace(path, ".png")
-        with plotting.style(), files.replacing(path) as temporary:
-            item.figure.savefig(temporary, format="png", dpi=130)
+        with files.replacing(path) as temporary:
+            plotting.write_png(item.figure, temporary)
         pictures.append(path)
     data["figures"] = [
         {"file": f"figures/{d.name}.png", "title": d.title, "text": d.text} | ({"section": d.section} if d.section else {}) for d in drawn
@@ -91,7 +109,7 @@ def simulated_columns(result: Simulated) -> dict[str, np.ndarray]:
 def write_simulated(result: Run, data: dict[str, Any], folder: Path, *, suffix: str = ".csv", trial: Trial | None = None) -> list[Path]:
     """Write all samples, `simulated.json`, a figure and `report.html` below a folder; return the files, the report last."""
     name = f"simulated{suffix}"
-    drawn = figures.simulated(figures.outline(result), trial)
+    drawn = figures.draw(figures.simulated(figures.outline(result), trial))
     data["file"] = name
 
     def write(out: Path) -> list[Path]:
@@ -103,5 +121,5 @@ def write_simulated(result: Run, data: dict[str, Any], folder: Path, *, suffix: 
 
 def write_passive(result: PassiveMoments, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write `passive.json`, figures and `report.html` below a folder; return the files, the report last."""
-    drawn = figures.passive(result)
+    drawn = figures.draw(figures.passive(result))
     return files.write_whole(folder, lambda out: write_result(out, "passive", data, drawn))

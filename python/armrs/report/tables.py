@@ -231,15 +231,60 @@ def dependence(data: Mapping[str, Any]) -> Table:
     return Table(head, rows, left=2)
 
 
+def course_label(course: Mapping[str, Any]) -> str:
+    """Name a parameter that is followed or predicted, with the number of its joint."""
+    name = symbol(str(course["name"]))
+    return name if course["joint"] is None else f"{course['kind']} {course['joint']} {name}"
+
+
+def predictions(data: Mapping[str, Any]) -> Table:
+    """Return how well each parameter will be known, beside another movement where one is compared."""
+    other = data.get("compared")
+    rows: list[list[object]] = []
+    for k, p in enumerate(data["predictions"]):
+        row: list[object] = [
+            course_label(p),
+            *(_known(p[key]) for key in ("value", "std", "std_of_data")),
+            unit(p["unit"]),
+            percent(p["relative"]),
+        ]
+        rows.append(row if other is None else [*row, percent(other["predictions"][k]["relative"])])
+    head = ["parameter", "value", "std to expect", "std of the data", "unit", "relative"]
+    return Table(head if other is None else [*head, "compared"], rows)
+
+
+def percent(share: float | None) -> str:
+    """Write a share with two digits; what has none is unknown."""
+    return "unknown" if share is None or not math.isfinite(share) else f"{100 * share:.2g} %"
+
+
+def _known(value: float | None) -> str:
+    return "unknown" if value is None or not math.isfinite(value) else f"{value:.4g}"
+
+
+def movements(data: Mapping[str, Any]) -> Table:
+    """Return planned movements: repeats, speeds and waypoints."""
+    rows = [
+        [
+            f"movement {k}",
+            m["repeats"],
+            f"{m['speed_rad_s']:.3g}",
+            f"{m['acceleration_rad_s2']:.3g}",
+            "; ".join(", ".join(f"{angle:.0f}" for angle in point) for point in m["waypoints_deg"]),
+        ]
+        for k, m in enumerate(data["movements"], start=1)
+    ]
+    return Table(["", "repeats", "speed [rad/s]", "acceleration [rad/s²]", "waypoints [°]"], rows)
+
+
 def history(courses: Sequence[Mapping[str, Any]]) -> Table:
     """Return every parameter over sessions: the last value, and how it differs from those before."""
     rows = []
     for c in courses:
-        label = c["name"] if c["joint"] is None else f"{c['kind']} {c['joint']} {c['name']}"
         several = c["change"] is not None and math.isfinite(c["change"])
         rows.append(
             [
-                label,
+                course_label(c),
                 c["unit"],
                 len(c["dates"]),
                 f"{c['values'][-1]:.4g} ± {c['stds'][-1]:.2g}",

@@ -41,7 +41,15 @@ def is_synthetic(result: Mapping[str, Any]) -> bool:
 
 def verdict(result: Mapping[str, Any]) -> str:
     """Return a result in a sentence or two; results of `gap` and `sweep` have words of their own."""
-    sentences = {"identify": _identified, "simulate": _simulated, "passive": _passive, "demo": _demo, "fmu run": _coupled}
+    sentences = {
+        "identify": _identified,
+        "simulate": _simulated,
+        "passive": _passive,
+        "plan": _planned,
+        "history": _followed,
+        "demo": _demo,
+        "fmu run": _coupled,
+    }
     return sentences[result["verb"]](result)
 
 
@@ -81,6 +89,20 @@ def _passive(result: Mapping[str, Any]) -> str:
         half = curve["half_width_mean_Nm"]
         parts.append(f"{curve['joint_name']} {half:.3g} N m ({curve['configuration']})")
     return f"Half the width of the hysteresis: {'; '.join(parts)}."
+
+
+def _planned(result: Mapping[str, Any]) -> str:
+    return (
+        f"{len(result['movements'])} movements take {result['duration_s']:.3g} s with all repeats. "
+        f"The parameter that is known worst has a relative standard deviation of {tables.percent(result['worst_relative_std'])}."
+    )
+
+
+def _followed(result: Mapping[str, Any]) -> str:
+    courses = result["courses"]
+    changed = [tables.course_label(c) for c in courses if c["changed"]]
+    said = f"{', '.join(changed)} changed in the last session" if changed else "No parameter changed in the last session"
+    return f"{len(courses)} parameters are followed. {said}, at a level of 5 % over all of them together."
 
 
 def _demo(result: Mapping[str, Any]) -> str:
@@ -267,31 +289,30 @@ def recorded(result: Mapping[str, Any]) -> None:
 
 def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print a plan and what it will show."""
-    from ..workflows.plan import Slowed
-
     other = result.get("compared")
-    rows = []
-    for k, p in enumerate(result["predictions"]):
-        label = p["name"] if p["joint"] is None else f"{p['kind']} {p['joint']} {p['name']}"
-        row = [label, p["value"], p["std"], p["std_of_data"], p["unit"], f"{100 * p['relative']:.2g} %"]
-        rows.append(row if other is None else [*row, f"{100 * other['predictions'][k]['relative']:.2g} %"])
-    head = ["parameter", "value", "std to expect", "std of the data", "unit", "relative"]
-    console.table(head if other is None else [*head, "compared"], rows)
+    show("", tables.predictions(result))
     print(
-        f"\n{len(result['movements'])} movements, {result['duration_s']:.3g} s with all repeats; force on the arm up to "
+        f"{len(result['movements'])} movements, {result['duration_s']:.3g} s with all repeats; force on the arm up to "
         f"{result['largest_force_N']:.3g} N, joints up to {result['largest_speed_rad_s']:.3g} rad/s, "
         f"the robot's up to {result['largest_robot_speed_rad_s']:.3g} rad/s and {result['largest_robot_acceleration_rad_s2']:.3g} rad/s²; "
-        f"worst relative deviation {100 * result['worst_relative_std']:.2g} %"
+        f"worst relative deviation {tables.percent(result['worst_relative_std'])}"
         + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
     )
-    for slow in result["slowed"]:
-        print(Slowed(**slow))
+    for line in slowed(result):
+        print(line)
     if result.get("would_show"):
         from ..workflows.gap.words import limits
 
         print()
         show("The smallest effects that `armrs gap` would name on such a session", limits({"would_have_seen": result["would_show"]}))
     print("\n".join(str(path) for path in written))
+
+
+def slowed(result: Mapping[str, Any]) -> list[str]:
+    """Return the planned movements that had to be slowed, a line each."""
+    from ..workflows.plan import Slowed
+
+    return [str(Slowed(**slow)) for slow in result["slowed"]]
 
 
 def reproduced(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:

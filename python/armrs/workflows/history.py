@@ -18,6 +18,7 @@ from .. import checks
 from ..errors import BadInput, Text, show
 from ..io import files
 from ..io.dataset import Dataset
+from ..tabular import Tabular, Tidy
 from .identify import Estimate, Identified
 
 APPLICATION = 0x61726D73
@@ -120,6 +121,40 @@ class Course:
         }
 
 
+@dataclass(frozen=True, eq=False)
+class History(Tabular):
+    """What is known of one subject over sessions.
+
+    Attributes
+    ----------
+    subject : str or None
+    courses : tuple of Course
+        One for every parameter that the data decided in the last session.
+    """
+
+    subject: str | None
+    courses: tuple[Course, ...]
+
+    VIEW = ("report.results", "HISTORY")
+
+    def __repr__(self) -> str:
+        changed = [c.label for c in self.courses if c.changed]
+        dates = len({date for c in self.courses for date in c.dates})
+        said = f"changed in the last session: {', '.join(changed)}" if changed else "nothing changed in the last session"
+        return f"History({self.subject!r}: {len(self.courses)} parameters on {dates} dates; {said})"
+
+    def tidy(self) -> Tidy:
+        """Return the values, one parameter and session a row."""
+        rows = [(c, k) for c in self.courses for k in range(len(c.dates))]
+        columns: dict[str, list[Any]] = {name: [getattr(c, name) for c, _ in rows] for name in ("name", "kind", "joint", "unit")}
+        columns |= {"date": [c.dates[k] for c, k in rows]}
+        return Tidy(columns | {name: [float(getattr(c, f"{name}s")[k]) for c, k in rows] for name in ("value", "std")}, {})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {"subject": self.subject, "courses": [course.to_dict() for course in self.courses]}
+
+
 def session_date(name: str, given: str | None = None) -> str:
     """Return the date of a session: as given, or in the name of the data set, or today.
 
@@ -173,14 +208,14 @@ def check(path: str | os.PathLike[str], joints: int, subject: str) -> None:
             _same_arm(connection, joints, subject, file)
 
 
-def add(path: str | os.PathLike[str], result: Identified, date: str) -> tuple[Course, ...]:
+def add(path: str | os.PathLike[str], result: Identified, date: str) -> History:
     """Add a result to the history of its subject, as `adding` does, and return the history."""
-    with adding(path, result, date) as courses:
-        return courses
+    with adding(path, result, date) as history:
+        return history
 
 
 @contextmanager
-def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Iterator[tuple[Course, ...]]:
+def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Iterator[History]:
     """Add a result to the history of its subject and give that history; what is added stays only if the block ends well.
 
     Parameters
@@ -209,7 +244,7 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
         raise BadInput("history", Text(str(error)), "a history that can be written", file=file) from None
 
 
-def _foreseen(file: Path, result: Identified, subject: str, date: str) -> tuple[Course, ...]:
+def _foreseen(file: Path, result: Identified, subject: str, date: str) -> History:
     """Return the history as it will be with a result, without writing it."""
     with closing(sqlite3.connect(":memory:")) as memory:
         memory.execute("PRAGMA foreign_keys = ON")
@@ -241,7 +276,7 @@ def _insert(connection: sqlite3.Connection, result: Identified, date: str) -> No
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
 
 
-def read(path: str | os.PathLike[str], method: str = "joint") -> tuple[Course, ...]:
+def read(path: str | os.PathLike[str], method: str = "joint") -> History:
     """Return every parameter that the data decided in the last session, over all sessions in which they did."""
     with _reading(checks.path("history", path)) as connection:
         return _courses(connection, method)
@@ -257,7 +292,7 @@ def _reading(file: Path) -> Iterator[sqlite3.Connection]:
         raise _no_history(file, str(error)) from None
 
 
-def _courses(connection: sqlite3.Connection, method: str) -> tuple[Course, ...]:
+def _courses(connection: sqlite3.Connection, method: str) -> History:
     rows = connection.execute(
         "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id FROM estimate e JOIN session s ON s.id = e.session "
         "WHERE s.method = ? AND e.decided_by = 'data' ORDER BY s.date, s.id, e.rowid",
@@ -272,7 +307,7 @@ def _courses(connection: sqlite3.Connection, method: str) -> tuple[Course, ...]:
     followed = {key: points for key, points in by_parameter.items() if points[-1][3] == last}
     tests = [_change([p for p in points if beside[p[3], key[2]] == beside[last, key[2]]]) for key, points in followed.items()]
     adjusted = _holm([p for *_, p in tests])
-    return tuple(
+    courses = tuple(
         Course(
             name=name,
             kind=kind,
@@ -287,6 +322,7 @@ def _courses(connection: sqlite3.Connection, method: str) -> tuple[Course, ...]:
         )
         for ((name, kind, joint, unit), points), (change, std, _), p_value in zip(followed.items(), tests, adjusted, strict=True)
     )
+    return History(_whose(connection), courses)
 
 
 def _open(file: Path) -> sqlite3.Connection:

@@ -138,6 +138,8 @@ class Identified(Tabular):
     model: Model
     dataset: Dataset
 
+    VIEW = ("report.results", "IDENTIFIED")
+
     def __repr__(self) -> str:
         known = f"{self.rank} of {self.unknowns} unknowns determined"
         return f"Identified({self.dataset.name!r}, {self.method} method, {self.status}: {known}; {'; '.join(map(str, self.combinations))})"

@@ -188,6 +188,8 @@ class PassiveMoments(Tabular):
     dependence: tuple[joint_coupling.Dependence, ...] = ()
     checks: tuple[passivity_checks.Check, ...] = ()
 
+    VIEW = ("report.results", "PASSIVE")
+
     def __repr__(self) -> str:
         parts = [f"joint {c.joint} in {c.configuration!r}: ±{np.nanmean(c.half_width):.3g} N m" for c in self.curves]
         return f"PassiveMoments({self.dataset.name!r}; {'; '.join(parts) or 'no joint moved in both directions'})"

@@ -13,6 +13,7 @@ from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io import files, tomlfile
 from ..model import Model, Tolerance
+from ..report.plain import origin
 from ..tabular import Tabular, Tidy
 from .experiment import Safety
 from .identify import core_settings, effects_of
@@ -98,6 +99,8 @@ class Limits:
         checks.number("duration", self.duration, above=0.0, most=600.0, unit="s")
 
 
+MOST_UNCERTAIN = 0.5
+"""Relative standard deviation from which on a parameter counts as not known."""
 _SCALARS = ("speed", "acceleration", "robot_speed", "robot_acceleration", "force", "duration")
 """Limits that are a single number."""
 
@@ -202,6 +205,8 @@ class Plan(Tabular):
     duration: float
     model: Model = field(repr=False)
     slowed: tuple[Slowed, ...] = field(default=(), repr=False)
+
+    VIEW = ("report.results", "PLANNED")
 
     def __repr__(self) -> str:
         return f"Plan({len(self.movements)} movements, {self.duration:.4g} s; {'; '.join(map(str, self.predictions))})"
@@ -369,9 +374,17 @@ def angles_of(text: str) -> tuple[tuple[float, float], ...]:
     return tuple(ranges)
 
 
-def plan_data(found: Plan, beside: Plan | None = None, smallest: Sequence[Any] = ()) -> dict[str, Any]:
+def plan_data(
+    found: Plan, beside: Plan | None = None, smallest: Sequence[Any] = (), *, name: str = "planned movements", command: str | None = None
+) -> dict[str, Any]:
     """Return a plan as it is written to JSON, with the forecast of another movement to compare with, and the smallest effects seen."""
-    data: dict[str, Any] = {"verb": "plan", **found.to_dict(), "would_show": [dict(vars(w)) for w in smallest]}
+    data: dict[str, Any] = {
+        "verb": "plan",
+        **found.to_dict(),
+        "would_show": [dict(vars(w)) for w in smallest],
+        "data": {"name": name, "synthetic": True, "joints": [joint.name for joint in found.model.joints]},
+        "made_by": origin(command),
+    }
     if beside is not None:
         data["compared"] = beside.to_dict() | {"worst_ratio": beside.worst / found.worst}
     return data

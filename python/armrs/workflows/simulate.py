@@ -17,7 +17,7 @@ from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..io.trial import Trial
 from ..model import Model, load_model
-from ..tabular import Tabular, Tidy
+from ..tabular import Labelled, Series, Tidy
 
 DEFAULT_DT = 0.25e-3
 """Step of the simulation [s]."""
@@ -133,7 +133,7 @@ class Sensors:
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated(Tabular):
+class Simulated(Series):
     """A recorded run; rows are samples.
 
     Attributes
@@ -162,6 +162,8 @@ class Simulated(Tabular):
     model: Model = field(repr=False)
     settings: dict[str, Any] = field(repr=False)
 
+    VIEW = ("report.results", "SIMULATED")
+
     def __repr__(self) -> str:
         most = np.max(np.hypot(*self.force_on_arm.T))
         size = f"{len(self.t)} samples, {self.t[-1]:.6g} s, {self.q.shape[1]} joints"
@@ -174,6 +176,28 @@ class Simulated(Tabular):
         columns |= {"force_on_arm_y": self.force_on_arm[:, 0], "force_on_arm_z": self.force_on_arm[:, 1]}
         units = {"t": "s"} | {f"q{j + 1}": "rad" for j in joints} | {f"qd{j + 1}": "rad/s" for j in joints}
         return Tidy(columns, units | {"force_on_arm_y": "N", "force_on_arm_z": "N"})
+
+    def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
+        """Return every recorded quantity with the names of its dimensions: joints, axes of the plane, joints of the robot."""
+        joint, axis, robot = ("time", "joint"), ("time", "axis"), ("time", "robot_joint")
+        dims: dict[str, tuple[tuple[str, ...], str]] = {
+            "q": (joint, "rad"), "qd": (joint, "rad/s"), "qdd": (joint, "rad/s^2"), "tip": (axis, "m"), "handle": (axis, "m"),
+            "robot_q": (robot, "rad"), "robot_qd": (robot, "rad/s"), "robot_qdd": (robot, "rad/s^2"), "force_on_arm": (axis, "N"),
+            "moment_on_arm": (("time",), "N m"),
+        }  # fmt: skip
+        for name in self.columns:
+            family = name.partition(".")[0]
+            if family in ("torque", "energy", "work"):
+                dims[name] = (joint, "N m") if family == "torque" else (("time",), "J")
+        coordinates = {
+            "time": self.t,
+            "joint": [j.name for j in self.model.joints],
+            "axis": ["y", "z"],
+        }
+        there = {name: self.columns.get(name) for name in dims}
+        if there["robot_q"] is not None:
+            coordinates["robot_joint"] = [1, 2]
+        return coordinates, {name: Labelled(dims[name][0], values, dims[name][1]) for name, values in there.items() if values is not None}
 
     def to_dict(self) -> dict[str, Any]:
         """Return the samples and the settings as plain data."""
@@ -268,7 +292,8 @@ def simulate(
     dt : float
         Step [s].
     rate : float
-        Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps.
+        Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps. Sensors read this recording at a rate of their own,
+        `sensors.rate`, which may not be larger: in between there would be straight lines.
     duration : float, optional
         Length of the run [s]; that of the movement or trial when absent.
     coupling : {"compliant", "rigid"}
@@ -296,8 +321,7 @@ def simulate(
         coupling=coupling,
         start=(start, start_speed),
     )
-    checks.instance("sensors", sensors, Sensors, type(None))
-    sensing = None if sensors is None else _sensing(sensors, seeds)
+    sensing = _sensing(sensors, seeds, rate)
     with asked.about_drive():
         raw = _armrs.simulate(_armrs.Rig(asked.model), asked.led, asked.core, sensing)
     return asked.recorded(raw)
@@ -482,16 +506,40 @@ def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
     return led
 
 
-def _sensing(sensors: Sensors, seeds: Sequence[int]) -> dict[str, Any]:
+def _sensing(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> dict[str, Any] | None:
+    """Return what sensors do as the core takes it; what would silently have no effect is refused."""
+    checks.instance("sensors", sensors, Sensors, type(None))
     checks.instance("seeds", seeds, list, tuple, range, np.ndarray)
     read = [checks.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
+    if sensors is None:
+        if read:
+            raise BadInput("seeds", read, "none without sensors: they are the seeds of what sensors read")
+        return None
+    if not read:
+        raise BadInput("seeds", Text("none"), "a seed for each reading of the sensors")
+    if sensors.rate > rate * (1.0 + 1e-9):
+        found = Text(f"{rate:g} Hz")
+        raise BadInput("rate", found, f"at least the {sensors.rate:g} Hz of the sensors, which read what is recorded")
     return {"rate": sensors.rate, "seeds": read} | {kind: getattr(sensors, kind)._entry() for kind in _CHANNELS}
 
 
-def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
-    """Read a movement file: a TOML table `[movement]` with `waypoints_deg` (or `_rad`), speed, acceleration, pause, shape."""
+def load_movement(path: str | os.PathLike[str], n_joints: int | None = None) -> Movement:
+    """Read a movement file: a TOML table `[movement]` with `waypoints_deg` (or `_rad`), speed, acceleration, pause, shape.
+
+    Parameters
+    ----------
+    path : path
+    n_joints : int, optional
+        Angles that each waypoint must have, where that is known; as many as the file has when absent.
+
+    Raises
+    ------
+    BadInput
+        For a file that is no movement, or one of another number of joints.
+    """
     checks.path("path", path)
-    checks.whole("n_joints", n_joints, least=1)
+    if n_joints is not None:
+        checks.whole("n_joints", n_joints, least=1)
 
     def made(document: dict[str, Any], _: object) -> Movement:
         checks.keys("", document, required=["movement"])
@@ -500,8 +548,8 @@ def load_movement(path: str | os.PathLike[str], n_joints: int) -> Movement:
     return tomlfile.load(path, made)
 
 
-def movement_of(table: dict[str, Any], n_joints: int) -> Movement:
-    """Return the movement that a table describes."""
+def movement_of(table: dict[str, Any], n_joints: int | None) -> Movement:
+    """Return the movement that a table describes, with waypoints of so many angles, or as many as the table has."""
     known = [
         "waypoints_deg", "waypoints_rad", "speed_rad_s", "speed_deg_s", "acceleration_rad_s2", "acceleration_deg_s2", "pause_s", "shape",
     ]  # fmt: skip
@@ -526,6 +574,7 @@ def movement_of(table: dict[str, Any], n_joints: int) -> Movement:
         fields[key] = numbers if key == "waypoints" else float(numbers)
     if "waypoints" not in fields:
         raise BadInput("movement", "no waypoints", "waypoints_deg or waypoints_rad")
-    if fields["waypoints"].ndim != 2 or fields["waypoints"].shape[1] != n_joints:
-        raise BadInput("movement.waypoints", f"an array of shape {fields['waypoints'].shape}", f"rows of {n_joints} angles")
+    shape = fields["waypoints"].shape
+    if len(shape) != 2 or shape[1] != (shape[1] if n_joints is None else n_joints):
+        raise BadInput("movement.waypoints", f"an array of shape {shape}", f"rows of {'' if n_joints is None else f'{n_joints} '}angles")
     return Movement(**fields)

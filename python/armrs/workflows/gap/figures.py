@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...report import plotting
-from ...report.figures import Drawn, slug
+from ...report.figures import Drawn, Figures, slug
 from . import maps
 from .found import GapFound, Missing
 from .headline import place_of
@@ -27,18 +28,17 @@ STEPS = {
 """The models that are compared: colour, name, width and dash of their lines."""
 
 
-def gap(result: GapFound) -> list[Drawn]:
-    """Draw what the workflow found; `section` of each figure is the part of the report that it belongs to."""
-    drawn: list[Drawn] = []
-    with plotting.style():
-        drawn.append(summary(result))
-        if any(g.calibrated is not None for g in result.gap.values()):
-            drawn.append(_before_and_after(result))
-        drawn += _maps(result)
-        if result.ladder:
-            drawn.append(_ladder(result))
-        drawn += [_effect(result, k, e) for k, e in enumerate(result.effects)]
-    return drawn
+def gap(result: GapFound) -> Figures:
+    """Return the figures of what the workflow found; `section` of each is the part of the report that it belongs to."""
+    figures: dict[str, Callable[[], Drawn]] = {"summary": partial(summary, result)}
+    if any(g.calibrated is not None for g in result.gap.values()):
+        figures["before-and-after"] = partial(_before_and_after, result)
+    missing = _missing_torques(result)
+    if all(missing.values()):
+        figures["maps"] = partial(_maps, result, missing)
+    if result.ladder:
+        figures["ladder"] = partial(_ladder, result)
+    return figures | {_name_of(k, e): partial(_effect, result, k, e) for k, e in enumerate(result.effects)}
 
 
 def _steps(result: GapFound) -> list[str]:
@@ -95,13 +95,16 @@ def _time_legend(figure: Any, steps: Sequence[str]) -> None:
     figure.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=9)
 
 
-def _maps(result: GapFound) -> list[Drawn]:
-    """Draw the torque that is missing over angle and speed, before and after."""
+def _missing_torques(result: GapFound) -> dict[str, list[maps.Discrepancy]]:
+    """Return what torque is missing in the fit trials, by model; nothing where that cannot be computed."""
     led, plays = is_led(result.dataset), result.raw["trials"]
     versions = [s for s in _steps(result) if s != "given"]
-    found = {v: [d for d in maps.discrepancies(result.dataset, led, plays, v) if d.trial.role == "fit"] for v in versions}
-    if not all(found.values()):
-        return []
+    return {v: [d for d in maps.discrepancies(result.dataset, led, plays, v) if d.trial.role == "fit"] for v in versions}
+
+
+def _maps(result: GapFound, found: Mapping[str, Sequence[maps.Discrepancy]]) -> Drawn:
+    """Draw the torque that is missing over angle and speed, before and after."""
+    versions = list(found)
     joints = [j.name for j in result.dataset.model.joints]
     figure = plotting.figure(4.4 * len(joints) + 0.4, 2.9 * len(versions) + 0.2)
     axes = figure.subplots(len(versions), len(joints), squeeze=False, sharex="col", sharey="col")
@@ -129,7 +132,7 @@ def _maps(result: GapFound) -> list[Drawn]:
         " right are a spring or a weight, colours that deepen away from the line grow with speed. Pale cells are not clear beside what"
         " trials differ by, empty ones were not visited."
     )
-    return [Drawn("maps", "Where the torque is missing", text, figure, "where")]
+    return Drawn("maps", "Where the torque is missing", text, figure, "where")
 
 
 def _ladder(result: GapFound) -> Drawn:
@@ -198,7 +201,12 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
         axes[0].set_axis_off()
         axes[0].text(0.0, 0.5, "not drawn: it cannot be simulated by itself")
     label = place_of(effect.kind, effect.joint, effect.channel)
-    return Drawn(f"effect-{number + 1}-{slug(label)}", label[0].upper() + label[1:], text.strip(), figure, "effects")
+    return Drawn(_name_of(number, effect), label[0].upper() + label[1:], text.strip(), figure, "effects")
+
+
+def _name_of(number: int, effect: Missing) -> str:
+    """Return the name of the figure of an effect; `number` counts from 0."""
+    return f"effect-{number + 1}-{slug(place_of(effect.kind, effect.joint, effect.channel))}"
 
 
 def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:

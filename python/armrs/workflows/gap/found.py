@@ -356,6 +356,8 @@ class GapFound(Tabular):
     dataset: Dataset
     raw: Mapping[str, Any] = field(repr=False, default_factory=dict)
 
+    VIEW = ("workflows.gap.results", "GAP")
+
     def __repr__(self) -> str:
         named = ", ".join(f"{e.kind}{'' if e.joint is None else f' in joint {e.joint}'}" for e in self.effects) or "no effect named"
         shown = (f"{name} {g.before:.3g} → {g.after:.3g} (floor {g.floor:.3g})" for name, g in self.gap.items() if _complete(g))

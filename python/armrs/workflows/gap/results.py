@@ -10,8 +10,10 @@ from typing import Any
 from ...catalogue import catalogue
 from ...io import files, tomlfile
 from ...io.dataset import FILE, Dataset
+from ...report.figures import draw
 from ...report.plain import data_of, origin
 from ...report.results import write_result
+from ...report.view import View
 from . import figures
 from .found import GapFound
 
@@ -64,7 +66,7 @@ def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path
     """
     name = "amended.toml"
     files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
-    drawn = figures.gap(result)
+    drawn = draw(figures.gap(result))
 
     def write(out: Path) -> list[Path]:
         result.model.write(out / name)
@@ -72,3 +74,6 @@ def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path
         return [out / name, *movements, *write_result(out, "gap", data, drawn)]
 
     return files.write_whole(folder, write)
+
+
+GAP = View(gap_data, lambda result, _: figures.gap(result))

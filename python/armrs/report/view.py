@@ -1,0 +1,66 @@
+"""How a result shows itself in Python: the figures of its report, and the report."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import checks
+from ..errors import BadInput, Text, unknown_name
+from . import html, pages, plotting
+from .figures import Drawn, Figures, draw
+
+
+@dataclass(frozen=True)
+class View:
+    """How results of one kind are shown.
+
+    Attributes
+    ----------
+    data : callable
+        Makes plain data of a result, as it is written to JSON.
+    figures : callable
+        Makes figures of a result and its plain data.
+    """
+
+    data: Callable[[Any], dict[str, Any]]
+    figures: Callable[[Any, Mapping[str, Any]], Figures]
+
+    def plot(self, result: object, name: str | None) -> np.ndarray:
+        """Draw one figure where pyplot shows it, and return its Axes."""
+        figures = self.figures(result, self.data(result))
+        if not figures:
+            raise BadInput("plot", Text("nothing to draw in this result"), "a result with values")
+        if name is not None and checks.text("name", name) not in figures:
+            raise unknown_name("name", name, figures, what="figure")
+        with plotting.style(), plotting.in_pyplot():
+            figure = figures[next(iter(figures)) if name is None else name]().figure
+            # Ticks and layout take the style that is in force when they are made.
+            figure.draw_without_rendering()
+        axes = np.empty(len(figure.axes), dtype=object)
+        axes[:] = figure.axes
+        return axes
+
+    def report(self, result: object, path: str | os.PathLike[str]) -> Path:
+        """Write the report as one HTML page with its figures in it."""
+        target = checks.path("path", path)
+        if target.suffix.lower() != ".html":
+            raise BadInput("path", str(target), "the name of a file that ends with .html")
+        data = self.data(result)
+        pictures = defaultdict(list)
+        for drawn in draw(self.figures(result, data)):
+            pictures[drawn.section].append(_picture(drawn))
+        return pages.write_page_of(data, pictures, target)
+
+
+def _picture(drawn: Drawn) -> html.Picture:
+    image = io.BytesIO()
+    plotting.write_png(drawn.figure, image)
+    return html.Picture(f"{drawn.name}.png", drawn.title, drawn.text, html.data_uri(image.getvalue()))
