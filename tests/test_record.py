@@ -12,6 +12,7 @@ import armrs
 from armrs import BadInput
 from armrs.cli import main
 from armrs.workflows.experiment import Controller, load_experiment
+from armrs.workflows.record import measure
 
 EXPERIMENT = """\
 name = "virtual S1"
@@ -212,3 +213,17 @@ def test_a_session_that_the_supervisor_stopped_is_one_line(experiment: Path, tmp
     with pytest.raises(armrs.ArmrsError, match=r"the first after \d.* s: acceleration 1 beyond the limit, -?\d.* where -?60 is allowed$"):
         armrs.record(experiment, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_sensors_read_as_fast_as_1_khz(experiment: Path) -> None:
+    """The run is recorded at 500 Hz, unless they are faster."""
+    short = EXPERIMENT.replace("[[-60, 60], [-48, 60], [-60, 72], [-60, 60]]", "[[-60, 60], [-48, 60]]").replace(
+        "repeats = 2", "repeats = 1"
+    )
+    angles = []
+    for rate in (500, 1000):
+        experiment.write_text(short.replace("emg = true", f"rate_Hz = {rate}.0"), encoding="utf-8")
+        trial = measure(load_experiment(experiment)).dataset.trials[0]
+        assert trial.rate == pytest.approx(rate)
+        angles.append(trial.robot_q)
+    assert np.array_equal(angles[1][::2], angles[0])

@@ -20,11 +20,13 @@ from pyarrow import parquet
 
 import armrs
 from armrs import cli
+from armrs.errors import BadInput
 from armrs.io.files import json_text
 from armrs.io.samples import write_samples
 from armrs.report import figures
 from armrs.report.plain import simulated_data
 from armrs.report.results import simulated_columns
+from armrs.workflows.demo import true_model
 from armrs.workflows.simulate import PIECE
 from armrs.workflows.streamed import stream
 from conftest import MODEL
@@ -261,3 +263,33 @@ def test_both_engines_come_to_the_same(slow_arm: Path, tmp_path: Path) -> None:
     for name, tolerance in (("q1_rad", 1e-5), ("q2_rad", 1e-5), ("force_on_arm_y_N", 0.02), ("force_on_arm_z_N", 0.02)):
         native, rapier = (tables[engine].column(name).to_numpy() for engine in ("native", "rapier"))
         assert np.abs(native - rapier).max() < tolerance
+
+
+def test_a_movement_file_knows_its_joints(slow_arm: Path, tmp_path: Path) -> None:
+    assert np.array_equal(
+        armrs.load_movement(slow_arm / "movement.toml").waypoints, armrs.load_movement(slow_arm / "movement.toml", 2).waypoints
+    )
+    (tmp_path / "flat.toml").write_text("[movement]\nwaypoints_deg = [10, 20]\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"movement\.waypoints: found 'an array of shape \(2,\)', allowed rows of angles"):
+        armrs.load_movement(tmp_path / "flat.toml")
+
+
+def test_sensors_that_read_faster_than_the_run_is_recorded_are_refused() -> None:
+    with pytest.raises(BadInput, match="rate: found 50 Hz, allowed at least the 100 Hz of the sensors, which read what is recorded"):
+        armrs.simulate(true_model(), duration=0.1, sensors=armrs.Sensors(rate=100.0), seeds=[1])
+    run = armrs.simulate(true_model(), duration=0.1, rate=100.0, sensors=armrs.Sensors(rate=100.0), seeds=[1])
+    assert np.array_equal(run.readings[0]["q"], run.q)
+
+
+def test_sensors_and_seeds_belong_together() -> None:
+    with pytest.raises(BadInput, match="seeds: found none, allowed a seed for each reading of the sensors"):
+        armrs.simulate(true_model(), duration=0.1, sensors=armrs.Sensors())
+    with pytest.raises(BadInput, match=r"seeds: found \[1\], allowed none without sensors"):
+        armrs.simulate(true_model(), duration=0.1, seeds=[1])
+
+
+def test_an_arm_is_made_of_a_model() -> None:
+    model = true_model()
+    lists = ([getattr(s, name) for s in model.segments] for name in ("length", "mass", "com", "inertia"))
+    q = np.radians([[-60.0, 30.0], [-30.0, 60.0]])
+    assert np.array_equal(armrs.Arm.from_model(model).gravity(q), armrs.Arm(*lists).gravity(q))

@@ -69,11 +69,13 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
     split = _balanced(sizes, columns)
     height = max(sum(sizes[k] for k in column) for column in split)
     figure = plotting.figure(5.4 * columns, 0.36 * height + 0.9)
-    for place, column in zip(figure.add_gridspec(1, columns), split, strict=True):
+    grid = figure.add_gridspec(1, columns)
+    for place, column in enumerate(split):
         spare = height - sum(sizes[k] for k in column)
         ratios = [sizes[k] for k in column] + ([spare] if spare > 0.5 else [])
-        for cell, k in zip(place.subgridspec(len(ratios), 1, height_ratios=ratios), column, strict=False):
-            plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], figure.add_subplot(cell))
+        rows = grid[0, place].subgridspec(len(ratios), 1, height_ratios=ratios)
+        for row, k in enumerate(column):
+            plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], figure.add_subplot(rows[row, 0]))
     plotting.interval_legend(figure, unique)
     text = (
         f"Bars are {100 * level:g} % intervals. A full marker rests on the measurement. A hollow one does not: where the movements leave a "

@@ -210,7 +210,9 @@ class _Session:
             robot_q=led["robot_q"][::every],
             valid=np.ones(1, bool),
         )
-        true = simulate(model, path, rate=RECORDING_RATE, start=run.movement.waypoints[0], sensors=_sensors(devices), seeds=[seed])
+        # Sensors read what is recorded.
+        rate = RECORDING_RATE if devices.rate_Hz <= RECORDING_RATE else 2.0 * RECORDING_RATE
+        true = simulate(model, path, rate=rate, start=run.movement.waypoints[0], sensors=_sensors(devices), seeds=[seed])
         return self._read(run, repeat, true, (draw, story))
 
     def _lead(self, model: Model, movement: Movement, fault: Fault | None, seed: int) -> dict[str, Any]:

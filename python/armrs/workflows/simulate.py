@@ -293,7 +293,7 @@ def simulate(
         Step [s].
     rate : float
         Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps. Sensors read this recording at a rate of their own,
-        `sensors.rate`, which may not be larger: in between there would be straight lines.
+        `sensors.rate`, which may not be larger: what is in between was not simulated.
     duration : float, optional
         Length of the run [s]; that of the movement or trial when absent.
     coupling : {"compliant", "rigid"}
