@@ -270,7 +270,7 @@ def simulate(
     engine: str = "native",
     integrator: str | None = None,
     dt: float = DEFAULT_DT,
-    rate: float = DEFAULT_RATE,
+    rate: float | None = None,
     duration: float | None = None,
     coupling: str = "compliant",
     start: np.ndarray | None = None,
@@ -291,9 +291,9 @@ def simulate(
         Of the native engine: fourth order, taken when absent, or semi-implicit first order.
     dt : float
         Step [s].
-    rate : float
+    rate : float, optional
         Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps. Sensors read this recording at a rate of their own,
-        `sensors.rate`, which may not be larger: what is in between was not simulated.
+        `sensors.rate`, which may not be larger: what is in between is not recorded. When absent, 50 Hz, or that of faster sensors.
     duration : float, optional
         Length of the run [s]; that of the movement or trial when absent.
     coupling : {"compliant", "rigid"}
@@ -310,6 +310,9 @@ def simulate(
     SimulationError
         When the run stops early.
     """
+    checks.instance("sensors", sensors, Sensors, type(None))
+    if rate is None:
+        rate = DEFAULT_RATE if sensors is None else max(DEFAULT_RATE, sensors.rate)
     asked = _asked(
         model,
         drive,
@@ -508,7 +511,6 @@ def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
 
 def _sensing(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> dict[str, Any] | None:
     """Return what sensors do as the core takes it; what would silently have no effect is refused."""
-    checks.instance("sensors", sensors, Sensors, type(None))
     checks.instance("seeds", seeds, list, tuple, range, np.ndarray)
     read = [checks.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
     if sensors is None:
