@@ -46,7 +46,7 @@ $(STAMPS)/venv:
 
 $(STAMPS)/build: $(PACKAGE) | $(STAMPS)/venv
 	$(BIN)/python scripts/fmu_library.py
-	$(BIN)/maturin develop --release
+	$(BIN)/maturin develop --release --extras files
 	@touch $@
 
 # What the tests run on: what was made for speed where that is current, else what shares its dependencies with the Rust tests, in half

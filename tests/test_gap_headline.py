@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from armrs.catalogue import catalogue
-from armrs.workflows.gap.found import Missing
+from armrs.workflows.gap.found import ChannelGap, Missing
 from armrs.workflows.gap.headline import headline, still_open
 from armrs.workflows.gap.summary import marks
 from armrs.workflows.gap.words import gap, left
@@ -107,3 +107,11 @@ def test_nothing_is_claimed_that_was_not_tested() -> None:
 )
 def test_an_effect_is_drawn_where_it_acts(kind: str, joint: int | None, marked: list[tuple[str, int]]) -> None:
     assert marks(Missing(kind, joint, None, {}, 0.0, 1.0), catalogue()[kind]) == marked
+
+
+def test_no_more_than_all_of_a_gap_is_closed() -> None:
+    """Both the gap that is left and what repeats differ by are estimates: the first may be the smaller one."""
+    table = gap(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.10, 0.15)}))
+    assert table.rows[0][table.head.index("gap closed")] == "100%"
+    assert ChannelGap(3.0, 2.4, 0.10, 0.15).closed == 1.0
+    assert ChannelGap(3.0, 2.4, 1.275, 0.15).closed == pytest.approx(0.5)

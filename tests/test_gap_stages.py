@@ -9,13 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 import armrs
 from armrs import cli
 from armrs.catalogue import catalogue
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
-from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, separate
+from armrs.report import plotting
+from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, figures, separate
 from armrs.workflows.gap.found import Value
 from armrs.workflows.gap.results import gap_data, write_gap
 from gap_sessions import model, session
@@ -202,6 +204,18 @@ def test_a_result_is_confirmed_on_another_day(found: armrs.GapFound) -> None:
     assert other.after > 5.0 * other.before
 
 
+def test_maps_tell_what_was_visited_and_the_law_has_a_legend(found: armrs.GapFound) -> None:
+    with plotting.style():
+        drawn = {name: draw() for name, draw in figures.gap(found).items()}
+    assert all(one.name == name for name, one in drawn.items())
+    ax = drawn["maps"].figure.axes[0]
+    visited, pale, clear = (np.ma.masked_invalid(mesh.get_array()) for mesh in ax.collections[:3])
+    assert to_hex(ax.get_facecolor()) == plotting.FAINT.lower() and visited.mask.any()
+    assert np.array_equal(~visited.mask, ~pale.mask | ~clear.mask) and set(visited.compressed()) == {0.0}
+    law = next(one for name, one in drawn.items() if name.startswith("effect-1")).figure.axes[0]
+    assert [text.get_text() for text in law.get_legend().get_texts()] == ["named effect", "measured"]
+
+
 def test_a_movement_separates_two_laws_that_are_not_the_same(found: armrs.GapFound, tmp_path: Path) -> None:
     kinds = {"quadratic_drag": [0.3], "coulomb": [0.15, 0.01], "viscous": [found.effects[0].parameters["viscosity"].value]}
     alternatives = tuple(Alternative(kind, 2, None, "", 1.0, 0.9) for kind in kinds)
@@ -216,6 +230,8 @@ def test_a_movement_separates_two_laws_that_are_not_the_same(found: armrs.GapFou
     assert drag is not None and dry is not None and same is not None
     assert drag.then > drag.now + 5.0
     assert dry.then > dry.now + 5.0
+    # By one unit of twice the log-likelihood they explain the data worse: that is one standard deviation, whatever was expected.
+    assert drag.now <= 1.0 and dry.now <= 1.0
     # An effect is not apart from itself, on any movement.
     assert same.now < 0.1
     assert same.then < 0.1

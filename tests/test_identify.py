@@ -272,3 +272,16 @@ def test_a_calibration_beyond_twice_its_tolerance_is_called_out(slow_arm: Path) 
     assert warnings(0.0) == []
     (line,) = warnings(4.0 * promised)
     assert line.endswith("times the declared tolerance: what the model lacks may be in it")
+
+
+def test_a_calibration_far_beyond_its_tolerance_is_not_decided_by_the_model(slow_arm: Path) -> None:
+    """Forces 60 ms early, and no friction in the model: a delay of 3.6 times its tolerance was said to be decided by prior."""
+    data = armrs.load_dataset(slow_arm)
+    late = [dataclasses.replace(t, force_on_arm=np.roll(t.force_on_arm, -3, axis=0), original={}) for t in data.trials]
+    result = armrs.identify(data.replace(trials=tuple(late)))
+    delay = next(e for e in result.calibration if e.name == "time delay")
+    assert abs(delay.value) > 3.0 * data.tolerance.time_delay_s and delay.std > 0.5 * data.tolerance.time_delay_s
+    assert delay.decided_by == "data"
+    assert any("time delay came out" in line for line in result.warnings)
+    small = [e for e in result.calibration if abs(e.value) < e.std]
+    assert small and all(e.decided_by == "prior" for e in small)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import matplotlib
 import numpy as np
 import pytest
@@ -105,10 +107,22 @@ def test_hysteresis_and_spread(ax: matplotlib.axes.Axes) -> None:
     assert len(ax.collections) == 1
 
 
-def test_by_direction(ax: matplotlib.axes.Axes) -> None:
+def test_by_direction_explains_every_colour(ax: matplotlib.axes.Axes) -> None:
     plotting.by_direction(T, T, np.sign(T - 1).astype(int), ax, quantity="left [N m]")
     assert labels(ax) == ("joint angle [°]", "left [N m]")
     assert sum(len(line.get_xdata()) for line in ax.lines[:3]) == len(T)
+    assert legend(ax) == ["neither", "rising", "falling"]
+
+
+def test_labels_of_large_numbers_do_not_collide() -> None:
+    items = [{"value": v, "interval": (0.8 * v, 1.2 * v), "unit": "N/m", "decided_by": "data"} for v in (1e5, 1.25e5, 1.5e5)]
+    with plotting.style():
+        ax = plotting.intervals(items, ["a", "b", "c"], plotting.figure(3.0, 2.0).subplots())
+        ax.figure.draw_without_rendering()
+        boxes = [tick.get_window_extent() for tick in ax.get_xticklabels() if tick.get_text()]
+        assert ax.xaxis.get_offset_text().get_text() == "1e5"
+    assert len(boxes) > 2
+    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
 
 
 def test_without_axes_a_figure_is_made(monkeypatch: pytest.MonkeyPatch) -> None:

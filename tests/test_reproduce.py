@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import json
 import re
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 from armrs import cli
 from armrs.thesis.people import TABLE_4_10
@@ -206,6 +208,16 @@ def test_the_robot_holds_the_arm_in_every_frame(made: Path, items: dict[str, dic
         robot, arm = (np.array(chain["points_m"])[:, -1] for chain in film["chains"])
         assert np.hypot(*(robot - arm).T).max() < 0.005  # the contact gives way by 1 mm for 10 N
         assert np.ptp(arm, axis=0).max() > 0.05
+
+
+def test_a_caption_calls_colours_what_they_are(items: dict[str, dict[str, Any]]) -> None:
+    hues = {"red": (345, 15), "orange": (15, 45), "blue": (190, 250)}
+    for film in (film for item in items.values() for film in item["animations"]):
+        colours = {chain["name"]: colorsys.rgb_to_hsv(*to_rgb(chain["colour"]))[0] * 360 for chain in film["chains"]}
+        for name, word in re.findall(r"(robot|arm) \((\w+)\)", film["text"]):
+            low, high = hues[word]
+            assert low <= colours[name] <= high, (name, word)
+        assert "in red" not in film["text"]
 
 
 def test_the_animation_moves_stops_and_is_dragged(made: Path) -> None:

@@ -293,3 +293,16 @@ def test_an_arm_is_made_of_a_model() -> None:
     lists = ([getattr(s, name) for s in model.segments] for name in ("length", "mass", "com", "inertia"))
     q = np.radians([[-60.0, 30.0], [-30.0, 60.0]])
     assert np.array_equal(armrs.Arm.from_model(model).gravity(q), armrs.Arm(*lists).gravity(q))
+
+
+def test_a_trial_without_forces_leads_an_arm(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = pyarrow.csv.read_csv(slow_arm / "trials/slow_1.csv")
+    pyarrow.csv.write_csv(source.drop_columns(["Fy_N", "Fz_N"]), tmp_path / "path.csv")
+    digests = []
+    for trial in (slow_arm / "trials/slow_1.csv", tmp_path / "path.csv"):
+        assert cli.main(["simulate", str(slow_arm / "model.toml"), "--trial", str(trial), "--json", str(tmp_path / "out.json")]) == 0
+        digests.append(json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["digest"])
+    assert digests[0] == digests[1]
+    pyarrow.csv.write_csv(source.select(["t_s", "q1_rad", "q2_rad"]), tmp_path / "angles.csv")
+    assert cli.main(["simulate", str(slow_arm / "model.toml"), "--trial", str(tmp_path / "angles.csv")]) == 2
+    assert "neither robot angles nor joint torques" in capsys.readouterr().err

@@ -17,10 +17,11 @@ from pyarrow import parquet
 import armrs
 from armrs import BadInput
 from armrs.cli import main
-from armrs.montecarlo import load_sweep
+from armrs.montecarlo import figures, load_sweep
 from armrs.montecarlo.case import compute, resampled
 from armrs.montecarlo.change import vary_of
-from armrs.montecarlo.summary import Moments
+from armrs.montecarlo.summary import Moments, Quantity, Summary
+from armrs.report import plotting
 from armrs.workflows.identify import identify
 from armrs.workflows.record import measure
 from markup import assert_escaped
@@ -451,3 +452,25 @@ def test_the_sweep_of_files_md_is_read(tmp_path: Path) -> None:
 
     for column in (*_cases(shown).names, *_estimates().names):
         assert f"`{column}`" in text or column in [v.key for v in shown.vary], column
+
+
+def quantity(name: str, value: np.ndarray, truth: np.ndarray) -> Quantity:
+    made = Quantity(name, "segment", 1, "kg")
+    rows = {key: np.full(len(value), np.nan) for key in ("std", "bootstrap_std", "bootstrap_low", "bootstrap_high")}
+    made.add(rows | {"value": value, "truth": truth, "low": value - 1.0, "high": value + 1.0}, ["data"] * len(value))
+    return made
+
+
+def test_the_figure_has_no_empty_panels_and_explains_its_line() -> None:
+    truth = np.linspace(1.0, 2.0, 9)
+    never = np.full(9, np.nan)
+    listed = [quantity(f"m{k}", truth + 0.01 * k, truth) for k in range(4)] + [quantity("I1", never, never)]
+    data = {"data": {"joints": ["shoulder"]}, "level": 0.95, "quantities": [q.to_dict(0.95) for q in listed[:4]]}
+    with plotting.style():
+        values, coverage = (draw().figure for draw in figures.sweep(Summary(listed, {}), data).values())
+    assert [len(ax.lines) for ax in values.axes] == [2, 2, 2, 2]
+    assert [text.get_text() for text in values.legends[0].get_texts()] == ["a case", "truth"]
+    # Of intervals that all hold the truth the markers lie at the end of the axis.
+    markers = [line for line in coverage.axes[0].lines if line.get_marker() == "o"]
+    assert max(markers[0].get_xdata()) == 100.0 and not markers[0].get_clip_on()
+    assert [text.get_text() for text in coverage.axes[0].get_legend().get_texts()] == ["promised", "intervals of the fit"]

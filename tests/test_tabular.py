@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 import armrs
 from armrs.workflows import history
 from armrs.workflows.demo import true_model
+from browser import opened
 
 
 @pytest.fixture(scope="module")
@@ -142,3 +143,14 @@ def test_a_history_is_a_tidy_frame(identified: armrs.Identified, tmp_path: Path)
     frame = followed.to_dataframe()
     assert set(frame["date"]) == {"2026-01-01", "2026-02-01"} and len(frame) == 2 * len(followed.courses)
     assert "nothing changed in the last session" in repr(followed)
+
+
+def test_tables_of_a_report_fit_on_a4(identified: armrs.Identified, tmp_path: Path) -> None:
+    passive = armrs.passive_moments(identified.dataset)
+    for result in (identified, passive):
+        page = result.report(tmp_path / "report.html")
+        # 210 mm less margins of 10 mm, in CSS pixels.
+        with opened(page, width=718) as seen:
+            seen.page.emulate_media(media="print")
+            widths = seen.page.evaluate("[...document.querySelectorAll('table')].map(t => [t.offsetWidth, t.parentNode.clientWidth])")
+        assert widths and all(table <= room for table, room in widths), widths

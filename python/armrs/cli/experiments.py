@@ -238,12 +238,20 @@ def sweep(
 
 
 def _single_trial(path: Path, n_joints: int) -> Reading:
-    """Read a trial that stands alone. Its forces are not used, so that it does not matter what they act on."""
+    """Read a trial that stands alone. Its forces are not used, so that they may be absent, and it does not matter what they act on."""
     from ..io.trial import read_trial
 
     try:
         reading = read_trial(
-            path, n_joints=n_joints, force_on="arm", sample_rate=None, file=path.name, configuration=path.stem, repeat=1, role="test"
+            path,
+            n_joints=n_joints,
+            force_on="arm",
+            sample_rate=None,
+            file=path.name,
+            configuration=path.stem,
+            repeat=1,
+            role="test",
+            loads=False,
         )
     except BadInput as error:
         raise error.within(file=path) from None

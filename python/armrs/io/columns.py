@@ -77,7 +77,7 @@ class Column:
         return self.name if self.quantity is ACTIVITY else f"{self.symbol}_{next(iter(self.quantity.units))}"
 
 
-def parse(names: Sequence[str], n_joints: int) -> list[Column]:
+def parse(names: Sequence[str], n_joints: int, *, loads: bool = True) -> list[Column]:
     """Read the names of all columns of a trial.
 
     Parameters
@@ -86,6 +86,8 @@ def parse(names: Sequence[str], n_joints: int) -> list[Column]:
         Column names.
     n_joints : int
         Number of joints of the model.
+    loads : bool
+        Whether forces or torques must be there.
 
     Raises
     ------
@@ -100,7 +102,7 @@ def parse(names: Sequence[str], n_joints: int) -> list[Column]:
             both = f"{seen[column.symbol]} and {column.name}"
             raise BadInput("header", Text(both), f"{column.symbol} once")
         seen[column.symbol] = column.name
-    _complete(seen, n_joints)
+    _complete(seen, n_joints, loads=loads)
     return columns
 
 
@@ -132,7 +134,7 @@ def _known(n_joints: int) -> list[str]:
     ]  # fmt: skip
 
 
-def _complete(seen: dict[str, str], n_joints: int) -> None:
+def _complete(seen: dict[str, str], n_joints: int, *, loads: bool) -> None:
     def group(symbols: list[str], *, required: bool, why: str) -> bool:
         present = [s for s in symbols if s in seen]
         for symbol in symbols:
@@ -147,5 +149,5 @@ def _complete(seen: dict[str, str], n_joints: int) -> None:
     torque = group([f"tau{j}" for j in joints], required=False, why="a torque for every joint or for none")
     group(["qr1", "qr2"], required=False, why="both angles of the robot or none")
     force = group(["Fy", "Fz"], required="Mx" in seen, why="both Fy and Fz or none of Fy, Fz, Mx")
-    if not force and not torque:
+    if loads and not force and not torque:
         raise BadInput("header", Text("neither forces nor torques"), "Fy_N and Fz_N, or tau1_Nm …, or both")

@@ -167,6 +167,7 @@ def read_trial(
     configuration: str,
     repeat: int,
     role: str,
+    loads: bool = True,
 ) -> Reading | None:
     """Read one trial and bring it to SI units, to forces on the arm and to a uniform grid.
 
@@ -182,6 +183,8 @@ def read_trial(
         Rate that the data set states [Hz].
     file, configuration, repeat, role
         Handed on to the trial.
+    loads : bool
+        Whether forces or torques must be there; a trial that only leads an arm needs none.
 
     Returns
     -------
@@ -194,7 +197,7 @@ def read_trial(
         Without the file's name in it; the caller adds it.
     """
     samples = read_samples(path)
-    header = columns.parse(samples.names, n_joints)
+    header = columns.parse(samples.names, n_joints, loads=loads)
     has_force = any(column.symbol == "Fy" for column in header)
     if has_force and force_on is None:
         raise BadInput("column Fy", Text("forces in a data set without force_on"), 'force_on = "robot" or "arm" in dataset.toml')

@@ -323,7 +323,8 @@ def direction_of_motion(before: Sequence[Part], after: Sequence[Part], joints: S
             ax.set_xlabel("")
     text = (
         "Joint torque of the test trials that the model does not explain, after masses and calibration were fitted. Above, without "
-        "friction; below, with dry friction at both joints. A gap between both directions is what friction looks like."
+        "friction; below, with dry friction at both joints. Colours say whether the angle rises or falls; grey samples rest or turn. A gap "
+        "between both directions is what friction looks like."
     )
     return Drawn("direction", "What is left, by direction of motion", text, figure)
 

@@ -42,6 +42,7 @@ _STYLE: dict[str, Any] = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
+    "axes.formatter.limits": (-4, 5),
     "grid.color": "#EAEAEA",
     "grid.linewidth": 0.8,
     "xtick.color": GREY,
@@ -58,7 +59,7 @@ _STYLE: dict[str, Any] = {
     "savefig.facecolor": "white",
     "text.parse_math": False,
 }
-"""Names of joints, movements and files are shown as they stand, whatever `$` they have in them."""
+"""Names of joints, movements and files are shown as they stand, whatever `$` they have in them. Tick labels of six digits would collide."""
 
 
 def style() -> AbstractContextManager[None]:
@@ -308,8 +309,10 @@ def by_direction(
         [rad], unit of `quantity`, and -1, 0 or 1.
     """
     ax = _axes(ax)
-    for sign, colour, name in ((0, FAINT, None), (1, RED, "angle rising"), (-1, BLUE, "angle falling")):
+    for sign, colour, name in ((0, SILVER, "neither"), (1, RED, "rising"), (-1, BLUE, "falling")):
         own = direction == sign
+        if not own.any():
+            continue
         ax.plot(np.degrees(angle[own]), values[own], color=colour, marker=".", ms=2.5, ls="", alpha=0.5, label=name)
     ax.axhline(0.0, color=INK, lw=0.8)
     ax.set(title=title, xlabel="joint angle [°]", ylabel=quantity)

@@ -128,7 +128,7 @@ def _film(comparison: Comparison, title: str) -> dict[str, object]:
     arm_colour, robot_colour = plotting.RED, plotting.BLUE
     return film(
         title,
-        "Robot in blue, arm in red, as in figure 3.14. Drag the slider, or stop and play; thin lines are poses over the whole movement.",
+        "The robot (blue) and the arm (orange) of figure 3.14. Drag the slider, or stop and play; thin lines are poses on the way.",
         run.t,
         {"robot": (robot_colour, chain), "arm": (arm_colour, points(model, run.q))},
     )

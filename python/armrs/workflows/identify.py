@@ -268,6 +268,7 @@ def _result(
     parameters, combinations, calibration = (
         _estimates(raw[name], NOISY_SPEED if noisy else None) for name in ("parameters", "combinations", "calibration")
     )
+    calibration = _moved_by_data(calibration, dataset.tolerance)
     # Without a load there is no torque that a residual could be a part of.
     shares = [] if raw["scale_free"] else _residual_shares(explained)
     return Identified(
@@ -419,10 +420,24 @@ def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: Tolerance, abo
     """Return the calibrations that came out larger than promised, more than `above` and up to `to` times, a line each."""
     lines = []
     for e in calibration:
-        promised = next(getattr(tolerance, key) for start, key in _TOLERANCES.items() if e.name.startswith(start))
+        promised = _promised(e, tolerance)
         if above * promised < abs(e.value) <= to * promised:
             lines.append(f"{e.name} came out as {e.value:.3g} {e.unit}, {abs(e.value) / promised:.1f} times the declared tolerance")
     return tuple(lines)
+
+
+def _moved_by_data(calibration: Sequence[Estimate], tolerance: Tolerance) -> tuple[Estimate, ...]:
+    """Return the calibration with what the data pulled far beyond its tolerance decided by them.
+
+    Where the model does not fit, standard deviations are as wide as the tolerance, which says that the data decided nothing. The value
+    itself says the contrary: beforehand it was zero.
+    """
+    return tuple(dataclasses.replace(e, decided_by="data") if abs(e.value) > _FAR * _promised(e, tolerance) else e for e in calibration)
+
+
+def _promised(calibration: Estimate, tolerance: Tolerance) -> float:
+    """Return the tolerance that a calibration has."""
+    return float(next(getattr(tolerance, key) for start, key in _TOLERANCES.items() if calibration.name.startswith(start)))
 
 
 def _residual_shares(explained: Sequence[Explained]) -> list[float]:

@@ -116,7 +116,10 @@ def _maps(result: GapFound, found: Mapping[str, Sequence[maps.Discrepancy]]) -> 
             ax = axes[row, j]
             look: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
             edges = np.degrees(one.angle), one.speed
-            ax.pcolormesh(*edges, np.where(one.clear, np.nan, one.torque), alpha=0.22, **look)
+            ax.set_facecolor(plotting.FAINT)
+            # Cells that were visited are at least white.
+            ax.pcolormesh(*edges, np.where(np.isfinite(one.torque), 0.0, np.nan), cmap="Greys", vmin=0.0, vmax=1.0)
+            ax.pcolormesh(*edges, np.where(one.clear, np.nan, one.torque), alpha=0.3, **look)
             mesh = ax.pcolormesh(*edges, np.where(one.clear, one.torque, np.nan), **look)
             ax.axhline(0.0, color=plotting.INK, lw=0.6)
             ax.grid(visible=False)
@@ -130,7 +133,7 @@ def _maps(result: GapFound, found: Mapping[str, Sequence[maps.Discrepancy]]) -> 
         "Mean torque over all fit trials by which a joint resists a growing angle more (red) or less (blue) than the model says, by "
         "angle and speed; above the line the angle grows. Two halves of opposite colour are friction, colours that change from left to"
         " right are a spring or a weight, colours that deepen away from the line grow with speed. Pale cells are not clear beside what"
-        " trials differ by, empty ones were not visited."
+        " trials differ by, grey ones were not visited."
     )
     return Drawn("maps", "Where the torque is missing", text, figure, "where")
 
@@ -213,10 +216,11 @@ def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:
     factor, unit = (180.0 / np.pi, "°") if seen.against == "angle" else (1.0, "rad/s" if seen.against == "speed" else "s")
     x = seen.x * factor
     there = np.isfinite(seen.data)
-    ax.errorbar(
-        x[there], seen.data[there], seen.scatter[there], fmt="o", ms=4, color=plotting.GREY, ecolor=plotting.SILVER, elinewidth=3, zorder=1
-    )
+    grey: dict[str, Any] = {"ms": 4, "color": plotting.GREY, "ecolor": plotting.SILVER, "elinewidth": 3}
+    if there.any():
+        ax.errorbar(x[there], seen.data[there], seen.scatter[there], fmt="o", label="measured", zorder=1, **grey)
     ax.fill_between(x, seen.low, seen.high, color=plotting.BLUE, alpha=0.25, lw=0, zorder=2)
-    ax.plot(x, torque, color=plotting.BLUE, lw=2.0, zorder=3)
+    ax.plot(x, torque, color=plotting.BLUE, lw=2.0, label="named effect", zorder=3)
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=2, columnspacing=1.2, handlelength=1.6)
     ax.axhline(0.0, color=plotting.INK, lw=0.8)
     ax.set(xlabel=f"joint {seen.against} [{unit}]" if seen.against != "time" else "time [s]", ylabel="resisting torque [N m]")

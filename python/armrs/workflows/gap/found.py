@@ -53,6 +53,7 @@ class Separation:
     shape : {"trapezoid", "smooth"}
     now, then : float
         How many standard deviations apart the two are, everything refitted: by the fit trials alone, and with one such trial more.
+        By the fit trials they are no further apart than their misfits say, whatever was expected to first order.
     """
 
     waypoints_deg: tuple[tuple[float, ...], ...]
@@ -209,11 +210,11 @@ class ChannelGap:
 
     @property
     def closed(self) -> float | None:
-        """Share of the calibrated gap above the floor that is gone."""
+        """Share of the calibrated gap above the floor that is gone, 1 where all of it is."""
         if None in (self.calibrated, self.after) or self.floor is None:
             return None
         above = self.calibrated - self.floor  # type: ignore[operator]
-        return None if above <= 0 else (self.calibrated - self.after) / above  # type: ignore[operator]
+        return None if above <= 0 else min((self.calibrated - self.after) / above, 1.0)  # type: ignore[operator]
 
 
 @dataclass(frozen=True)

@@ -100,13 +100,16 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
             listed.append(alternative)
             continue
         distance, best = max(found, key=lambda pair: pair[0])
+        expected, then = float(now[k]) / noise, float(distance) / noise
+        # What was expected of the fit trials to first order is known by now: what the new trial adds to it is not.
+        seen = min(expected, float(np.sqrt(max(alternative.worse, 0.0))))
         separation = Separation(
             waypoints_deg=tuple(tuple(float(v) for v in np.round(np.degrees(row), 1)) for row in best.movement.waypoints),
             speed_rad_s=best.movement.speed,
             acceleration_rad_s2=best.movement.acceleration,
             shape=best.movement.shape,
-            now=float(now[k]) / noise,
-            then=float(distance) / noise,
+            now=seen,
+            then=float(np.sqrt(seen**2 + max(then**2 - expected**2, 0.0))),
         )
         listed.append(replace(alternative, separating_movement=best.words, separation=separation))
     return replace(effect, alternatives=tuple(listed))

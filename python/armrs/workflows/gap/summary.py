@@ -184,7 +184,9 @@ def shrinking(result: GapFound, gaps: Mapping[str, ChannelGap], ax: Axes) -> Non
             )
         for step, value in seen:
             colour, _ = STEPS[step]
-            ax.plot(value, row, marker="o", ms=9, color=colour, mfc="white" if step == "before" else colour, mew=1.8, zorder=3)
+            ax.plot(
+                value, row, marker="o", ms=9, color=colour, mfc="white" if step == "before" else colour, mew=1.8, zorder=3, clip_on=False
+            )
         text, colour = _change(name, seen, one, opened=name in opened), plotting.RED if name in opened else plotting.INK
         right: dict[str, Any] = {"xycoords": ax.get_yaxis_transform(), "xytext": (6, 0), "textcoords": "offset points"}
         ax.annotate(text, (1.0, row), va="center", fontsize=9, color=colour, **right)

@@ -186,7 +186,8 @@ def gap(data: Mapping[str, Any]) -> Table:
         above = None if None in (channel["floor"], channel["calibrated"]) else channel["calibrated"] - channel["floor"]
         # Of a gap that hardly lies above the floor there is no share worth a number.
         counts = above is not None and channel["after"] is not None and above > 0.1 * channel["floor"]
-        closed = f"{(channel['calibrated'] - channel['after']) / above:.0%}" if counts else None
+        # Below the floor there is nothing to close.
+        closed = f"{min((channel['calibrated'] - channel['after']) / above, 1.0):.0%}" if counts else None
         quantity, held_in = name.rsplit("_", 1)
         values = [None if channel[step] is None else f"{channel[step]:.3g}" for step in steps]
         rows.append(
@@ -198,7 +199,7 @@ def gap(data: Mapping[str, Any]) -> Table:
             ]
         )
     head = {"before": "as given", "calibrated": "calibrated", "after": "with the named", "floor": "repeats differ by"}
-    columns = ["channel", *(head[step] for step in steps), *(["closed above that"] if named else []), ""]
+    columns = ["channel", *(head[step] for step in steps), *(["gap closed"] if named else []), ""]
     # Nothing is open: there is no column for it.
     return Table(columns, rows, 1) if opened else Table(columns[:-1], [row[:-1] for row in rows], 1)
 
