@@ -174,9 +174,8 @@ def read_trial(
     Parameters
     ----------
     path : Path
-        The file.
     n_joints : int
-        Number of joints of the model.
+        Of the model.
     force_on : {"robot", "arm"} or None
         What the forces of the file act on.
     sample_rate : float or None
@@ -184,12 +183,11 @@ def read_trial(
     file, configuration, repeat, role
         Handed on to the trial.
     loads : bool
-        Whether forces or torques must be there; a trial that only leads an arm needs none.
+        Whether forces or torques must be there.
 
     Returns
     -------
-    Reading or None
-        None when the header is right but not a single sample follows.
+    Reading, or None when the header is right but not a single sample follows.
 
     Raises
     ------
