@@ -325,15 +325,16 @@ DASHES = ("-", "--", "-.", ":")
 
 def _legend(ax: Axes) -> None:
     """Put the legend where no data are: right of the title when it is short, below the axis when it is long."""
-    count = len(ax.get_legend_handles_labels()[1])
+    shown: list[Any] = ax.get_legend_handles_labels()[0]
+    count = len(shown)
     if count == 0:
         return
+    # A point needs no room for a line.
+    look = {"columnspacing": 1.2, "handlelength": 1.6 if any(handle.get_linestyle() != "None" for handle in shown) else 0.7}
     if count <= 3:
-        legend = ax.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=count, columnspacing=1.2, handlelength=1.6
-        )
+        legend = ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=count, **look)
     else:
-        legend = ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=4, columnspacing=1.2, handlelength=1.6)
+        legend = ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=4, **look)
     handles: list[Any] = legend.legend_handles
     for handle in handles:
         handle.set_alpha(1.0)
