@@ -290,3 +290,26 @@ def test_a_cut_off_channel_is_warned_of(share: float) -> None:
 
 def test_a_coarse_channel_at_rest_is_not_called_saturated() -> None:
     assert examine(changed(session(), force_on_arm=lambda f: 0.1 * np.round(f / 0.1)), True) == []
+
+
+def test_where_the_arm_cannot_be_followed_the_torques_of_its_measured_motion_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first search is refused as that of a free wrist is; the second is the real one."""
+    from armrs import _armrs
+    from armrs.errors import SimulationError
+
+    real, asked = _armrs.find_gap, []
+
+    def refused_once(*given: object) -> object:
+        asked.append(given)
+        if len(asked) == 1:
+            raise SimulationError("angle beside the simulated run is inf")
+        return real(*given)
+
+    monkeypatch.setattr(_armrs, "find_gap", refused_once)
+    hidden = armrs.Effect("coulomb", 2, parameters={"torque": 0.5})
+    found = armrs.find_gap(session(hidden), threads=2, separate=False)
+    assert [given[2]["led"] for given in asked] == [True, False]
+    assert set(found.gap) >= {"tau1_Nm", "tau2_Nm"}
+    assert "joint torques in measured motion are compared" in found.warnings[0]
+    (rubs,) = (e for e in found.effects if (e.family, e.joint) == ("dry", 2))
+    assert "coulomb" in (rubs.kind, *(a.kind for a in rubs.alternatives))

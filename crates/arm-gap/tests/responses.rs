@@ -276,3 +276,58 @@ fn nothing_is_named_where_nothing_is_hidden() {
     assert!(finding.trial_specific.is_empty());
     assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
 }
+
+#[test]
+fn a_number_that_is_held_is_no_unknown_and_the_others_answer_as_before() {
+    let session = session(&[], (1e-3, 0.1));
+    let prepared = PreparedSession::new(&session, 1).expect("a sound session");
+    let point = prepared.linearize(&session.given()).expect("a run");
+    let held = point.holding(|t| t == Target::Known(1, 0));
+    let place = |p: &[Coordinate]| p.iter().position(|c| c.target == Target::Known(1, 0));
+    let place_before = place(&point.coordinates).expect("an unknown");
+    assert_eq!(place(&held.coordinates), None);
+    let before = point.rows.clusters(&prepared, &[], &point.residuals);
+    let after = held.rows.clusters(&prepared, &[], &point.residuals);
+    for (before, after) in std::iter::zip(&before, &after) {
+        let kept = |n: usize| (0..n).filter(|&i| i != place_before);
+        for (a, i) in kept(before.gram.nrows()).enumerate() {
+            assert_eq!(before.score[i], after.score[a]);
+            for (b, j) in kept(before.gram.nrows()).enumerate() {
+                assert_eq!(before.gram[(i, j)], after.gram[(a, b)]);
+            }
+        }
+    }
+}
+
+/// The session of an arm whose model has no joint law at all.
+fn little_known(effects: &[Effect<f64>]) -> Session<2> {
+    let mut session = session(effects, (1e-3, 0.1));
+    session.effects.clear();
+    session.with_base()
+}
+
+#[test]
+fn the_laws_of_a_passive_joint_are_named_with_what_could_stand_in_their_place() {
+    let session = little_known(&[]);
+    assert_eq!(session.base.len(), 6);
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    let named = &finding.amended.hypothesis.named;
+    let viscous = Kind::named("viscous").expect("known");
+    let places: Vec<_> = named.iter().map(|e| (e.kind, e.index)).collect();
+    assert!(
+        places.contains(&(viscous, 0)) && places.contains(&(viscous, 1)),
+        "{places:?}"
+    );
+    assert!(finding.amended.hypothesis.known.is_empty());
+    for one in &finding.named {
+        let effect = &named[one.slot];
+        assert_eq!(effect.kind, viscous, "{effect:?}");
+        assert!((effect.parameters[0] - 0.1).abs() < 0.03, "{effect:?}");
+        assert!(one.share > 0.0 && one.share <= 1.0);
+        for other in &one.alternatives {
+            assert_eq!(other.effect.index, effect.index);
+            assert!(!other.candidate.is_same_effect(effect));
+        }
+    }
+}

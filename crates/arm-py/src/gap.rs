@@ -10,15 +10,14 @@ use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use arm_gap::measurement_model::prediction::{Channels, Course};
+use arm_gap::selection::conclusion::Finding;
 use arm_gap::selection::first_order_screening::Look;
 use arm_gap::selection::fit::Fitted;
 use arm_gap::selection::held_out::{Left, Open, held_out as open_gaps};
 use arm_gap::selection::lack_of_fit::LackOfFit;
 use arm_gap::selection::model_discrimination::Contest;
 use arm_gap::selection::model_selection::Named;
-use arm_gap::selection::search::Finding;
 use arm_gap::trial_specific::component::TrialSpecific;
-use arm_numerics::statistics::distributions::chi_square_tail;
 use numpy::ToPyArray;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -435,8 +434,6 @@ fn result<'py, const N: usize>(
         .iter()
         .map(|r| (asked(&r.candidate), r.gain, r.price, r.smallest))
         .collect();
-    out.set_item("base", base(finding))?;
-    out.set_item("explained", finding.explained)?;
     out.set_item("ruled", ruled)?;
     let search_trace: Vec<_> = finding
         .search_trace
@@ -465,18 +462,6 @@ fn rigid<const N: usize>(session: &Session<N>) -> Hypothesis<N> {
     let mut given = session.given();
     given.known.truncate(session.effects.len());
     given
-}
-
-/// Named laws of the passive base: effect, standard deviations, what it gains, probability of that by chance.
-type Base = Vec<(Entry, Vec<(usize, f64)>, f64, f64)>;
-
-fn base<const N: usize>(finding: &Finding<N>) -> Base {
-    let each = finding.base.iter().map(|term| {
-        let effect = &finding.amended.hypothesis.known[term.known];
-        let chance = chi_square_tail(term.gain, term.sd.len());
-        (entry(effect), term.sd.clone(), term.gain, chance)
-    });
-    each.collect()
 }
 
 /// What a model leaves of a trial: movement, whether it is a test, rate, residuals by channel, samples that count.

@@ -9,6 +9,8 @@ use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::selection::passive_base::Free;
+use crate::selection::score_test::THRESHOLD;
 use crate::sensitivity::linearization_point::{Change, LinearizationPoint, Response};
 
 /// Share of a joint's torque that an effect has in the change with which its response is taken.
@@ -38,6 +40,8 @@ pub struct Candidate {
     pub price: f64,
     /// How much more its score scatters between repeats than the noise tells.
     pub spread: f64,
+    /// What is known of its numbers before the data: the sizes that an arm of this weight may have.
+    pub expected: Vec<Free>,
 }
 
 impl Candidate {
@@ -135,11 +139,24 @@ impl Candidate {
             step: question.step,
             price: 0.0,
             spread: 1.0,
+            expected: typical(prepared.session, &effect),
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(&motions(prepared, point), &candidate)?;
         }
         Some(candidate)
+    }
+
+    /// The same as a law of the passive base, which is fitted as it was there.
+    ///
+    /// * `rows` - rows of data that decide it
+    pub fn passive(self, expected: Vec<Free>, rows: usize) -> Self {
+        Self {
+            refined: &[],
+            price: price(self.width(), 1, rows),
+            expected,
+            ..self
+        }
     }
 
     /// The effect with the coefficients of its columns.
@@ -184,7 +201,11 @@ impl Candidate {
         free.chain(shapes)
             .map(|(p, step)| Coordinate {
                 target: Target::Named(slot, p),
-                prior: None,
+                prior: self
+                    .expected
+                    .iter()
+                    .find(|e| e.parameter == p)
+                    .map(|e| (e.mean, e.sd)),
                 lower: info.parameters[p].min,
                 upper: info.parameters[p].max,
                 step,
@@ -213,12 +234,20 @@ impl Library {
         point: &LinearizationPoint<N>,
         periodic: Option<[f64; 2]>,
     ) -> Result<Self, GapError> {
-        Self::of(
-            prepared,
-            point,
-            prepared.session.kinds(),
-            periodic.as_slice(),
-        )
+        Self::of(prepared, point, |_, _| true, periodic.as_slice())
+    }
+
+    /// Asks what may act in one joint alone.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::responses`].
+    pub fn of_joint<const N: usize>(
+        prepared: &PreparedSession<N>,
+        point: &LinearizationPoint<N>,
+        joint: usize,
+    ) -> Result<Self, GapError> {
+        let here = |kind: Kind, index| kind.info().place == Place::Joint && index == joint;
+        Self::of(prepared, point, here, &[])
     }
 
     /// Asks what is periodic alone, in waves of the given frequencies \[Hz\] and phases \[rad\].
@@ -230,24 +259,23 @@ impl Library {
         point: &LinearizationPoint<N>,
         waves: &[[f64; 2]],
     ) -> Result<Self, GapError> {
-        let kinds = prepared.session.kinds();
-        let kinds = kinds.filter(|k| k.probe().nature == Nature::Periodic);
-        Self::of(prepared, point, kinds, waves)
+        let periodic = |kind: Kind, _| kind.probe().nature == Nature::Periodic;
+        Self::of(prepared, point, periodic, waves)
     }
 
     fn of<const N: usize>(
         prepared: &PreparedSession<N>,
         point: &LinearizationPoint<N>,
-        kinds: impl Iterator<Item = Kind>,
+        is_asked: impl Fn(Kind, usize) -> bool,
         waves: &[[f64; 2]],
     ) -> Result<Self, GapError> {
         let hypothesis = &point.hypothesis;
         let motions = motions(prepared, point);
         let mut candidates = Vec::new();
-        for kind in kinds {
-            for index in places(prepared.session, kind) {
+        for kind in prepared.session.kinds() {
+            for index in places(prepared.session, kind).filter(|&i| is_asked(kind, i)) {
                 for asked in kind.probe().questions.iter().enumerate() {
-                    let mut own = ask(&motions, kind, index, asked, waves);
+                    let mut own = ask(prepared.session, &motions, (kind, index), asked, waves);
                     // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
                     if !prepared.repeated && kind.probe().nature != Nature::Periodic {
                         own.iter_mut().for_each(|c| c.refined = &[]);
@@ -332,6 +360,29 @@ pub struct Twin {
     pub place: usize,
     /// The coefficients of its columns.
     pub sizes: Vec<f64>,
+}
+
+/// What an effect must gain to be named: the threshold, Schwarz' price of its numbers, and that of the shapes that were tried.
+///
+/// * `rows` - rows of data that decide it
+pub fn price(width: usize, tried: usize, rows: usize) -> f64 {
+    THRESHOLD + width as f64 * libm::log(rows as f64) + 2.0 * libm::log(tried as f64)
+}
+
+/// What is known of the first number of an effect in a joint beforehand, by the weight that the joint bears.
+fn typical<const N: usize>(session: &Session<N>, effect: &Effect<f64>) -> Vec<Free> {
+    let typical = effect.kind.probe().typical;
+    if typical == 0.0 || effect.kind.info().place != Place::Joint {
+        return Vec::new();
+    }
+    let sd = typical * session.weight_moment(effect.index.min(N - 1));
+    vec![Free {
+        parameter: 0,
+        mean: 0.0,
+        sd,
+        lower: 0.0,
+        step: 0.0,
+    }]
 }
 
 /// Where a kind may act in a session.
@@ -421,9 +472,9 @@ fn motions<const N: usize>(
 
 /// The candidates of one question about a kind at a place.
 fn ask<const N: usize>(
+    session: &Session<N>,
     movements: &[Movement<N>],
-    kind: Kind,
-    index: usize,
+    (kind, index): (Kind, usize),
     (number, question): (usize, &'static Question),
     waves: &[[f64; 2]],
 ) -> Vec<Candidate> {
@@ -485,6 +536,7 @@ fn ask<const N: usize>(
             step: question.step,
             price: 0.0,
             spread: 1.0,
+            expected: typical(session, &effect),
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(movements, &candidate)?;

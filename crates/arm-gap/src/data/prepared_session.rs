@@ -121,7 +121,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             dry: [false; N],
             resting: Vec::new(),
             touched: Vec::new(),
-            dropped: vec![false; session.base.len()],
+            dropped: session.base.iter().map(|law| !law.likely).collect(),
             start: None,
             threads,
         })

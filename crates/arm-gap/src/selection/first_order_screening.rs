@@ -10,7 +10,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::score_test::ScoreTest;
-use crate::selection::search::Progress;
+use crate::selection::search_state::Progress;
 use crate::trial_specific::tremor_detection::Line;
 
 /// What a first look shows; nothing in it was converged by simulation but the calibration.

@@ -87,7 +87,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let residuals = self.residuals(point, &hypothesis)?;
         let squares = point.rows.squares(self, &residuals);
         let data: f64 = squares.iter().map(|c| c.square).sum();
-        let cost = data + departure(&hypothesis, &point.coordinates);
+        let own = named(&hypothesis, &asked);
+        let cost = data + departure(&hypothesis, &point.coordinates) + departure(&hypothesis, &own);
         Ok(Fitted {
             hypothesis,
             asked,

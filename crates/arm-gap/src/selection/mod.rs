@@ -1,5 +1,6 @@
 //! Which effects are missing: first-order score tests, search by fitting, model selection.
 
+pub mod conclusion;
 pub mod first_order_screening;
 pub mod fit;
 pub mod held_out;
@@ -10,3 +11,5 @@ pub mod passive_base;
 pub mod score_test;
 pub mod score_variance;
 pub mod search;
+pub mod search_state;
+pub mod set_apart;

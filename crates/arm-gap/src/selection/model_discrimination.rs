@@ -54,7 +54,9 @@ impl<'a, const N: usize> Contest<'a, N> {
         let rivals: Vec<Option<Rival<N>>> = rivals
             .iter()
             .map(|(effect, free)| {
-                let candidate = Candidate::again(&prepared, &given, *effect, free)?;
+                let mut candidate = Candidate::again(&prepared, &given, *effect, free)?;
+                // Only what the data tell counts.
+                candidate.expected.clear();
                 Some(Rival {
                     hypothesis: with(*effect),
                     coordinates: candidate.coordinates(without.named.len(), effect),

@@ -11,7 +11,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::score_test::{Choice, ScoreTest};
-use crate::selection::search::{Progress, Settled};
+use crate::selection::search_state::{Progress, Settled};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use arm_numerics::statistics::distributions::chi_square_tail;
 
@@ -83,9 +83,9 @@ pub struct Alternative {
 }
 
 /// An alternative, fitted.
-struct Rival<const N: usize> {
-    alternative: Alternative,
-    fitted: Fitted<N>,
+pub(crate) struct Rival<const N: usize> {
+    pub alternative: Alternative,
+    pub fitted: Fitted<N>,
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
@@ -108,8 +108,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if let Some(less) = again(&hypothesis)? {
             return Ok(less);
         }
-        // What the effect had held up may be impossible without it: then from the segments as given.
-        hypothesis.segments = [[0.0; 3]; N];
+        // The laws of the base whose place it took are gone, and the arm cannot be simulated without either: then from where the
+        // calibration starts.
+        hypothesis = Hypothesis {
+            named: hypothesis.named,
+            ..self.given()
+        };
         if let Some(less) = again(&hypothesis)? {
             return Ok(less);
         }
@@ -152,6 +156,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             for (slot, less) in without.into_iter().enumerate() {
                 let mut gain = gains[slot];
+                let candidate = &fitted.asked[slot];
                 if let Some(with) = foretold
                     && gain.is_finite()
                 {
@@ -162,7 +167,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 let least = others
                     .map(|o| mimicked(&fitted.asked[slot].effect, &fitted.asked[o], gains[o]))
                     .fold(floor, f64::max);
-                let candidate = &fitted.asked[slot];
                 let worth = gain / scale - candidate.price * candidate.spread;
                 let worth = if gain < least {
                     worth.min(gain - least)
@@ -253,17 +257,23 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     slot,
                     p_value: (asked * chance).min(1.0),
                     gain: gain / scale,
-                    share: gain / (calibrated.cost - fitted.cost).max(gain),
-                    alternatives: rivals
-                        .into_iter()
-                        .map(|r| r.alternative)
-                        .filter(|a| a.worse <= self.tie(candidate, gain / scale))
-                        .collect(),
+                    share: 0.0,
+                    alternatives: self.ties(rivals, candidate, gain / scale),
                 });
             }
-            named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
             return Ok((fitted, point, named));
         }
+    }
+
+    /// Those of the others that explain the data as well as what gained so much.
+    pub(crate) fn ties(
+        &self,
+        rivals: Vec<Rival<N>>,
+        own: &Candidate,
+        gain: f64,
+    ) -> Vec<Alternative> {
+        let all = rivals.into_iter().map(|r| r.alternative);
+        all.filter(|a| a.worse <= self.tie(own, gain)).collect()
     }
 
     /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
@@ -281,7 +291,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// The better one does, when it earns the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
     /// one with fewer parameters or, with as many, the one that stands before it in the catalogue: an intricate one bends itself to
     /// what sensors and a rigid model get wrong.
-    fn takes_over(&self, rival: &Alternative, (own, gain): (&Candidate, f64), bent: f64) -> bool {
+    pub(crate) fn takes_over(
+        &self,
+        rival: &Alternative,
+        (own, gain): (&Candidate, f64),
+        bent: f64,
+    ) -> bool {
         const BETTER: f64 = 0.05;
         let shapes = |c: &Candidate| self.price_of_shapes(std::slice::from_ref(c));
         let plain = |c: &Candidate| {
@@ -305,7 +320,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Two things speak for another effect: what it explains once all is refitted without the named one, and how well it stands for
     /// that one where all is as it was fitted. The first is blind where the refitting has gone to its bounds, the second where much
     /// else changes with the exchange.
-    fn rivals(
+    pub(crate) fn rivals(
         &self,
         fitted: &Fitted<N>,
         (slot, less, twin): (usize, &Fitted<N>, Option<&Twin>),

@@ -11,22 +11,25 @@ use arm_ident::inference::estimate::{Estimate, Quantity};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::regression::trial::{Model, Role};
 use arm_ident::regression::unknown::Source;
+use arm_numerics::statistics::distributions::chi_square_tail;
 
 use crate::GapError;
+use crate::candidates::candidate::{Candidate, Library, Twin};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
-use crate::selection::fit::Fitted;
+use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::selection::search::Settled;
+use crate::selection::model_selection::{Alternative, Named};
+use crate::selection::search_state::Settled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
 const LIKELY: f64 = 2.0;
 /// Square of the same beyond which a law stays once it was refitted by simulation: 2 standard deviations,
 const STAYS: f64 = 4.0;
-/// and beyond which it is named: with nine such laws an arm without any has one false name in two hundred sessions.
-pub const NAMED: f64 = 12.0;
+/// and what it must gain to be named: with nine such laws an arm without any has one false name in two hundred sessions.
+pub(crate) const NAMED: f64 = 12.0;
 /// Part of the whole arm's weight moment that each joint's typical sizes are read off at least: muscles that cross a wrist are made
 /// for more than the weight of a hand.
 const OF_THE_ARM: f64 = 0.3;
@@ -34,6 +37,10 @@ const OF_THE_ARM: f64 = 0.3;
 const REST_SD: f64 = 1.0;
 /// Distance between the two rest angles at which a spring is regressed \[rad\].
 const APART: f64 = 6.0;
+/// What speaks for a law that every passive joint has against one that few have, in units of twice the log-likelihood: odds of 20.
+const ODDS: f64 = 6.0;
+/// Times that something else may take the place of a law of the base.
+const EXCHANGES: usize = 3;
 /// Times that laws are dropped and the others refitted.
 const TURNS: usize = 4;
 /// Furthest start of a segment from its literature values, in standard deviations.
@@ -46,10 +53,12 @@ pub struct Passive {
     pub effect: Effect<f64>,
     /// Its numbers that are fitted.
     pub free: Vec<Free>,
+    /// Whether measured motion shows it; the others are asked again once something is named.
+    pub likely: bool,
 }
 
 /// A number of a law, with what is known of it beforehand.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Free {
     /// Its position among the parameters.
     pub parameter: usize,
@@ -63,15 +72,26 @@ pub struct Free {
     pub step: f64,
 }
 
-/// A law of the passive base as it was judged.
-#[derive(Clone, Debug)]
-pub struct Term {
-    /// Its place among the known effects.
-    pub known: usize,
+/// A law of the passive base, and how clearly it stands out.
+struct Term {
+    /// Its place in the base.
+    base: usize,
+    /// Square of its first parameter in standard deviations.
+    gain: f64,
+}
+
+/// A law of the passive base that is named.
+pub(crate) struct BaseLaw<const N: usize> {
+    /// Its place in the base.
+    pub base: usize,
+    /// The question that it answers.
+    pub question: Candidate,
     /// Square of its first parameter in standard deviations.
     pub gain: f64,
-    /// Standard deviations of its free parameters.
-    pub sd: Vec<(usize, f64)>,
+    /// What does as well in its joint.
+    pub alternatives: Vec<Alternative>,
+    /// The hypothesis in which something else takes its place, where that explains more.
+    better: Option<Fitted<N>>,
 }
 
 /// What a joint law is asked with in the regression: one column, or two with a rest angle.
@@ -131,10 +151,9 @@ impl<const N: usize> Session<N> {
                         moved.clamp(middle - 2.0 * REST_SD, middle + 2.0 * REST_SD);
                 }
             }
-            passive.effect.parameters[0] = size;
-            if size > 0.0 && size > LIKELY * sd {
-                self.base.push(passive);
-            }
+            passive.likely = size > 0.0 && size > LIKELY * sd;
+            passive.effect.parameters[0] = if passive.likely { size } else { 0.0 };
+            self.base.push(passive);
         }
         let (chain, nominal) = (found.chain, self.chain);
         for k in 0..N {
@@ -214,6 +233,7 @@ impl<const N: usize> Session<N> {
         Passive {
             effect,
             free: std::iter::once(size).chain(rest).collect(),
+            likely: false,
         }
     }
 
@@ -236,53 +256,35 @@ impl<const N: usize> Session<N> {
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// The laws of the base that are not dropped, as they stand in a fitted hypothesis.
-    ///
-    /// # Errors
-    /// As [`PreparedSession::precision`].
-    pub fn base_terms(
+    fn base_terms(
         &self,
-        anchor: &LinearizationPoint<N>,
+        point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
-        scale: f64,
     ) -> Result<Vec<Term>, GapError> {
-        let mut precision = self.precision(anchor, fitted, scale)?;
+        let precision = self.precision(point, fitted, 1.0)?;
         let first = self.session.effects.len();
-        let sizes = |known: usize| fitted.hypothesis.known[known].parameters[0];
-        let mut terms = Vec::new();
-        for b in (0..self.session.base.len()).filter(|&b| !self.dropped[b]) {
-            let known = first + b;
-            let of = |target: Target| match target {
-                Target::Known(e, p) if e == known => Some(p),
+        let sizes = std::iter::zip(&precision.coordinates, &precision.sd);
+        Ok(sizes
+            .filter_map(|(c, sd)| match c.target {
+                Target::Known(e, 0) if e >= first => {
+                    let ratio = fitted.hypothesis.get(c.target) / sd;
+                    Some(Term {
+                        base: e - first,
+                        gain: ratio * ratio,
+                    })
+                }
                 _ => None,
-            };
-            let own = std::iter::zip(&precision.coordinates, &mut precision.sd);
-            let sd: Vec<(usize, f64)> = own
-                .filter_map(|(c, sd)| Some((of(c.target)?, *sd)))
-                .collect();
-            let ratio = sd
-                .iter()
-                .find(|(p, _)| *p == 0)
-                .map_or(0.0, |(_, sd)| sizes(known) / sd);
-            terms.push(Term {
-                known,
-                gain: ratio * ratio,
-                sd,
-            });
-        }
-        Ok(terms)
+            })
+            .collect())
     }
 
-    /// Drops the weakest law of each joint that gains less than asked for; whether there was one.
+    /// Drops the weakest law of each joint that stands out too little; whether there was one.
     fn dropped_weak(&mut self, terms: &[Term], least: f64) -> bool {
-        let first = self.session.effects.len();
-        let joint = |t: &Term| self.session.base[t.known - first].effect.index;
+        let joint = |t: &Term| self.session.base[t.base].effect.index;
         let mut weak = Vec::new();
         for j in 0..N {
             let own = terms.iter().filter(|t| joint(t) == j && t.gain < least);
-            weak.extend(
-                own.min_by(|a, b| a.gain.total_cmp(&b.gain))
-                    .map(|t| t.known - first),
-            );
+            weak.extend(own.min_by(|a, b| a.gain.total_cmp(&b.gain)).map(|t| t.base));
         }
         for &b in &weak {
             self.dropped[b] = true;
@@ -297,7 +299,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn calibrate_base(&mut self) -> Result<Settled<'a, N>, GapError> {
         let mut settled = self.calibrate()?;
         for _ in 0..TURNS {
-            let terms = self.base_terms(&settled.1, &settled.0, 1.0)?;
+            let terms = self.base_terms(&settled.1, &settled.0)?;
             self.start = Some(settled.0.hypothesis.clone());
             if !self.dropped_weak(&terms, STAYS) {
                 break;
@@ -311,6 +313,38 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(settled)
     }
 
+    /// Asks for the laws of the base once more that were dropped before anything was named: what was named since may have hidden
+    /// them. `None` where none comes back.
+    pub(crate) fn with_base_revived(
+        &mut self,
+        current: &Fitted<N>,
+    ) -> Result<Option<Settled<'a, N>>, GapError> {
+        let before = self.dropped.clone();
+        if !before.contains(&true) || current.asked.is_empty() {
+            return Ok(None);
+        }
+        for (dropped, law) in self.dropped.iter_mut().zip(&self.session.base) {
+            *dropped = current.asked.iter().any(|c| c.is_same_effect(&law.effect));
+        }
+        let mut start = current.hypothesis.clone();
+        for _ in 0..TURNS {
+            let Ok((fitted, point)) = self.settle(start, current.asked.clone()) else {
+                break;
+            };
+            let terms = self.base_terms(&point, &fitted)?;
+            if !self.dropped_weak(&terms, STAYS) {
+                let back = std::iter::zip(&before, &self.dropped).any(|(was, is)| *was && !is);
+                if back && fitted.cost < current.cost {
+                    return Ok(Some((fitted, point)));
+                }
+                break;
+            }
+            start = self.without_dropped(fitted.hypothesis);
+        }
+        self.dropped = before;
+        Ok(None)
+    }
+
     /// Chooses the samples and reads the noise anew from where the next calibration starts.
     fn read_anew(&mut self) -> Result<(), GapError> {
         let anchor = self.linearize(&self.given())?;
@@ -319,8 +353,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.measure_noise(&anchor)
     }
 
-    /// Judges the base once everything is named: laws that do not earn their names are dropped one after the other, and the rest is
-    /// refitted.
+    /// Judges the base once everything is named: laws that do not earn their names are dropped one after the other and the rest is
+    /// refitted; what stands in better for one takes its place; what does as well is its alternative.
     ///
     /// # Errors
     /// As [`PreparedSession::settle`].
@@ -328,15 +362,147 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &mut self,
         mut settled: Settled<'a, N>,
         scale: f64,
-    ) -> Result<(Settled<'a, N>, Vec<Term>), GapError> {
+    ) -> Result<(Settled<'a, N>, Vec<BaseLaw<N>>), GapError> {
+        let mut exchanges = 0;
         loop {
-            let terms = self.base_terms(&settled.1, &settled.0, scale)?;
-            if !self.dropped_weak(&terms, NAMED) {
-                return Ok((settled, terms));
+            let terms = self.base_terms(&settled.1, &settled.0)?;
+            if self.dropped_weak(&terms, NAMED * scale) {
+                let start = self.without_dropped(settled.0.hypothesis);
+                settled = self.settle(start, settled.0.asked)?;
+                continue;
             }
-            let (fitted, _) = settled;
-            let start = self.without_dropped(fitted.hypothesis);
-            settled = self.settle(start, fitted.asked)?;
+            let mut laws = self.base_laws(&settled, &terms, scale)?;
+            let better = laws
+                .iter_mut()
+                .find_map(|law| Some((law.base, law.better.take()?)));
+            let Some((base, better)) = better.filter(|_| exchanges < EXCHANGES) else {
+                return Ok((settled, laws));
+            };
+            exchanges += 1;
+            self.dropped[base] = true;
+            match self.settle(better.hypothesis, better.asked) {
+                Ok(exchanged) => settled = exchanged,
+                // What can be followed but not simulated is no answer.
+                Err(_) => {
+                    self.dropped[base] = false;
+                    return Ok((settled, laws));
+                }
+            }
+        }
+    }
+
+    /// The laws of the base as they would be among the named effects, each with what could stand in its place in the same joint.
+    fn base_laws(
+        &self,
+        (fitted, point): &Settled<'a, N>,
+        terms: &[Term],
+        scale: f64,
+    ) -> Result<Vec<BaseLaw<N>>, GapError> {
+        let first = self.session.effects.len();
+        let rows = self.rows_of_references();
+        let mut laws = Vec::new();
+        for term in terms {
+            let effect = fitted.hypothesis.known[first + term.base];
+            let Some(question) = Candidate::again(self, point, effect, &[0]) else {
+                continue;
+            };
+            let expected = self.session.base[term.base].free.clone();
+            laws.push(BaseLaw {
+                base: term.base,
+                question: question.passive(expected, rows),
+                gain: term.gain / scale,
+                alternatives: Vec::new(),
+                better: None,
+            });
+        }
+        for joint in 0..N {
+            let own: Vec<usize> = (0..laws.len())
+                .filter(|&l| laws[l].question.effect.index == joint)
+                .collect();
+            if own.is_empty() {
+                continue;
+            }
+            let mut library = Library::of_joint(self, point, joint)?;
+            let effect = |l: usize| fitted.hypothesis.known[first + laws[l].base];
+            let named: Vec<_> = own
+                .iter()
+                .map(|&l| (laws[l].question.clone(), effect(l)))
+                .collect();
+            let twins = library.add_named(self, point, &named)?;
+            for (&l, twin) in own.iter().zip(&twins) {
+                let known = first + laws[l].base;
+                let held = point.holding(|t| matches!(t, Target::Known(e, _) if e == known));
+                let law = &mut laws[l];
+                let mut as_named = fitted.clone();
+                as_named
+                    .hypothesis
+                    .named
+                    .push(fitted.hypothesis.known[known]);
+                as_named.hypothesis.known[known].parameters[0] = 0.0;
+                as_named.asked.push(law.question.clone());
+                self.judge_base_law(law, (&as_named, twin.as_ref()), (&held, &library), scale);
+            }
+        }
+        Ok(laws)
+    }
+
+    /// Looks for what could stand in the place of a law of the base, which is the last of the named effects.
+    fn judge_base_law(
+        &self,
+        law: &mut BaseLaw<N>,
+        (fitted, twin): (&Fitted<N>, Option<&Twin>),
+        (point, library): (&LinearizationPoint<'a, N>, &Library),
+        scale: f64,
+    ) {
+        let slot = fitted.asked.len() - 1;
+        let mut less = fitted.hypothesis.clone();
+        less.named.pop();
+        // Of what cannot be followed without it nothing can be said.
+        let Ok(less) = self.fit(point, less, fitted.asked[..slot].to_vec()) else {
+            return;
+        };
+        let place = (slot, &less, twin);
+        let rivals = self.rivals(fitted, place, (point, library), scale);
+        let mut rivals = rivals.unwrap_or_default();
+        for rival in &mut rivals {
+            let alternative = &mut rival.alternative;
+            if !alternative.candidate.kind().probe().passive {
+                alternative.worse += ODDS;
+            }
+        }
+        let own = (&law.question, law.gain);
+        law.better = rivals
+            .iter()
+            .find(|r| self.takes_over(&r.alternative, own, 0.0))
+            .map(|r| r.fitted.clone());
+        law.alternatives = self.ties(rivals, &law.question, law.gain);
+    }
+
+    /// Names a law of the base: it stands among the named effects from here on.
+    pub(crate) fn name(
+        &self,
+        law: BaseLaw<N>,
+        amended: &mut Fitted<N>,
+        precision: &mut Precision,
+    ) -> Named {
+        let (known, slot) = (self.session.effects.len() + law.base, amended.asked.len());
+        for c in &mut precision.coordinates {
+            if let Target::Known(e, p) = c.target
+                && e == known
+            {
+                c.target = Target::Named(slot, p);
+            }
+        }
+        let effect = amended.hypothesis.known[known];
+        amended.hypothesis.named.push(effect);
+        let width = law.question.width();
+        amended.asked.push(law.question);
+        Named {
+            slot,
+            p_value: chi_square_tail(law.gain, width),
+            gain: law.gain,
+            share: 0.0,
+            alternatives: law.alternatives,
         }
     }
 
@@ -360,9 +526,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The model as given, refitted without its base, and what it leaves; `None` where there is no base.
     ///
-    /// Where it cannot be simulated the model as given stands for it, and what the laws of the base explain is its cost.
-    pub(crate) fn rigid(&self, base: &[Term]) -> Option<(Fitted<N>, LackOfFit)> {
-        if base.is_empty() {
+    /// Where it cannot be simulated the model as given stands for it, and what it leaves is what the laws of the base gain.
+    ///
+    /// * `gained` - what each of them gains, in units of twice the log-likelihood
+    pub(crate) fn rigid(&self, gained: &[f64]) -> Option<(Fitted<N>, LackOfFit)> {
+        if gained.is_empty() {
             return None;
         }
         let session = Session {
@@ -383,12 +551,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let lack = lack_of_fit(self, &anchor, &fitted);
             Ok((fitted, lack))
         });
-        let alone: f64 = base.iter().map(|t| t.gain).sum();
         Some(simulated.unwrap_or_else(|_| {
             let lack = LackOfFit {
                 ratio: f64::INFINITY,
                 z: f64::INFINITY,
-                excess: alone,
+                excess: gained.iter().sum(),
             };
             let fitted = Fitted {
                 hypothesis,

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
-use crate::candidates::candidate::{Library, Twin};
+use crate::candidates::candidate::{Library, Twin, price};
 use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::{Fitted, priors, regularise};
 use crate::selection::score_variance::{spread, unlike};
@@ -112,10 +112,7 @@ impl ScoreTest {
             price: library
                 .candidates
                 .iter()
-                .map(|c| {
-                    let width = c.width() as f64;
-                    THRESHOLD + width * libm::log(rows as f64) + 2.0 * libm::log(c.tried as f64)
-                })
+                .map(|c| price(c.width(), c.tried, rows))
                 .collect(),
             scale: 1.0,
             square: normal.square,

@@ -38,7 +38,7 @@ pub struct LinearizationPoint<'a, const N: usize> {
     /// The hypothesis.
     pub hypothesis: Hypothesis<N>,
     /// The runs along which led arms are followed, by group; nothing where torques are compared.
-    pub lines: Vec<Linear<'a, N>>,
+    pub lines: Arc<Vec<Linear<'a, N>>>,
     /// What the sensors would read of each group's reference, in the common band.
     shown: Vec<Channels>,
     /// Measured less predicted channels of the fitted trials.
@@ -49,6 +49,26 @@ pub struct LinearizationPoint<'a, const N: usize> {
     pub own: Vec<Response>,
     /// Rows of the nuisances.
     pub rows: Rows,
+}
+
+impl<const N: usize> LinearizationPoint<'_, N> {
+    /// The same with some of the nuisances held where they are.
+    pub fn holding(&self, held: impl Fn(Target) -> bool) -> Self {
+        let columns: Vec<usize> = (0..self.coordinates.len())
+            .filter(|&i| held(self.coordinates[i].target))
+            .collect();
+        let mut coordinates = self.coordinates.clone();
+        coordinates.retain(|c| !held(c.target));
+        Self {
+            hypothesis: self.hypothesis.clone(),
+            lines: Arc::clone(&self.lines),
+            shown: self.shown.clone(),
+            residuals: self.residuals.clone(),
+            coordinates,
+            own: self.own.clone(),
+            rows: self.rows.without(&columns),
+        }
+    }
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
@@ -75,7 +95,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         };
         let mut point = LinearizationPoint {
             hypothesis: hypothesis.clone(),
-            lines,
+            lines: Arc::new(lines),
             shown: Vec::new(),
             residuals: Vec::new(),
             coordinates: self.nuisances(),

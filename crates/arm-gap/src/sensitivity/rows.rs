@@ -15,6 +15,7 @@ use crate::sensitivity::normal_equations::{Cluster, factor};
 pub const PARTS: usize = 5;
 
 /// Fitted trials of one movement that are compared at the same samples.
+#[derive(Clone)]
 struct Class {
     /// The movement, or one part of a trial where no movement is repeated.
     group: usize,
@@ -105,6 +106,25 @@ impl Rows {
         Self {
             classes,
             own: prepared.session.by_trial().into_iter().map(sd).collect(),
+        }
+    }
+
+    /// The same without some of the common columns.
+    pub fn without(&self, columns: &[usize]) -> Self {
+        let places: Vec<usize> = columns.iter().map(|c| self.own.len() + c).collect();
+        let classes = self.classes.iter().map(|class| {
+            let kept =
+                |(i, column): (usize, &Vec<f64>)| (!places.contains(&i)).then(|| column.clone());
+            let products = class.products.clone();
+            Class {
+                columns: class.columns.iter().enumerate().filter_map(kept).collect(),
+                products: products.remove_columns_at(&places).remove_rows_at(&places),
+                ..class.clone()
+            }
+        });
+        Self {
+            classes: classes.collect(),
+            own: self.own.clone(),
         }
     }
 

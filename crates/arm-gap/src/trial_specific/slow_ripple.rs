@@ -7,7 +7,7 @@ use crate::candidates::candidate::Library;
 use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
 use crate::selection::score_test::ScoreTest;
-use crate::selection::search::SLOW;
+use crate::selection::set_apart::SLOW;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::tremor_detection::{SLOWEST_RIPPLE, UNSTEADY};
 

@@ -31,7 +31,7 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
     """Return what the core found in a data set as objects."""
     together = tuple(_missing(item, dataset) for item in raw["named"])
     apart = tuple(_apart(item, dataset, raw) for item in raw["apart"])
-    effects = tuple(sorted(map(_in_family, (*together, *apart, *_passive_base(raw))), key=lambda e: -e.share))
+    effects = tuple(sorted(map(_in_family, (*together, *apart)), key=lambda e: -e.share))
     (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
     gap = gaps(dataset, led, raw)
@@ -102,22 +102,6 @@ def _missing(item: Mapping[str, Any], dataset: Dataset) -> Missing:
         why = "explains these movements as well" if worse < 2.0 else "explains these movements nearly as well"
         alternatives.append(Alternative(entry[0], *catalogue()[entry[0]].place(entry[1]), why, float(worse), float(likeness)))
     return Missing(name, *kind.place(index), parameters, item["p_value"], item["share"], tuple(alternatives))
-
-
-def _passive_base(raw: Mapping[str, Any]) -> list[Missing]:
-    """Return the laws of joints that the model left without one."""
-    everything = raw["explained"]
-    if not math.isfinite(everything):
-        everything = sum(gain for *_, gain, _ in raw["base"])
-    effects = []
-    for (name, index, values), sd, gain, chance in raw["base"]:
-        kind = catalogue()[name]
-        known = dict(sd)
-        parameters = {
-            p.name: Value.of(v, known.get(k), p.unit, (p.min, p.max)) for k, (p, v) in enumerate(zip(kind.parameters, values, strict=True))
-        }
-        effects.append(Missing(name, *kind.place(index), parameters, chance, min(gain / max(everything, gain), 1.0)))
-    return effects
 
 
 def _apart(item: Sequence[Any], dataset: Dataset, raw: Mapping[str, Any]) -> Missing:

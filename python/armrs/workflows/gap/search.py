@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from ... import _armrs, checks
 from ...custom_effects import OwnEffect
+from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
 from ..identify import core_columns
 from . import reading, suspicion
@@ -47,7 +49,12 @@ def find_gap(
     BadInput
         For data that cannot be judged: wrong units, swapped channels, a reversed force, trials that are copies.
     SimulationError
-        When the model as given cannot be simulated on a trial.
+        When the model cannot be simulated on a trial, and neither can joint torques in measured motion be compared.
+
+    Notes
+    -----
+    Where the simulated arm does not follow the measured one at all, as a free wrist may, joint torques in measured motion are compared
+    instead; the first of the warnings says so.
     """
     from . import separating
 
@@ -56,16 +63,36 @@ def find_gap(
     if progress is not None:
         checks.function("progress", progress)
     effects = checks.instances("effects", effects, OwnEffect)
+    own = [e.kind for e in effects]
+    try:
+        result = _searched(dataset, own, threads, progress)
+    except SimulationError as error:
+        if not reading.is_led(dataset):
+            raise
+        # The arm that robot angles would lead is not simulated then: the torques of its measured motion are compared.
+        still = dataset.replace(trials=tuple(dataclasses.replace(t, robot_q=None) for t in dataset.trials))
+        result = _searched(still, own, threads, progress)
+        result = dataclasses.replace(result, warnings=(_torques_instead(error), *result.warnings))
+    return separating.separate(result, threads=threads, progress=progress) if separate else result
+
+
+def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progress: Callable[[str, float], None] | None) -> GapFound:
     led = reading.is_led(dataset)
-    settings = core_settings(dataset, led, threads, [e.kind for e in effects])
+    settings = core_settings(dataset, led, threads, own)
     columns = core_trials(dataset)
     built = _armrs.Rig(dataset.model, dataset.model.all_effects)
     warnings = suspicion.examine(dataset, led)
     with naming_trials(dataset.trials):
         suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
         raw = _armrs.find_gap(built, columns, settings, progress)
-    result = reading.found(dataset, led, raw, warnings)
-    return separating.separate(result, threads=threads, progress=progress) if separate else result
+    return reading.found(dataset, led, raw, warnings)
+
+
+def _torques_instead(error: SimulationError) -> str:
+    return (
+        f"The simulated arm does not follow the measured one ({error}): joint torques in measured motion are compared instead of angles "
+        "and forces. Effects of the contact and of the robot cannot be asked that way."
+    )
 
 
 def core_trials(dataset: Dataset) -> list[dict[str, Any]]:

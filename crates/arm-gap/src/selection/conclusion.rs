@@ -1,0 +1,157 @@
+//! What a search came to.
+
+use arm_core::effect::Effect;
+
+use crate::GapError;
+use crate::data::prepared_session::PreparedSession;
+use crate::measurement_model::hypothesis::Hypothesis;
+use crate::selection::fit::{Fitted, Precision};
+use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
+use crate::selection::model_selection::Named;
+use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep};
+use crate::selection::set_apart::SetApart;
+use crate::trial_specific::component::TrialSpecific;
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct Finding<const N: usize> {
+    /// The model after refitting what was never exact.
+    pub calibrated: Fitted<N>,
+    /// The model with the named effects.
+    pub amended: Fitted<N>,
+    /// The named effects, those that explain most first.
+    pub named: Vec<Named>,
+    /// What is not the same in every trial.
+    pub trial_specific: Vec<TrialSpecific>,
+    /// The calibrated and the amended model as they are in each trial; see [`crate::measurement_model::in_trial`].
+    pub in_trials: [Vec<Hypothesis<N>>; 2],
+    /// Rounds of the search.
+    pub search_trace: Vec<SearchStep>,
+    /// How well the amended model is known.
+    pub precision: Precision,
+    /// Lack of fit of the calibrated and of the amended model.
+    pub lack: [LackOfFit; 2],
+    /// What else was asked.
+    pub ruled: Vec<Ruled>,
+    /// Misfit for each degree of freedom.
+    pub scale: f64,
+}
+
+impl<'a, const N: usize> PreparedSession<'a, N> {
+    /// Judges the passive base, and measures what is left.
+    pub(crate) fn concluded(
+        &mut self,
+        (state, mut named): (SearchState<'a, N>, Vec<Named>),
+        mut apart: SetApart<N>,
+        progress: Progress<'_>,
+    ) -> Result<Finding<N>, GapError> {
+        let SearchState {
+            mut calibrated,
+            mut before,
+            current,
+            point,
+            search_trace,
+            ruled,
+            asked,
+            scale,
+            ..
+        } = state;
+        progress("judging the passive base", 0.88)?;
+        let found = current.asked.len();
+        let ((mut amended, mut point), base) = self.judged_base((current, point), scale)?;
+        if amended.asked.len() > found {
+            let judging = (asked, scale, apart.periodic);
+            (amended, point, named) =
+                self.judged((amended, point), &calibrated, judging, progress)?;
+        }
+        progress("measuring what is left", 0.9)?;
+        let mut precision = self.precision(&point, &amended, scale)?;
+        for one in &named {
+            let missed = amended.asked[one.slot].kind().probe().missed;
+            precision.widen(one.slot, missed, one.gain);
+        }
+        let gained: Vec<f64> = base.iter().map(|law| law.gain).collect();
+        if let Some(rigid) = self.rigid(&gained) {
+            (calibrated, before) = rigid;
+        }
+        let lack = [before, lack_of_fit(self, &point, &amended)];
+        if let Some((hypothesis, _)) = self.refined(&calibrated) {
+            calibrated.hypothesis = hypothesis;
+        }
+        if let Some((hypothesis, known)) = self.refined(&amended) {
+            (amended.hypothesis, precision) = (hypothesis, known);
+        }
+        self.courses = std::mem::take(&mut apart.measured);
+        let in_trials = self.in_every_trial((&mut calibrated, &mut amended), &mut apart)?;
+        for law in base {
+            named.push(self.name(law, &mut amended, &mut precision));
+        }
+        for fitted in [&mut calibrated, &mut amended] {
+            fitted.hypothesis.known.truncate(self.session.effects.len());
+        }
+        share_out(&mut named, (calibrated.cost - amended.cost) / scale);
+        progress("done", 1.0)?;
+        Ok(Finding {
+            calibrated,
+            amended,
+            named,
+            trial_specific: apart.trial_specific,
+            in_trials,
+            search_trace,
+            precision,
+            lack,
+            ruled,
+            scale,
+        })
+    }
+
+    /// The calibrated and the amended model as they are in each trial, with what was set apart.
+    fn in_every_trial(
+        &self,
+        (calibrated, amended): (&mut Fitted<N>, &mut Fitted<N>),
+        apart: &mut SetApart<N>,
+    ) -> Result<[Vec<Hypothesis<N>>; 2], GapError> {
+        let rhythms = rhythms_of(&apart.trial_specific);
+        for fitted in [&mut *calibrated, &mut *amended] {
+            if let Some(hypothesis) = self.tuned(&fitted.hypothesis, &rhythms) {
+                fitted.hypothesis = hypothesis;
+            }
+        }
+        if !rhythms.is_empty() {
+            // The contact is part of what decides how large a rhythm is.
+            let tuned = self.linearize(&amended.hypothesis)?;
+            let rhythms = apart.trial_specific.iter_mut();
+            for one in rhythms.filter(|a| a.trial.is_none()) {
+                if let Some(sized) = self.sized(&tuned, one) {
+                    *one = sized;
+                }
+            }
+        }
+        let rhythms = rhythms_of(&apart.trial_specific);
+        Ok([
+            self.in_trials((&calibrated.hypothesis, &[])),
+            self.in_trials((&amended.hypothesis, &rhythms)),
+        ])
+    }
+}
+
+/// Those that swing in every trial.
+fn rhythms_of(trial_specific: &[TrialSpecific]) -> Vec<Effect<f64>> {
+    let rhythms = trial_specific.iter().filter(|a| a.trial.is_none());
+    rhythms.map(|a| a.effect).collect()
+}
+
+/// Says what share of all that is explained is lost without each effect, and sorts by it.
+///
+/// * `explained` - what all of them explain, in units of twice the log-likelihood; infinite where nothing can be simulated without
+///   them
+fn share_out(named: &mut [Named], explained: f64) {
+    let all = match explained.is_finite() {
+        true => explained,
+        false => named.iter().map(|n| n.gain).sum(),
+    };
+    for one in named.iter_mut() {
+        one.share = (one.gain / f64::max(all, one.gain)).min(1.0);
+    }
+    named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
+}

@@ -1,0 +1,83 @@
+//! How far a search is, and what it tells.
+
+use arm_core::effect::Effect;
+
+use crate::GapError;
+use crate::candidates::candidate::Candidate;
+use crate::selection::fit::{Fitted, enough};
+use crate::selection::lack_of_fit::LackOfFit;
+use crate::selection::model_selection::{FLOOR, mimicked_by_any};
+use crate::sensitivity::linearization_point::LinearizationPoint;
+
+/// One round of the search.
+#[derive(Clone, Debug)]
+pub struct SearchStep {
+    /// What was added, best first: the candidates and what they gained.
+    pub tried: Vec<(Vec<Candidate>, f64)>,
+    /// Cost before it.
+    pub before: f64,
+    /// Cost after it.
+    pub after: f64,
+}
+
+/// A candidate of the last scan: what it would still explain, and the smallest size that would have been named.
+#[derive(Clone, Debug)]
+pub struct Ruled {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// What it would gain.
+    pub gain: f64,
+    /// What it would have to gain.
+    pub price: f64,
+    /// Smallest size of its first free parameter that would have been named.
+    pub smallest: f64,
+}
+
+/// What a search tells while it works: what it does, and how far it is (0 to 1). [`GapError::Stopped`] in answer ends the search.
+pub type Progress<'a> = &'a (dyn Fn(&str, f64) -> Result<(), GapError> + Sync);
+
+/// A fitted hypothesis with the simulation that it was followed from.
+pub(crate) type Settled<'a, const N: usize> = (Fitted<N>, LinearizationPoint<'a, N>);
+
+/// What was found of effects that last.
+pub(crate) struct SearchState<'a, const N: usize> {
+    pub calibrated: Fitted<N>,
+    /// What the calibrated model leaves, at the same samples and with the same noise.
+    pub before: LackOfFit,
+    pub current: Fitted<N>,
+    pub point: LinearizationPoint<'a, N>,
+    pub search_trace: Vec<SearchStep>,
+    pub ruled: Vec<Ruled>,
+    /// Number of candidates.
+    pub asked: f64,
+    pub scale: f64,
+    /// Where it has been: what was named, the joints that are dry then, and the cost.
+    pub been: Vec<(Vec<Candidate>, [bool; N], f64)>,
+}
+
+impl<const N: usize> SearchState<'_, N> {
+    /// Whether it has been here before and was no worse off: from here it would go round in a circle.
+    pub fn is_back(&mut self, dry: [bool; N]) -> bool {
+        let Fitted { asked, cost, .. } = &self.current;
+        let same = |other: &[Candidate]| {
+            other.len() == asked.len()
+                && other
+                    .iter()
+                    .all(|o| asked.iter().any(|a| a.is_same_question(o)))
+        };
+        let back = self.been.iter().any(|(named, then, before)| {
+            *then == dry && same(named) && before - cost < enough(*cost)
+        });
+        self.been.push((asked.clone(), dry, *cost));
+        back
+    }
+
+    /// What a further effect must gain so as not to be the imperfect shape of a named one.
+    pub fn least(&self, effect: &Effect<f64>) -> f64 {
+        let explained = self.calibrated.cost - self.current.cost;
+        f64::max(
+            FLOOR * explained,
+            mimicked_by_any(effect, &self.current.asked, explained),
+        )
+    }
+}

@@ -1,0 +1,149 @@
+//! What is not the same in every trial: rhythms, told by what repeats differ in, and disturbances of single trials.
+
+use std::sync::Arc;
+
+use crate::GapError;
+use crate::data::prepared_session::PreparedSession;
+use crate::measurement_model::prediction::Course;
+use crate::selection::lack_of_fit::lack_of_fit;
+use crate::selection::search_state::{Progress, SearchState, Settled};
+use crate::trial_specific::component::TrialSpecific;
+use crate::trial_specific::tremor_detection::Line;
+
+/// Most disturbances of single trials that are named.
+const DISTURBANCES: usize = 4;
+/// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
+/// what a model lacks of them reach that far.
+pub(crate) const SLOW: f64 = 3.0;
+
+/// What is kept apart from effects that last.
+pub(crate) struct SetApart<const N: usize> {
+    /// What is not the same in every trial.
+    pub trial_specific: Vec<TrialSpecific>,
+    /// Frequency \[Hz\] and phase \[rad\] of a slow ripple of the robot, which is asked like other effects.
+    pub periodic: Option<[f64; 2]>,
+    /// The courses as they were measured.
+    pub measured: Vec<Arc<Course<N>>>,
+}
+
+impl<'a, const N: usize> PreparedSession<'a, N> {
+    /// Sets apart what is not the same in every trial: a rhythm, told by what repeats differ in, and disturbances of single trials.
+    pub(crate) fn set_apart(
+        &mut self,
+        mut settled: Settled<'a, N>,
+        apart: &mut SetApart<N>,
+    ) -> Result<Settled<'a, N>, GapError> {
+        if let Some(found) = self.rhythm(&settled.1, Line::BetweenRepeats)? {
+            self.take_out(&settled.1, &found)?;
+            apart.trial_specific.push(found);
+            settled = self.calibrate_anew()?;
+        }
+        self.disturbances(settled, &mut apart.trial_specific)
+    }
+
+    /// Asks for a rhythm once more when something was named: what rang may have been that; that may have hidden a rhythm; and how an
+    /// arm answers one depends on what was named.
+    pub(crate) fn rhythm_asked_again(
+        &mut self,
+        state: SearchState<'a, N>,
+        apart: &mut SetApart<N>,
+        progress: Progress<'_>,
+    ) -> Result<SearchState<'a, N>, GapError> {
+        if state.current.asked.is_empty() {
+            return Ok(state);
+        }
+        let found = &mut apart.trial_specific;
+        let before = found.iter().position(|a| a.trial.is_none());
+        let without = std::mem::replace(&mut self.courses, apart.measured.clone());
+        let again = self.rhythm(&state.point, Line::BetweenRepeats)?;
+        match (before, again) {
+            (Some(before), Some(again)) if again.is_like(&found[before]) => {
+                self.take_out(&state.point, &again)?;
+                found[before] = again;
+                self.renewed(state)
+            }
+            (None, None) => {
+                self.courses = without;
+                Ok(state)
+            }
+            (before, again) => {
+                before.map(|before| found.remove(before));
+                if let Some(again) = again {
+                    self.take_out(&state.point, &again)?;
+                    found.push(again);
+                }
+                let settled = self.calibrate_anew()?;
+                self.search_from(settled, apart.periodic, progress)
+            }
+        }
+    }
+
+    /// Looks for a ripple of the robot in what is left, and searches once more beside it.
+    pub(crate) fn rhythm_of_the_robot(
+        &mut self,
+        state: SearchState<'a, N>,
+        apart: &mut SetApart<N>,
+        progress: Progress<'_>,
+    ) -> Result<SearchState<'a, N>, GapError> {
+        let found = self.rhythm(&state.point, Line::OfTheRobot)?.filter(|f| {
+            (f.locked || f.wave()[0] > SLOW)
+                && f.gain > state.least(&f.effect)
+                // What is left of a rhythm that was taken out has its frequency.
+                && !apart.trial_specific.iter().any(|a| a.swings_with(f))
+        });
+        apart.periodic = match &found {
+            Some(found) => Some(found.wave()).filter(|[frequency, _]| *frequency < SLOW),
+            None => self.slow_ripple((&state.current, &state.point), state.scale),
+        };
+        if found.is_none() && apart.periodic.is_none() {
+            return Ok(state);
+        }
+        if let (Some(found), None) = (&found, apart.periodic) {
+            self.take_out(&state.point, found)?;
+            apart.trial_specific.push(found.clone());
+        }
+        let again = self.calibrate_anew()?;
+        self.search_from(again, apart.periodic, progress)
+    }
+
+    /// Asks for disturbances of single trials once more when something was named: what looked like one may have been that.
+    pub(crate) fn disturbances_asked_again(
+        &mut self,
+        mut state: SearchState<'a, N>,
+        apart: &mut SetApart<N>,
+    ) -> Result<SearchState<'a, N>, GapError> {
+        let found = &mut apart.trial_specific;
+        if state.current.asked.is_empty() || found.iter().all(|a| a.trial.is_none()) {
+            return Ok(state);
+        }
+        self.take_back();
+        found.retain(|a| a.trial.is_none());
+        self.measure_noise(&self.linearize(&state.current.hypothesis)?)?;
+        let settled = self.settle(state.current.hypothesis, state.current.asked)?;
+        let settled = self.disturbances(settled, found)?;
+        let from;
+        (state.calibrated, from) = self.settle(state.calibrated.hypothesis, Vec::new())?;
+        state.before = lack_of_fit(self, &from, &state.calibrated);
+        (state.current, state.point) = self.pruned(settled, &state.calibrated, state.scale)?;
+        Ok(state)
+    }
+
+    /// Leaves out of single trials what disturbs them, the clearest first.
+    fn disturbances(
+        &mut self,
+        (mut fitted, mut point): Settled<'a, N>,
+        trial_specific: &mut Vec<TrialSpecific>,
+    ) -> Result<Settled<'a, N>, GapError> {
+        let most = trial_specific.len() + DISTURBANCES;
+        while trial_specific.len() < most
+            && let Some(one) = self.disturbance(&point, 1.0)
+            && let Some(trial) = one.trial
+        {
+            self.leave_out(trial, one.span());
+            trial_specific.push(one);
+            self.measure_noise(&self.linearize(&point.hypothesis)?)?;
+            (fitted, point) = self.settle(fitted.hypothesis, fitted.asked)?;
+        }
+        Ok((fitted, point))
+    }
+}
