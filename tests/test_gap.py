@@ -311,5 +311,5 @@ def test_where_the_arm_cannot_be_followed_the_torques_of_its_measured_motion_are
     assert [given[2]["led"] for given in asked] == [True, False]
     assert set(found.gap) >= {"tau1_Nm", "tau2_Nm"}
     assert "joint torques in measured motion are compared" in found.warnings[0]
-    (rubs,) = (e for e in found.effects if (e.family, e.joint) == ("dry", 2))
-    assert "coulomb" in (rubs.kind, *(a.kind for a in rubs.alternatives))
+    # Without the closed chain the load of a joint is not known well enough to tell Coulomb's law from one that grows with the load.
+    assert [(e.family, e.joint) for e in found.effects] == [("dry", 2)]
