@@ -12,6 +12,7 @@ from .. import _armrs
 from ..analysis.quantities import value_in
 from ..io.dataset import Dataset
 from ..model import Contact
+from ..workflows.accuracy import energy_balance
 from ..workflows.identify import Estimate, Identified
 from ..workflows.passive import LEVEL, PassiveMoments
 from ..workflows.simulate import Simulated
@@ -67,7 +68,7 @@ def _with_given(estimate: Estimate, result: Identified) -> dict[str, Any]:
 
 def simulated_data(result: Run, name: str, command: str | None = None) -> dict[str, Any]:
     """Return what a run came to, as it is written to JSON; its samples stand in a file of their own."""
-    fastest = error = 0.0
+    fastest = 0.0
     largest = (-1.0, 0.0)
     first: Simulated | None = None
     last: Simulated | None = None
@@ -77,9 +78,9 @@ def simulated_data(result: Run, name: str, command: str | None = None) -> dict[s
         if force[at] > largest[0]:
             largest = (force[at], piece.t[at])
         fastest = max(fastest, np.abs(piece.qd).max())
-        error = max(error, np.abs(piece.columns["energy_error"]).max())
         first, last = piece if first is None else first, piece
     assert first is not None and last is not None
+    balance = energy_balance(result.pieces())
     stored = sum(last.columns[f"energy.{part}"][-1] - first.columns[f"energy.{part}"][0] for part in ("kinetic", "potential", "contact"))
     return {
         "verb": "simulate",
@@ -95,7 +96,9 @@ def simulated_data(result: Run, name: str, command: str | None = None) -> dict[s
         "energy": {
             "stored_J": stored,
             **{f"{part}_J": last.columns[f"work.{part}"][-1] for part in ("handle", "drive", "resisted", "damped")},
-            "error_J": error,
+            "error_J": balance.error,
+            "exchanged_J": balance.exchanged,
+            "error_share": balance.share,
         },
         "made_by": origin(command),
     }

@@ -143,9 +143,13 @@ def run(data: Mapping[str, Any]) -> Table:
         ["work of the motors", f"{energy['drive_J']:.4g} J"],
         ["taken up by the joints", f"{energy['resisted_J']:.4g} J"],
         ["lost in the contact", f"{energy['damped_J']:.4g} J"],
-        ["energy not accounted for", f"{energy['error_J']:.2g} J"],
+        ["energy not accounted for", f"{energy['error_J']:.2g} J, {100 * energy['error_share']:.2g} % of what was exchanged"],
         ["digest", data["digest"]],
     ]
+    if "half_step" in data:
+        halved = data["half_step"]
+        changed = f"angles by up to {math.degrees(halved['angle']):.2g}°, force by up to {halved['force']:.2g} N"
+        rows.insert(-1, ["half the step changes", changed])
     return Table(["quantity", "value"], rows, left=2)
 
 

@@ -14,7 +14,7 @@ from .. import _armrs
 from ..io import files
 from ..io.trial import Trial
 from ..model import Model
-from .simulate import PIECE, Movement, Simulated, digested, runaway, simulate_in_pieces
+from .simulate import PIECE, Movement, Simulated, digested, simulate_in_pieces, warnings
 
 
 class Run(Protocol):
@@ -121,8 +121,8 @@ class Streamed:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is hardly a movement of an arm, a line each."""
-        return runaway(self.pieces())
+        """What is hardly a movement of an arm, or not accounted for, a line each."""
+        return warnings(self)
 
 
 def _arrays(piece: Simulated) -> dict[str, np.ndarray]:

@@ -1,0 +1,124 @@
+"""What a simulated run says of its own accuracy, with strong dry friction above all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs.cli import main
+
+LENGTHS, MASSES, COMS, INERTIAS = (0.322, 0.264), (2.114, 1.264), (0.186, 0.121), (0.0165, 0.0074)
+
+
+def written(folder: Path, effects: str) -> Path:
+    """Write a model of two segments with given effects."""
+    segments = "".join(
+        f'[[arm.segment]]\nname = "s{k}"\nlength = {LENGTHS[k]}\nmass = {MASSES[k]}\ncom = {COMS[k]}\ninertia = {INERTIAS[k]}\n'
+        for k in range(2)
+    )
+    path = folder / "model.toml"
+    path.write_text(f"[arm]\n{segments}[[arm.joint]]\n[[arm.joint]]\n{effects}")
+    return path
+
+
+def effect(kind: str, joint: int, **values: float) -> str:
+    """Return the table of an effect."""
+    return f'[[effect]]\nkind = "{kind}"\njoint = {joint}\n' + "".join(f"{name} = {value}\n" for name, value in values.items())
+
+
+STRONG = {
+    "load_friction": [("load_friction", 1, {"coefficient": 0.18}), ("load_friction", 2, {"coefficient": 0.18})],
+    "load_friction bound": [("load_friction", 1, {"coefficient": 0.2}), ("load_friction", 2, {"coefficient": 0.2})],
+    "coulomb": [("coulomb", 1, {"torque": 5.0}), ("coulomb", 2, {"torque": 5.0})],
+    "stribeck": [("stribeck", 1, {"torque": 5.0}), ("stribeck", 2, {"torque": 5.0})],
+    "thixotropy": [("thixotropy", 1, {"friction": 5.0}), ("thixotropy", 2, {"friction": 5.0})],
+}
+
+
+@pytest.mark.parametrize("name", STRONG)
+def test_smooth_friction_too_steep_for_the_step_ends_with_status_1(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    """The force was off by up to twice its size, with status 0."""
+    path = written(tmp_path, "".join(effect(kind, joint, **values) for kind, joint, values in STRONG[name]))
+    movement = tmp_path / "movement.toml"
+    movement.write_text("[movement]\nwaypoints_deg = [[-60, 60], [-48, 60], [-60, 72]]\nspeed_rad_s = 1.0\nacceleration_rad_s2 = 4.0\n")
+    status = main(["simulate", str(path), "--movement", str(movement), "--json", "-"])
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["half_step"]["force_share"] > 0.01
+    assert status == 1
+    assert "too steep for the step" in printed.err
+
+
+def random_arm(rng: np.random.Generator, joints: int) -> tuple[str, armrs.Movement]:
+    """Return a model whose smooth friction reaches the bounds of the catalogue, and a movement."""
+    shrink = (1.0, 0.8, 0.35)
+    text = "[arm]\n"
+    for k in range(joints):
+        length, mass = shrink[k] * rng.uniform(0.25, 0.36), shrink[k] * rng.uniform(1.0, 2.5)
+        com, inertia = length * rng.uniform(0.4, 0.6), mass * length**2 * rng.uniform(0.06, 0.12)
+        text += f'[[arm.segment]]\nname = "s{k}"\nlength = {length}\nmass = {mass}\ncom = {com}\ninertia = {inertia}\n'
+    text += "[[arm.joint]]\n" * joints
+    start = np.array([-60.0, 60.0, 5.0])[:joints] + rng.uniform(-15.0, 15.0, joints)
+    path = np.radians([start, start + rng.uniform(-25.0, 25.0, joints)])
+
+    def spread(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    for k in range(joints):
+        rest = path[0, k]
+        text += effect("viscous", k + 1, viscosity=rng.uniform(0.02, 0.3)) + effect(
+            "elastic", k + 1, stiffness=rng.uniform(0.5, 4.0), rest=rest
+        )
+        text += (
+            "",
+            effect("coulomb", k + 1, torque=spread(0.02, 100.0)),
+            effect("stribeck", k + 1, torque=spread(0.02, 100.0), speed=spread(0.01, 1.0)),
+            effect("load_friction", k + 1, coefficient=spread(1e-3, 1.0)),
+            effect("thixotropy", k + 1, friction=spread(0.02, 100.0), stiffness=rng.uniform(0.0, 2.0), rest=rest),
+        )[rng.integers(5)]
+    return text, armrs.Movement(path, speed=1.5, acceleration=6.0)
+
+
+def test_no_run_with_smooth_friction_is_wrong_in_silence(tmp_path: Path) -> None:
+    """Random arms at the default step against a twentieth of it; arms = 200 gives the figures of docs/conventions.md."""
+    arms = 24
+    counts = {"refused": 0, "wrong, warned": 0, "wrong, silent": 0, "right, warned": 0, "right, silent": 0}
+    rng = np.random.default_rng(11)
+    path = tmp_path / "model.toml"
+    for k in range(arms):
+        text, movement = random_arm(rng, 2 + k % 2)
+        path.write_text(text)
+        try:
+            usual, fine = (armrs.simulate(path, movement, dt=dt) for dt in (0.25e-3, 0.25e-3 / 20))
+        except armrs.SimulationError:
+            counts["refused"] += 1
+            continue
+        angle = np.degrees(np.abs(usual.q - fine.q).max())
+        force = np.hypot(*(usual.force_on_arm - fine.force_on_arm).T).max() / np.hypot(*fine.force_on_arm.T).max()
+        wrong = "wrong" if angle > 0.01 or force > 0.01 else "right"
+        counts[f"{wrong}, {'warned' if usual.warnings else 'silent'}"] += 1
+    print(counts)
+    assert counts["wrong, silent"] == 0
+    assert min(counts["wrong, warned"], counts["right, silent"]) >= 5
+    assert counts["right, warned"] <= 0.1 * arms
+
+
+def test_a_run_that_loses_energy_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Semi-implicit Euler at a coarse step: a warning, and status 1 from 1 %; half the step tells too."""
+    path = written(tmp_path, effect("viscous", 1, viscosity=0.2) + effect("viscous", 2, viscosity=0.2))
+    movement = tmp_path / "movement.toml"
+    movement.write_text("[movement]\nwaypoints_deg = [[-60, 60], [-20, 110], [-60, 60]]\nspeed_rad_s = 3.0\nacceleration_rad_s2 = 30.0\n")
+    asked = ["simulate", str(path), "--movement", str(movement), "--json", "-"]
+    assert main([*asked, "--check-step"]) == 0
+    good = json.loads(capsys.readouterr().out)
+    assert good["energy"]["error_share"] < 1e-6
+    assert good["half_step"]["angle_share"] < 1e-3
+    status = main([*asked, "--integrator", "euler", "--dt", "0.005", "--check-step"])
+    printed = capsys.readouterr()
+    bad = json.loads(printed.out)
+    assert bad["energy"]["error_share"] > 0.01 or bad["half_step"]["force_share"] > 0.01
+    assert status == 1
+    assert "take a shorter step" in printed.err
