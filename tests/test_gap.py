@@ -14,6 +14,7 @@ import armrs
 from armrs import cli
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
+from armrs.model import AddedMass
 from armrs.workflows.gap import calibrate, compare
 from armrs.workflows.gap.results import gap_data, write_gap
 from armrs.workflows.gap.shapes import portrait
@@ -199,6 +200,13 @@ def test_a_copied_trial_is_refused(into: str, source: str, length: int | None, w
                 function(data.replace(trials=trials))
             start = f"{into}: samples: found those of {source}, one by one, allowed a measurement of its own"
             assert str(refused.value) == f"{start} ({why}; simulated repeats need noise)"
+
+
+def test_masses_worn_in_some_configurations_are_refused() -> None:
+    data = session().replace(added=(AddedMass(2, 0.2, 0.1, ("slow",)),))
+    for function in (armrs.find_gap, calibrate, compare):
+        with pytest.raises(BadInput, match=r"^\[\[added\]\]: found masses worn in some configurations"):
+            function(data)
 
 
 def test_a_copied_file_ends_with_status_2_and_nothing_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -113,6 +113,12 @@ class Dataset:
         return dataclasses.replace(self, **changes)
 
 
+def refuse_added(dataset: Dataset) -> None:
+    """Refuse masses that are worn in some configurations: whatever has one arm in all trials would ignore them."""
+    if dataset.added:
+        raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
+
+
 def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     """Read a data set: check it, bring it to SI units, to forces on the arm, and to uniform time.
 

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import BadInput, IdentificationError, Text, unknown_name
-from ..io.dataset import Dataset, load_dataset, naming_trials
+from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_added
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial
 from ..model import Effect, Model, Segment, Tolerance
@@ -238,8 +238,7 @@ def _checked(
     dataset: Dataset, method: str, with_effects: Sequence[str] | str, cutoff: float | None, motion: str, level: float
 ) -> tuple[str, ...]:
     """Refuse what cannot be identified, or not with these settings; return the kinds of effects to fit."""
-    if dataset.added:
-        raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
+    refuse_added(dataset)
     checks.choice("method", method, ("joint", "cascade"))
     checks.choice("motion", motion, ("auto", "measured", "simulated"))
     kinds = checks.texts("with_effects", with_effects, "kinds of effects")

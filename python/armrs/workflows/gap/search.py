@@ -10,7 +10,7 @@ from typing import Any
 from ... import _armrs, checks
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
-from ...io.dataset import Dataset, load_dataset, naming_trials
+from ...io.dataset import Dataset, load_dataset, naming_trials, refuse_added
 from ..identify import core_columns
 from . import reading, suspicion
 from .found import GapFound
@@ -97,6 +97,7 @@ def _torques_instead(error: SimulationError) -> str:
 
 def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
     """Return the trials for the core."""
+    refuse_added(dataset)
     configurations = sorted({t.configuration for t in dataset.trials})
     return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
 
