@@ -22,6 +22,9 @@ def page() -> str:
         "Generated from the core by `scripts/effects_page.py`; `armrs effects` prints the same. "
         "`R` is a torque with which a joint resists.",
         "In a model an effect is a table `[[effect]]` with `kind`, where it acts, and its parameters; what is left out takes its default.",
+        "Dry friction has a `smoothing`. Above 0 the sign of the speed is `tanh(q̇/smoothing)`: a joint at rest creeps, and an explicit "
+        "step must resolve the steep slope at rest. With `smoothing = 0` friction is set-valued: `sgn(q̇)` in motion, and at rest whatever "
+        "holds the joint, up to the same torque. Simulation solves that law at any step: joints stick, slip, and switch at located times.",
     ]
     for place in places:
         blocks.append(f"## {place[0].upper()}{place[1:]}")
@@ -31,7 +34,7 @@ def page() -> str:
 
 def entry(kind: Kind) -> str:
     """Return the section of one kind."""
-    rows = [f"| `{p.name}` | {p.unit} | {p.min:g} to {p.max:g} | {p.default:g} |" for p in kind.parameters]
+    rows = [f"| `{p.name}` | {p.unit} | {'0 or ' if p.or_zero else ''}{p.min:g} to {p.max:g} | {p.default:g} |" for p in kind.parameters]
     table = "\n".join(["| parameter | unit | allowed | default |", "| --- | --- | --- | --- |", *rows])
     head = f"### `{kind.kind}`\n{kind.summary}; at: {ADDRESS[kind.address]}."
     return f"{head}\n\n    {kind.formula}\n\nSource: {kind.reference}.\n\n{table}"

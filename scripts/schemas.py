@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armrs.catalogue import FORCE_CHANNELS, Kind, catalogue
+from armrs.catalogue import FORCE_CHANNELS, Kind, Parameter, catalogue
 
 FOLDER = Path(__file__).parent.parent / "docs" / "schemas"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -33,11 +33,20 @@ def table(properties: dict[str, Any], required: list[str] | None = None, text: s
     return found | ({"required": required} if required else {}) | ({"description": text} if text else {})
 
 
+def parameter(p: Parameter) -> Any:
+    """Return the schema of a parameter of an effect."""
+    within = number(f"[{p.unit}]", least=p.min, most=p.max, default=p.default)
+    if not p.or_zero:
+        return within
+    bounds = {key: within.pop(key) for key in ("minimum", "maximum")}
+    return within | {"anyOf": [{"const": 0}, bounds]}
+
+
 def effect(kind: Kind) -> Any:
     """Return the schema of an effect of one kind."""
     places = {"joint": {"type": "integer", "minimum": kind.first_joint}, "channel": {"enum": list(FORCE_CHANNELS)}}
     address = {kind.address: places[kind.address]} if kind.address else {}
-    values = {p.name: number(f"[{p.unit}]", least=p.min, most=p.max, default=p.default) for p in kind.parameters}
+    values = {p.name: parameter(p) for p in kind.parameters}
     text = f"{kind.summary}. {kind.formula}"
     return table({"kind": {"const": kind.kind}, **address, **values}, ["kind", *address], text)
 

@@ -32,6 +32,8 @@ class Parameter:
         Value when it is left out.
     linear : bool
         Whether the effect is linear in it; a fit takes such parameters as unknowns.
+    or_zero : bool
+        Whether zero is allowed beside the bounds, for the limit of the law.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Parameter:
     max: float
     default: float
     linear: bool = True
+    or_zero: bool = False
 
     def __post_init__(self) -> None:
         checks.text("name", self.name)
@@ -48,6 +51,7 @@ class Parameter:
             checks.extent(name, getattr(self, name))
         checks.number("default", self.default)
         checks.flag("linear", self.linear)
+        checks.flag("or_zero", self.or_zero)
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ class Kind:
 
     def values(self, numbers: Sequence[float]) -> dict[str, float]:
         """Return numbers in the order of the parameters by name; what rounding has put beyond a bound is at the bound."""
-        return {p.name: min(max(v, p.min), p.max) for p, v in zip(self.parameters, numbers, strict=True)}
+        return {p.name: v if p.or_zero and v == 0.0 else min(max(v, p.min), p.max) for p, v in zip(self.parameters, numbers, strict=True)}
 
     def place(self, index: int) -> tuple[int | None, str | None]:
         """Return joint and channel of the core's index."""

@@ -156,6 +156,8 @@ def _check(kind: str, parameters: tuple[Parameter, ...]) -> None:
     if flags != sorted(flags, reverse=True):
         raise BadInput("parameters", Text("one in which the torque is linear after one in which it is not"), "the linear ones first")
     for p in parameters:
+        if p.or_zero:
+            raise BadInput(p.name, Text("or_zero = True"), "False: the law of an effect of one's own is read within its bounds")
         inside = p.min <= p.default <= p.max
         if not inside or (p.linear and not p.min <= 0.0 <= p.max):
             raise BadInput(

@@ -165,6 +165,27 @@ impl<T: Scalar, const N: usize> Resistance<T, N> {
         }))
     }
 
+    /// Joint accelerations for each newton metre of torque in one joint \[rad/(s² N m)\]: a column of the inverse inertia matrix.
+    #[inline]
+    pub fn column(&self, joint: usize) -> Joints<T, N> {
+        let mut rows = [T::ZERO; N];
+        for (i, row) in rows.iter_mut().enumerate() {
+            if i == joint {
+                *row = T::ONE;
+            } else if i + 1 == joint {
+                *row = -T::ONE;
+            }
+        }
+        self.solve(&mut rows);
+        joints(from_fn(|i| {
+            if i == 0 {
+                rows[0]
+            } else {
+                rows[i] - rows[i - 1]
+            }
+        }))
+    }
+
     #[inline(always)]
     fn solve(&self, b: &mut [T; N]) {
         let (m, reciprocal) = (&self.matrix, &self.reciprocal);

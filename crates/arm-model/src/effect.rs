@@ -182,7 +182,12 @@ impl Effect {
         let mut values = [0.0; arm_core::effect::MAX_PARAMETERS];
         let parameters = core.kind.info().parameters.iter();
         for ((value, found), parameter) in values.iter_mut().zip(core.parameters).zip(parameters) {
-            *value = found.clamp(parameter.min, parameter.max) + 0.0;
+            let at_bound = found.clamp(parameter.min, parameter.max);
+            *value = if parameter.allows(found) {
+                found
+            } else {
+                at_bound
+            } + 0.0;
         }
         Self {
             kind: core.kind,

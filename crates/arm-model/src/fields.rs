@@ -9,6 +9,7 @@ pub struct Bounds {
     least: Option<f64>,
     most: Option<f64>,
     unit: &'static str,
+    or_zero: bool,
     hint: &'static str,
 }
 
@@ -20,6 +21,7 @@ impl Bounds {
             least: None,
             most: None,
             unit,
+            or_zero: false,
             hint: "",
         }
     }
@@ -52,6 +54,7 @@ impl Bounds {
         let mut bounds = Self::finite(parameter.unit);
         bounds.least = parameter.min.is_finite().then_some(parameter.min);
         bounds.most = parameter.max.is_finite().then_some(parameter.max);
+        bounds.or_zero = parameter.or_zero;
         bounds
     }
 
@@ -91,7 +94,7 @@ impl Bounds {
             && self.above.is_none_or(|limit| number > limit)
             && self.least.is_none_or(|limit| number >= limit)
             && self.most.is_none_or(|limit| number <= limit);
-        if inside {
+        if inside || (self.or_zero && number == 0.0) {
             // One zero, so that equal models are equal texts.
             return Ok(number + 0.0);
         }
@@ -107,6 +110,9 @@ impl Bounds {
         let g = |limit: f64| rounded(limit, 6);
         let above = self.above.map(|limit| format!("> {}", g(limit)));
         let range = match (self.least, self.most) {
+            (Some(least), Some(most)) if self.or_zero => {
+                Some(format!("0 or {} to {}", g(least), g(most)))
+            }
             (Some(least), Some(most)) => Some(format!("{} to {}", g(least), g(most))),
             (Some(least), None) => Some(format!(">= {}", g(least))),
             (None, Some(most)) => Some(format!("<= {}", g(most))),

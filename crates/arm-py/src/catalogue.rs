@@ -19,6 +19,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
             entry.set_item("max", p.max)?;
             entry.set_item("default", p.default)?;
             entry.set_item("linear", p.linear)?;
+            entry.set_item("or_zero", p.or_zero)?;
             parameters.append(entry)?;
         }
         let entry = PyDict::new(py);

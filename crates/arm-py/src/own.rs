@@ -1,5 +1,6 @@
 //! Kinds of effects of one's own: laws that are Python callables.
 
+use std::cell::RefCell;
 use std::sync::{Mutex, PoisonError};
 
 use arm_core::effect::{
@@ -14,6 +15,11 @@ use crate::errors::{bad_input, invalid, refused};
 
 /// What a callable raised while the core asked it.
 static FAILED: Mutex<Option<PyErr>> = Mutex::new(None);
+
+thread_local! {
+    /// The laws that this thread is asking.
+    static ASKING: RefCell<Vec<&'static str>> = const { RefCell::new(Vec::new()) };
+}
 
 /// The kind of a name: of the catalogue or of one's own.
 pub fn kind(name: &str) -> PyResult<Kind> {
@@ -78,6 +84,7 @@ pub fn declare(
             parameters
                 .into_iter()
                 .map(|(name, unit, min, max, default, linear, _)| Parameter {
+                    or_zero: false,
                     name: name.leak(),
                     unit: unit.leak(),
                     min,
@@ -96,14 +103,27 @@ pub fn declare(
         knee,
         count: [angles.max(4), speeds.max(4)],
     };
+    let me = info.kind;
     let ask = move |p: &[f64]| {
-        Python::attach(|py| match ask(py, &tabulate, grid, p) {
-            Ok(tables) => Some(tables),
-            Err(error) => {
+        // A law that simulates an arm with this very effect would never end.
+        let again = ASKING.with_borrow(|laws| laws.contains(&me));
+        let answer = if again {
+            Err(bad_input(
+                &format!("law of {me}"),
+                "a law that simulates an arm with this effect",
+                "a function of angle and speed",
+            ))
+        } else {
+            ASKING.with_borrow_mut(|laws| laws.push(me));
+            let answer = Python::attach(|py| ask(py, &tabulate, grid, p));
+            ASKING.with_borrow_mut(Vec::pop);
+            answer
+        };
+        answer
+            .map_err(|error| {
                 *FAILED.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-                None
-            }
-        })
+            })
+            .ok()
     };
     let probe = Probe::lasting(leak(vec![question]));
     let law = Box::leak(Box::new(Tabulated::new(info, probe, grid, Box::new(ask))));

@@ -61,7 +61,12 @@ pub fn simulate_batch<const N: usize>(
 fn group<const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
     let prepared: Result<Vec<_>, _> = experiments.iter().map(Prepared::new).collect();
     match prepared {
-        Ok(prepared) if prepared.len() > 1 && prepared.iter().all(|p| alike(p, &prepared[0])) => {
+        // The switches of dry friction are of each run alone.
+        Ok(prepared)
+            if prepared.len() > 1
+                && !prepared.iter().any(|p| p.model.has_dry)
+                && prepared.iter().all(|p| alike(p, &prepared[0])) =>
+        {
             match side_by_side(&prepared) {
                 Ok(outcomes) => outcomes,
                 Err(error) => vec![Err(error); prepared.len()],

@@ -8,7 +8,7 @@
 
 use crate::model::{Input, State};
 use crate::prepare::{Prepared, Schedule};
-use crate::step::{Inputs, Memory, step};
+use crate::step::{Inputs, Memory, advance};
 use crate::{Coupling, Drive, Experiment};
 
 /// Nearer to a point of the grid than this, in steps, a break lies on it: what it still does is as the square of that.
@@ -90,7 +90,7 @@ pub(crate) fn step_in_pieces<const N: usize>(
             middle: &middle,
             end: &end,
         };
-        step(model, prepared.integrator(), h, inputs, (state, memory));
+        advance(model, prepared.integrator(), h, inputs, (state, memory));
     };
     let (begin, end) = (schedule.time(number - 1), schedule.time(number));
     let touched = prepared.discontinuities.within(number);

@@ -104,6 +104,19 @@ pub enum SimulationError {
         /// Zero-based joint.
         joint: usize,
     },
+    /// Friction that grows with the force through its joint so fast that it has no single answer.
+    #[error(
+        "at {time} s the friction in joint {} has no single answer: through the joint force it can add {gain:.3} times itself to itself, allowed is less than 0.98; its coefficient is too large for this arm",
+        joint + 1
+    )]
+    Jam {
+        /// Time \[s\].
+        time: f64,
+        /// Zero-based joint.
+        joint: usize,
+        /// What a newton metre of it adds to it \[N m\].
+        gain: f64,
+    },
     /// Something that an engine cannot do.
     #[error("the {engine} engine cannot simulate {what}")]
     Unsupported {

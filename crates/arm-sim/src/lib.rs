@@ -6,6 +6,7 @@ mod digest;
 mod discontinuities;
 mod error;
 mod experiment;
+mod friction;
 mod input_buffer;
 mod model;
 pub mod models;

@@ -1,6 +1,6 @@
 //! The closed chain at one instant: from state and drive to accelerations, forces and powers.
 
-use arm_core::effect::{Effect, Local, Motion, resisting_torque};
+use arm_core::effect::{Effect, Local, Motion, resisting_besides_dry, resisting_torque};
 use arm_core::{
     Chain, Contact, Invalid, Joints, Lanes, Load, Placement, Plane, Pose, Products, Resistance,
     Scalar, Setup, accelerations, forward_dynamics, joint_force, kinetic_energy, potential_energy,
@@ -35,7 +35,16 @@ pub(crate) struct Model<T, const N: usize> {
     /// All again with those switched off; empty where none is left.
     others: Vec<Effect<T>>,
     /// Whether an effect depends on the force through its joint.
-    feels_joint_force: bool,
+    pub(crate) feels_joint_force: bool,
+    /// Whether one besides dry friction does.
+    pub(crate) feels_besides_dry: bool,
+    /// Joints with set-valued dry friction.
+    pub dry: [bool; N],
+    /// Whether there is any: steps are then those of [`friction`](crate::friction).
+    pub has_dry: bool,
+    /// Whether some of it depends on speed.
+    pub dry_falls: bool,
+    pub products: Products<T, N>,
     /// Whether an effect has a state of its own.
     pub has_memory: bool,
 }
@@ -144,15 +153,29 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         if others.iter().all(|effect| !effect.on) {
             others.clear();
         }
+        let is_dry = |e: &&Effect<T>| rubs(e);
+        let mut dry = [false; N];
+        for effect in effects.iter().filter(is_dry) {
+            if let Some(dry) = dry.get_mut(effect.index) {
+                *dry = true;
+            }
+        }
+        let chain = setup.chain()?;
+        let feels_besides_dry = |e: &Effect<T>| !e.is_dry() && feels_joint_force(e);
         Ok(Self {
             affine,
             others,
-            chain: setup.chain()?,
+            products: Products::of(&chain),
+            chain,
             base: MovingBase::of(setup)?,
             placement: Placement::of(setup),
             link,
             feels_joint_force: effects.iter().any(feels_joint_force),
             has_memory: effects.iter().any(|e| e.kind.info().memory),
+            feels_besides_dry: effects.iter().any(feels_besides_dry),
+            has_dry: dry.contains(&true),
+            dry_falls: effects.iter().any(falls),
+            dry,
             effects,
         })
     }
@@ -168,7 +191,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             {
                 Some(Plain {
                     chain: self.chain,
-                    products: Products::of(&self.chain),
+                    products: self.products,
                     contact: *contact,
                     affine: self.affine,
                 })
@@ -239,7 +262,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         ]
     }
 
-    /// Sum of what all effects resist with \[N m\].
+    /// Sum of what all effects resist with besides dry friction \[N m\].
     #[inline(always)]
     pub fn resisting(&self, motion: &Motion<T, N>, memory: &[T]) -> Joints<T, N> {
         let mut total = affine(&self.affine, &motion.q, &motion.qd);
@@ -252,7 +275,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     /// Apart, so that the usual case stays small.
     #[inline(never)]
     fn resist_otherwise(&self, motion: &Motion<T, N>, memory: &[T], total: &mut Joints<T, N>) {
-        *total = sum(total, &resisting_torque(&self.others, motion, memory));
+        let others = if self.has_dry {
+            resisting_besides_dry(&self.others, motion, memory)
+        } else {
+            resisting_torque(&self.others, motion, memory)
+        };
+        *total = sum(total, &others);
     }
 
     /// Time derivatives of the effects' own states.
@@ -262,7 +290,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         }
     }
 
-    /// Accelerations, contact force and powers at a state.
+    /// Accelerations, contact force and powers at a state, without dry friction.
     ///
     /// Friction that depends on the force through its joint changes the motion and so that force: a fixed-point iteration of
     /// [`PASSES`] passes from the motion without it, each of which takes one more order of the friction into account.
@@ -369,13 +397,13 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// Evaluations of the dynamics for one state.
     #[inline]
-    fn passes(&self) -> usize {
+    pub(crate) fn passes(&self) -> usize {
         if self.feels_joint_force { PASSES } else { 1 }
     }
 
     /// Whether the link-form solver of the core holds the whole rig.
     #[inline]
-    fn in_link_form(&self) -> bool {
+    pub(crate) fn in_link_form(&self) -> bool {
         self.base.is_none() && !matches!(self.link, Link::Rigid)
     }
 
@@ -383,14 +411,25 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     fn joint_force(
         &self,
         pose: &Pose<T, N>,
-        (qd, qdd): (&Joints<T, N>, &Joints<T, N>),
+        moving: (&Joints<T, N>, &Joints<T, N>),
         force: Plane<T>,
     ) -> [T; N] {
+        let through = self.through_joints(pose, moving, force);
+        through.map(|[y, z]| (y.squared() + z.squared()).sqrt())
+    }
+
+    /// Forces through the joints \[N\].
+    pub(crate) fn through_joints(
+        &self,
+        pose: &Pose<T, N>,
+        (qd, qdd): (&Joints<T, N>, &Joints<T, N>),
+        force: Plane<T>,
+    ) -> [Plane<T>; N] {
         let mut through = joint_force(&self.chain, pose, (qd, qdd), force);
         if let Some(base) = &self.base {
             base.add_joint_force(&self.chain, qdd, &mut through);
         }
-        through.map(|[y, z]| (y.squared() + z.squared()).sqrt())
+        through
     }
 
     /// Force of a compliant contact on the arm, and the power lost in its damping.
@@ -413,7 +452,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 
     /// Accelerations and the force on the arm, which for a rigid coupling follows from the constraint.
-    fn accelerations(
+    pub(crate) fn accelerations(
         &self,
         input: &Input<T, N>,
         torque: &Joints<T, N>,
@@ -441,17 +480,24 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     /// Brings a rigidly held tip back to position and velocity of the handle, with the least energy of motion.
     ///
     /// The position by `iterations` Newton steps, so that lanes and single runs take the same ones; the velocity exactly.
-    pub fn project(&self, input: &Input<T, N>, state: &mut State<T, N>, iterations: usize) {
+    ///
+    /// * `held` - joints that friction holds meanwhile
+    pub fn project(
+        &self,
+        input: &Input<T, N>,
+        state: &mut State<T, N>,
+        (iterations, held): (usize, &[bool; N]),
+    ) {
         for _ in 0..iterations {
             let pose = Pose::new(&state.q);
-            let terms = self.terms(&pose, &state.qd);
+            let terms = self.terms(&pose, &state.qd).holding(held);
             let at = self.tip(&state.q, &pose);
             let wanted = input.handle.position;
             let constraint = terms.constraint();
             let force = constraint.force([wanted[0] - at[0], wanted[1] - at[1]]);
             state.q = sum(&state.q, &constraint.response(force));
         }
-        let terms = self.terms(&Pose::new(&state.q), &state.qd);
+        let terms = self.terms(&Pose::new(&state.q), &state.qd).holding(held);
         let (v, wanted) = (terms.tip_rate(&state.qd), input.handle.velocity);
         let constraint = terms.constraint();
         let force = constraint.force([wanted[0] - v[0], wanted[1] - v[1]]);
@@ -560,7 +606,7 @@ fn pull<T: Scalar>([spring, damper]: [Plane<T>; 2], rate: Plane<T>) -> (Plane<T>
 
 /// Powers as in [`Outcome::power`].
 #[inline(always)]
-fn powers<T: Scalar, const N: usize>(
+pub(crate) fn powers<T: Scalar, const N: usize>(
     (force, v): (Plane<T>, Plane<T>),
     [drive, resisting]: [&Joints<T, N>; 2],
     qd: &Joints<T, N>,
@@ -581,6 +627,29 @@ fn load<T: Scalar, const N: usize>(torque: &Joints<T, N>, force_on_arm: Plane<T>
         force_on_arm,
         moment_on_arm: T::ZERO,
     }
+}
+
+/// Tries how much dry friction there is in an effect at a speed.
+fn dry_at<T: Scalar>(effect: &Effect<T>, speed: f64) -> T {
+    effect.dry(&Local {
+        time: T::ZERO,
+        q: T::ZERO,
+        qd: T::of(speed),
+        qdd: T::ZERO,
+        proximal_q: T::ZERO,
+        joint_force: T::ONE,
+        memory: T::ZERO,
+    })
+}
+
+/// Tries whether there is any dry friction in an effect.
+fn rubs<T: Scalar>(effect: &Effect<T>) -> bool {
+    effect.is_dry() && !dry_at(effect, 0.0).every(|most| most == 0.0)
+}
+
+/// Tries whether dry friction is less at a speed than at rest.
+fn falls<T: Scalar>(effect: &Effect<T>) -> bool {
+    rubs(effect) && !(dry_at(effect, 0.1) - dry_at(effect, 0.0)).every(|change| change == 0.0)
 }
 
 /// Tries whether the force through the joint changes an effect's torque; no kind is named here.

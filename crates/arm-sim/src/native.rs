@@ -5,7 +5,7 @@ use crate::input_buffer::{Ahead, InputBuffer};
 use crate::model::{Plain, State};
 use crate::prepare::Prepared;
 use crate::recorder::{Instant, Pieces, Recorder, Row};
-use crate::step::{Memory, step};
+use crate::step::{Memory, advance};
 use crate::{Experiment, Partial, SimulationError};
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Pose, Scalar};
@@ -26,7 +26,7 @@ pub(crate) fn run<const N: usize>(
     };
     let mut row = Row::new();
     let mut sample = |steps: usize, state: &State<f64, N>, memory: &[f64]| {
-        row.fill(&Instant {
+        row.fill_solved(&Instant {
             model: &prepared.model,
             input: &prepared.input(schedule.time(steps)),
             state,
@@ -60,11 +60,7 @@ pub(crate) fn run<const N: usize>(
             });
         }
         if let Some(joint) = diverged(&state) {
-            stopped = Some(SimulationError::Diverged {
-                step: done,
-                time: schedule.time(done),
-                joint,
-            });
+            stopped = Some(why(&memory, (done, schedule.time(done), joint)));
             break;
         }
         if done == sampled + schedule.every {
@@ -103,7 +99,7 @@ impl<const N: usize> Computation for Steps<'_, N> {
         let Some(rig) = plain else {
             for number in 0..ahead.steps {
                 let (inputs, at) = (ahead.step(number), (&mut *state, &mut *memory));
-                step(&prepared.model, prepared.integrator(), h, inputs, at);
+                advance(&prepared.model, prepared.integrator(), h, inputs, at);
                 if !state.is_finite() {
                     return number + 1;
                 }
@@ -161,6 +157,17 @@ impl<const N: usize> PlainSteps<f64, N> for Alone<'_, N> {
         let handle = &self.ahead.step(number).start.handle;
         let outcome = self.rig.evaluate(handle, &Pose::new(&state.q), state);
         state.advance(self.h, &outcome);
+    }
+}
+
+/// Why a state ceased to be finite.
+pub(crate) fn why(
+    memory: &Memory<f64>,
+    (step, time, joint): (usize, f64, usize),
+) -> SimulationError {
+    match memory.jam {
+        Some(jam) => jam.into(),
+        None => SimulationError::Diverged { step, time, joint },
     }
 }
 

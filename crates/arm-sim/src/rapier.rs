@@ -64,9 +64,9 @@
 //! - A rotor turns against two segments, which no inertia of a body can express; it is a damper of rapier's motor,
 //!   which makes it exact but the solver slow: eight times as many sweeps. A rotor beyond about 15 times the inertia of the
 //!   segments that it turns needs still more; where they are by far too few the run does not stay finite.
-//! - Dry friction is stable for steps below smoothing × inertia / torque, a third of what Rk4 bears. Above that the speed
-//!   chatters within the smoothing: with 0.16 N m and 0.01 rad/s in all joints of table 4.10 the engines agree to
-//!   5e-7 rad at 0.25 ms and to 5e-3 rad at 0.5 ms.
+//! - Dry friction is a motor that wants the joint to rest and has no more torque than the friction. Where a joint is fast enough
+//!   that it cannot stop within the step it is a torque. Switches between sticking and slipping are not located: at each the
+//!   speed is off by up to the step times the change of the acceleration, of first order.
 //! - Friction that grows with the joint force takes the force that acts, extrapolated from the two steps before; the native
 //!   engine takes that of the motion without this friction. They differ by the second order of the friction, 1.6e-3 rad
 //!   for 3 mm in the elbow of the thrown arm.

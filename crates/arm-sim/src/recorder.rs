@@ -6,7 +6,8 @@ use arm_core::effect::Motion;
 use arm_core::{Joints, Plane, Pose, Scalar, contributions};
 
 use crate::Recording;
-use crate::model::{Input, Link, Model, Outcome, State, difference};
+use crate::friction::{self, Friction};
+use crate::model::{Input, Link, Model, Outcome, State, difference, sum};
 use crate::prepare::Prepared;
 use crate::record::Piece;
 use arm_core::simd_dispatch::{Computation, dispatch};
@@ -18,6 +19,8 @@ pub(crate) struct Forces<T, const N: usize> {
     pub force_on_arm: Plane<T>,
     /// Force through each joint, for the effects that depend on it \[N\].
     pub joint_force: [T; N],
+    /// Dry friction, where there is any.
+    pub friction: Option<Friction<T, N>>,
 }
 
 /// A run at one instant, or several runs in lanes.
@@ -44,6 +47,7 @@ impl<T: Scalar, const N: usize> Instant<'_, T, N> {
             qdd,
             force_on_arm,
             joint_force,
+            friction: None,
         }
     }
 }
@@ -51,12 +55,31 @@ impl<T: Scalar, const N: usize> Instant<'_, T, N> {
 /// Everything that is recorded of an instant, in the order of [`columns`]. Its room is taken once.
 pub(crate) struct Row<T>(Vec<T>);
 
+impl Row<f64> {
+    /// An instant of the native engine, dry friction included.
+    pub fn fill_solved<const N: usize>(&mut self, instant: &Instant<f64, N>) {
+        if !instant.model.has_dry {
+            return self.fill(instant);
+        }
+        let State { q, qd, .. } = instant.state;
+        let (outcome, friction) =
+            friction::at(instant.model, instant.input, (q, qd), instant.memory);
+        let forces = Forces {
+            qdd: outcome.qdd,
+            force_on_arm: outcome.force_on_arm,
+            joint_force: outcome.joint_force,
+            friction,
+        };
+        self.fill_with(instant, &forces);
+    }
+}
+
 impl<T: Scalar> Row<T> {
     pub fn new() -> Self {
         Self(Vec::new())
     }
 
-    /// An instant of the native engine: forces follow from the model.
+    /// An instant of the native engine without dry friction: forces follow from the model.
     pub fn fill<const N: usize>(&mut self, instant: &Instant<T, N>) {
         dispatch(Native { row: self, instant });
     }
@@ -73,7 +96,10 @@ impl<T: Scalar> Row<T> {
         let pose = Pose::new(q);
         let mut motion = Motion::new(input.time, *q, *qd);
         motion.joint_force = forces.joint_force;
-        let resisting = model.resisting(&motion, memory);
+        let mut resisting = model.resisting(&motion, memory);
+        if let Some(friction) = &forces.friction {
+            resisting = sum(&resisting, &friction.torque);
+        }
         let load = model.load(
             &pose,
             &difference(&input.torque, &resisting),
@@ -99,7 +125,15 @@ impl<T: Scalar> Row<T> {
         row.extend(forces.force_on_arm);
         row.push(T::ZERO);
         let effects = model.effects.iter().zip(*memory);
-        row.extend(effects.map(|(e, &memory)| e.torque(&motion.local(e.index, memory))));
+        row.extend(effects.map(|(e, &memory)| {
+            let local = motion.local(e.index, memory);
+            match &forces.friction {
+                Some(friction) if e.is_dry() => {
+                    e.besides_dry(&local) + friction.share(e.index, e.dry(&local))
+                }
+                _ => e.torque(&local),
+            }
+        }));
         row.extend(memory.iter());
         for torque in [
             &parts.inertial,

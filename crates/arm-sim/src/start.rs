@@ -1,6 +1,6 @@
 //! The state in which a run starts.
 
-use arm_core::effect::Motion;
+use arm_core::effect::{Motion, dry_friction};
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
@@ -35,7 +35,7 @@ pub(crate) fn given<const N: usize>(
         work: [0.0; 4],
     };
     if matches!(model.link, Link::Rigid) {
-        model.project(input, &mut state, ITERATIONS);
+        model.project(input, &mut state, (ITERATIONS, &[false; N]));
         let [y, z] = gap(model, input, &state.q);
         let gap = libm::hypot(y, z);
         // Not a number counts as apart.
@@ -48,14 +48,78 @@ pub(crate) fn given<const N: usize>(
 
 /// The static equilibrium near given angles: `G + R = τ + Jᵀ F` at rest.
 ///
-/// A contact with play pushes nowhere inside it, and a search that comes there finds no way out. Then the play is closed
-/// first; the tip hangs back by the play on the side to which it is pulled.
+/// Dry friction can hold a joint in a whole range of angles. What the handle leaves free, the last joints first, stays where it
+/// was given if its friction can hold it there; the other joints come to rest as if shaken, where they need no friction. Where
+/// that is nowhere, as few joints as possible are held by friction.
 pub(crate) fn equilibrium<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     near: &Joints<f64, N>,
 ) -> Result<Joints<f64, N>, SimulationError> {
-    let found = balanced(model, input, near);
+    let shaken = |held: &[bool; N]| {
+        let x = settled(model, input, (near, held))?;
+        Ok((
+            holds(model, input, (&x, held)),
+            Joints::from_fn(|i, _| x[i]),
+        ))
+    };
+    let led = matches!(model.link, Link::Compliant(_) | Link::Rigid);
+    let dry = (0..N).filter(|&j| model.dry[j]).count();
+    let free = if led { N.saturating_sub(2) } else { N };
+    for count in (1..=dry.min(free)).rev() {
+        let mut held = [false; N];
+        for joint in (0..N).rev().filter(|&j| model.dry[j]).take(count) {
+            held[joint] = true;
+        }
+        if let Ok((true, q)) = shaken(&held) {
+            return Ok(q);
+        }
+    }
+    let found: Result<_, SimulationError> = shaken(&[false; N]).map(|(_, q)| q);
+    if found.is_ok() {
+        return found;
+    }
+    let mut choices: Vec<[bool; N]> = (1..1_usize << N)
+        .map(|code| core::array::from_fn(|j| code >> (N - 1 - j) & 1 == 1))
+        .filter(|held: &[bool; N]| (0..N).all(|j| model.dry[j] || !held[j]))
+        .collect();
+    choices.sort_by_key(|held| held.iter().filter(|&&h| h).count());
+    for held in &choices {
+        if let Ok((true, q)) = shaken(held) {
+            return Ok(q);
+        }
+    }
+    found
+}
+
+/// Whether dry friction can hold what it has to hold.
+fn holds<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (x, held): (&[f64], &[bool; N]),
+) -> bool {
+    if !held.contains(&true) {
+        return true;
+    }
+    let (q, rest) = (Joints::from_fn(|i, _| x[i]), Joints::<f64, N>::zeros());
+    let force = force(model, input, x);
+    let through = model.through_joints(&Pose::new(&q), (&rest, &rest), force);
+    let motion = Motion::new(0.0, q, rest).with_joint_force(&through);
+    let most = dry_friction(&model.effects, &motion, &vec![0.0; model.effects.len()]);
+    let needed = imbalance(model, input, x);
+    (0..N).all(|j| !held[j] || needed[j].abs() <= most[j])
+}
+
+/// The equilibrium of the joints that friction does not hold where they are given.
+///
+/// A contact with play pushes nowhere inside it, and a search that comes there finds no way out. Then the play is closed
+/// first; the tip hangs back by the play on the side to which it is pulled.
+fn settled<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (near, held): (&Joints<f64, N>, &[bool; N]),
+) -> Result<Vec<f64>, SimulationError> {
+    let found = balanced(model, input, (near, held));
     let Link::Compliant(contact) = &model.link else {
         return found;
     };
@@ -71,7 +135,8 @@ pub(crate) fn equilibrium<const N: usize>(
     );
     let mut closed = model.clone();
     closed.link = Link::Compliant(tight);
-    let q = balanced(&closed, input, near)?;
+    let x = balanced(&closed, input, (near, held))?;
+    let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
     let stretch = gap(model, input, &q);
     let back = [0, 1].map(|axis| -play[axis].copysign(stretch[axis]));
     // The smallest change of the angles that moves the tip so.
@@ -92,17 +157,17 @@ pub(crate) fn equilibrium<const N: usize>(
     } else {
         back.map(|b| b / (yy + zz))
     };
-    balanced(model, input, &(q + along_y * y + along_z * z))
+    balanced(model, input, (&(q + along_y * y + along_z * z), held))
 }
 
-/// The equilibrium by Newton's method with halved steps.
+/// The equilibrium by Newton's method with halved steps: the angles, and the force of a rigid coupling.
 ///
 /// With a rigid coupling the force on the arm is unknown too, and the gap between handle and tip must vanish.
 fn balanced<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
-    near: &Joints<f64, N>,
-) -> Result<Joints<f64, N>, SimulationError> {
+    (near, held): (&Joints<f64, N>, &[bool; N]),
+) -> Result<Vec<f64>, SimulationError> {
     let rigid = matches!(model.link, Link::Rigid);
     let mut x: Vec<f64> = near.iter().copied().collect();
     if rigid {
@@ -112,17 +177,28 @@ fn balanced<const N: usize>(
         Link::Compliant(contact) => contact.stiffness[0].max(contact.stiffness[1]),
         Link::Free | Link::Forced(_) | Link::Rigid => 0.0,
     };
+    let residual = |x: &[f64]| {
+        let mut r = imbalance(model, input, x);
+        for joint in (0..N).filter(|&j| held[j]) {
+            r[joint] = x[joint] - near[joint];
+        }
+        r
+    };
+    // A torque counts by the angle that it turns a joint by, where that is more than 1 rad/(N m): an arm may be light.
+    let unit = stiffness(&residual, &x, N).min(1.0);
     // A stiff contact turns the rounding of a position into a force.
-    let enough = BALANCED + 1e-15 * stiffest;
-    let residual = |x: &[f64]| imbalance(model, input, x);
+    let enough = BALANCED + 1e-15 * stiffest / unit;
     let size = |r: &[f64]| {
-        r.iter()
-            .fold(0.0, |m: f64, v| if v.abs() <= m { m } else { v.abs() })
+        let sizes = r.iter().enumerate().map(|(i, v)| {
+            let torque = i < N && !held[i];
+            if torque { v.abs() / unit } else { v.abs() }
+        });
+        sizes.fold(0.0, |m: f64, v| if v <= m { m } else { v })
     };
     let mut r = residual(&x);
     for iteration in 0..ITERATIONS {
         if size(&r) < enough {
-            return Ok(Joints::from_fn(|i, _| x[i]));
+            return Ok(x);
         }
         let failed = SimulationError::NoEquilibrium {
             residual: size(&r),
@@ -151,6 +227,32 @@ fn balanced<const N: usize>(
     })
 }
 
+/// Largest change of a torque with an angle \[N m/rad\]; 1 where none changes.
+fn stiffness(residual: &impl Fn(&[f64]) -> Vec<f64>, x: &[f64], joints: usize) -> f64 {
+    const SMALL: f64 = 1e-6;
+    let here = residual(x);
+    let mut largest: f64 = 0.0;
+    for k in 0..joints {
+        let mut beside = x.to_vec();
+        beside[k] += SMALL;
+        for (there, here) in residual(&beside).iter().zip(&here).take(joints) {
+            largest = largest.max((there - here).abs() / SMALL);
+        }
+    }
+    if largest > 0.0 { largest } else { 1.0 }
+}
+
+/// Force on the arm at rest \[N\]; for a rigid coupling the last two of `x`.
+fn force<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[f64]) -> [f64; 2] {
+    let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
+    match (&model.link, x.get(N..)) {
+        (Link::Compliant(contact), _) => contact.force_on_arm(gap(model, input, &q), [0.0; 2]),
+        (Link::Forced(force), _) => *force,
+        (Link::Rigid, Some(&[y, z])) => [y, z],
+        _ => [0.0; 2],
+    }
+}
+
 /// Left-hand side less right-hand side at rest; for a rigid coupling the last two of `x` are the force on the arm.
 fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[f64]) -> Vec<f64> {
     let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
@@ -158,12 +260,7 @@ fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[
     let pose = Pose::new(&q);
     let memory = vec![0.0; model.effects.len()];
     let resisting = model.resisting(&Motion::new(0.0, q, rest), &memory);
-    let force = match (&model.link, x.get(N..)) {
-        (Link::Compliant(contact), _) => contact.force_on_arm(gap(model, input, &q), [0.0; 2]),
-        (Link::Forced(force), _) => *force,
-        (Link::Rigid, Some(&[y, z])) => [y, z],
-        _ => [0.0; 2],
-    };
+    let force = force(model, input, x);
     let terms = model.terms(&pose, &rest);
     let held = terms.tip_torque(force);
     let mut r: Vec<f64> = (0..N)

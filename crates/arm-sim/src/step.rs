@@ -4,11 +4,12 @@ use arm_core::effect::Motion;
 use arm_core::{Joints, Scalar};
 
 use crate::Integrator;
+use crate::friction::{self, Jam};
 use crate::model::{Input, Link, Model, Outcome, State};
 
 /// Newton steps that bring a rigidly held tip back to its handle: after a step it is off by the error of the integrator
 /// in one step, and each squares it.
-const PROJECTIONS: usize = 2;
+pub(crate) const PROJECTIONS: usize = 2;
 
 /// What drives the arm in a step: at its start, its middle and its end.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +27,10 @@ pub(crate) struct Memory<T> {
     stage: Vec<T>,
     rate: Vec<T>,
     sum: Vec<T>,
+    /// The states before a step that may have to be made again.
+    pub kept: Vec<T>,
+    /// Why a step could not be made.
+    pub jam: Option<Jam>,
 }
 
 impl<T: Scalar> Memory<T> {
@@ -35,12 +40,30 @@ impl<T: Scalar> Memory<T> {
             state: zeros.clone(),
             stage: zeros.clone(),
             rate: zeros.clone(),
-            sum: zeros,
+            sum: zeros.clone(),
+            kept: zeros,
+            jam: None,
         }
     }
 }
 
-/// Advances a state by one step of length `h`.
+/// Advances a state by one step of length `h`, with dry friction where there is any.
+#[inline(always)]
+pub(crate) fn advance<const N: usize>(
+    model: &Model<f64, N>,
+    integrator: Integrator,
+    h: f64,
+    inputs: Inputs<f64, N>,
+    at: (&mut State<f64, N>, &mut Memory<f64>),
+) {
+    if model.has_dry {
+        friction::step(model, integrator, h, inputs, at);
+    } else {
+        step(model, integrator, h, inputs, at);
+    }
+}
+
+/// Advances a state by one step of length `h`; nothing in it is dry friction.
 #[inline(always)]
 pub(crate) fn step<T: Scalar, const N: usize>(
     model: &Model<T, N>,
@@ -51,10 +74,15 @@ pub(crate) fn step<T: Scalar, const N: usize>(
 ) {
     match integrator {
         Integrator::SemiImplicitEuler => semi_implicit_euler(model, h, inputs, state, memory),
-        Integrator::Rk4 => rk4(model, h, inputs, state, memory),
+        Integrator::Rk4 => rk4(
+            model,
+            (h, inputs),
+            (state, memory),
+            |input, q, qd, memory| model.evaluate(input, q, qd, memory),
+        ),
     }
     if matches!(model.link, Link::Rigid) {
-        model.project(inputs.end, state, PROJECTIONS);
+        model.project(inputs.end, state, (PROJECTIONS, &[false; N]));
     }
 }
 
@@ -68,23 +96,35 @@ fn semi_implicit_euler<T: Scalar, const N: usize>(
 ) {
     let h = T::of(h);
     let now = model.evaluate(inputs.start, &state.q, &state.qd, &memory.state);
+    remember(model, h, inputs.start, (state, memory), &now);
+    state.advance(h, &now);
+}
+
+/// Carries the states of effects on for a time, along the motion at its start.
+#[inline(always)]
+pub(crate) fn remember<T: Scalar, const N: usize>(
+    model: &Model<T, N>,
+    h: T,
+    input: &Input<T, N>,
+    (state, memory): (&State<T, N>, &mut Memory<T>),
+    now: &Outcome<T, N>,
+) {
     if model.has_memory {
-        let motion = motion(inputs.start, &state.q, &state.qd, &now);
+        let motion = motion(input, &state.q, &state.qd, now);
         model.memory_rates(&motion, &memory.state, &mut memory.rate);
         for (m, rate) in memory.state.iter_mut().zip(&memory.rate) {
             *m += h * *rate;
         }
     }
-    state.advance(h, &now);
 }
 
+/// The classical method; `evaluate` says what follows from input, angles, speeds and the states of the effects.
 #[inline(always)]
-fn rk4<T: Scalar, const N: usize>(
+pub(crate) fn rk4<T: Scalar, const N: usize>(
     model: &Model<T, N>,
-    h: f64,
-    inputs: Inputs<T, N>,
-    state: &mut State<T, N>,
-    memory: &mut Memory<T>,
+    (h, inputs): (f64, Inputs<T, N>),
+    (state, memory): (&mut State<T, N>, &mut Memory<T>),
+    mut evaluate: impl FnMut(&Input<T, N>, &Joints<T, N>, &Joints<T, N>, &[T]) -> Outcome<T, N>,
 ) {
     let stages = [
         (inputs.start, 0.0, 1.0),
@@ -113,7 +153,7 @@ fn rk4<T: Scalar, const N: usize>(
                 };
             }
         }
-        let now = model.evaluate(input, &q, &qd, &memory.stage);
+        let now = evaluate(input, &q, &qd, &memory.stage);
         if model.has_memory {
             model.memory_rates(
                 &motion(input, &q, &qd, &now),

@@ -4,10 +4,11 @@ use arm_core::effect::Effect;
 use arm_core::{Joints, Plane, Pose, Setup};
 
 use crate::experiment::altered;
+use crate::friction;
 use crate::model::{Input, Link, Model, State};
-use crate::native::diverged;
+use crate::native::{diverged, why};
 use crate::prepare::{add_ripple, assemble};
-use crate::step::{Inputs, Memory, step};
+use crate::step::{Inputs, Memory, advance};
 use crate::{Handle, Integrator, SimulationError, stability, start};
 
 /// Most inner steps in one call of [`Stepper::advance`].
@@ -315,15 +316,13 @@ impl<const N: usize> Stepper<N> {
                 end: &next,
             };
             let at = (&mut self.state, &mut self.memory);
-            step(&self.model, Integrator::Rk4, h, inputs, at);
+            advance(&self.model, Integrator::Rk4, h, inputs, at);
             if let Some(joint) = diverged(&self.state) {
                 let time = next.time;
                 self.undo();
-                return Err(SimulationError::Diverged {
-                    step: done as usize,
-                    time,
-                    joint,
-                });
+                let why = why(&self.memory, (done as usize, time, joint));
+                self.memory.jam = None;
+                return Err(why);
             }
         }
         if regular {
@@ -340,7 +339,7 @@ impl<const N: usize> Stepper<N> {
         let State { q, qd, .. } = &self.state;
         let pose = Pose::new(q);
         let input = self.input(outside);
-        let outcome = self.model.evaluate(&input, q, qd, &self.memory.state);
+        let (outcome, _) = friction::at(&self.model, &input, (q, qd), &self.memory.state);
         let tip = self.model.tip(q, &pose);
         let tip_velocity = self.model.tip_velocity(qd, &pose);
         let tip_acceleration = self.model.tip_acceleration(&self.state, &outcome.qdd);

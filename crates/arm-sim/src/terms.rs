@@ -178,6 +178,21 @@ impl<T: Scalar, const N: usize> Terms<T, N> {
         terms
     }
 
+    /// The same with some joints held: nothing moves them, and through them nothing moves.
+    pub fn holding(mut self, held: &[bool; N]) -> Self {
+        for joint in (0..N).filter(|&j| held[j]) {
+            for k in 0..N {
+                self.inertia[(joint, k)] = T::ZERO;
+                self.inertia[(k, joint)] = T::ZERO;
+            }
+            self.inertia[(joint, joint)] = T::ONE;
+            for row in &mut self.jacobian {
+                row[joint] = T::ZERO;
+            }
+        }
+        self
+    }
+
     /// `J v` \[m/s for speeds\].
     pub fn tip_rate(&self, v: &Joints<T, N>) -> Plane<T> {
         self.jacobian.map(|row| {

@@ -58,7 +58,7 @@ def effects(
             print(f"{entry.kind} ({entry.where}{needs}): {entry.summary}")
             print(f"    {entry.formula}    [{entry.reference}]")
             for p in entry.parameters:
-                print(f"    {p.name}: {_range(p.min, p.max)} {p.unit}, default {p.default:g}")
+                print(f"    {p.name}: {'0 or ' if p.or_zero else ''}{_range(p.min, p.max)} {p.unit}, default {p.default:g}")
             print()
 
     present(data, json, human)

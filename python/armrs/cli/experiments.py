@@ -102,7 +102,7 @@ def simulate(
         with console.progress("simulating"):
             result = stack.enter_context(stream(arm, drive, folder, dt=dt, **options))
         halved = None
-        if check_step or is_doubtful(result):
+        if check_step or is_doubtful(result) is not None:
             with console.progress("simulating with half the step"), stream(arm, drive, folder, dt=0.5 * dt, **options) as half:
                 halved = step_error(result.pieces(), half.pieces())
         plain = simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))

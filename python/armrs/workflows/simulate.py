@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _armrs, checks
+from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..io.trial import Trial
@@ -256,22 +257,27 @@ def digested(columns: Mapping[str, Any]) -> list[str]:
     return [name for name in columns if name not in ("effects", "energy_error")]
 
 
-def is_doubtful(run: Run) -> bool:
-    """Return whether dry friction may be too steep for the step: the run then has to be compared with one of half the step.
+def is_doubtful(run: Run) -> str | None:
+    """Return why a run has to be compared with one of half the step; None where nothing asks for it.
 
-    Friction that the step does not resolve chatters about rest and loses energy while it does: at 1e-5 of what is exchanged the force
-    is off by up to 0.2 %.
+    Rapier does not locate where set-valued friction sticks and slips. Smooth friction whose slope at rest is too steep for the step
+    chatters, and loses energy while it does: at 1e-5 of what is exchanged the force is off by up to 0.2 %.
     """
-    model = run.model
-    dry = any("smoothing" in effect.parameters for effect in model.effects) or any(joint.coulomb > 0.0 for joint in model.joints)
-    return dry and energy_balance(run.pieces()).share > CHATTER
+    speeds = [effect.parameters[p.name] for effect in run.model.effects for p in catalogue()[effect.kind].parameters if p.or_zero]
+    speeds += [np.inf for joint in run.model.joints if joint.coulomb > 0.0]
+    if run.settings["engine"] == "rapier" and 0.0 in speeds:
+        return "rapier does not locate where set-valued friction sticks and slips"
+    if any(speed > 0.0 for speed in speeds) and energy_balance(run.pieces()).share > CHATTER:
+        return "the dry friction may be too steep for the step"
+    return None
 
 
 def warnings(run: Run) -> tuple[str, ...]:
     """Return fast joints, missing energy and doubts about the step, a line each."""
     lines = [*runaway(run.pieces()), *energy_balance(run.pieces()).warnings]
-    if is_doubtful(run):
-        lines.append("the dry friction may be too steep for the step: compare with half the step, or take a larger smoothing")
+    doubt = is_doubtful(run)
+    if doubt is not None:
+        lines.append(f"{doubt}: compare with half the step, or give it smoothing = 0 in the native engine, which solves it at any step")
     return tuple(lines)
 
 

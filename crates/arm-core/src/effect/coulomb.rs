@@ -21,12 +21,18 @@ impl Law for Coulomb {
         ],
         memory: false,
     };
+    const SMOOTHED_BY: Option<usize> = Some(1);
     const RATE_INDEPENDENT: bool = true;
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03).in_family(Family::Dry).typically(0.1).passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
         p[0] * smooth_sign(at.qd, p[1])
+    }
+
+    #[inline]
+    fn dry<T: Scalar>(p: &Parameters<T>, _at: &Local<T>) -> T {
+        p[0]
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {

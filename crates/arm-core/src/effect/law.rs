@@ -70,6 +70,8 @@ pub struct Parameter {
     pub default: f64,
     /// Whether the torque is linear in it. A fit takes linear parameters as unknowns and holds the others.
     pub linear: bool,
+    /// Whether zero is allowed beside the bounds, for the limit of the law.
+    pub or_zero: bool,
 }
 
 impl Parameter {
@@ -88,7 +90,19 @@ impl Parameter {
             max,
             default,
             linear: true,
+            or_zero: false,
         }
+    }
+
+    /// The same, with zero allowed beside the bounds.
+    pub const fn or_zero(mut self) -> Self {
+        self.or_zero = true;
+        self
+    }
+
+    /// Whether a value is allowed.
+    pub fn allows(&self, value: f64) -> bool {
+        (self.min..=self.max).contains(&value) || (self.or_zero && value == 0.0)
     }
 
     /// A parameter of the shape, which a linear fit holds.
@@ -182,6 +196,10 @@ pub trait Law {
     const ACTS_ON: ActsOn = ActsOn::at(Self::INFO.place);
     /// Whether its torque is a constant, or one whose sign alone follows the motion: what a quasi-static analysis can find.
     const RATE_INDEPENDENT: bool = false;
+    /// Position of the parameter that makes the sign of the speed smooth, for a law whose torque, or a part of it, is dry
+    /// friction. Where that parameter is zero the friction is set-valued: [`Law::dry`] against the motion, and at rest whatever
+    /// holds the joint up to that, which a simulation solves for.
+    const SMOOTHED_BY: Option<usize> = None;
     /// How a search asks for it.
     const PROBE: Probe = Probe::FIRST;
 
@@ -193,6 +211,14 @@ pub trait Law {
     /// simulation adds those of one joint up before it starts. Nothing for other laws.
     fn affine<T: Scalar>(_p: &Parameters<T>) -> Option<[T; 3]> {
         None
+    }
+    /// Largest torque of its dry friction: what it resists with in motion, and holds at most at rest \[N m\]; not negative.
+    fn dry<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
+        T::ZERO
+    }
+    /// [`Law::torque`] of a law with dry friction without that friction \[N m\].
+    fn besides_dry<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
+        T::ZERO
     }
     /// Derivatives to the parameters of the torque that the motion needs at the joint: of [`Law::torque`], and for a kind
     /// that alters the rig in one joint, of what inverse dynamics gains there. A state of its own counts as given.
@@ -225,20 +251,29 @@ pub trait Law {
 
 /// The sign of a speed, smooth through zero: `tanh(q̇/smoothing)`.
 ///
-/// As in Andersson, Söderberg, Björklund 2007: friction without a sticking state, so that a fixed step stays stable.
+/// As in Andersson, Söderberg, Björklund 2007: friction without a sticking state. For a smoothing of zero it is the sign itself,
+/// zero at rest.
 #[inline]
 pub(super) fn smooth_sign<T: Scalar>(speed: T, smoothing: T) -> T {
-    (speed / smoothing).tanh()
+    let sign = T::if_less(
+        T::ZERO,
+        speed,
+        T::ONE,
+        T::if_less(speed, T::ZERO, -T::ONE, T::ZERO),
+    );
+    T::if_less(T::ZERO, smoothing, (speed / smoothing).tanh(), sign)
 }
 
 /// Derivative of [`smooth_sign`] to `smoothing`, from its value.
 #[inline]
 pub(super) fn smooth_sign_slope<T: Scalar>(sign: T, speed: T, smoothing: T) -> T {
-    -(T::ONE - sign.squared()) * speed / smoothing.squared()
+    let slope = -(T::ONE - sign.squared()) * speed / smoothing.squared();
+    T::if_less(T::ZERO, smoothing, slope, T::ZERO)
 }
 
-/// The bounds of `smoothing` that all kinds of dry friction share.
-pub(super) const SMOOTHING: Parameter = Parameter::shape("smoothing", "rad/s", 1e-4, 1.0, 0.01);
+/// `smoothing` of all kinds of dry friction: zero for friction that sticks.
+pub(super) const SMOOTHING: Parameter =
+    Parameter::shape("smoothing", "rad/s", 1e-4, 1.0, 0.01).or_zero();
 
 /// Values for the leading parameters, zero for the others.
 #[inline]

@@ -24,11 +24,17 @@ impl Law for LoadFriction {
         memory: false,
     };
     const FEELS_FORCE: bool = true;
+    const SMOOTHED_BY: Option<usize> = Some(1);
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03).in_family(Family::Dry);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
         p[0] * at.joint_force * smooth_sign(at.qd, p[1])
+    }
+
+    #[inline]
+    fn dry<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        p[0] * at.joint_force
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {

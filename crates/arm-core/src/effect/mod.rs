@@ -68,6 +68,10 @@ macro_rules! catalogue {
             pub const fn is_rate_independent(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::RATE_INDEPENDENT,)* Self::Own(_) => false }
             }
+            /// Position of the parameter that makes its dry friction smooth, if it has any.
+            pub const fn smoothed_by(self) -> Option<usize> {
+                match self { $(Self::$law => <$module::$law as Law>::SMOOTHED_BY,)* Self::Own(_) => None }
+            }
             /// Whether it depends on the force through the joint.
             pub fn feels_force(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Own(own) => own.feels_force() }
@@ -88,6 +92,17 @@ macro_rules! catalogue {
             pub fn affine(&self) -> Option<[T; 3]> {
                 if !self.on { return None; }
                 match self.kind { $(Kind::$law => $module::$law::affine(&self.parameters),)* Kind::Own(_) => None }
+            }
+            /// Largest torque of its dry friction: what it resists with in motion, and holds at most at rest \[N m\].
+            #[inline]
+            pub fn dry(&self, at: &Local<T>) -> T {
+                if !self.on { return T::ZERO; }
+                match self.kind { $(Kind::$law => $module::$law::dry(&self.parameters, at),)* Kind::Own(_) => T::ZERO }
+            }
+            /// Its torque without dry friction \[N m\].
+            #[inline]
+            pub fn besides_dry(&self, at: &Local<T>) -> T {
+                match self.kind { $(Kind::$law => $module::$law::besides_dry(&self.parameters, at),)* Kind::Own(_) => T::ZERO }
             }
             /// Derivatives of [`Effect::torque`] to the parameters.
             #[inline]
@@ -244,6 +259,27 @@ impl<T: Scalar> Effect<T> {
         self
     }
 
+    /// Whether it is set-valued dry friction, or has some: no speed makes it smooth, and a simulation solves for it.
+    pub fn is_dry(&self) -> bool {
+        let smoothing = self
+            .kind
+            .smoothed_by()
+            .and_then(|at| self.parameters.get(at));
+        smoothing.is_some_and(|s| s.every(|s| s == 0.0))
+    }
+
+    /// The same effect with friction that is smooth over 30 µrad/s in place of set-valued dry friction: for derivatives along a
+    /// simulated motion, whose speeds are exact.
+    pub fn differentiable(mut self) -> Self {
+        const SMOOTHING: f64 = 3e-5;
+        if self.is_dry()
+            && let Some(at) = self.kind.smoothed_by()
+        {
+            self.parameters[at] = T::of(SMOOTHING);
+        }
+        self
+    }
+
     /// Checks the values against the bounds of the kind, and the index against the number of joints.
     ///
     /// # Errors
@@ -273,11 +309,11 @@ impl<T: Scalar> Effect<T> {
                 return Err(Invalid::NotFinite { name, index });
             }
             let (min, max) = (parameter.min, parameter.max);
-            if !value.within(min, max) {
+            if !value.every(|v| parameter.allows(v)) {
                 let found = core::cell::Cell::new(min);
                 let _ = value.every(|v| {
                     found.set(v);
-                    v >= min && v <= max
+                    parameter.allows(v)
                 });
                 return Err(Invalid::OutOfRange {
                     name,
@@ -389,4 +425,44 @@ pub fn resisting_torque<T: Scalar, const N: usize>(
         }
     }
     total
+}
+
+/// Sum of what all effects resist with besides set-valued dry friction \[N m\], see [`resisting_torque`].
+#[inline]
+pub fn resisting_besides_dry<T: Scalar, const N: usize>(
+    effects: &[Effect<T>],
+    motion: &Motion<T, N>,
+    memory: &[T],
+) -> Joints<T, N> {
+    let mut total = joints([T::ZERO; N]);
+    for (i, effect) in effects.iter().enumerate() {
+        if effect.on && effect.index < N {
+            let state = memory.get(i).copied().unwrap_or(T::ZERO);
+            if effect.is_dry() {
+                total[effect.index] += effect.besides_dry(&motion.local(effect.index, state));
+            } else {
+                effect.resist(motion, state, &mut total);
+            }
+        }
+    }
+    total
+}
+
+/// Largest torque of the set-valued dry friction of each joint \[N m\], see [`resisting_torque`].
+#[inline]
+pub fn dry_friction<T: Scalar, const N: usize>(
+    effects: &[Effect<T>],
+    motion: &Motion<T, N>,
+    memory: &[T],
+) -> [T; N] {
+    let mut most = [T::ZERO; N];
+    for (i, effect) in effects.iter().enumerate() {
+        if effect.on && effect.is_dry() {
+            let state = memory.get(i).copied().unwrap_or(T::ZERO);
+            if let Some(most) = most.get_mut(effect.index) {
+                *most += effect.dry(&motion.local(effect.index, state));
+            }
+        }
+    }
+    most
 }

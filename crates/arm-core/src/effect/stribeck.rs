@@ -24,6 +24,7 @@ impl Law for Stribeck {
         ],
         memory: false,
     };
+    const SMOOTHED_BY: Option<usize> = Some(2);
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])
         .refining(&[1, 2])])
@@ -32,6 +33,11 @@ impl Law for Stribeck {
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
         p[0] * (-(at.qd.abs() / p[1])).exp() * smooth_sign(at.qd, p[2])
+    }
+
+    #[inline]
+    fn dry<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        p[0] * (-(at.qd.abs() / p[1])).exp()
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {

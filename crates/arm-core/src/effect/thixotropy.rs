@@ -27,6 +27,7 @@ impl Law for Thixotropy {
         ],
         memory: true,
     };
+    const SMOOTHED_BY: Option<usize> = Some(5);
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[
             (3, Values::Each(&[0.03, 0.1, 0.3])),
@@ -39,6 +40,16 @@ impl Law for Thixotropy {
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
         let intact = T::ONE - at.memory;
         intact * (p[0] * smooth_sign(at.qd, p[5]) + p[1] * (at.q - p[2]))
+    }
+
+    #[inline]
+    fn dry<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        (T::ONE - at.memory) * p[0]
+    }
+
+    #[inline]
+    fn besides_dry<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+        (T::ONE - at.memory) * p[1] * (at.q - p[2])
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {

@@ -133,7 +133,11 @@ impl Tabulated {
         let size = self.grid.count[0] * self.grid.count[1];
         let made = (self.tabulate)(&p[..self.info.parameters.len()])
             .filter(|t| t.len() == self.linear && t.iter().all(|t| t.len() == size));
-        let tables = Arc::new(made.unwrap_or_default());
+        // A law that fails may fail once.
+        let Some(made) = made else {
+            return Tables::default();
+        };
+        let tables = Arc::new(made);
         let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = find(&kept) {
             return known;
@@ -160,18 +164,25 @@ impl OwnLaw for Tabulated {
             return 0.0;
         }
         let (me, key) = (core::ptr::from_ref(self) as usize, self.key(p));
-        LAST.with_borrow_mut(|last| {
-            let tables = match last {
-                Some((law, shape, tables)) if *law == me && *shape == key => tables,
-                _ => &mut last.insert((me, key, self.tables(key, p))).2,
-            };
-            if tables.is_empty() {
-                return f64::NAN;
-            }
+        let read = |tables: &Tables| {
             let place = self.grid.place(at.q, at.qd);
             std::iter::zip(tables.iter(), p).fold(0.0, |sum, (table, value)| {
                 sum + value * self.grid.between(table, place)
             })
+        };
+        let known = LAST.with_borrow(|last| match last {
+            Some((law, shape, tables)) if *law == me && *shape == key => Some(read(tables)),
+            _ => None,
+        });
+        known.unwrap_or_else(|| {
+            // Nothing is borrowed meanwhile: the law may simulate, and then asks for tables itself.
+            let tables = self.tables(key, p);
+            if tables.is_empty() {
+                return f64::NAN;
+            }
+            let torque = read(&tables);
+            LAST.set(Some((me, key, tables)));
+            torque
         })
     }
 }
@@ -255,6 +266,33 @@ mod tests {
             assert_eq!(law.torque(&p, &at(2.0, 0.0)), law.torque(&p, &at(5.0, 0.0)));
         }
         assert_eq!(law.kept.read().map(|k| k.len()).ok(), Some(2));
+    }
+
+    #[test]
+    fn a_law_that_failed_once_is_asked_again() {
+        let good = law().tabulate;
+        let first = std::sync::atomic::AtomicBool::new(true);
+        let once = move |p: &[f64]| {
+            let fails = first.swap(false, std::sync::atomic::Ordering::Relaxed);
+            if fails { None } else { good(p) }
+        };
+        let law = Tabulated::new(&INFO, Probe::FIRST, GRID, Box::new(once));
+        let p = [1.0, 0.0, 0.2, 0.0, 0.0, 0.0];
+        assert!(law.torque(&p, &at(1.0, 0.0)).is_nan());
+        assert!((law.torque(&p, &at(1.0, 0.0)) - libm::sin(5.0)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_law_may_ask_for_another_one() {
+        let inner: &'static Tabulated = Box::leak(Box::new(law()));
+        let good = law().tabulate;
+        let asks = move |p: &[f64]| {
+            let torque = inner.torque(&[1.0, 0.0, 0.2, 0.0, 0.0, 0.0], &at(0.0, 0.0));
+            good(p).filter(|_| torque == 0.0)
+        };
+        let law = Tabulated::new(&INFO, Probe::FIRST, GRID, Box::new(asks));
+        let p = [1.0, 0.0, 0.5, 0.0, 0.0, 0.0];
+        assert!((law.torque(&p, &at(1.0, 0.0)) - libm::sin(2.0)).abs() < 1e-6);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! What the channels would read if a hypothesis were true.
 
-use arm_core::effect::{Effect, Motion, Place, advance_states, resisting_torque};
+use arm_core::effect::{
+    Effect, Motion, Place, advance_states, resisting_besides_dry, resisting_torque,
+};
 use arm_core::{Joints, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque};
 use arm_ident::regression::kinematics::Kinematics;
 use arm_ident::regression::measured_motion::{is_quiet, low_pass, measured, relative_speed_noise};
@@ -469,8 +471,8 @@ pub(crate) fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N>
     reading.q
 }
 
-/// Longest step with which the steepest dry friction does not rattle \[s\]: one time constant of its slope at rest on the
-/// inertia of its joint.
+/// Longest step with which steep resistance does not rattle \[s\]: one time constant of its slope at rest on the inertia of its
+/// joint. Set-valued dry friction is solved, whatever the step.
 fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>) -> f64 {
     const SPEED: f64 = 1e-5;
     let Ok(setup) = experiment.altered() else {
@@ -489,7 +491,7 @@ fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>
             let mut qd = zero;
             qd[j] = speed;
             let motion = Motion::new(0.0, *q, qd).with_joint_force(&through);
-            resisting_torque(&experiment.effects, &motion, &[])[j]
+            resisting_besides_dry(&experiment.effects, &motion, &[])[j]
         };
         let slope = (resisting(SPEED) - resisting(-SPEED)) / (2.0 * SPEED);
         let mut unit = zero;

@@ -52,6 +52,7 @@ impl<const N: usize> Plant<N> {
             .effects()
             .into_iter()
             .filter(|e| e.on)
+            .map(Effect::differentiable)
             .partition(|e| e.kind.info().place == Place::Joint);
         Ok(Self {
             chain: setup.chain()?,

@@ -6,12 +6,13 @@
 
 use core::array::from_fn;
 
-use arm_core::effect::Motion;
+use arm_core::effect::{Motion, dry_friction};
 use arm_core::{Contact, Joints, Plane, Pose, joint_force};
 
 use super::RapierSettings;
 use super::world::{Bodies, Loads, Reaction, Start, World};
 use crate::SimulationError;
+use crate::friction::{self, Friction};
 use crate::model::{Input, Link, Model};
 use crate::prepare::Prepared;
 use crate::recorder::Forces;
@@ -67,7 +68,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         let memory = vec![0.0; model.effects.len()];
         let input = prepared.input(0.0);
         // How a motion begins is, besides the laws of the effects, all that the engines share.
-        let first = model.evaluate(&input, &q, &qd, &memory);
+        let (first, _) = friction::at(model, &input, (&q, &qd), &memory);
         let (qdd, force) = (first.qdd, first.force_on_arm);
         let earlier = q - qd * dt + qdd * (0.5 * dt * dt);
         let start = Start {
@@ -76,6 +77,7 @@ impl<'a, const N: usize> Arm<'a, N> {
             earlier,
             handle: matches!(model.link, Link::Rigid).then_some(input.handle.position),
             placement: prepared.setup.placement,
+            dry: model.dry,
         };
         let mut world = World::new(&model.chain, &start, dt, settings)?;
         let bodies = world.read();
@@ -122,12 +124,15 @@ impl<'a, const N: usize> Arm<'a, N> {
             Link::Compliant(contact) => self.contact(contact, input),
             Link::Free | Link::Forced(_) | Link::Rigid => ([0.0; 2], 0.0),
         };
+        let (mut friction, sticky) = self.friction(&motion);
         let loads = Loads {
-            torque: input.torque - resisting,
+            torque: input.torque - resisting - friction.torque,
             force_on_arm: pull,
+            sticky,
         };
         self.world
             .step(&now, &loads, &self.reaction, next.handle.position)?;
+        friction.torque += self.world.friction();
         let after = self.world.read();
         let finite = |i: &usize| after.q[*i].is_finite() && after.qd[*i].is_finite();
         if let Some(joint) = (0..N).find(|i| !finite(i)) {
@@ -146,11 +151,12 @@ impl<'a, const N: usize> Arm<'a, N> {
                 qdd: reaction.change / dt,
                 force_on_arm: force,
                 joint_force: through,
+                friction: model.has_dry.then_some(friction),
             },
             power: [
                 force[0] * v[0] + force[1] * v[1],
                 dot(&input.torque, &qd),
-                dot(&resisting, &qd),
+                dot(&(resisting + friction.torque), &qd),
                 damping,
             ],
             middle: Motion {
@@ -163,6 +169,27 @@ impl<'a, const N: usize> Arm<'a, N> {
         };
         self.advance(after, reaction);
         Ok(sample)
+    }
+
+    /// Dry friction of joints that slip in this step for certain, and what it is at most in the others, where rapier finds it.
+    fn friction(&self, motion: &Motion<f64, N>) -> (Friction<f64, N>, Joints<f64, N>) {
+        /// How much faster a joint that keeps its direction is than what a step, or friction in it, changes of its speed.
+        const CERTAIN: f64 = 4.0;
+        let inertia = |i: usize| self.model.chain.segments()[i].inertia;
+        let most = dry_friction(&self.model.effects, motion, &self.memory);
+        let (mut torque, mut sticky) = (Joints::zeros(), Joints::zeros());
+        for j in (0..N).filter(|&j| self.model.dry[j]) {
+            let (speed, change) = (self.before.joints[j], self.reaction.change[j]);
+            // Segments that nothing else holds would give way most.
+            let proximal = if j == 0 { 0.0 } else { 1.0 / inertia(j - 1) };
+            let stopped = self.dt * most[j] * (proximal + 1.0 / inertia(j));
+            if speed.abs() > CERTAIN * change.abs() + stopped {
+                torque[j] = most[j] * speed.signum();
+            } else {
+                sticky[j] = most[j];
+            }
+        }
+        (Friction { torque, most }, sticky)
     }
 
     /// Force of a compliant contact on the arm \[N\], and the power lost in its damping \[W\].

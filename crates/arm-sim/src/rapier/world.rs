@@ -15,10 +15,12 @@ use crate::SimulationError;
 
 /// Hertz. So far above any step rate that a joint's error is removed within one step and its softness vanishes.
 const STIFF: f64 = 1e9;
+/// Newton metres a radian a second with which a motor that is dry friction wants rest: all that it has, at any speed.
+const RIGID: f64 = 1e12;
 
-/// Times as many sweeps with rotors: what the sweeps leave of their torque is lost, whereas a joint that they leave open
+/// Times as many sweeps with motors, which rotors and dry friction are: what the sweeps leave of their torque is lost, whereas a joint that they leave open
 /// is closed by the steps that follow.
-const ROTORS: usize = 8;
+const MOTORS: usize = 8;
 /// Times as many sweeps around a closed loop of joints, where a sweep removes about a tenth of what is left.
 const HELD: usize = 4;
 
@@ -27,6 +29,8 @@ pub(super) struct World<const N: usize> {
     world: PhysicsWorld,
     links: [RigidBodyHandle; N],
     joints: [ImpulseJointHandle; N],
+    /// Joints of their own for dry friction: motors that want rest and have no more torque than it.
+    friction: [Option<ImpulseJointHandle>; N],
     held: Option<Held>,
     /// Where the handle holds the last segment, in its own frame \[m\].
     tip: Plane<f64>,
@@ -57,6 +61,8 @@ pub(super) struct Start<const N: usize> {
     pub handle: Option<Plane<f64>>,
     /// Where the hand holds the handle beside its tip: along the last segment and to its left \[m\].
     pub placement: Plane<f64>,
+    /// Joints with dry friction.
+    pub dry: [bool; N],
 }
 
 /// What is read of the bodies between two steps. Speeds are those of the step that led here, half a step ago.
@@ -79,6 +85,8 @@ pub(super) struct Loads<const N: usize> {
     pub torque: Joints<f64, N>,
     /// On the arm at its tip \[N\].
     pub force_on_arm: Plane<f64>,
+    /// Most that dry friction which is still to be found does in each joint \[N m\].
+    pub sticky: Joints<f64, N>,
 }
 
 /// What joints did in a step, and are expected to do in the next.
@@ -119,11 +127,26 @@ impl<const N: usize> World<N> {
         let tip = [reach + start.placement[0], start.placement[1]];
         let mut world = PhysicsWorld {
             gravity: vector(chain.gravity()),
-            integration_parameters: parameters(chain, start.handle.is_some(), dt, settings),
+            integration_parameters: parameters(chain, start, dt, settings),
             ..PhysicsWorld::default()
         };
         let links = links(&mut world, chain, start, dt);
         let joints = joints(&mut world, chain, &links);
+        let friction = from_fn(|i| {
+            if !start.dry[i] {
+                return None;
+            }
+            let proximal = match i.checked_sub(1) {
+                None => world.insert_body(RigidBodyBuilder::fixed()),
+                Some(before) => links[before],
+            };
+            let motor = GenericJointBuilder::new(JointAxesMask::empty())
+                .contacts_enabled(false)
+                .motor_model(JointAxis::AngX, MotorModel::ForceBased)
+                .motor_velocity(JointAxis::AngX, 0.0, RIGID)
+                .motor_max_force(JointAxis::AngX, 0.0);
+            Some(world.insert_impulse_joint(proximal, links[i], motor))
+        });
         let held = match (start.handle, links.last()) {
             (Some(at), Some(&hand)) => Some(Held::new(&mut world, hand, tip, at)),
             _ => None,
@@ -133,6 +156,7 @@ impl<const N: usize> World<N> {
             world,
             links,
             joints,
+            friction,
             held,
             tip,
             chain: *chain,
@@ -180,6 +204,12 @@ impl<const N: usize> World<N> {
         handle: Plane<f64>,
     ) -> Result<(), usize> {
         let torque = loads.torque + self.turn_rotors(now, &expected.change);
+        for (joint, &most) in self.friction.iter().zip(&loads.sticky) {
+            let joint = joint.and_then(|j| self.world.impulse_joints.get_mut(j, false));
+            if let Some(joint) = joint {
+                joint.data.set_motor_max_force(JointAxis::AngX, most);
+            }
+        }
         for i in 0..N {
             let distal = if i + 1 < N { torque[i + 1] } else { 0.0 };
             let body = &mut self.world.bodies[self.links[i]];
@@ -244,6 +274,17 @@ impl<const N: usize> World<N> {
             }
         }
         torque
+    }
+
+    /// Torque with which the dry friction that was found resisted in the last step \[N m\].
+    pub fn friction(&self) -> Joints<f64, N> {
+        let dt = self.world.integration_parameters.dt;
+        Joints::from_fn(|i, _| {
+            let joint = self.friction[i].and_then(|j| self.world.impulse_joints.get(j));
+            joint.map_or(0.0, |joint| {
+                joint.data.motors[JointAxis::AngX as usize].impulse / dt
+            })
+        })
     }
 
     /// Force on the arm over the last step of a handle that holds the tip rigidly \[N\].
@@ -382,13 +423,14 @@ fn frames<const N: usize>(chain: &Chain<f64, N>, q: &Joints<f64, N>) -> [Frame; 
 
 fn parameters<const N: usize>(
     chain: &Chain<f64, N>,
-    held: bool,
+    start: &Start<N>,
     dt: f64,
     settings: &RapierSettings,
 ) -> IntegrationParameters {
     let rotors = chain.rotor_inertia().iter().skip(1).any(|r| *r > 0.0);
-    let times = match (rotors, held) {
-        (true, _) => ROTORS,
+    let motors = rotors || start.dry.contains(&true);
+    let times = match (motors, start.handle.is_some()) {
+        (true, _) => MOTORS,
         (false, true) => HELD,
         (false, false) => 1,
     };

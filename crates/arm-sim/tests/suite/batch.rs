@@ -142,6 +142,17 @@ fn a_lane_that_diverges_does_not_touch_the_others() {
     same_bits(&experiments, 1);
 }
 
+/// A run of a group may be the only one whose friction is not zero.
+#[test]
+fn friction_of_one_run_of_a_group_is_not_lost() {
+    let mut experiments = perturbed(&smooth(0.05), 3);
+    for (i, experiment) in experiments.iter_mut().enumerate() {
+        let torque = if i == 1 { 0.3 } else { 0.0 };
+        experiment.effects = vec![Effect::new(Kind::Coulomb, 0).with(&[torque, 0.0])];
+    }
+    same_bits(&experiments, 1);
+}
+
 #[test]
 fn the_step_that_diverges_is_found_wherever_samples_are_taken() {
     for speed in [1e5, 1e10, 1e25, 1e50, 1e100] {

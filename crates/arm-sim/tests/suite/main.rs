@@ -5,6 +5,8 @@ mod batch;
 mod common;
 mod controlled;
 mod energy;
+mod friction;
+mod friction_reference;
 mod golden;
 mod long;
 mod pendulum;

@@ -1,0 +1,350 @@
+//! Steps with dry friction, which is solved for: a joint slips one way or sticks, and switches between these are located.
+//!
+//! The torque of dry friction is set-valued: c against the motion, and at rest whatever holds the joint within −c to c. Made
+//! smooth it is so stiff that an explicit method needs steps far below those of everything else. So the state says by speeds
+//! that are exactly zero which joints may stick; [`instant`] finds which of them do; between two switches the motion is smooth
+//! and a step has the order of its integrator. A step in which a speed reaches zero, or a torque what friction holds at most,
+//! ends there, and another one makes the rest of it: the switch is located as in Shampine, Gladwell, Brankin 1991.
+//!
+//! Semi-implicit Euler does not locate switches: it takes the torque with which speeds at the end of the step obey the law
+//! (Moreau 1988; Stewart, Trinkle 1996), of first order as all of that method. Rk4 does so too with what is left of a step that
+//! switches more than [`MOST_SWITCHES`] times.
+
+mod instant;
+
+pub(crate) use instant::{Friction, at};
+
+use arm_core::Joints;
+use instant::{Mode, Modes, Solved, modes};
+
+use crate::model::{Input, Link, Model, State};
+use crate::step::{Inputs, Memory, PROJECTIONS, remember, rk4};
+use crate::{Handle, Integrator, SimulationError};
+
+/// Switches that are located in one step.
+const MOST_SWITCHES: usize = 12;
+/// Most of a time constant of friction that falls with speed that a part of a step lasts.
+const RESOLVED: f64 = 0.3;
+/// Shortest part of a step that is made for that, as a fraction of the step.
+const SHORTEST: f64 = 1.0 / 128.0;
+/// Trials in which a switch is located.
+const TRIALS: usize = 60;
+/// How near a switch is located, as a fraction of the step.
+const LOCATED: f64 = 1e-12;
+/// Speed against the friction that is rounding \[rad/s\].
+const STILL: f64 = 1e-13;
+
+/// Friction that has no single answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Jam {
+    /// Time \[s\].
+    pub time: f64,
+    /// Zero-based joint.
+    pub joint: usize,
+    /// What the friction adds to itself, through the force with which it grows.
+    pub gain: f64,
+}
+
+impl From<Jam> for SimulationError {
+    fn from(jam: Jam) -> Self {
+        let Jam { time, joint, gain } = jam;
+        Self::Jam { time, joint, gain }
+    }
+}
+
+/// Advances a state by one step of length `h`.
+#[inline(never)]
+pub(crate) fn step<const N: usize>(
+    model: &Model<f64, N>,
+    integrator: Integrator,
+    h: f64,
+    inputs: Inputs<f64, N>,
+    (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
+) {
+    match integrator {
+        Integrator::SemiImplicitEuler => {
+            implicit(model, (h, 1.0), [inputs.start, inputs.end], (state, memory));
+        }
+        Integrator::Rk4 => switching(model, h, &inputs, (state, memory)),
+    }
+}
+
+/// One step of Rk4 in as many parts as it has switches and one more.
+fn switching<const N: usize>(
+    model: &Model<f64, N>,
+    h: f64,
+    inputs: &Inputs<f64, N>,
+    (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
+) {
+    let (mut from, mut switches) = (0.0, 0);
+    while switches < MOST_SWITCHES {
+        let start = input_at(inputs, h, from);
+        let (modes, first) = modes(model, &start, (&state.q, &state.qd), &memory.state, None);
+        if let Some((joint, gain)) = first.jam {
+            return stop(start.time, (joint, gain), (state, memory));
+        }
+        for joint in (0..N).filter(|&j| first.held[j]) {
+            state.qd[joint] = 0.0;
+        }
+        memory.kept.copy_from_slice(&memory.state);
+        let part = Part {
+            model,
+            inputs,
+            h,
+            from,
+            before: *state,
+            modes,
+            first,
+        };
+        let to = part.end(&start, &memory.kept);
+        let margin = part.attempt(to, (state, memory));
+        if margin >= 0.0 || margin.is_nan() {
+            from = to;
+        } else {
+            from = part.locate((to, margin), (state, memory));
+            switches += 1;
+        }
+        part.settle(state);
+        if 1.0 - from < LOCATED || margin.is_nan() {
+            return;
+        }
+    }
+    let (start, rest) = (input_at(inputs, h, from), (1.0 - from) * h);
+    implicit(model, (rest, 0.5), [&start, inputs.end], (state, memory));
+}
+
+/// What is left of a step, while no joint switches.
+struct Part<'a, const N: usize> {
+    model: &'a Model<f64, N>,
+    inputs: &'a Inputs<'a, f64, N>,
+    h: f64,
+    /// Where it begins, as a fraction of the step.
+    from: f64,
+    before: State<f64, N>,
+    modes: Modes<N>,
+    first: Solved<N>,
+}
+
+impl<const N: usize> Part<'_, N> {
+    /// Where it ends if nothing switches, as a fraction of the step.
+    ///
+    /// Friction that falls with speed makes a joint that begins to slip run away from rest; the step must not be longer than
+    /// that takes, or the slip begins a step too late.
+    fn end(&self, input: &Input<f64, N>, memory: &[f64]) -> f64 {
+        let rest = 1.0 - self.from;
+        if !self.model.dry_falls {
+            return 1.0;
+        }
+        let at = (&self.before.q, &self.before.qd);
+        let length = |speed: &Joints<f64, N>| {
+            let rate = instant::growth(self.model, input, (at.0, speed), memory, &self.modes);
+            let length = (RESOLVED / (rate * self.h)).max(SHORTEST);
+            if length < rest { length } else { rest }
+        };
+        let first = length(at.1);
+        // Slower joints slow down into steeper friction.
+        let slower = Joints::<f64, N>::from_fn(|j, _| {
+            let (speed, change) = (at.1[j], 1.5 * first * self.h * self.first.outcome.qdd[j]);
+            if speed * change >= 0.0 {
+                speed
+            } else if change.abs() < speed.abs() {
+                speed + change
+            } else {
+                0.0
+            }
+        });
+        let length = first.min(length(&slower));
+        if length < rest {
+            self.from + length
+        } else {
+            1.0
+        }
+    }
+
+    /// Makes the step up to a fraction of it, and tells how far the joint that is nearest to a switch is from it; below zero
+    /// it is beyond.
+    fn attempt(&self, to: f64, (state, memory): (&mut State<f64, N>, &mut Memory<f64>)) -> f64 {
+        *state = self.before;
+        memory.state.copy_from_slice(&memory.kept);
+        let fractions = [self.from, 0.5 * (self.from + to), to];
+        let [start, middle, end] = fractions.map(|x| input_at(self.inputs, self.h, x));
+        let inputs = Inputs {
+            start: &start,
+            middle: &middle,
+            end: &end,
+        };
+        let (mut begun, mut last) = (false, self.first);
+        let h = (to - self.from) * self.h;
+        rk4(
+            self.model,
+            (h, inputs),
+            (state, memory),
+            |input, q, qd, memory| {
+                if begun {
+                    last = instant::solve(self.model, input, (q, qd), memory, (&self.modes, None));
+                }
+                begun = true;
+                last.outcome
+            },
+        );
+        for joint in (0..N).filter(|&j| self.first.held[j]) {
+            state.qd[joint] = 0.0;
+        }
+        if matches!(self.model.link, Link::Rigid) {
+            let how = (PROJECTIONS, &self.first.held);
+            self.model.project(&end, state, how);
+        }
+        self.margin(state, &last)
+    }
+
+    fn margin(&self, state: &State<f64, N>, last: &Solved<N>) -> f64 {
+        let mut margin = f64::INFINITY;
+        for j in 0..N {
+            let distance = match self.modes[j] {
+                Mode::Slips(way) if way != 0.0 => {
+                    let speed = way * state.qd[j];
+                    let size = self.before.qd[j].abs() + self.h * self.first.outcome.qdd[j].abs();
+                    if speed > -STILL {
+                        speed.max(0.0) / (size + STILL)
+                    } else {
+                        speed / (size + STILL)
+                    }
+                }
+                Mode::Sticks => instant::reserve(last, j),
+                Mode::None | Mode::Slips(_) => continue,
+            };
+            // Not a number counts as the nearest.
+            if !(distance >= margin) {
+                margin = distance;
+            }
+        }
+        margin
+    }
+
+    /// Makes the step up to the first switch, and tells where that is.
+    ///
+    /// Regula falsi in its Illinois form, with every third trial in the middle.
+    ///
+    /// * `after` - where it was tried to end it, and the margin there
+    fn locate(
+        &self,
+        after: (f64, f64),
+        (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
+    ) -> f64 {
+        let before = self.margin(&self.before, &self.first).max(1e-9);
+        let (mut low, mut high) = ((self.from, before), after);
+        let mut tried = after.0;
+        for trial in 1..=TRIALS {
+            if high.0 - low.0 < LOCATED {
+                break;
+            }
+            let share = if trial % 3 == 0 {
+                0.5
+            } else {
+                low.1 / (low.1 - high.1)
+            };
+            tried = low.0 + share * (high.0 - low.0);
+            let margin = self.attempt(tried, (state, memory));
+            if margin < 0.0 {
+                high = (tried, margin);
+                low.1 *= 0.5;
+                if margin > -LOCATED {
+                    break;
+                }
+            } else {
+                low = (tried, margin);
+                high.1 *= 0.5;
+            }
+        }
+        if tried != high.0 {
+            self.attempt(high.0, (state, memory));
+        }
+        high.0
+    }
+
+    /// Speeds that reached zero are exactly that.
+    fn settle(&self, state: &mut State<f64, N>) {
+        for j in 0..N {
+            if let Mode::Slips(way) = self.modes[j]
+                && way * state.qd[j] < 0.0
+            {
+                state.qd[j] = 0.0;
+            }
+        }
+    }
+}
+
+/// A step whose friction is that of its end. With it, angles go on with a speed that is `share` of the new one and else of the
+/// old one.
+fn implicit<const N: usize>(
+    model: &Model<f64, N>,
+    (h, share): (f64, f64),
+    [start, end]: [&Input<f64, N>; 2],
+    (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
+) {
+    let (_, now) = modes(model, start, (&state.q, &state.qd), &memory.state, Some(h));
+    if let Some(jam) = now.jam {
+        return stop(start.time, jam, (state, memory));
+    }
+    remember(model, h, start, (state, memory), &now.outcome);
+    let mut power = now.outcome.power;
+    for j in 0..N {
+        let before = state.qd[j];
+        let after = if now.held[j] {
+            0.0
+        } else {
+            before + h * now.outcome.qdd[j]
+        };
+        // An impulse takes energy by the mean of the speeds before and after it.
+        power[2] += now.dry[j] * 0.5 * (after - before);
+        state.qd[j] = after;
+        state.q[j] += h * (before + share * (after - before));
+    }
+    for (work, power) in state.work.iter_mut().zip(power) {
+        *work += h * power;
+    }
+    if matches!(model.link, Link::Rigid) {
+        model.project(end, state, (PROJECTIONS, &now.held));
+    }
+}
+
+/// Ends the run.
+fn stop<const N: usize>(
+    time: f64,
+    (joint, gain): (usize, f64),
+    (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
+) {
+    memory.jam = Some(Jam { time, joint, gain });
+    state.qd = Joints::repeat(f64::NAN);
+}
+
+/// The drive at a fraction of a step: positions by Hermite's cubic, all else by the parabola through start, middle and end.
+fn input_at<const N: usize>(inputs: &Inputs<f64, N>, h: f64, x: f64) -> Input<f64, N> {
+    let Inputs { start, middle, end } = *inputs;
+    if x <= 0.0 {
+        return *start;
+    }
+    if x >= 1.0 {
+        return *end;
+    }
+    let y = 1.0 - x;
+    let parabola = |a: f64, b: f64, c: f64| y * (y - x) * a + 4.0 * x * y * b + x * (x - y) * c;
+    let plane = |of: &dyn Fn(&Handle<f64>) -> [f64; 2]| {
+        let [a, b, c] = [start, middle, end].map(|input| of(&input.handle));
+        [0, 1].map(|axis| parabola(a[axis], b[axis], c[axis]))
+    };
+    let (from, to) = (&start.handle, &end.handle);
+    Input {
+        time: start.time + x * (end.time - start.time),
+        handle: Handle {
+            position: [0, 1].map(|axis| {
+                let ends = y * y * (1.0 + 2.0 * x) * from.position[axis]
+                    + x * x * (1.0 + 2.0 * y) * to.position[axis];
+                ends + h * x * y * (y * from.velocity[axis] - x * to.velocity[axis])
+            }),
+            velocity: plane(&|handle| handle.velocity),
+            acceleration: plane(&|handle| handle.acceleration),
+        },
+        torque: Joints::from_fn(|j, _| parabola(start.torque[j], middle.torque[j], end.torque[j])),
+    }
+}

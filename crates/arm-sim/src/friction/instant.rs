@@ -1,0 +1,610 @@
+//! Dry friction at one instant: which joints stick, and what their friction is.
+
+use arm_core::effect::{Motion, dry_friction};
+use arm_core::{Joints, Plane, Pose, Products, Resistance, Scalar};
+
+use crate::model::{Input, Link, Model, Outcome, difference, powers, sum};
+use crate::terms::{Constraint, Terms};
+
+/// What the dry friction of a joint does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Mode {
+    /// There is none.
+    None,
+    /// It resists with all that it can against this direction, 1 or −1. Zero for a joint at rest that its friction cannot hold
+    /// because something else does.
+    Slips(f64),
+    /// It holds the joint.
+    Sticks,
+}
+
+/// What friction does in each joint.
+pub(crate) type Modes<const N: usize> = [Mode; N];
+
+/// What follows from state and input with friction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Solved<const N: usize> {
+    pub outcome: Outcome<f64, N>,
+    /// Torque with which dry friction resists \[N m\].
+    pub dry: Joints<f64, N>,
+    /// Most that it could be \[N m\].
+    pub most: [f64; N],
+    /// The joints that stick.
+    pub held: [bool; N],
+    /// Joint in which the friction has no single answer, and what it adds to itself.
+    pub jam: Option<(usize, f64)>,
+}
+
+/// Dry friction of all joints, as it is recorded.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Friction<T, const N: usize> {
+    /// Torque with which it resists \[N m\].
+    pub torque: Joints<T, N>,
+    /// Most that it could be \[N m\].
+    pub most: [T; N],
+}
+
+impl<T: Scalar, const N: usize> Friction<T, N> {
+    /// The torque of one of several effects in a joint, by what each could be at most \[N m\].
+    pub fn share(&self, joint: usize, most: T) -> T {
+        match (self.torque.get(joint), self.most.get(joint)) {
+            (Some(&torque), Some(&all)) => T::if_less(T::ZERO, all, torque * (most / all), T::ZERO),
+            _ => T::ZERO,
+        }
+    }
+}
+
+/// Share by which a torque may be beyond what friction holds, which is rounding.
+const ROUNDING: f64 = 1e-10;
+/// Speed of a rigidly led joint that is rounding \[rad/s\].
+const LED_STILL: f64 = 1e-9;
+/// Acceleration of a rigidly led joint that is rounding \[rad/s²\].
+const LED_STEADY: f64 = 1e-6;
+/// Share of its own inverse inertia below which what a joint gives to a torque of its friction is rounding.
+const STIFF: f64 = 1e-9;
+/// Passes of Newton's method for friction that grows with the joint force.
+const PASSES: usize = 30;
+/// Determinant of one less the gain of that friction below which it has no single answer.
+const SINGLE: f64 = 0.02;
+/// Changes of one mode each in which the modes of all joints are found.
+const CHANGES: usize = 64;
+
+/// What follows from state and input: outcome, and the friction in it.
+pub(crate) fn at<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    moving: (&Joints<f64, N>, &Joints<f64, N>),
+    memory: &[f64],
+) -> (Outcome<f64, N>, Option<Friction<f64, N>>) {
+    if !model.has_dry {
+        return (model.evaluate(input, moving.0, moving.1, memory), None);
+    }
+    let (_, solved) = modes(model, input, moving, memory, None);
+    let friction = Friction {
+        torque: solved.dry,
+        most: solved.most,
+    };
+    (solved.outcome, Some(friction))
+}
+
+/// How far what holds a joint is from the most that it can be, as a share of that.
+pub(crate) fn reserve<const N: usize>(solved: &Solved<N>, joint: usize) -> f64 {
+    let (most, held) = (solved.most[joint], solved.dry[joint].abs());
+    if most > 0.0 {
+        1.0 + ROUNDING - held / most
+    } else {
+        -held
+    }
+}
+
+/// Finds what friction does in each joint, and what follows.
+///
+/// A joint that moves slips. What joints at rest do is a linear complementarity problem in their accelerations: each sticks
+/// within what holds it, or slips the way in which it is accelerated. With `ahead` \[s\] it is one of all joints, in their
+/// speeds after that time. From all of them sticking, the first that cannot be so changes, until none is left: Murty's
+/// principal pivoting, which ends where the inertia matrix is positive definite.
+pub(crate) fn modes<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
+    memory: &[f64],
+    ahead: Option<f64>,
+) -> (Modes<N>, Solved<N>) {
+    let led = matches!(model.link, Link::Rigid);
+    let rests = |j: usize| qd[j] == 0.0 || (led && qd[j].abs() < LED_STILL);
+    let open: [bool; N] = core::array::from_fn(|j| model.dry[j] && (ahead.is_some() || rests(j)));
+    let mut modes: Modes<N> = core::array::from_fn(|j| match (model.dry[j], open[j]) {
+        (false, _) => Mode::None,
+        (true, true) => Mode::Sticks,
+        (true, false) => Mode::Slips(qd[j].signum()),
+    });
+    let speed = |j: usize| ahead.map_or(0.0, |h| qd[j] / h);
+    let mut solved = solve(model, input, (q, qd), memory, (&modes, ahead));
+    for _ in 0..CHANGES {
+        if solved.jam.is_some() {
+            return (modes, solved);
+        }
+        let other = |j: usize| match modes[j] {
+            Mode::Sticks if !solved.held[j] => {
+                let rate = solved.outcome.qdd[j] + speed(j);
+                let steady = rate.abs() < LED_STEADY;
+                Some(Mode::Slips(if steady { 0.0 } else { rate.signum() }))
+            }
+            Mode::Sticks if reserve(&solved, j) < 0.0 => Some(Mode::Slips(solved.dry[j].signum())),
+            Mode::Slips(way) if way * (solved.outcome.qdd[j] + speed(j)) < 0.0 => {
+                Some(Mode::Sticks)
+            }
+            _ => None,
+        };
+        let Some((joint, mode)) = (0..N)
+            .filter(|&j| open[j])
+            .find_map(|j| other(j).map(|m| (j, m)))
+        else {
+            if model.feels_joint_force {
+                solved.jam = ambiguous(model, input, (q, qd), memory, (&modes, &solved));
+            }
+            return (modes, solved);
+        };
+        modes[joint] = mode;
+        solved = solve(model, input, (q, qd), memory, (&modes, ahead));
+    }
+    // Where friction does not grow with what it does only rounding keeps a mode from being found: either will do.
+    if model.feels_joint_force {
+        solved.jam = (0..N).find(|&j| open[j]).map(|j| (j, f64::INFINITY));
+    }
+    (modes, solved)
+}
+
+/// Joint whose friction may have several answers, and the largest that a newton metre of it can add to it.
+///
+/// With a joint force that is linear in the friction, `λ = ±μ |F₀ + λ f|` has one solution for each sign if `μ |f| < 1`. Beyond
+/// that it has two or none, and whether the joint sticks or slips does not follow from the law (Painlevé 1895).
+fn ambiguous<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
+    memory: &[f64],
+    (modes, solved): (&Modes<N>, &Solved<N>),
+) -> Option<(usize, f64)> {
+    let pose = Pose::new(q);
+    let arm = Arm {
+        model,
+        input,
+        pose: &pose,
+        qd,
+        force: solved.outcome.force_on_arm,
+        form: Form::at(model, &pose, qd),
+    };
+    let answer = Answer {
+        qdd: solved.outcome.qdd,
+        force: solved.outcome.force_on_arm,
+    };
+    let through = model.through_joints(&pose, (qd, &answer.qdd), answer.force);
+    let motion = Motion::new(input.time, *q, *qd).with_joint_force(&through);
+    let gain = |j: usize| {
+        let slope = slope(model, &motion, memory, j);
+        if slope == 0.0 {
+            return 0.0;
+        }
+        let others = core::array::from_fn(|k| k != j && modes[k] == Mode::Sticks);
+        let then = arm.with_less(j, &answer, &others);
+        let [y, z] = [0, 1].map(|axis| then[j][axis] - through[j][axis]);
+        slope * (y * y + z * z).sqrt()
+    };
+    (0..N)
+        .filter(|&j| modes[j] != Mode::None)
+        .map(|j| (j, gain(j)))
+        .find(|(_, gain)| *gain >= 1.0 - SINGLE)
+}
+
+/// What a newton of force through a joint adds to its friction \[m\].
+fn slope<const N: usize>(
+    model: &Model<f64, N>,
+    motion: &Motion<f64, N>,
+    memory: &[f64],
+    joint: usize,
+) -> f64 {
+    let change = 1e-3 * (1.0 + motion.joint_force[joint]);
+    let force = |by: f64| {
+        let mut beside = *motion;
+        beside.joint_force[joint] += by;
+        dry_friction(&model.effects, &beside, memory)[joint]
+    };
+    (force(change) - force(0.0)) / change
+}
+
+/// Fastest rate with which the speed of a joint that slips grows by itself because its friction falls with it \[1/s\].
+pub(crate) fn growth<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
+    memory: &[f64],
+    modes: &Modes<N>,
+) -> f64 {
+    /// A change of speed in which friction hardly bends \[rad/s\].
+    const CHANGE: f64 = 1e-6;
+    let motion = Motion::new(input.time, *q, *qd);
+    let mut faster = motion;
+    for j in 0..N {
+        if let Mode::Slips(way) = modes[j] {
+            faster.qd[j] += CHANGE * way;
+        }
+    }
+    let [slow, fast] = [motion, faster].map(|m| dry_friction(&model.effects, &m, memory));
+    let pose = Pose::new(q);
+    let arm = Arm {
+        model,
+        input,
+        pose: &pose,
+        qd,
+        force: [0.0; 2],
+        form: Form::at(model, &pose, qd),
+    };
+    (0..N)
+        .filter(|&j| fast[j] < slow[j])
+        .map(|j| (slow[j] - fast[j]) / CHANGE * arm.column(j).0.qdd[j])
+        .fold(0.0, f64::max)
+}
+
+/// What follows from state, input and modes.
+///
+/// * `ahead` - time after which joints that stick rest \[s\]; `None` for those that rest already
+pub(crate) fn solve<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
+    memory: &[f64],
+    (modes, ahead): (&Modes<N>, Option<f64>),
+) -> Solved<N> {
+    let pose = Pose::new(q);
+    let (force, lost) = model.contact(input, q, qd, &pose);
+    let arm = Arm {
+        model,
+        input,
+        pose: &pose,
+        qd,
+        force,
+        form: Form::at(model, &pose, qd),
+    };
+    let mut motion = Motion::new(input.time, *q, *qd);
+    let mut rubbing = Rubbing {
+        modes,
+        wanted: ahead.map_or_else(Joints::zeros, |h| qd / h),
+        memory,
+    };
+    let mut resisting = model.resisting(&motion, memory);
+    let mut found = rubbing.under(&arm, &mut motion, &difference(&input.torque, &resisting));
+    if model.feels_besides_dry {
+        for _ in 1..model.passes() {
+            resisting = model.resisting(&motion, memory);
+            found = rubbing.under(&arm, &mut motion, &difference(&input.torque, &resisting));
+        }
+    }
+    let v = match &model.link {
+        Link::Forced(_) => model.tip_velocity(qd, &pose),
+        _ => input.handle.velocity,
+    };
+    let all = sum(&resisting, &found.dry);
+    Solved {
+        outcome: Outcome {
+            qdd: found.answer.qdd,
+            force_on_arm: found.answer.force,
+            power: powers((found.answer.force, v), [&input.torque, &all], qd, lost),
+            joint_force: motion.joint_force,
+        },
+        dry: found.dry,
+        most: found.most,
+        held: found.held,
+        jam: found.jam,
+    }
+}
+
+/// Accelerations, and the force on the arm that belongs to them.
+#[derive(Clone, Copy, Debug)]
+struct Answer<const N: usize> {
+    qdd: Joints<f64, N>,
+    force: Plane<f64>,
+}
+
+impl<const N: usize> Answer<N> {
+    /// Less a multiple of another one.
+    fn less(&mut self, factor: f64, other: &Self) {
+        for i in 0..N {
+            self.qdd[i] -= factor * other.qdd[i];
+        }
+        for axis in 0..2 {
+            self.force[axis] -= factor * other.force[axis];
+        }
+    }
+}
+
+/// An arm in one state, which answers any torques.
+struct Arm<'a, const N: usize> {
+    model: &'a Model<f64, N>,
+    input: &'a Input<f64, N>,
+    pose: &'a Pose<f64, N>,
+    qd: &'a Joints<f64, N>,
+    /// Of a contact that gives way.
+    force: Plane<f64>,
+    form: Form<N>,
+}
+
+// One of them lives at a time, on the stack of a step.
+#[allow(clippy::large_enum_variant)]
+enum Form<const N: usize> {
+    Links(Products<f64, N>, Resistance<f64, N>),
+    Joints(Terms<f64, N>, Option<Constraint<f64, N>>),
+}
+
+impl<const N: usize> Form<N> {
+    #[inline]
+    fn at(model: &Model<f64, N>, pose: &Pose<f64, N>, qd: &Joints<f64, N>) -> Self {
+        if model.in_link_form() {
+            let resistance = Resistance::at(&model.products, pose, qd);
+            return Self::Links(model.products, resistance);
+        }
+        let terms = model.terms(pose, qd);
+        let constraint = matches!(model.link, Link::Rigid).then(|| terms.constraint());
+        Self::Joints(terms, constraint)
+    }
+}
+
+impl<const N: usize> Arm<'_, N> {
+    #[inline]
+    fn under(&self, torque: &Joints<f64, N>) -> Answer<N> {
+        let (qdd, force) = match &self.form {
+            Form::Links(products, resistance) => {
+                let load = self.model.load(self.pose, torque, self.force);
+                let qdd = resistance.accelerations(products, self.pose, &load);
+                (qdd, self.force)
+            }
+            Form::Joints(terms, _) => self
+                .model
+                .accelerations(self.input, torque, self.force, terms),
+        };
+        Answer { qdd, force }
+    }
+
+    /// What one newton metre in a joint adds, and what it would give way by if nothing held the tip.
+    fn column(&self, joint: usize) -> (Answer<N>, f64) {
+        let (free, constraint) = match &self.form {
+            Form::Links(_, resistance) => (resistance.column(joint), None),
+            Form::Joints(terms, constraint) => {
+                let mut unit = Joints::<f64, N>::zeros();
+                unit[joint] = 1.0;
+                let free = terms.accelerate(&unit);
+                (
+                    free,
+                    constraint.as_ref().map(|c| (c, terms.tip_rate(&free))),
+                )
+            }
+        };
+        let mut answer = Answer {
+            qdd: free,
+            force: [0.0; 2],
+        };
+        if let Some((constraint, [y, z])) = constraint {
+            answer.force = constraint.force([-y, -z]);
+            answer.qdd = sum(&free, &constraint.response(answer.force));
+        }
+        (answer, free[joint])
+    }
+
+    /// Forces through the joints with one newton metre less in a joint, while others stick \[N\].
+    fn with_less(&self, joint: usize, answer: &Answer<N>, sticks: &[bool; N]) -> [Plane<f64>; N] {
+        let (mut column, _) = self.column(joint);
+        self.hold(&mut column, sticks, &Joints::zeros());
+        let mut less = *answer;
+        less.less(1.0, &column);
+        self.model
+            .through_joints(self.pose, (self.qd, &less.qdd), less.force)
+    }
+
+    /// Takes from an answer what joints that stick do, so that these have the accelerations wanted of them.
+    ///
+    /// Returns their torques, and which of them stick: not those that nothing but the handle moves.
+    fn hold(
+        &self,
+        answer: &mut Answer<N>,
+        sticks: &[bool; N],
+        wanted: &Joints<f64, N>,
+    ) -> (Joints<f64, N>, [bool; N]) {
+        let (mut held, mut torque) = (*sticks, Joints::<f64, N>::zeros());
+        let mut columns = [*answer; N];
+        let (mut m, mut left, mut own) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
+        for k in (0..N).filter(|&k| sticks[k]) {
+            (columns[k], own[k]) = self.column(k);
+            left[k] = answer.qdd[k] - wanted[k];
+        }
+        for k in (0..N).filter(|&k| sticks[k]) {
+            for i in (0..N).filter(|&i| sticks[i]) {
+                m[i][k] = columns[k].qdd[i];
+            }
+        }
+        for k in 0..N {
+            // Not a number counts as stiff.
+            held[k] = sticks[k] && m[k][k] > STIFF * own[k];
+            if !held[k] {
+                continue;
+            }
+            for i in (k + 1..N).filter(|&i| sticks[i]) {
+                let factor = m[i][k] / m[k][k];
+                for c in k..N {
+                    m[i][c] -= factor * m[k][c];
+                }
+                left[i] -= factor * left[k];
+            }
+        }
+        for k in (0..N).rev().filter(|&k| held[k]) {
+            let mut rest = left[k];
+            for c in (k + 1..N).filter(|&c| held[c]) {
+                rest -= m[k][c] * torque[c];
+            }
+            torque[k] = rest / m[k][k];
+        }
+        for k in (0..N).filter(|&k| held[k]) {
+            answer.less(torque[k], &columns[k]);
+        }
+        for k in (0..N).filter(|&k| held[k]) {
+            answer.qdd[k] = wanted[k];
+        }
+        (torque, held)
+    }
+}
+
+/// What friction does at one instant, and what the joints that stick are to do.
+struct Rubbing<'a, const N: usize> {
+    modes: &'a Modes<N>,
+    /// Speeds that joints lose in a second, where they are to rest after a time \[rad/s²\].
+    wanted: Joints<f64, N>,
+    memory: &'a [f64],
+}
+
+/// What follows with friction.
+struct Found<const N: usize> {
+    answer: Answer<N>,
+    dry: Joints<f64, N>,
+    most: [f64; N],
+    held: [bool; N],
+    jam: Option<(usize, f64)>,
+}
+
+impl<const N: usize> Rubbing<'_, N> {
+    /// What follows under given torques besides friction; the joint forces are put into the motion where an effect feels them.
+    fn under(
+        &mut self,
+        arm: &Arm<'_, N>,
+        motion: &mut Motion<f64, N>,
+        net: &Joints<f64, N>,
+    ) -> Found<N> {
+        let (model, modes) = (arm.model, self.modes);
+        let sticks = modes.map(|mode| mode == Mode::Sticks);
+        let any = sticks.contains(&true);
+        let stop = self.wanted.map(|w| -w);
+        let way = |j: usize| match modes[j] {
+            Mode::Slips(way) => way,
+            Mode::None | Mode::Sticks => 0.0,
+        };
+        let mut most = dry_friction(&model.effects, motion, self.memory);
+        let mut slips = Joints::<f64, N>::from_fn(|j, _| way(j) * most[j]);
+        let (mut jam, mut settled) = (None, !model.feels_joint_force);
+        for _ in 0..PASSES {
+            let mut answer = arm.under(&difference(net, &slips));
+            let (mut dry, mut held) = (Joints::zeros(), [false; N]);
+            if any {
+                (dry, held) = arm.hold(&mut answer, &sticks, &stop);
+            }
+            let found = |most, jam| Found {
+                answer,
+                dry: sum(&dry, &slips),
+                most,
+                held,
+                jam,
+            };
+            if settled {
+                return found(most, jam);
+            }
+            let moving = (arm.qd, &answer.qdd);
+            let through = model.through_joints(arm.pose, moving, answer.force);
+            *motion = motion.with_joint_force(&through);
+            most = dry_friction(&model.effects, motion, self.memory);
+            let missing = Joints::<f64, N>::from_fn(|j, _| way(j) * most[j] - slips[j]);
+            let size = 1.0 + slips.amax();
+            // What is not finite is not for this to say.
+            let lost = !missing.iter().all(|m| m.is_finite());
+            if jam.is_some() || lost || missing.amax() <= 1e-12 * size {
+                return found(most, jam);
+            }
+            let gains = self.gains(arm, motion, (&answer, &through), &sticks);
+            let (change, determinant) = newton(&gains, &missing);
+            if determinant <= SINGLE {
+                jam = Some(strongest(&gains));
+                settled = true;
+            }
+            slips += change;
+        }
+        jam = Some((0, f64::INFINITY));
+        let mut answer = arm.under(&difference(net, &slips));
+        let (dry, held) = arm.hold(&mut answer, &sticks, &stop);
+        Found {
+            answer,
+            dry: sum(&dry, &slips),
+            most,
+            held,
+            jam,
+        }
+    }
+
+    /// What a newton metre of friction in each slipping joint adds to the friction of each, through the joint forces.
+    fn gains(
+        &self,
+        arm: &Arm<'_, N>,
+        motion: &Motion<f64, N>,
+        (answer, through): (&Answer<N>, &[Plane<f64>; N]),
+        sticks: &[bool; N],
+    ) -> [[f64; N]; N] {
+        let model = arm.model;
+        let mut slopes = [0.0; N];
+        for (j, gain) in slopes.iter_mut().enumerate() {
+            let Mode::Slips(way) = self.modes[j] else {
+                continue;
+            };
+            *gain = way * slope(model, motion, self.memory, j);
+        }
+        let mut gains = [[0.0; N]; N];
+        for k in 0..N {
+            if !matches!(self.modes[k], Mode::Slips(way) if way != 0.0) {
+                continue;
+            }
+            let then = arm.with_less(k, answer, sticks);
+            for j in 0..N {
+                let [y, z] = through[j];
+                let size = motion.joint_force[j];
+                if size > 0.0 {
+                    let along = (y * (then[j][0] - y) + z * (then[j][1] - z)) / size;
+                    gains[j][k] = slopes[j] * along;
+                }
+            }
+        }
+        gains
+    }
+}
+
+/// Solution of `(1 − G) x = b`, and the determinant of its matrix.
+fn newton<const N: usize>(gains: &[[f64; N]; N], b: &Joints<f64, N>) -> (Joints<f64, N>, f64) {
+    let mut m = *gains;
+    for (i, row) in m.iter_mut().enumerate() {
+        for (k, value) in row.iter_mut().enumerate() {
+            *value = if i == k { 1.0 - *value } else { -*value };
+        }
+    }
+    let (mut x, mut determinant) = (*b, 1.0);
+    for k in 0..N {
+        determinant *= m[k][k];
+        for i in k + 1..N {
+            let factor = m[i][k] / m[k][k];
+            for c in k..N {
+                m[i][c] -= factor * m[k][c];
+            }
+            x[i] -= factor * x[k];
+        }
+    }
+    for k in (0..N).rev() {
+        for c in k + 1..N {
+            x[k] -= m[k][c] * x[c];
+        }
+        x[k] /= m[k][k];
+    }
+    (x, determinant)
+}
+
+/// The joint whose friction adds most to itself, and how much.
+fn strongest<const N: usize>(gains: &[[f64; N]; N]) -> (usize, f64) {
+    let mut most = (0, gains.first().map_or(0.0, |row| row[0]));
+    for (j, row) in gains.iter().enumerate() {
+        if row[j] > most.1 {
+            most = (j, row[j]);
+        }
+    }
+    most
+}
