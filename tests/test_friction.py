@@ -64,7 +64,9 @@ def mujoco_swing(start: tuple[float, float], duration: float, dt: float) -> np.n
 def test_an_arm_falls_swings_and_sticks_as_in_mujoco(tmp_path: Path) -> None:
     """MuJoCo's friction is a soft constraint of first order: it comes nearer with its step."""
     start = (-0.4, 0.9)
-    effects = "".join(effect("coulomb", k + 1, torque=FRICTION[k], smoothing=0.0) + effect("viscous", k + 1, viscosity=VISCOSITY) for k in range(2))
+    effects = "".join(
+        effect("coulomb", k + 1, torque=FRICTION[k], smoothing=0.0) + effect("viscous", k + 1, viscosity=VISCOSITY) for k in range(2)
+    )
     run = armrs.simulate(written(tmp_path, effects), None, start=np.array(start), start_speed=np.zeros(2), duration=4.0, rate=100.0)
     coarse, fine = (np.abs(mujoco_swing(start, 4.0, dt) - run.q).max() for dt in (1e-4, 2.5e-5))
     print(f"MuJoCo differs by {coarse:.2e} rad at 0.1 ms, {fine:.2e} rad at 0.025 ms")
@@ -121,9 +123,7 @@ def test_rapier_with_set_valued_friction_is_compared_with_half_the_step(tmp_path
 
 
 @pytest.mark.parametrize("name", STRONG)
-def test_smooth_friction_too_steep_for_the_step_ends_with_status_1(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
+def test_smooth_friction_too_steep_for_the_step_ends_with_status_1(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     """The force was off by up to twice its size, with status 0."""
     path = written(tmp_path, "".join(effect(kind, joint, **values) for kind, joint, values in STRONG[name]))
     movement = tmp_path / "movement.toml"
@@ -133,6 +133,60 @@ def test_smooth_friction_too_steep_for_the_step_ends_with_status_1(
     assert json.loads(printed.out)["half_step"]["force_share"] > 0.01
     assert status == 1
     assert "smoothing = 0" in printed.err
+
+
+def random_arm(rng: np.random.Generator, joints: int) -> tuple[str, armrs.Movement]:
+    """Return a model whose smooth friction reaches the bounds of the catalogue, and a movement."""
+    shrink = (1.0, 0.8, 0.35)
+    text = "[arm]\n"
+    for k in range(joints):
+        length, mass = shrink[k] * rng.uniform(0.25, 0.36), shrink[k] * rng.uniform(1.0, 2.5)
+        com, inertia = length * rng.uniform(0.4, 0.6), mass * length**2 * rng.uniform(0.06, 0.12)
+        text += f'[[arm.segment]]\nname = "s{k}"\nlength = {length}\nmass = {mass}\ncom = {com}\ninertia = {inertia}\n'
+    text += "[[arm.joint]]\n" * joints
+    start = np.array([-60.0, 60.0, 5.0])[:joints] + rng.uniform(-15.0, 15.0, joints)
+    path = np.radians([start, start + rng.uniform(-25.0, 25.0, joints)])
+
+    def spread(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    for k in range(joints):
+        rest = path[0, k]
+        text += effect("viscous", k + 1, viscosity=rng.uniform(0.02, 0.3)) + effect(
+            "elastic", k + 1, stiffness=rng.uniform(0.5, 4.0), rest=rest
+        )
+        text += (
+            "",
+            effect("coulomb", k + 1, torque=spread(0.02, 100.0)),
+            effect("stribeck", k + 1, torque=spread(0.02, 100.0), speed=spread(0.01, 1.0)),
+            effect("load_friction", k + 1, coefficient=spread(1e-3, 1.0)),
+            effect("thixotropy", k + 1, friction=spread(0.02, 100.0), stiffness=rng.uniform(0.0, 2.0), rest=rest),
+        )[rng.integers(5)]
+    return text, armrs.Movement(path, speed=1.5, acceleration=6.0)
+
+
+def test_no_run_with_smooth_friction_is_wrong_in_silence(tmp_path: Path) -> None:
+    """Random arms at the default step against a twentieth of it; arms = 200 gives the figures of docs/conventions.md."""
+    arms = 24
+    counts = {"refused": 0, "wrong, warned": 0, "wrong, silent": 0, "right, warned": 0, "right, silent": 0}
+    rng = np.random.default_rng(11)
+    path = tmp_path / "model.toml"
+    for k in range(arms):
+        text, movement = random_arm(rng, 2 + k % 2)
+        path.write_text(text)
+        try:
+            usual, fine = (armrs.simulate(path, movement, dt=dt) for dt in (0.25e-3, 0.25e-3 / 20))
+        except armrs.SimulationError:
+            counts["refused"] += 1
+            continue
+        angle = np.degrees(np.abs(usual.q - fine.q).max())
+        force = np.hypot(*(usual.force_on_arm - fine.force_on_arm).T).max() / np.hypot(*fine.force_on_arm.T).max()
+        wrong = "wrong" if angle > 0.01 or force > 0.01 else "right"
+        counts[f"{wrong}, {'warned' if usual.warnings else 'silent'}"] += 1
+    print(counts)
+    assert counts["wrong, silent"] == 0
+    assert min(counts["wrong, warned"], counts["right, silent"]) >= 5
+    assert counts["right, warned"] <= 0.1 * arms
 
 
 def test_a_run_that_loses_energy_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

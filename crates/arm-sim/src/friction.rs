@@ -10,6 +10,7 @@
 //! (Moreau 1988; Stewart, Trinkle 1996), of first order as all of that method. Rk4 does so too with what is left of a step that
 //! switches more than [`MOST_SWITCHES`] times.
 
+mod gain;
 mod instant;
 
 pub(crate) use instant::{Friction, at};
@@ -214,9 +215,7 @@ impl<const N: usize> Part<'_, N> {
                 Mode::None | Mode::Slips(_) => continue,
             };
             // Not a number counts as the nearest.
-            if !(distance >= margin) {
-                margin = distance;
-            }
+            margin = if distance >= margin { margin } else { distance };
         }
         margin
     }

@@ -291,6 +291,35 @@ fn differences<const N: usize>(r: &Recording<N>, truth: &[(Motion<N>, Follows<N>
     (angle, force / size)
 }
 
+/// `cargo test --release -p arm-sim --test suite -- --ignored --nocapture what_sticking_costs`.
+#[test]
+#[ignore = "a measurement: the times of docs/performance.md"]
+fn what_sticking_costs() {
+    for (kind, values) in [
+        (Kind::Coulomb, vec![0.5]),
+        (Kind::Stribeck, vec![0.5, 0.06]),
+        (Kind::LoadFriction, vec![0.01]),
+        (Kind::Thixotropy, vec![0.5, 0.0, 0.0, 0.1, 3.0]),
+    ] {
+        let [smooth, solved] = [0.01, 0.0].map(|smoothing| {
+            let mut experiment = models::mechanical_experiment(2.0, [0.0; 2]).expect("a sample");
+            let values = [&values[..], &[smoothing]].concat();
+            experiment.effects = (0..2)
+                .map(|joint| Effect::new(kind, joint).with(&values))
+                .collect();
+            let runs = (0..20).map(|_| {
+                let begun = std::time::Instant::now();
+                run(&experiment);
+                begun.elapsed().as_secs_f64()
+            });
+            runs.fold(f64::INFINITY, f64::min)
+        });
+        let [smooth_ms, solved_ms] = [smooth, solved].map(|s| 1e3 * s);
+        let ratio = solved / smooth;
+        println!("{kind:?}: smooth {smooth_ms:.2} ms, set-valued {solved_ms:.2} ms, {ratio:.2}");
+    }
+}
+
 /// `cargo test --release -p arm-sim --test suite -- --ignored --nocapture two_hundred`.
 #[test]
 #[ignore = "some minutes; the table of docs/effects.md"]

@@ -401,10 +401,9 @@ impl<const N: usize> Reference<N> {
             let reached = !switches && wanted >= end - time;
             time = if reached { end } else { time + made.1 };
             for j in 0..N {
-                if self.has_friction(j) && f64::from(modes[j]) * at.qd[j] <= 1e-12 {
-                    if modes[j] == 0 || switches || at.qd[j] == 0.0 {
-                        at.qd[j] = 0.0;
-                    }
+                let stops = self.has_friction(j) && f64::from(modes[j]) * at.qd[j] <= 1e-12;
+                if stops && (modes[j] == 0 || switches) {
+                    at.qd[j] = 0.0;
                 }
             }
             if switches {
