@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from .simulate import Simulated
 
 WARNED = 1e-3
 """Share from which an error is warned of."""
 WRONG = 1e-2
 """Share from which a run is no result: exit status 1."""
 _ROUNDING = 1e-10
+
+
+class Piece(Protocol):
+    """What is judged of a piece of a simulated run; see `armrs.Simulated`."""
+
+    @property
+    def columns(self) -> Mapping[str, np.ndarray]: ...
+    @property
+    def q(self) -> np.ndarray: ...
+    @property
+    def force_on_arm(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -54,7 +62,7 @@ class EnergyBalance:
         )
 
 
-def energy_balance(pieces: Iterable[Simulated]) -> EnergyBalance:
+def energy_balance(pieces: Iterable[Piece]) -> EnergyBalance:
     """Return the energy balance of a run from its pieces, in order."""
     error = exchanged = stored = 0.0
     before: np.ndarray | None = None
@@ -107,12 +115,12 @@ class StepError:
         )
 
 
-def step_error(pieces: Iterable[Simulated], halved: Iterable[Simulated]) -> StepError:
+def step_error(pieces: Iterable[Piece], halved: Iterable[Piece]) -> StepError:
     """Compare a run with the same run at half the step, sample by sample.
 
     Parameters
     ----------
-    pieces, halved : iterable of Simulated
+    pieces, halved : iterable of Piece
         Of equal lengths, as `Simulated.pieces` gives them.
     """
     angle = force = largest = 0.0
