@@ -19,11 +19,16 @@ class Piece(Protocol):
     """What is judged of a piece of a simulated run; see `armrs.Simulated`."""
 
     @property
-    def columns(self) -> Mapping[str, np.ndarray]: ...
+    def columns(self) -> Mapping[str, np.ndarray]:
+        """Every column by its name, energies and works among them."""
+
     @property
-    def q(self) -> np.ndarray: ...
+    def q(self) -> np.ndarray:
+        """Joint angles [rad], shape (n_samples, n_joints)."""
+
     @property
-    def force_on_arm(self) -> np.ndarray: ...
+    def force_on_arm(self) -> np.ndarray:
+        """Contact force [N], shape (n_samples, 2)."""
 
 
 @dataclass(frozen=True)
