@@ -473,6 +473,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let own = (&law.question, law.gain);
         law.better = rivals
             .iter()
+            // A law that few joints have is asked beside the base, and does not take its place.
+            .filter(|r| r.alternative.candidate.kind().probe().passive)
             .find(|r| self.takes_over(&r.alternative, own, 0.0))
             .map(|r| r.fitted.clone());
         law.alternatives = self.ties(rivals, &law.question, law.gain);
