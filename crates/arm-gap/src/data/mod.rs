@@ -1,6 +1,7 @@
 //! What was measured, made ready: session, repeats, the samples that are compared, noise.
 
 pub mod noise;
+pub mod passive_law;
 pub mod prepared_session;
 pub mod repeats;
 pub mod session;

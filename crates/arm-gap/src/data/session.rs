@@ -6,8 +6,8 @@ use arm_ident::regression::trial::{Role, Tolerance, Trial};
 use arm_sim::{SimulationError, altered};
 
 use crate::GapError;
+use crate::data::passive_law::Passive;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::selection::passive_base::Passive;
 
 /// A data set as the workflow sees it.
 #[derive(Clone, Debug)]

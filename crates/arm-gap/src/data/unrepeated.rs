@@ -4,8 +4,8 @@ use crate::GapError;
 use crate::candidates::candidate::Library;
 use crate::data::noise::{Noise, dot};
 use crate::data::prepared_session::{PreparedSession, flat};
+use crate::measurement_model::hypothesis::priors;
 use crate::measurement_model::prediction::Channels;
-use crate::selection::fit::priors;
 use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
 use crate::sensitivity::normal_equations::solve;
 

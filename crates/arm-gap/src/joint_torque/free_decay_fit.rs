@@ -10,9 +10,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::data::prepared_session::PreparedSession;
 use crate::joint_torque::free_run::{CHANGE, State};
+use crate::measurement_model::hypothesis::priors;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::prediction::Channels;
-use crate::selection::fit::{Fitted, Precision, priors};
+use crate::selection::fit::{Fitted, Precision};
 use crate::sensitivity::normal_equations::solve;
 
 /// Length of a run \[s\].

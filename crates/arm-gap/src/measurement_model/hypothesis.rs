@@ -145,6 +145,28 @@ impl<const N: usize> Hypothesis<N> {
     }
 }
 
+/// The distance of each number from what was known of it, with its standard deviation.
+pub fn priors<const N: usize>(
+    hypothesis: &Hypothesis<N>,
+    coordinates: &[Coordinate],
+) -> Vec<Option<(f64, f64)>> {
+    coordinates
+        .iter()
+        .map(|c| {
+            c.prior
+                .map(|(mean, sd)| (hypothesis.get(c.target) - mean, sd))
+        })
+        .collect()
+}
+
+/// What the numbers of a hypothesis cost against what was known of them.
+pub fn departure<const N: usize>(hypothesis: &Hypothesis<N>, coordinates: &[Coordinate]) -> f64 {
+    let known = priors(hypothesis, coordinates).into_iter().flatten();
+    known
+        .map(|(distance, sd)| (distance / sd) * (distance / sd))
+        .sum()
+}
+
 #[cfg(test)]
 mod tests {
     use arm_core::effect::Kind;

@@ -13,9 +13,9 @@ use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{FURTHEST, Session};
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, difference};
-use crate::selection::set_apart::SLOW;
 use crate::sensitivity::linearization_point::slope;
 use crate::sensitivity::normal_equations::solve;
+use crate::trial_specific::component::SLOW;
 use crate::trial_specific::component::shapes_of;
 
 /// Times that channels are weighed anew by what is left of them.

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
 use crate::measurement_model::prediction::Channels;
 use crate::selection::score_variance::spread;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -52,28 +52,6 @@ fn named<const N: usize>(hypothesis: &Hypothesis<N>, asked: &[Candidate]) -> Vec
     let each = asked.iter().enumerate();
     each.flat_map(|(slot, c)| c.coordinates(slot, &hypothesis.named[slot]))
         .collect()
-}
-
-/// The distance of each number from what was known of it, with its standard deviation.
-pub fn priors<const N: usize>(
-    hypothesis: &Hypothesis<N>,
-    coordinates: &[Coordinate],
-) -> Vec<Option<(f64, f64)>> {
-    coordinates
-        .iter()
-        .map(|c| {
-            c.prior
-                .map(|(mean, sd)| (hypothesis.get(c.target) - mean, sd))
-        })
-        .collect()
-}
-
-/// What the numbers of a hypothesis cost against what was known of them.
-pub fn departure<const N: usize>(hypothesis: &Hypothesis<N>, coordinates: &[Coordinate]) -> f64 {
-    let known = priors(hypothesis, coordinates).into_iter().flatten();
-    known
-        .map(|(distance, sd)| (distance / sd) * (distance / sd))
-        .sum()
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {

@@ -7,9 +7,10 @@ use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
+use crate::measurement_model::hypothesis::priors;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::prediction::{Channels, difference};
-use crate::selection::fit::{priors, regularise};
+use crate::selection::fit::regularise;
 use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
 

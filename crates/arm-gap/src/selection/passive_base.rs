@@ -15,6 +15,7 @@ use arm_numerics::statistics::distributions::chi_square_tail;
 
 use crate::GapError;
 use crate::candidates::candidate::{Candidate, Library, Twin};
+use crate::data::passive_law::{Free, Passive};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
@@ -45,32 +46,6 @@ const EXCHANGES: usize = 3;
 const TURNS: usize = 4;
 /// Furthest start of a segment from its literature values, in standard deviations.
 const FURTHEST_START: f64 = 3.0;
-
-/// A law of a joint that the model leaves without one.
-#[derive(Clone, Debug)]
-pub struct Passive {
-    /// The law as it was identified from measured motion.
-    pub effect: Effect<f64>,
-    /// Its numbers that are fitted.
-    pub free: Vec<Free>,
-    /// Whether measured motion shows it; the others are asked again once something is named.
-    pub likely: bool,
-}
-
-/// A number of a law, with what is known of it beforehand.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Free {
-    /// Its position among the parameters.
-    pub parameter: usize,
-    /// Value expected.
-    pub mean: f64,
-    /// Standard deviation: the typical size that follows from the weight of the arm.
-    pub sd: f64,
-    /// Smallest value allowed.
-    pub lower: f64,
-    /// A change that is small and yet seen.
-    pub step: f64,
-}
 
 /// A law of the passive base, and how clearly it stands out.
 struct Term {

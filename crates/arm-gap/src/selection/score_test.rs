@@ -5,14 +5,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::GapError;
 use crate::candidates::candidate::{Library, Twin, price};
 use crate::data::prepared_session::PreparedSession;
-use crate::selection::fit::{Fitted, priors, regularise};
+use crate::measurement_model::hypothesis::priors;
+use crate::selection::fit::{Fitted, regularise};
 use crate::selection::score_variance::{spread, unlike};
 use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
 use crate::sensitivity::normal_equations::{Normal, factor, solve};
-
-/// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
-/// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.
-pub const THRESHOLD: f64 = 12.0;
 
 /// The candidates' normal equations after everything else was projected off.
 pub struct ScoreTest {

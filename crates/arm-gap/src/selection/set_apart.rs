@@ -7,15 +7,11 @@ use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::prediction::Course;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::search_state::{Progress, SearchState, Settled};
-use crate::trial_specific::component::TrialSpecific;
+use crate::trial_specific::component::{SLOW, TrialSpecific};
 use crate::trial_specific::tremor_detection::Line;
 
 /// Most disturbances of single trials that are named.
 const DISTURBANCES: usize = 4;
-/// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
-/// what a model lacks of them reach that far.
-pub(crate) const SLOW: f64 = 3.0;
-
 /// What is kept apart from effects that last.
 pub(crate) struct SetApart<const N: usize> {
     /// What is not the same in every trial.

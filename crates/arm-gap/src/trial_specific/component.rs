@@ -3,6 +3,10 @@
 
 use arm_core::effect::{Effect, Kind, Nature};
 
+/// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
+/// what a model lacks of them reach that far.
+pub(crate) const SLOW: f64 = 3.0;
+
 /// An effect that stands apart from the fit of all trials.
 #[derive(Clone, Debug)]
 pub struct TrialSpecific {

@@ -11,9 +11,10 @@ use nalgebra::{DMatrix, DVector};
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
+use crate::measurement_model::hypothesis::departure;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, away_from_gaps, difference, margin, smooth};
-use crate::selection::fit::{departure, stepped};
+use crate::selection::fit::stepped;
 use crate::sensitivity::normal_equations::{Cluster, Scaled, factor};
 use crate::trial_specific::component::shapes_of;
 

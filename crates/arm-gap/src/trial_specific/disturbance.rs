@@ -2,6 +2,7 @@
 
 use arm_core::effect::{Effect, KINDS, Nature};
 
+use crate::candidates::candidate::price;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::prediction::Channels;
@@ -37,10 +38,8 @@ impl<const N: usize> PreparedSession<'_, N> {
             .filter(|&m| self.has_repeat(m))
             .filter(|&m| stands_out(&deviations[m], self.session.channels(), scale))
             .collect();
-        let rows = self.rows_of_references() as f64;
-        let tried = (self.fitted.len() * 4 * N * 100) as f64;
-        let price =
-            crate::selection::score_test::THRESHOLD + libm::log(rows) + 2.0 * libm::log(tried);
+        let tried = self.fitted.len() * 4 * N * 100;
+        let price = price(1, tried, self.rows_of_references());
         let mut best: Option<TrialSpecific> = None;
         for m in suspects {
             let trial = self.fitted[m];

@@ -7,8 +7,8 @@ use crate::candidates::candidate::Library;
 use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
 use crate::selection::score_test::ScoreTest;
-use crate::selection::set_apart::SLOW;
 use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::trial_specific::component::SLOW;
 use crate::trial_specific::tremor_detection::{SLOWEST_RIPPLE, UNSTEADY};
 
 /// Turns of the phase, over the longest trial, between two frequencies that are asked.

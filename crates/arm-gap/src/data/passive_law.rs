@@ -1,0 +1,29 @@
+//! A law that a joint may have which the model leaves without one.
+
+use arm_core::effect::Effect;
+
+/// A law of a joint that the model leaves without one.
+#[derive(Clone, Debug)]
+pub struct Passive {
+    /// The law as it was identified from measured motion.
+    pub effect: Effect<f64>,
+    /// Its numbers that are fitted.
+    pub free: Vec<Free>,
+    /// Whether measured motion shows it; the others are asked again once something is named.
+    pub likely: bool,
+}
+
+/// A number of a law, with what is known of it beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Free {
+    /// Its position among the parameters.
+    pub parameter: usize,
+    /// Value expected.
+    pub mean: f64,
+    /// Standard deviation: the typical size that follows from the weight of the arm.
+    pub sd: f64,
+    /// Smallest value allowed.
+    pub lower: f64,
+    /// A change that is small and yet seen.
+    pub step: f64,
+}
