@@ -1,76 +1,101 @@
-"""How the package is built: no long functions, no circles of imports, folders that do not know what is above them."""
+"""How the project is built: no long functions or files, no circles of imports, folders that do not know what is above them."""
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
-PACKAGE = Path(__file__).parents[1] / "python" / "armrs"
-LONGEST = 80
+import pytest
+
+import structure
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "python" / "armrs"
+CRATES = sorted(path.parent for path in ROOT.glob("*/*/src/lib.rs"))
+RUST = structure.sources(ROOT, ("crates", "bench", "examples"), ".rs")
+PYTHON = structure.sources(ROOT, ("python", "tests", "scripts", "examples", "bench"), ".py")
+
+LONGEST_FUNCTION = 80
 """Lines of a function, its docstring with it."""
+LONGEST_FILE = 600
+
+# What is not mended yet; these lists only become shorter.
+LONG_FUNCTIONS: set[str] = {
+    "bench/hidden/src/run.rs: run",
+    "bench/hidden/src/world.rs: new",
+    "crates/arm-cosim/src/description.rs: model_description",
+    "crates/arm-cosim/src/variables.rs: outputs",
+    "crates/arm-gap/src/selection/lack_of_fit.rs: lack_of_fit",
+    "crates/arm-gap/src/selection/model_selection.rs: rivals",
+    "crates/arm-gap/src/selection/score_test.rs: new",
+    "crates/arm-gap/src/selection/search.rs: round",
+    "crates/arm-gap/src/sensitivity/linearized_run.rs: follow",
+    "crates/arm-gap/src/trial_specific/tremor_detection.rs: explain",
+    "crates/arm-ident/examples/coverage.rs: main",
+    "crates/arm-py/src/own.rs: declare",
+    "crates/arm-sim/src/batch.rs: side_by_side",
+}
+LONG_FILES: set[str] = {
+    "crates/arm-capi/tests/suite/main.rs",
+    "crates/arm-core/src/estimator/mod.rs",
+    "crates/arm-gap/src/sensitivity/linearized_run.rs",
+    "crates/arm-model/tests/model.rs",
+    "crates/arm-sim/src/model.rs",
+    "python/armrs/workflows/simulate.py",
+}
+CIRCLES: list[list[str]] = [
+    ["hidden", "crate::cast", "crate::cast::joint", "crate::cast::rig"],
+    ["hidden", "crate::effect", "crate::effect::body", "crate::effect::dry", "crate::effect::elastic", "crate::effect::muscle"],
+    ["arm-capi", "crate", "crate::arm", "crate::held", "crate::motion", "crate::status"],
+    ["arm-core", "crate::effect::law", "crate::effect::probe"],
+    ["arm-core", "crate::scalar", "crate::series"],
+    ["arm-cosim", "crate::slave", "crate::state"],
+    ["arm-gap", "crate::data::prepared_session", "crate::sensitivity::linearization_point", "crate::sensitivity::rows"],
+    ["arm-gap", "crate::selection::model_selection", "crate::selection::search_state"],
+    ["arm-numerics", "crate::least_squares::condense", "crate::least_squares::factor"],
+    ["arm-py", "crate::arm", "crate::convert", "crate::kernel"],
+    ["arm-py", "crate::model", "crate::model::dataset", "crate::model::effect", "crate::model::parts", "crate::model::whole"],
+    [
+        "arm-sim",
+        "crate::discontinuities",
+        "crate::experiment",
+        "crate::friction",
+        "crate::input_buffer",
+        "crate::native",
+        "crate::prepare",
+        "crate::rapier",
+        "crate::rapier::leapfrog",
+        "crate::rapier::world",
+        "crate::recorder",
+        "crate::stability",
+        "crate::step",
+    ],
+]
 
 
-@cache
-def modules() -> dict[str, tuple[ast.Module, str]]:
-    """Return syntax and package of every module by its dotted name."""
-    found = {}
-    for path in PACKAGE.rglob("*.py"):
-        parts = ("armrs", *path.relative_to(PACKAGE).with_suffix("").parts)
-        is_package = parts[-1] == "__init__"
-        name = ".".join(parts[:-1] if is_package else parts)
-        found[name] = ast.parse(path.read_text(encoding="utf-8")), name if is_package else name.rpartition(".")[0]
-    return found
-
-
-def imports(name: str) -> set[str]:
-    """Return the modules of this package that a module imports anywhere, in functions as well. The root, which loads lazily, is left out."""
-    syntax, package = modules()[name]
-    found = set()
-    for node in ast.walk(syntax):
-        if isinstance(node, ast.ImportFrom) and node.level:
-            base = package.split(".")[: len(package.split(".")) - node.level + 1]
-            origin = ".".join([*base, *([node.module] if node.module else [])])
-            found |= {inner if (inner := f"{origin}.{alias.name}") in modules() else origin for alias in node.names}
-    return {other for other in found if other in modules() and other not in (name, "armrs")}
-
-
-def circles() -> Iterator[set[str]]:
-    """Yield every set of modules each of which leads to all others."""
-    graph = {name: imports(name) for name in modules() if name != "armrs"}
-
-    def reached(start: str) -> set[str]:
-        seen: set[str] = set()
-        todo = list(graph[start])
-        while todo:
-            name = todo.pop()
-            if name not in seen:
-                seen.add(name)
-                todo += graph[name]
-        return seen
-
-    beyond = {name: reached(name) for name in graph}
-    left = {name for name in graph if name in beyond[name]}
-    while left:
-        first = min(left)
-        circle = {other for other in left if other in beyond[first] and first in beyond[other]}
-        yield circle
-        left -= circle
+def is_test(path: Path) -> bool:
+    """Whether a Rust file holds tests alone, which list cases."""
+    return "tests" in path.parts
 
 
 def test_no_function_is_long() -> None:
-    long = [
-        f"{name}: {node.name} has {node.end_lineno - node.lineno + 1} lines"
-        for name, (syntax, _) in modules().items()
-        for node in ast.walk(syntax)
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and (node.end_lineno or 0) - node.lineno + 1 > LONGEST
-    ]
-    assert long == []
+    files = [*PYTHON, *(path for path in RUST if not is_test(path))]
+    assert structure.long_functions(ROOT, files, LONGEST_FUNCTION).keys() - LONG_FUNCTIONS == set()
 
 
-def test_no_circle_of_imports_has_three_modules() -> None:
-    assert [sorted(circle) for circle in circles() if len(circle) > 2] == []
+def test_no_file_is_long() -> None:
+    assert structure.long_files(ROOT, [*RUST, *PYTHON], LONGEST_FILE).keys() - LONG_FILES == set()
+
+
+def test_no_circle_in_a_crate() -> None:
+    assert len(CRATES) >= 10
+    found = [[source.parent.name, *circle] for source in CRATES for circle in structure.circles(structure.rust_imports(source))]
+    assert [circle for circle in found if not any(set(circle) <= set(known) for known in CIRCLES)] == []
+
+
+def test_no_circle_of_imports_in_the_package() -> None:
+    """At the start of a module none; with those in functions, where one of two modules may need the other late, none of three."""
+    assert structure.circles(structure.python_imports(PACKAGE, at_start=True)) == []
+    assert [circle for circle in structure.circles(structure.python_imports(PACKAGE)) if len(circle) > 2] == []
 
 
 def test_folders_do_not_know_what_is_above_them() -> None:
@@ -81,13 +106,93 @@ def test_folders_do_not_know_what_is_above_them() -> None:
         "montecarlo": {"cli"},
     }
     below = {"io": {"io", "model", "checks", "errors", "catalogue", "rig", "custom_effects"}}
-    for name in modules():
-        if name == "armrs":
-            continue  # it names everything for type checkers, and loads nothing
+    for name, used in structure.python_imports(PACKAGE).items():
         room = name.split(".")[1]
-        for other in imports(name):
+        for other in used:
             known = other.split(".")[1]
             if known in allowed and known != room:
                 assert room in allowed[known], f"{name} imports {other}"
             if room in below:
                 assert known in below[room], f"{name} imports {other}"
+
+
+# ---- that each rule finds what it is for
+def tree(root: Path, files: dict[str, str]) -> Path:
+    """Write a small tree of sources."""
+    for name, content in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content, encoding="utf-8")
+    return root
+
+
+def test_a_long_function_is_found(tmp_path: Path) -> None:
+    rust = """\
+fn short() -> [u8; 2] { [0; 2] } // fn in_a_comment() {
+trait T { fn declared(&self) -> [u8; 2]; }
+fn long<'a>(
+    text: &'a str,
+) {
+    let braces = ["}", r#""}"#, "\\"}"];
+    let sign = '}';
+    /* } */
+}
+#[cfg(test)]
+mod tests {
+    fn long_test() {
+        1;
+        2;
+        3;
+    }
+}
+"""
+    python = 'def short(): ...\nclass C:\n    async def long(self):\n        """One.\n\n        Two.\n        """\n'
+    root = tree(tmp_path, {"a.rs": rust, "a.py": python})
+    files = [root / "a.rs", root / "a.py"]
+    assert structure.long_functions(root, files, 4) == {"a.rs: long": 7, "a.py: long": 5}
+    assert structure.long_functions(root, files, 7) == {}
+
+
+def test_a_long_file_is_found(tmp_path: Path) -> None:
+    root = tree(tmp_path, {"in/a.rs": "//\n" * 4, "in/b.rs": "//\n" * 3, "in/target/c.rs": "//\n" * 9, "out/d.rs": "//\n" * 9})
+    assert structure.long_files(root, structure.sources(root, ["in"], ".rs"), 3) == {"in/a.rs": 4}
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("use crate::b::B;", "use super::a::A;"),
+        ("use crate::{c, b::{self}};", "fn f() -> crate::a::A {}"),
+        ("use super::B;", "use crate::a;"),
+        ("pub use crate::b::B; struct A(B);", "use crate::a::A;"),
+        ("use crate::D;", "pub struct D(crate::a::A);"),
+    ],
+)
+def test_a_circle_in_a_crate_is_found(tmp_path: Path, one: str, other: str) -> None:
+    """Also where a name is taken from the module that hands it on."""
+    root = tree(
+        tmp_path, {"lib.rs": "mod a; mod b; mod c; pub use b::B; pub use b::*;", "a.rs": one, "b.rs": other, "c.rs": "use crate::a;"}
+    )
+    assert structure.circles(structure.rust_imports(root)) == [["crate::a", "crate::b", *(["crate::c"] if "{c" in one else [])]]
+
+
+def test_a_circle_of_a_module_and_its_part_is_found(tmp_path: Path) -> None:
+    root = tree(tmp_path, {"lib.rs": "mod a;", "a/mod.rs": "mod part; fn f() { part::g(); }", "a/part.rs": "use super::f;"})
+    assert structure.circles(structure.rust_imports(root)) == [["crate::a", "crate::a::part"]]
+
+
+def test_what_only_looks_like_a_circle_is_none(tmp_path: Path) -> None:
+    """Names that are handed on, other crates, comments, text and tests."""
+    b = 'use other::a::A; // use crate::a::A;\nconst S: &str = "crate::a::A";\n#[cfg(test)]\nmod tests { use crate::a::A; }'
+    root = tree(tmp_path, {"lib.rs": "mod a; mod b; pub use a::A; pub use b::B;", "a.rs": "use crate::B;", "b.rs": b})
+    assert structure.rust_imports(root) == {"crate": set(), "crate::a": {"crate::b"}, "crate::b": set()}
+
+
+def test_a_circle_of_python_modules_is_found(tmp_path: Path) -> None:
+    files = {"p/__init__.py": "from . import a", "p/a.py": "from . import b", "p/b.py": "from .c.d import x", "p/c/__init__.py": ""}
+    package = tree(tmp_path, {**files, "p/c/d.py": "from ..a import y"}) / "p"
+    for at_start in (True, False):
+        assert structure.circles(structure.python_imports(package, at_start)) == [["p.a", "p.b", "p.c.d"]]
+    tree(tmp_path, {"p/c/d.py": "if TYPE_CHECKING:\n    from ..a import y\ndef f():\n    from ..a import y\n"})
+    assert structure.circles(structure.python_imports(package, at_start=True)) == []
+    assert structure.circles(structure.python_imports(package)) == [["p.a", "p.b", "p.c.d"]]
