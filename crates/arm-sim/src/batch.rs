@@ -5,12 +5,14 @@ use std::mem::discriminant;
 use arm_core::effect::Effect;
 use arm_core::{Contact, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup};
 
-use crate::discontinuities::step_in_pieces;
+use crate::divided_step::step_in_pieces;
 use crate::input_buffer::{Ahead, InputBuffer};
-use crate::model::{Input, Link, Model, Plain, State};
+use crate::model::{Link, Model};
 use crate::native::{PlainSteps, diverged};
+use crate::plain::Plain;
 use crate::prepare::{Prepared, add_ripple, commands, has_ripple};
 use crate::recorder::{Instant, Recorder, Row};
+use crate::state::{Input, State};
 use crate::step::{Inputs, Memory, step};
 use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
 use arm_core::simd_dispatch::{Computation, dispatch};
@@ -88,72 +90,19 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && kinds(a) == kinds(b)
 }
 
-/// The runs in the lanes of one. A group of fewer than eight repeats its last run in the lanes left over.
+/// The run of a lane. A group of fewer than eight repeats its last one in the lanes left over.
+fn in_lane<'a, 'b, const N: usize>(
+    prepared: &'b [Prepared<'a, N>],
+    lane: usize,
+) -> &'b Prepared<'a, N> {
+    &prepared[lane.min(prepared.len() - 1)]
+}
+
+/// The runs in the lanes of one.
 fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>, SimulationError> {
-    let lane = |i: usize| &prepared[i.min(prepared.len() - 1)];
-    let first = &prepared[0];
-    let (schedule, integrator) = (first.schedule, first.integrator());
-    let setup = pack_setup(lane);
-    let link = match first.model.link {
-        Link::Compliant(_) => Link::Compliant(setup.contact),
-        Link::Free => Link::Free,
-        Link::Forced(_) => Link::Forced(pack_plane(|i| match lane(i).model.link {
-            Link::Forced(force) => force,
-            _ => [0.0; 2],
-        })),
-        Link::Rigid => Link::Rigid,
-    };
-    let effects =
-        (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
-    let model = Model::new(&setup, link, effects.collect())?;
-    let one_drive = prepared
-        .iter()
-        .all(|p| p.experiment.drive == first.experiment.drive && !has_ripple(&p.setup));
-    let mut each: [Vec<Input<f64, N>>; LANES] = Default::default();
-    let mut own = |half_steps: &[usize], out: &mut Vec<Input<Wide, N>>| {
-        for (i, inputs) in each.iter_mut().enumerate() {
-            inputs.clear();
-            commands(&lane(i).experiment.drive, &schedule, half_steps, inputs);
-        }
-        for at in 0..half_steps.len() {
-            let mut input = pack_input(|i| each[i][at]);
-            add_ripple(&mut input, &setup);
-            out.push(input);
-        }
-    };
-    let mut memory = Memory::<Wide>::new(model.effects.len());
-    let mut state = State {
-        q: Joints::from_fn(|j, _| pack(|i| lane(i).start.0[j])),
-        qd: Joints::from_fn(|j, _| pack(|i| lane(i).start.1[j])),
-        work: [Wide::ZERO; 4],
-    };
-    let mut recorders: Vec<_> = prepared.iter().map(Recorder::new).collect();
-    let mut stopped: Vec<Option<SimulationError>> = vec![None; prepared.len()];
-    let mut row = Row::new();
-    let mut sample =
-        |steps: usize, state: &State<Wide, N>, memory: &[Wide], stopped: &[Option<_>]| {
-            let time = schedule.time(steps);
-            let input = if one_drive {
-                first.input(time).wide()
-            } else {
-                pack_input(|i| lane(i).input(time))
-            };
-            row.fill(&Instant {
-                model: &model,
-                input: &input,
-                state,
-                memory,
-            });
-            for (i, recorder) in recorders.iter_mut().enumerate() {
-                if stopped[i].is_none() {
-                    // Whole recordings never break off.
-                    let _ = recorder.push(&row, |all| all.0[i]);
-                }
-            }
-        };
-    sample(0, &state, &memory.state, &stopped);
-    let (mut common, mut feed) = (InputBuffer::new(integrator), InputBuffer::new(integrator));
-    let plain = first.plain().and_then(|_| model.plain());
+    let schedule = prepared[0].schedule;
+    let mut group = Group::new(prepared)?;
+    group.sample(0);
     // Where the drive of any lane breaks, every lane makes its own step.
     let mut broken: Vec<usize> = prepared
         .iter()
@@ -166,51 +115,155 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     while done < schedule.steps {
         let next = done + 1;
         if broken.next_if_eq(&next).is_some() {
-            step_apart(prepared, next, (&mut state, &mut memory));
+            step_apart(prepared, next, (&mut group.state, &mut group.memory));
             done = next;
         } else {
             let most = schedule.smooth(done, sampled, broken.peek());
-            let steps = Steps {
-                model: &model,
-                plain: plain.as_ref(),
-                integrator,
-                h: schedule.dt,
-            };
-            let at = (&mut state, &mut memory);
-            done += if one_drive {
-                let ahead = common.ahead(next, most, |half_steps, out| {
-                    commands(&first.experiment.drive, &schedule, half_steps, out);
-                });
-                dispatch(Advance { steps, ahead, at })
-            } else {
-                let ahead = feed.ahead(next, most, &mut own);
-                dispatch(Advance { steps, ahead, at })
-            };
+            done += group.advance(next, most);
         }
-        if !state.is_finite() {
-            for (i, stop) in stopped.iter_mut().enumerate() {
-                if let (None, Some(joint)) = (&stop, diverged(&state.lane(i))) {
-                    *stop = Some(SimulationError::Diverged {
-                        step: done,
-                        time: schedule.time(done),
-                        joint,
-                    });
-                }
-            }
-            if stopped.iter().all(Option::is_some) {
-                break;
-            }
+        if group.stop_diverged(done) {
+            break;
         }
         if done == sampled + schedule.every {
             sampled = done;
-            sample(done, &state, &memory.state, &stopped);
+            group.sample(done);
         }
     }
-    let recordings = recorders.into_iter().map(Recorder::finish);
-    Ok(recordings
-        .zip(stopped)
-        .map(|(recording, stopped)| stopped.map_or(Ok(recording), Err))
-        .collect())
+    Ok(group.finish())
+}
+
+/// Runs in the lanes of one, on their way.
+struct Group<'a, const N: usize> {
+    prepared: &'a [Prepared<'a, N>],
+    setup: Setup<Wide, N>,
+    model: Model<Wide, N>,
+    /// The rig, where it is plain and the integrator that of plain rigs.
+    plain: Option<Plain<Wide, N>>,
+    /// Whether one drive, without ripple, is that of all lanes.
+    one_drive: bool,
+    common: InputBuffer<f64, N>,
+    own: InputBuffer<Wide, N>,
+    /// Room for the commands of each lane.
+    commanded: [Vec<Input<f64, N>>; LANES],
+    state: State<Wide, N>,
+    memory: Memory<Wide>,
+    row: Row<Wide>,
+    recorders: Vec<Recorder<'a, 'static, N>>,
+    /// Why a run stopped early.
+    stopped: Vec<Option<SimulationError>>,
+}
+
+impl<'a, const N: usize> Group<'a, N> {
+    fn new(prepared: &'a [Prepared<'a, N>]) -> Result<Self, SimulationError> {
+        let lane = |i: usize| in_lane(prepared, i);
+        let first = &prepared[0];
+        let setup = pack_setup(lane);
+        let effects =
+            (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
+        let model = Model::new(&setup, pack_link(lane, setup.contact), effects.collect())?;
+        Ok(Self {
+            prepared,
+            plain: first.plain().and_then(|_| model.plain()),
+            one_drive: prepared
+                .iter()
+                .all(|p| p.experiment.drive == first.experiment.drive && !has_ripple(&p.setup)),
+            common: InputBuffer::new(first.integrator()),
+            own: InputBuffer::new(first.integrator()),
+            commanded: Default::default(),
+            state: State {
+                q: Joints::from_fn(|j, _| pack(|i| lane(i).start.0[j])),
+                qd: Joints::from_fn(|j, _| pack(|i| lane(i).start.1[j])),
+                work: [Wide::ZERO; 4],
+            },
+            memory: Memory::new(model.effects.len()),
+            row: Row::new(),
+            recorders: prepared.iter().map(Recorder::new).collect(),
+            stopped: vec![None; prepared.len()],
+            setup,
+            model,
+        })
+    }
+
+    /// Records the runs that go on, after a number of steps.
+    fn sample(&mut self, steps: usize) {
+        let time = self.prepared[0].schedule.time(steps);
+        let input = if self.one_drive {
+            self.prepared[0].input(time).wide()
+        } else {
+            pack_input(|i| in_lane(self.prepared, i).input(time))
+        };
+        self.row.fill(&Instant {
+            model: &self.model,
+            input: &input,
+            state: &self.state,
+            memory: &self.memory.state,
+        });
+        let recorders = self.recorders.iter_mut().zip(&self.stopped).enumerate();
+        for (i, (recorder, stopped)) in recorders {
+            if stopped.is_none() {
+                // Whole recordings never break off.
+                let _ = recorder.push(&self.row, |all| all.0[i]);
+            }
+        }
+    }
+
+    /// Makes steps from number `next` on, at most `most`; returns how many.
+    fn advance(&mut self, next: usize, most: usize) -> usize {
+        let (prepared, first) = (self.prepared, &self.prepared[0]);
+        let schedule = &first.schedule;
+        let steps = Steps {
+            model: &self.model,
+            plain: self.plain.as_ref(),
+            integrator: first.integrator(),
+            h: schedule.dt,
+        };
+        let at = (&mut self.state, &mut self.memory);
+        if self.one_drive {
+            let ahead = self.common.ahead(next, most, |half_steps, out| {
+                commands(&first.experiment.drive, schedule, half_steps, out);
+            });
+            return dispatch(Advance { steps, ahead, at });
+        }
+        let (commanded, setup) = (&mut self.commanded, &self.setup);
+        let ahead = self.own.ahead(next, most, |half_steps, out| {
+            for (i, inputs) in commanded.iter_mut().enumerate() {
+                inputs.clear();
+                let drive = &in_lane(prepared, i).experiment.drive;
+                commands(drive, schedule, half_steps, inputs);
+            }
+            for at in 0..half_steps.len() {
+                let mut input = pack_input(|i| commanded[i][at]);
+                add_ripple(&mut input, setup);
+                out.push(input);
+            }
+        });
+        dispatch(Advance { steps, ahead, at })
+    }
+
+    /// Stops the runs whose state is no longer finite after a number of steps; returns whether none is left.
+    fn stop_diverged(&mut self, done: usize) -> bool {
+        if self.state.is_finite() {
+            return false;
+        }
+        for (i, stop) in self.stopped.iter_mut().enumerate() {
+            if let (None, Some(joint)) = (&stop, diverged(&self.state.lane(i))) {
+                *stop = Some(SimulationError::Diverged {
+                    step: done,
+                    time: self.prepared[0].schedule.time(done),
+                    joint,
+                });
+            }
+        }
+        self.stopped.iter().all(Option::is_some)
+    }
+
+    fn finish(self) -> Outcomes<N> {
+        let recordings = self.recorders.into_iter().map(Recorder::finish);
+        recordings
+            .zip(self.stopped)
+            .map(|(recording, stopped)| stopped.map_or(Ok(recording), Err))
+            .collect()
+    }
 }
 
 /// What steps are made of, whatever drives them.
@@ -338,7 +391,7 @@ fn step_apart<const N: usize>(
 ) {
     let mut lane_memory = Memory::new(memory.state.len());
     for i in 0..LANES {
-        let run = &prepared[i.min(prepared.len() - 1)];
+        let run = in_lane(prepared, i);
         let mut lane = state.lane(i);
         for (one, all) in lane_memory.state.iter_mut().zip(&memory.state) {
             *one = all.0[i];
@@ -357,6 +410,21 @@ fn pack(value: impl Fn(usize) -> f64) -> Wide {
 
 fn pack_plane(value: impl Fn(usize) -> Plane<f64>) -> Plane<Wide> {
     [0, 1].map(|axis| pack(|i| value(i)[axis]))
+}
+
+fn pack_link<'a, const N: usize>(
+    lane: impl Fn(usize) -> &'a Prepared<'a, N>,
+    contact: Contact<Wide>,
+) -> Link<Wide> {
+    match lane(0).model.link {
+        Link::Compliant(_) => Link::Compliant(contact),
+        Link::Free => Link::Free,
+        Link::Forced(_) => Link::Forced(pack_plane(|i| match lane(i).model.link {
+            Link::Forced(force) => force,
+            _ => [0.0; 2],
+        })),
+        Link::Rigid => Link::Rigid,
+    }
 }
 
 fn pack_effect<'a>(effect: impl Fn(usize) -> &'a Effect<f64>) -> Effect<Wide> {

@@ -1,12 +1,9 @@
 //! What is simulated: the rig, what acts in it, how it is driven, and the numerical settings.
 
-use core::ops::ControlFlow;
-
 use arm_core::effect::Effect;
 use arm_core::{Joints, Robot, Setup};
 
-use crate::recorder::Pieces;
-use crate::{HandlePath, Piece, Recording, Series, SimulationError, native};
+use crate::{HandlePath, Series, SimulationError};
 
 /// The closed-chain experiment of thesis section 3.6 (figure 3.13), or an arm that is driven by torques or swings freely.
 ///
@@ -130,108 +127,14 @@ pub enum Integrator {
     /// Speeds from the accelerations at the start of the step, then angles from the new speeds. First order; one
     /// evaluation a step. Without friction the energy error stays bounded, of the order of the step, and does not grow.
     ///
-    /// [`Recording::energy_error`] of a step h is `h/2 · ( [P − q̇ᵀBq̈] + ∫ (2 ∂T/∂q + Q)·q̈ dt )` and terms in h², with the
+    /// [`Recording::energy_error`](crate::Recording::energy_error) of a step h is `h/2 · ( [P − q̇ᵀBq̈] + ∫ (2 ∂T/∂q + Q)·q̈ dt )` and terms in h², with the
     /// power P that the energy gains and Q all that acts besides its gradient: about 10⁻⁴ of the exchanged energy a second
     /// at the default step.
     SemiImplicitEuler,
     /// The classical fourth-order method of Kutta; four evaluations a step. Smooth motions lose or gain energy by the
     /// fifth power of the step in each step; vibrations near the stability limit are damped.
     ///
-    /// [`Recording::energy_error`] is of fourth order too: below 5·10⁻¹² of the exchanged energy a second at the default
+    /// [`Recording::energy_error`](crate::Recording::energy_error) is of fourth order too: below 5·10⁻¹² of the exchanged energy a second at the default
     /// step for movements as slow as those of the thesis, with a compliant and a rigid coupling.
     Rk4,
-}
-
-/// Which implementation computes the motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Engine {
-    /// Minimal coordinates: the joint angles.
-    Native,
-    /// Maximal coordinates: rigid bodies and joints, solved by rapier. A second opinion.
-    #[cfg(feature = "rapier")]
-    Rapier,
-}
-
-/// Simulates an experiment with the native engine.
-///
-/// # Errors
-/// [`SimulationError`] says what was refused, or at which step and joint the state ceased to be finite.
-pub fn simulate<const N: usize>(
-    experiment: &Experiment<N>,
-) -> Result<Recording<N>, SimulationError> {
-    simulate_partial(experiment)?.complete()
-}
-
-/// Simulates an experiment with a chosen engine.
-///
-/// # Errors
-/// As [`simulate`].
-pub fn simulate_with<const N: usize>(
-    engine: Engine,
-    experiment: &Experiment<N>,
-) -> Result<Recording<N>, SimulationError> {
-    match engine {
-        Engine::Native => simulate(experiment),
-        #[cfg(feature = "rapier")]
-        Engine::Rapier => crate::rapier::run(experiment, None)?.complete(),
-    }
-}
-
-/// Simulates an experiment with a chosen engine and gives the samples away a piece after another, so that a long run takes no
-/// more memory than a short one.
-///
-/// The samples have the bits of [`simulate_with`]. A run that stops early has given what was recorded before.
-///
-/// * `samples` - in each piece but the last
-/// * `take` - gets every piece, and breaks the run off where it wants no more
-///
-/// # Errors
-/// As [`simulate`].
-pub fn simulate_in_pieces<const N: usize>(
-    engine: Engine,
-    experiment: &Experiment<N>,
-    samples: usize,
-    take: &mut dyn FnMut(&Piece<'_, N>) -> ControlFlow<()>,
-) -> Result<(), SimulationError> {
-    let samples = samples.max(1);
-    let pieces = Some(Pieces { samples, take });
-    let partial = match engine {
-        Engine::Native => native::run(experiment, pieces)?,
-        #[cfg(feature = "rapier")]
-        Engine::Rapier => crate::rapier::run(experiment, pieces)?,
-    };
-    partial.complete().map(|_| ())
-}
-
-/// Simulates with the native engine and keeps what was recorded before a state ceased to be finite.
-///
-/// # Errors
-/// Only what is refused before the first step.
-pub fn simulate_partial<const N: usize>(
-    experiment: &Experiment<N>,
-) -> Result<Partial<N>, SimulationError> {
-    native::run(experiment, None)
-}
-
-/// A recording and, where the run did not reach its end, why.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Partial<const N: usize> {
-    /// All samples before the stop.
-    pub recording: Recording<N>,
-    /// Why the run stopped early.
-    pub stopped: Option<SimulationError>,
-}
-
-impl<const N: usize> Partial<N> {
-    /// The recording of a run that reached its end.
-    ///
-    /// # Errors
-    /// The reason for which it did not.
-    pub fn complete(self) -> Result<Recording<N>, SimulationError> {
-        match self.stopped {
-            None => Ok(self.recording),
-            Some(reason) => Err(reason),
-        }
-    }
 }

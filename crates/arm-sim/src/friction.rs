@@ -18,9 +18,10 @@ pub(crate) use instant::{Friction, at};
 use arm_core::Joints;
 use instant::{Mode, Modes, Solved, modes};
 
-use crate::model::{Input, Link, Model, State};
-use crate::step::{Inputs, Memory, PROJECTIONS, remember, rk4};
-use crate::{Handle, Integrator, SimulationError};
+use crate::model::{Link, Model};
+use crate::state::{Input, State};
+use crate::step::{self, Inputs, Jam, Memory, PROJECTIONS, remember, rk4};
+use crate::{Handle, Integrator};
 
 /// Switches that are located in one step.
 const MOST_SWITCHES: usize = 12;
@@ -35,27 +36,25 @@ const LOCATED: f64 = 1e-12;
 /// Speed against the friction that is rounding \[rad/s\].
 const STILL: f64 = 1e-13;
 
-/// Friction that has no single answer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Jam {
-    /// Time \[s\].
-    pub time: f64,
-    /// Zero-based joint.
-    pub joint: usize,
-    /// What the friction adds to itself, through the force with which it grows.
-    pub gain: f64,
-}
-
-impl From<Jam> for SimulationError {
-    fn from(jam: Jam) -> Self {
-        let Jam { time, joint, gain } = jam;
-        Self::Jam { time, joint, gain }
+/// Advances a state by one step of length `h`, with dry friction where there is any.
+#[inline(always)]
+pub(crate) fn advance<const N: usize>(
+    model: &Model<f64, N>,
+    integrator: Integrator,
+    h: f64,
+    inputs: Inputs<f64, N>,
+    at: (&mut State<f64, N>, &mut Memory<f64>),
+) {
+    if model.has_dry {
+        step(model, integrator, h, inputs, at);
+    } else {
+        step::step(model, integrator, h, inputs, at);
     }
 }
 
-/// Advances a state by one step of length `h`.
+/// Advances a state by one step of length `h` in which there is dry friction.
 #[inline(never)]
-pub(crate) fn step<const N: usize>(
+fn step<const N: usize>(
     model: &Model<f64, N>,
     integrator: Integrator,
     h: f64,

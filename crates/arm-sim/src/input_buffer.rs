@@ -3,7 +3,7 @@
 use arm_core::Scalar;
 
 use crate::Integrator;
-use crate::model::Input;
+use crate::state::Input;
 use crate::step::Inputs;
 
 /// Steps that are computed ahead.

@@ -4,6 +4,7 @@ mod batch;
 mod controlled;
 mod digest;
 mod discontinuities;
+mod divided_step;
 mod error;
 mod experiment;
 mod friction;
@@ -14,15 +15,19 @@ mod movement;
 mod native;
 mod noise;
 mod path;
+mod plain;
 mod prepare;
 #[cfg(feature = "rapier")]
 mod rapier;
 mod record;
 mod recorder;
+mod schedule;
 mod sensor;
 mod series;
+mod simulate;
 mod stability;
 mod start;
+mod state;
 mod step;
 mod stepper;
 mod terms;
@@ -31,17 +36,15 @@ pub use batch::simulate_batch;
 pub use controlled::{Controlled, Controller, Fault, Safety, control};
 pub use digest::{Digest, definite, digest, digest_of};
 pub use error::SimulationError;
-pub use experiment::{
-    Coupling, Drive, Engine, Experiment, Integrator, Partial, Start, altered, simulate,
-    simulate_in_pieces, simulate_partial, simulate_with,
-};
+pub use experiment::{Coupling, Drive, Experiment, Integrator, Start, altered};
 pub use movement::{JointMotion, Movement};
 pub use noise::Normal;
 pub use path::{Handle, HandlePath};
 #[cfg(feature = "rapier")]
 pub use rapier::{RapierSettings, simulate_rapier};
-pub use record::{EnergyColumns, Piece, Recording, TorqueColumns, WorkColumns};
+pub use record::{EnergyColumns, Partial, Piece, Recording, TorqueColumns, WorkColumns};
 pub use sensor::{Channel, Readings, Sensors};
 pub use series::{Interpolation, Jet, Series};
+pub use simulate::{Engine, simulate, simulate_in_pieces, simulate_partial, simulate_with};
 pub use stability::Vibration;
 pub use stepper::{Outside, Port, Seen, Snapshot, Stepper};

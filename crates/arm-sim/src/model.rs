@@ -2,12 +2,12 @@
 
 use arm_core::effect::{Effect, Local, Motion, resisting_besides_dry, resisting_torque};
 use arm_core::{
-    Chain, Contact, Invalid, Joints, Lanes, Load, Placement, Plane, Pose, Products, Resistance,
-    Scalar, Setup, accelerations, forward_dynamics, joint_force, kinetic_energy, potential_energy,
-    tip, tip_velocity,
+    Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
+    Setup, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
 };
 
-use crate::Handle;
+use crate::plain::{Plain, affine, apart, load, pull};
+use crate::state::{Input, Outcome, State, difference, powers, sum};
 use crate::terms::{MovingBase, Terms};
 
 /// How the tip is held.
@@ -47,86 +47,6 @@ pub(crate) struct Model<T, const N: usize> {
     pub products: Products<T, N>,
     /// Whether an effect has a state of its own.
     pub has_memory: bool,
-}
-
-/// What drives the arm at one instant.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Input<T, const N: usize> {
-    pub time: T,
-    pub handle: Handle<T>,
-    /// Torques of motors \[N m\].
-    pub torque: Joints<T, N>,
-}
-
-/// Angles, speeds and the work done so far.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct State<T, const N: usize> {
-    pub q: Joints<T, N>,
-    pub qd: Joints<T, N>,
-    /// By handle and drive, against resistance and damping \[J\].
-    pub work: [T; 4],
-}
-
-impl<T: Scalar, const N: usize> State<T, N> {
-    /// Whether every angle and speed of every lane is finite: zero times anything else is not zero.
-    #[inline(always)]
-    pub fn is_finite(&self) -> bool {
-        let mut sum = T::ZERO;
-        for i in 0..N {
-            sum += T::ZERO * self.q[i] + T::ZERO * self.qd[i];
-        }
-        sum.is_finite()
-    }
-
-    /// Goes on for a time by semi-implicit Euler: first the speeds, and with the new ones the angles.
-    #[inline(always)]
-    pub fn advance(&mut self, h: T, now: &Outcome<T, N>) {
-        for i in 0..N {
-            self.qd[i] += h * now.qdd[i];
-        }
-        for i in 0..N {
-            self.q[i] += h * self.qd[i];
-        }
-        for i in 0..4 {
-            self.work[i] += h * now.power[i];
-        }
-    }
-}
-
-impl<const L: usize, const N: usize> State<Lanes<L>, N> {
-    /// The state of one lane.
-    #[inline(always)]
-    pub fn lane(&self, lane: usize) -> State<f64, N> {
-        State {
-            q: Joints::from_fn(|j, _| self.q[j].0[lane]),
-            qd: Joints::from_fn(|j, _| self.qd[j].0[lane]),
-            // Not by `map`, which would copy every lane.
-            work: core::array::from_fn(|i| self.work[i].0[lane]),
-        }
-    }
-
-    /// Puts a state into one lane.
-    #[inline(always)]
-    pub fn set_lane(&mut self, lane: usize, state: &State<f64, N>) {
-        for j in 0..N {
-            self.q[j].0[lane] = state.q[j];
-            self.qd[j].0[lane] = state.qd[j];
-        }
-        for (all, one) in self.work.iter_mut().zip(state.work) {
-            all.0[lane] = one;
-        }
-    }
-}
-
-/// What follows from state and input.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Outcome<T, const N: usize> {
-    pub qdd: Joints<T, N>,
-    pub force_on_arm: Plane<T>,
-    /// Time derivative of [`State::work`] \[W\].
-    pub power: [T; 4],
-    /// Force through each joint where an effect needs it, else zero \[N\].
-    pub joint_force: [T; N],
 }
 
 /// Passes of the fixed-point iteration for friction that grows with the force through its joint.
@@ -515,120 +435,6 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 }
 
-/// A rig of which a step takes no decision: its base stands still, its tip is on springs and dampers without play, no motors
-/// turn its joints, and all that resists in these is linear in their motion.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Plain<T, const N: usize> {
-    chain: Chain<T, N>,
-    products: Products<T, N>,
-    contact: Contact<T>,
-    affine: [[T; 3]; N],
-}
-
-impl<T: Scalar, const N: usize> Plain<T, N> {
-    /// As [`Model::evaluate`], the same bits.
-    ///
-    /// * `pose` - at `state.q`
-    #[inline(always)]
-    pub fn evaluate(
-        &self,
-        handle: &Handle<T>,
-        pose: &Pose<T, N>,
-        state: &State<T, N>,
-    ) -> Outcome<T, N> {
-        let State { q, qd, .. } = state;
-        let (still, resisting) = (Joints::<T, N>::repeat(T::ZERO), affine(&self.affine, q, qd));
-        let (at, v) = (tip(&self.chain, pose), tip_velocity(&self.chain, pose, qd));
-        let (gap, rate) = apart(handle, at, v);
-        let (force, lost) = pull(self.contact.linear(gap, rate), rate);
-        let net = load(&difference(&still, &resisting), force);
-        let [led, _, resisted, _] =
-            powers((force, handle.velocity), [&still, &resisting], qd, lost);
-        Outcome {
-            qdd: accelerations(&self.products, pose, qd, &net),
-            force_on_arm: force,
-            power: [led, T::ZERO, resisted, lost],
-            joint_force: [T::ZERO; N],
-        }
-    }
-}
-
-impl<const L: usize, const N: usize> Plain<Lanes<L>, N> {
-    /// The rig of one lane.
-    #[inline(always)]
-    pub fn lane(&self, lane: usize) -> Plain<f64, N> {
-        let plane = |of: &Plane<Lanes<L>>| [of[0].0[lane], of[1].0[lane]];
-        Plain {
-            chain: self.chain.lane(lane),
-            products: self.products.lane(lane),
-            contact: Contact {
-                stiffness: plane(&self.contact.stiffness),
-                damping: plane(&self.contact.damping),
-                play: plane(&self.contact.play),
-            },
-            affine: core::array::from_fn(|i| {
-                core::array::from_fn(|term| self.affine[i][term].0[lane])
-            }),
-        }
-    }
-}
-
-/// What effects linear in the motion of their joint resist with: `constant + to_angle q + to_speed q̇`.
-#[inline(always)]
-fn affine<T: Scalar, const N: usize>(
-    terms: &[[T; 3]; N],
-    q: &Joints<T, N>,
-    qd: &Joints<T, N>,
-) -> Joints<T, N> {
-    Joints::from_fn(|i, _| {
-        let [constant, to_angle, to_speed] = terms[i];
-        constant + to_angle * q[i] + to_speed * qd[i]
-    })
-}
-
-/// Gap between the handle and a tip at `at` that moves with `v`, and its rate.
-#[inline(always)]
-fn apart<T: Scalar>(handle: &Handle<T>, at: Plane<T>, v: Plane<T>) -> (Plane<T>, Plane<T>) {
-    (
-        [handle.position[0] - at[0], handle.position[1] - at[1]],
-        [handle.velocity[0] - v[0], handle.velocity[1] - v[1]],
-    )
-}
-
-/// The force of springs and dampers, and the power lost in these.
-#[inline(always)]
-fn pull<T: Scalar>([spring, damper]: [Plane<T>; 2], rate: Plane<T>) -> (Plane<T>, T) {
-    (
-        [spring[0] + damper[0], spring[1] + damper[1]],
-        damper[0] * rate[0] + damper[1] * rate[1],
-    )
-}
-
-/// Powers as in [`Outcome::power`].
-#[inline(always)]
-pub(crate) fn powers<T: Scalar, const N: usize>(
-    (force, v): (Plane<T>, Plane<T>),
-    [drive, resisting]: [&Joints<T, N>; 2],
-    qd: &Joints<T, N>,
-    lost: T,
-) -> [T; 4] {
-    let (mut driven, mut resisted) = (T::ZERO, T::ZERO);
-    for i in 0..N {
-        driven += drive[i] * qd[i];
-        resisted += resisting[i] * qd[i];
-    }
-    [force[0] * v[0] + force[1] * v[1], driven, resisted, lost]
-}
-
-#[inline(always)]
-fn load<T: Scalar, const N: usize>(torque: &Joints<T, N>, force_on_arm: Plane<T>) -> Load<T, N> {
-    Load {
-        torque: *torque,
-        force_on_arm,
-        moment_on_arm: T::ZERO,
-    }
-}
-
 /// Tries how much dry friction there is in an effect at a speed.
 fn dry_at<T: Scalar>(effect: &Effect<T>, speed: f64) -> T {
     effect.dry(&Local {
@@ -666,25 +472,4 @@ fn feels_joint_force<T: Scalar>(effect: &Effect<T>) -> bool {
     let without = effect.torque(&at);
     at.joint_force = T::ONE;
     !(effect.torque(&at) - without).every(|d| d == 0.0)
-}
-
-#[inline(always)]
-pub(crate) fn sum<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>) -> Joints<T, N> {
-    let mut c = *a;
-    for i in 0..N {
-        c[i] += b[i];
-    }
-    c
-}
-
-#[inline(always)]
-pub(crate) fn difference<T: Scalar, const N: usize>(
-    a: &Joints<T, N>,
-    b: &Joints<T, N>,
-) -> Joints<T, N> {
-    let mut c = *a;
-    for i in 0..N {
-        c[i] -= b[i];
-    }
-    c
 }

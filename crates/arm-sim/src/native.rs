@@ -1,11 +1,13 @@
 //! The native engine: minimal coordinates, one run at a time.
 
-use crate::discontinuities::step_in_pieces;
+use crate::divided_step::step_in_pieces;
+use crate::friction::advance;
 use crate::input_buffer::{Ahead, InputBuffer};
-use crate::model::{Plain, State};
+use crate::plain::Plain;
 use crate::prepare::Prepared;
 use crate::recorder::{Instant, Pieces, Recorder, Row};
-use crate::step::{Memory, advance};
+use crate::state::State;
+use crate::step::Memory;
 use crate::{Experiment, Partial, SimulationError};
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Pose, Scalar};

@@ -79,26 +79,17 @@
 //! bits in debug and release.
 
 mod leapfrog;
+mod settings;
 mod world;
 
-use crate::model::{Link, State};
+pub use settings::RapierSettings;
+
+use crate::model::Link;
 use crate::prepare::Prepared;
 use crate::recorder::{Instant, Pieces, Recorder, Row};
+use crate::state::State;
 use crate::{Experiment, Partial, SimulationError, Vibration};
 use leapfrog::Arm;
-
-/// How rapier solves for the forces in the joints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RapierSettings {
-    /// Gauss-Seidel sweeps over all joints in each step, 30 unless set.
-    pub sweeps: usize,
-}
-
-impl Default for RapierSettings {
-    fn default() -> Self {
-        Self { sweeps: 30 }
-    }
-}
 
 /// Runs an experiment with the default settings, recorded as a whole or in pieces.
 pub(crate) fn run<const N: usize>(

@@ -1,5 +1,6 @@
 //! What is recorded of a run.
 
+use crate::SimulationError;
 use arm_core::effect::Kind;
 
 /// A run as columns, each with one row a sample (row-major); names and signs as in the equation of motion
@@ -184,5 +185,27 @@ impl<const N: usize> Piece<'_, N> {
         samples
             .map(|i| self.recording.balance(i) - self.balance)
             .collect()
+    }
+}
+
+/// A recording and, where the run did not reach its end, why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Partial<const N: usize> {
+    /// All samples before the stop.
+    pub recording: Recording<N>,
+    /// Why the run stopped early.
+    pub stopped: Option<SimulationError>,
+}
+
+impl<const N: usize> Partial<N> {
+    /// The recording of a run that reached its end.
+    ///
+    /// # Errors
+    /// The reason for which it did not.
+    pub fn complete(self) -> Result<Recording<N>, SimulationError> {
+        match self.stopped {
+            None => Ok(self.recording),
+            Some(reason) => Err(reason),
+        }
     }
 }

@@ -7,9 +7,10 @@ use arm_core::{Joints, Plane, Pose, Scalar, contributions};
 
 use crate::Recording;
 use crate::friction::{self, Friction};
-use crate::model::{Input, Link, Model, Outcome, State, difference, sum};
+use crate::model::{Link, Model};
 use crate::prepare::Prepared;
 use crate::record::Piece;
+use crate::state::{Input, Outcome, State, difference, sum};
 use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Forces of a state, by whatever engine.

@@ -4,7 +4,8 @@ use arm_core::effect::{Motion, dry_friction};
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
-use crate::model::{Input, Link, Model, State};
+use crate::model::{Link, Model};
+use crate::state::{Input, State};
 
 /// Largest torque left in an equilibrium, and largest gap of a rigid coupling \[N m, m\].
 const BALANCED: f64 = 1e-9;

@@ -3,9 +3,9 @@
 use arm_core::effect::Motion;
 use arm_core::{Joints, Scalar};
 
-use crate::Integrator;
-use crate::friction::{self, Jam};
-use crate::model::{Input, Link, Model, Outcome, State};
+use crate::model::{Link, Model};
+use crate::state::{Input, Outcome, State};
+use crate::{Integrator, SimulationError};
 
 /// Newton steps that bring a rigidly held tip back to its handle: after a step it is off by the error of the integrator
 /// in one step, and each squares it.
@@ -18,6 +18,24 @@ pub(crate) struct Inputs<'a, T, const N: usize> {
     /// Not looked at by semi-implicit Euler.
     pub middle: &'a Input<T, N>,
     pub end: &'a Input<T, N>,
+}
+
+/// Friction that has no single answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Jam {
+    /// Time \[s\].
+    pub time: f64,
+    /// Zero-based joint.
+    pub joint: usize,
+    /// What the friction adds to itself, through the force with which it grows.
+    pub gain: f64,
+}
+
+impl From<Jam> for SimulationError {
+    fn from(jam: Jam) -> Self {
+        let Jam { time, joint, gain } = jam;
+        Self::Jam { time, joint, gain }
+    }
 }
 
 /// States of the effects, and room for those of the stages.
@@ -44,22 +62,6 @@ impl<T: Scalar> Memory<T> {
             kept: zeros,
             jam: None,
         }
-    }
-}
-
-/// Advances a state by one step of length `h`, with dry friction where there is any.
-#[inline(always)]
-pub(crate) fn advance<const N: usize>(
-    model: &Model<f64, N>,
-    integrator: Integrator,
-    h: f64,
-    inputs: Inputs<f64, N>,
-    at: (&mut State<f64, N>, &mut Memory<f64>),
-) {
-    if model.has_dry {
-        friction::step(model, integrator, h, inputs, at);
-    } else {
-        step(model, integrator, h, inputs, at);
     }
 }
 

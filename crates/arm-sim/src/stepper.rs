@@ -5,10 +5,12 @@ use arm_core::{Joints, Plane, Pose, Setup};
 
 use crate::experiment::altered;
 use crate::friction;
-use crate::model::{Input, Link, Model, State};
+use crate::friction::advance;
+use crate::model::{Link, Model};
 use crate::native::{diverged, why};
 use crate::prepare::{add_ripple, assemble};
-use crate::step::{Inputs, Memory, advance};
+use crate::state::{Input, State};
+use crate::step::{Inputs, Memory};
 use crate::{Handle, Integrator, SimulationError, stability, start};
 
 /// Most inner steps in one call of [`Stepper::advance`].

@@ -1,10 +1,11 @@
 //! Dry friction at one instant: which joints stick, and what their friction is.
 
 use arm_core::effect::{Motion, dry_friction};
-use arm_core::{Joints, Plane, Pose, Products, Resistance, Scalar};
+use arm_core::{Joints, Plane, Pose, Resistance, Scalar};
 
 use super::gain::{newton, strongest};
-use crate::model::{Input, Link, Model, Outcome, difference, powers, sum};
+use crate::model::{Link, Model};
+use crate::state::{Input, Outcome, difference, powers, sum};
 use crate::terms::{Constraint, Terms};
 
 /// What the dry friction of a joint does.
@@ -330,10 +331,8 @@ struct Arm<'a, const N: usize> {
     form: Form<N>,
 }
 
-// One of them lives at a time, on the stack of a step.
-#[allow(clippy::large_enum_variant)]
 enum Form<const N: usize> {
-    Links(Products<f64, N>, Resistance<f64, N>),
+    Links(Resistance<f64, N>),
     Joints(Terms<f64, N>, Option<Constraint<f64, N>>),
 }
 
@@ -341,8 +340,7 @@ impl<const N: usize> Form<N> {
     #[inline]
     fn at(model: &Model<f64, N>, pose: &Pose<f64, N>, qd: &Joints<f64, N>) -> Self {
         if model.in_link_form() {
-            let resistance = Resistance::at(&model.products, pose, qd);
-            return Self::Links(model.products, resistance);
+            return Self::Links(Resistance::at(&model.products, pose, qd));
         }
         let terms = model.terms(pose, qd);
         let constraint = matches!(model.link, Link::Rigid).then(|| terms.constraint());
@@ -354,9 +352,9 @@ impl<const N: usize> Arm<'_, N> {
     #[inline]
     fn under(&self, torque: &Joints<f64, N>) -> Answer<N> {
         let (qdd, force) = match &self.form {
-            Form::Links(products, resistance) => {
+            Form::Links(resistance) => {
                 let load = self.model.load(self.pose, torque, self.force);
-                let qdd = resistance.accelerations(products, self.pose, &load);
+                let qdd = resistance.accelerations(&self.model.products, self.pose, &load);
                 (qdd, self.force)
             }
             Form::Joints(terms, _) => self
@@ -369,7 +367,7 @@ impl<const N: usize> Arm<'_, N> {
     /// What one newton metre in a joint adds, and what it would give way by if nothing held the tip.
     fn column(&self, joint: usize) -> (Answer<N>, f64) {
         let (free, constraint) = match &self.form {
-            Form::Links(_, resistance) => (resistance.column(joint), None),
+            Form::Links(resistance) => (resistance.column(joint), None),
             Form::Joints(terms, constraint) => {
                 let mut unit = Joints::<f64, N>::zeros();
                 unit[joint] = 1.0;

@@ -9,13 +9,14 @@ use core::array::from_fn;
 use arm_core::effect::{Motion, dry_friction};
 use arm_core::{Contact, Joints, Plane, Pose, joint_force};
 
-use super::RapierSettings;
+use super::settings::RapierSettings;
 use super::world::{Bodies, Loads, Reaction, Start, World};
 use crate::SimulationError;
 use crate::friction::{self, Friction};
-use crate::model::{Input, Link, Model};
+use crate::model::{Link, Model};
 use crate::prepare::Prepared;
 use crate::recorder::Forces;
+use crate::state::Input;
 
 /// An arm on its way.
 pub(super) struct Arm<'a, const N: usize> {

@@ -10,7 +10,7 @@ use rapier2d_f64::prelude::{
     RigidBodyHandle, SpringCoefficients, Vector,
 };
 
-use super::RapierSettings;
+use super::settings::RapierSettings;
 use crate::SimulationError;
 
 /// Hertz. So far above any step rate that a joint's error is removed within one step and its softness vanishes.

@@ -1,0 +1,122 @@
+//! What drives the arm at one instant, its state, and what follows from both.
+
+use arm_core::{Joints, Lanes, Plane, Scalar};
+
+use crate::Handle;
+
+/// What drives the arm at one instant.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Input<T, const N: usize> {
+    pub time: T,
+    pub handle: Handle<T>,
+    /// Torques of motors \[N m\].
+    pub torque: Joints<T, N>,
+}
+
+/// Angles, speeds and the work done so far.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State<T, const N: usize> {
+    pub q: Joints<T, N>,
+    pub qd: Joints<T, N>,
+    /// By handle and drive, against resistance and damping \[J\].
+    pub work: [T; 4],
+}
+
+impl<T: Scalar, const N: usize> State<T, N> {
+    /// Whether every angle and speed of every lane is finite: zero times anything else is not zero.
+    #[inline(always)]
+    pub fn is_finite(&self) -> bool {
+        let mut sum = T::ZERO;
+        for i in 0..N {
+            sum += T::ZERO * self.q[i] + T::ZERO * self.qd[i];
+        }
+        sum.is_finite()
+    }
+
+    /// Goes on for a time by semi-implicit Euler: first the speeds, and with the new ones the angles.
+    #[inline(always)]
+    pub fn advance(&mut self, h: T, now: &Outcome<T, N>) {
+        for i in 0..N {
+            self.qd[i] += h * now.qdd[i];
+        }
+        for i in 0..N {
+            self.q[i] += h * self.qd[i];
+        }
+        for i in 0..4 {
+            self.work[i] += h * now.power[i];
+        }
+    }
+}
+
+impl<const L: usize, const N: usize> State<Lanes<L>, N> {
+    /// The state of one lane.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> State<f64, N> {
+        State {
+            q: Joints::from_fn(|j, _| self.q[j].0[lane]),
+            qd: Joints::from_fn(|j, _| self.qd[j].0[lane]),
+            // Not by `map`, which would copy every lane.
+            work: core::array::from_fn(|i| self.work[i].0[lane]),
+        }
+    }
+
+    /// Puts a state into one lane.
+    #[inline(always)]
+    pub fn set_lane(&mut self, lane: usize, state: &State<f64, N>) {
+        for j in 0..N {
+            self.q[j].0[lane] = state.q[j];
+            self.qd[j].0[lane] = state.qd[j];
+        }
+        for (all, one) in self.work.iter_mut().zip(state.work) {
+            all.0[lane] = one;
+        }
+    }
+}
+
+/// What follows from state and input.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outcome<T, const N: usize> {
+    pub qdd: Joints<T, N>,
+    pub force_on_arm: Plane<T>,
+    /// Time derivative of [`State::work`] \[W\].
+    pub power: [T; 4],
+    /// Force through each joint where an effect needs it, else zero \[N\].
+    pub joint_force: [T; N],
+}
+
+/// Powers as in [`Outcome::power`].
+#[inline(always)]
+pub(crate) fn powers<T: Scalar, const N: usize>(
+    (force, v): (Plane<T>, Plane<T>),
+    [drive, resisting]: [&Joints<T, N>; 2],
+    qd: &Joints<T, N>,
+    lost: T,
+) -> [T; 4] {
+    let (mut driven, mut resisted) = (T::ZERO, T::ZERO);
+    for i in 0..N {
+        driven += drive[i] * qd[i];
+        resisted += resisting[i] * qd[i];
+    }
+    [force[0] * v[0] + force[1] * v[1], driven, resisted, lost]
+}
+
+#[inline(always)]
+pub(crate) fn sum<T: Scalar, const N: usize>(a: &Joints<T, N>, b: &Joints<T, N>) -> Joints<T, N> {
+    let mut c = *a;
+    for i in 0..N {
+        c[i] += b[i];
+    }
+    c
+}
+
+#[inline(always)]
+pub(crate) fn difference<T: Scalar, const N: usize>(
+    a: &Joints<T, N>,
+    b: &Joints<T, N>,
+) -> Joints<T, N> {
+    let mut c = *a;
+    for i in 0..N {
+        c[i] -= b[i];
+    }
+    c
+}
