@@ -24,7 +24,7 @@ LITERAL = re.compile(
 FUNCTION = re.compile(r"\bfn\s+(\w+)")
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\([^)]*\))?\s+)?mod\s+\w+\s*(?=\{)")
 USE = re.compile(r"\b(pub(?:\([^)]*\))?\s+)?use\s+([^;]+);")
-DEFINED = re.compile(r"\b(?:fn|struct|enum|trait|type|const|static|union)\s+(\w+)")
+DEFINED = re.compile(r"(?<![*&])\b(?:fn|struct|enum|trait|type|const|static|union)\s+(\w+)")
 
 
 def sources(root: Path, folders: Iterable[str], suffix: str) -> list[Path]:

@@ -32,43 +32,17 @@ LONG_FUNCTIONS: set[str] = {
     "crates/arm-gap/src/trial_specific/tremor_detection.rs: explain",
     "crates/arm-ident/examples/coverage.rs: main",
     "crates/arm-py/src/own.rs: declare",
-    "crates/arm-sim/src/batch.rs: side_by_side",
 }
 LONG_FILES: set[str] = {
     "crates/arm-capi/tests/suite/main.rs",
     "crates/arm-core/src/estimator/mod.rs",
     "crates/arm-gap/src/sensitivity/linearized_run.rs",
     "crates/arm-model/tests/model.rs",
-    "crates/arm-sim/src/model.rs",
     "python/armrs/workflows/simulate.py",
 }
 CIRCLES: list[list[str]] = [
-    ["hidden", "crate::cast", "crate::cast::joint", "crate::cast::rig"],
-    ["hidden", "crate::effect", "crate::effect::body", "crate::effect::dry", "crate::effect::elastic", "crate::effect::muscle"],
-    ["arm-capi", "crate", "crate::arm", "crate::held", "crate::motion", "crate::status"],
-    ["arm-core", "crate::effect::law", "crate::effect::probe"],
-    ["arm-core", "crate::scalar", "crate::series"],
-    ["arm-cosim", "crate::slave", "crate::state"],
     ["arm-gap", "crate::data::prepared_session", "crate::sensitivity::linearization_point", "crate::sensitivity::rows"],
     ["arm-gap", "crate::selection::model_selection", "crate::selection::search_state"],
-    ["arm-numerics", "crate::least_squares::condense", "crate::least_squares::factor"],
-    ["arm-py", "crate::arm", "crate::convert", "crate::kernel"],
-    ["arm-py", "crate::model", "crate::model::dataset", "crate::model::effect", "crate::model::parts", "crate::model::whole"],
-    [
-        "arm-sim",
-        "crate::discontinuities",
-        "crate::experiment",
-        "crate::friction",
-        "crate::input_buffer",
-        "crate::native",
-        "crate::prepare",
-        "crate::rapier",
-        "crate::rapier::leapfrog",
-        "crate::rapier::world",
-        "crate::recorder",
-        "crate::stability",
-        "crate::step",
-    ],
 ]
 
 

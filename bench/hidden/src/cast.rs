@@ -3,13 +3,15 @@
 mod joint;
 mod outside;
 mod rig;
+mod scene;
 mod sizes;
 
 pub use outside::{OUTSIDE, cast_outside};
+pub use scene::Scene;
 
-use crate::effect::{Hidden, Scored};
+use crate::effect::Hidden;
 use crate::random::Random;
-use crate::rig::Rig;
+use scene::{Place, Values};
 use sizes::KINDS;
 
 /// How strong a hidden effect is.
@@ -31,19 +33,6 @@ impl Strength {
     }
 }
 
-/// What is known of a session when its effects are chosen.
-#[derive(Clone, Debug)]
-pub struct Scene<'a> {
-    /// The true rig without hidden effects.
-    pub rig: &'a Rig,
-    /// Smallest and largest angle of each joint in the movements to fit \[rad\].
-    pub range: Vec<[f64; 2]>,
-    /// Largest speed of each joint there \[rad/s\].
-    pub speed: Vec<f64>,
-    /// Duration of each trial to fit \[s\], and its number.
-    pub trials: Vec<(usize, f64)>,
-}
-
 /// Names of the kinds of the catalogue, in its order.
 pub fn kinds() -> impl ExactSizeIterator<Item = &'static str> {
     KINDS.iter().map(|kind| kind.name)
@@ -52,42 +41,6 @@ pub fn kinds() -> impl ExactSizeIterator<Item = &'static str> {
 /// Family of a kind: kinds of different families are combined.
 pub fn family(name: &str) -> Option<u8> {
     KINDS.iter().find(|k| k.name == name).map(|k| k.family)
-}
-
-/// Where an effect acts.
-#[derive(Clone, Copy, Debug, Default)]
-struct Place {
-    joint: Option<usize>,
-    channel: Option<usize>,
-    trial: Option<usize>,
-}
-
-/// Values in the parameters of the catalogue.
-struct Values(Vec<Scored>);
-
-impl Values {
-    /// The law of the catalogue with this value is what acts.
-    fn exact(name: &'static str, value: f64) -> Self {
-        Self(Vec::new()).and_exact(name, value)
-    }
-
-    /// A value of about this size fits best.
-    fn about(name: &'static str, value: f64) -> Self {
-        Self(Vec::new()).and_about(name, value)
-    }
-
-    fn and_exact(self, name: &'static str, value: f64) -> Self {
-        self.and(name, value, true)
-    }
-
-    fn and_about(self, name: &'static str, value: f64) -> Self {
-        self.and(name, value, false)
-    }
-
-    fn and(mut self, name: &'static str, value: f64, exact: bool) -> Self {
-        self.0.push(Scored { name, value, exact });
-        self
-    }
 }
 
 /// Kinds that act on the whole rig or on a force channel, and so at no joint.

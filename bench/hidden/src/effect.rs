@@ -4,12 +4,14 @@
 //! is computed; dry friction, its excess at low speed, thixotropy, end range, reflex, tremor and burst follow laws of their
 //! own. `exact` of a [`Scored`] value says whether the catalogue's parameter has that value strictly.
 
+mod acting;
 mod body;
 mod dry;
 mod elastic;
 mod muscle;
 mod sensing;
 
+pub use acting::{Acts, Instant, Loads};
 pub use body::Wobble;
 pub use dry::Dry;
 pub use elastic::Elastic;
@@ -18,54 +20,6 @@ pub use sensing::Sensing;
 
 use crate::random::Random;
 use crate::rig::{BasePath, Plane, Rig};
-
-/// What is known of the arm at an instant.
-#[derive(Clone, Debug)]
-pub struct Instant {
-    /// \[s\]
-    pub time: f64,
-    /// Joint angles \[rad\].
-    pub q: Vec<f64>,
-    /// Joint speeds \[rad/s\].
-    pub qd: Vec<f64>,
-    /// Magnitude of the force through each joint \[N\].
-    pub through: Vec<f64>,
-    /// Joints and tip \[m\].
-    pub points: Vec<Plane>,
-    /// Directions of the links \[rad\].
-    pub angles: Vec<f64>,
-}
-
-/// What effects do at an instant.
-#[derive(Clone, Debug)]
-pub struct Loads {
-    /// Torque with which each joint resists \[N m\].
-    pub resist: Vec<f64>,
-    /// Largest dry friction of each joint \[N m\], against rising and against falling angle.
-    pub dry: Vec<[f64; 2]>,
-    /// Forces on links: which, where \[m\], how much \[N\].
-    pub pushes: Vec<(usize, Plane, Plane)>,
-}
-
-impl Loads {
-    /// Nothing, for so many joints.
-    pub fn none(joints: usize) -> Self {
-        Self {
-            resist: vec![0.0; joints],
-            dry: vec![[0.0; 2]; joints],
-            pushes: Vec::new(),
-        }
-    }
-}
-
-/// Something that acts on the arm during a trial, with a memory where it has one.
-pub trait Acts {
-    /// Adds what it does now.
-    fn act(&self, now: &Instant, loads: &mut Loads);
-
-    /// Lets a step go by.
-    fn advance(&mut self, _now: &Instant, _step: f64) {}
-}
 
 /// A hidden effect.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,6 +8,7 @@ mod arm;
 mod compensation;
 mod estimator;
 mod held;
+mod layout;
 mod monitor;
 mod motion;
 mod robot;
@@ -64,18 +65,6 @@ abi! {
     armrs_abi_2_double_two_joints when all(not(feature = "single"), feature = "two-joints");
     armrs_abi_2_single_two_joints when all(feature = "single", feature = "two-joints");
 }
-
-/// Sizes that the header asserts as well.
-const _: () = {
-    use core::mem::size_of;
-    const REAL: usize = size_of::<armrs_real>();
-    assert!(size_of::<armrs_segment>() == 5 * REAL);
-    assert!(size_of::<armrs_effect>() == 8 + 6 * REAL);
-    assert!(size_of::<armrs_motion>() == (1 + 3 * ARMRS_JOINTS) * REAL);
-    assert!(size_of::<armrs_load>() == (3 + ARMRS_JOINTS) * REAL);
-    assert!(size_of::<armrs_status>() == 4 && size_of::<armrs_sample_status>() == 4);
-    assert!(size_of::<armrs_decision>() == 4 && size_of::<armrs_reason>() == 4);
-};
 
 /// Where no operating system ends a program there is nothing to unwind to. The function called here exists nowhere: if any
 /// panic can be reached, the firmware does not link, and that is the proof that none can.

@@ -155,14 +155,7 @@ impl<T: Scalar, const N: usize> Resistance<T, N> {
             let beyond = if i + 1 < N { load.torque[i + 1] } else { -load.moment_on_arm };
             rows[i] = load.torque[i] - beyond + pushed - rows[i];
         });
-        self.solve(&mut rows);
-        joints(from_fn(|i| {
-            if i == 0 {
-                rows[0]
-            } else {
-                rows[i] - rows[i - 1]
-            }
-        }))
+        self.solve(rows)
     }
 
     /// Joint accelerations for each newton metre of torque in one joint \[rad/(s² N m)\]: a column of the inverse inertia matrix.
@@ -176,18 +169,12 @@ impl<T: Scalar, const N: usize> Resistance<T, N> {
                 *row = -T::ONE;
             }
         }
-        self.solve(&mut rows);
-        joints(from_fn(|i| {
-            if i == 0 {
-                rows[0]
-            } else {
-                rows[i] - rows[i - 1]
-            }
-        }))
+        self.solve(rows)
     }
 
+    /// Joint accelerations under torques of the links.
     #[inline(always)]
-    fn solve(&self, b: &mut [T; N]) {
+    fn solve(&self, mut b: [T; N]) -> Joints<T, N> {
         let (m, reciprocal) = (&self.matrix, &self.reciprocal);
         each!(k in 0, N => {
             each!(i in k + 1, N => {
@@ -201,6 +188,7 @@ impl<T: Scalar, const N: usize> Resistance<T, N> {
             });
             b[i] = b[i] * reciprocal[i];
         });
+        joints(from_fn(|i| if i == 0 { b[0] } else { b[i] - b[i - 1] }))
     }
 }
 

@@ -31,6 +31,7 @@ mod energy;
 mod equation;
 mod error;
 pub mod estimator;
+mod float;
 mod gravity;
 mod inertia;
 mod kinematics;

@@ -1,7 +1,8 @@
 //! Directional derivatives of outputs and rates, by differences of fourth order.
 
+use crate::mode::Mode;
 use crate::quantity::Quantity;
-use crate::slave::{Mode, Slave};
+use crate::slave::Slave;
 use crate::status::Refused;
 use crate::variables::{Causality, Initial};
 

@@ -1,7 +1,8 @@
 //! Model Exchange: the importer integrates the arm, which gives derivatives of its states.
 
+use crate::mode::Mode;
 use crate::quantity::Quantity;
-use crate::slave::{Mode, Slave};
+use crate::slave::Slave;
 use crate::status::Refused;
 
 const READABLE: [Mode; 4] = [

@@ -5,6 +5,7 @@ mod description;
 mod directional;
 mod exchange;
 mod hash;
+mod mode;
 mod plant;
 mod quantity;
 mod slave;
@@ -17,8 +18,9 @@ mod variables;
 
 pub use description::{Fmi, MODEL_IDENTIFIER, model_description, terminals};
 pub use hash::fnv1a;
+pub use mode::Mode;
 pub use quantity::Quantity;
-pub use slave::{Mode, Slave};
+pub use slave::Slave;
 pub use spec::{ArmSpec, EffectSpec, SegmentSpec, StartSpec};
 pub use state::SlaveState;
 pub use status::{Refused, Status};

@@ -3,61 +3,12 @@
 use arm_core::Shown;
 use arm_sim::SimulationError;
 
+use crate::mode::Mode;
 use crate::plant::{Plant, plant};
 use crate::spec::ArmSpec;
 use crate::state::SlaveState;
 use crate::status::{Refused, Status};
 use crate::variables::{Causality, Initial, Variability, Variable, fits, put, token, variables};
-
-/// Where a slave is in its life.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Mode {
-    /// Made, or reset.
-    Instantiated = 0,
-    /// Start values are set, outputs can be looked at.
-    Initialization = 1,
-    /// Between communication steps.
-    Step = 2,
-    /// At the end.
-    Terminated = 3,
-    /// After an error: it can be read, reset, brought back to a state and freed.
-    Failed = 4,
-    /// Model Exchange: between two stretches of integration.
-    Event = 5,
-    /// Model Exchange: integrated by the importer.
-    Continuous = 6,
-}
-
-impl Mode {
-    /// The mode as the standard calls it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Instantiated => "instantiated",
-            Self::Initialization => "in initialization mode",
-            Self::Step => "in step mode",
-            Self::Terminated => "terminated",
-            Self::Failed => "in error",
-            Self::Event => "in event mode",
-            Self::Continuous => "in continuous-time mode",
-        }
-    }
-
-    pub(crate) fn numbered(number: u64) -> Option<Self> {
-        let all = [
-            Self::Instantiated,
-            Self::Initialization,
-            Self::Step,
-            Self::Terminated,
-            Self::Failed,
-            Self::Event,
-            Self::Continuous,
-        ];
-        usize::try_from(number)
-            .ok()
-            .and_then(|n| all.get(n).copied())
-    }
-}
 
 /// How far apart the importer's time and ours may be, relative to the larger of 1 s and the time.
 const SAME_TIME: f64 = 1e-9;

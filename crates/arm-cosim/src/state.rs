@@ -1,8 +1,8 @@
 //! The state of a slave, to come back to it in this or another process.
 
 use crate::hash::fnv1a;
+use crate::mode::Mode;
 use crate::plant::SavedPlant;
-use crate::slave::Mode;
 use crate::status::Refused;
 
 /// Marks the bytes, with the version of their layout.

@@ -6,10 +6,7 @@ use pyo3::prelude::*;
 
 use crate::convert::{Numbers, Rows, over_rows};
 use crate::errors::{bad_input, invalid};
-use crate::kernel;
-
-/// Longest arm that is compiled in.
-pub(crate) const MOST: usize = 6;
+use crate::kernel::{self, MOST};
 
 /// A chain whose length is known at run time.
 #[derive(Clone, Debug)]

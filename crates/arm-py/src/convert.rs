@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 use arm_core::simd_dispatch::{Computation, dispatch};
-use arm_core::{Chain, Joints, Lanes, Scalar};
+use arm_core::{Chain, Lanes, Scalar};
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{
     IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
@@ -13,7 +13,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::errors::bad_input;
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, MOST};
 
 /// Anything NumPy can read as real numbers; what is none is refused where the name of the argument is known.
 pub struct Numbers<'py>(PyResult<PyReadonlyArrayDyn<'py, f64>>);
@@ -148,17 +148,8 @@ fn first_not_finite(values: &[f64]) -> Option<usize> {
     Some(64 * number + within)
 }
 
-/// Values of a row as joint values.
-#[inline(always)]
-pub fn joints<T: Scalar, const N: usize>(row: &[T]) -> Joints<T, N> {
-    // Not from a slice, which copies numbers one by one where they are of many lanes.
-    Joints::from_fn(|i, _| row[i])
-}
-
 /// Rows that are computed side by side.
 const LANES: usize = 8;
-/// Most numbers in a row of an argument.
-const MOST: usize = crate::arm::MOST;
 
 /// A kernel over every row of a batch; arguments that are single rows serve all rows of the others.
 ///

@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arm::AnyChain;
-use crate::convert::joints;
 use crate::errors::{bad_input, invalid};
+use crate::kernel::joints;
 use crate::rig::Rig;
 
 /// Most effects and unknowns of the C interface.

@@ -1,9 +1,17 @@
 //! The kernels of the core over rows of numbers, one row at a time or several side by side.
 
-use arm_core::{Chain, Load, Pose, Scalar};
+use arm_core::{Chain, Joints, Load, Pose, Scalar};
 use nalgebra::SMatrix;
 
-use crate::convert::joints;
+/// Longest arm that is compiled in.
+pub(crate) const MOST: usize = 6;
+
+/// Values of a row as joint values.
+#[inline(always)]
+pub fn joints<T: Scalar, const N: usize>(row: &[T]) -> Joints<T, N> {
+    // Not from a slice, which copies numbers one by one where they are of many lanes.
+    Joints::from_fn(|i, _| row[i])
+}
 
 /// A function of a chain and a row of each of `K` arguments. A trait, as closures cannot be made to be inlined, and only what is
 /// inlined goes through the widest vectors.

@@ -6,8 +6,9 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, Arm, each_length};
-use crate::convert::{Numbers, in_order, joints};
+use crate::convert::{Numbers, in_order};
 use crate::errors::invalid;
+use crate::kernel::joints;
 use crate::{model, own};
 
 /// A model as the core computes with it: the arm, its effects, its contact with the robot and the robot itself.

@@ -1,6 +1,6 @@
 //! Effects in a joint.
 
-use super::{Place, Scene, Values};
+use super::scene::{Place, Scene, Values};
 use crate::effect::{Dry, Elastic, Law, Muscle};
 use crate::random::Random;
 

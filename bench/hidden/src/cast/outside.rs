@@ -1,6 +1,6 @@
 //! Effects that the catalogue does not have.
 
-use super::Scene;
+use super::scene::Scene;
 use crate::effect::{Dry, Elastic, Hidden, Law, Sensing, Wobble};
 use crate::random::Random;
 use crate::rig::BasePath;

@@ -1,6 +1,6 @@
 //! Effects in segments, frame, contact and robot, and in sensors.
 
-use super::{Place, Scene, Values};
+use super::scene::{Place, Scene, Values};
 use crate::effect::{Law, Sensing};
 use crate::random::Random;
 use crate::rig::BasePath;

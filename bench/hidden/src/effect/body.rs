@@ -1,6 +1,6 @@
 //! A segment that is not rigid.
 
-use super::{Acts, Instant, Loads};
+use super::acting::{Acts, Instant, Loads};
 use crate::rig::{Link, Plane, Rig};
 
 /// Soft tissue: part of a segment's mass hangs on springs at its centre of mass.

@@ -1,6 +1,6 @@
 //! Dry friction: what it can hold at most. The solver finds what it does hold.
 
-use super::{Acts, Instant, Loads};
+use super::acting::{Acts, Instant, Loads};
 
 /// A law of dry friction.
 #[derive(Clone, Copy, Debug, PartialEq)]

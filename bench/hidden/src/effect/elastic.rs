@@ -1,6 +1,6 @@
 //! What stores energy in joints.
 
-use super::{Acts, Instant, Loads};
+use super::acting::{Acts, Instant, Loads};
 
 /// A law of elasticity.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Acts, Instant, Loads};
+use super::acting::{Acts, Instant, Loads};
 use crate::random::Random;
 
 /// A law of muscles.

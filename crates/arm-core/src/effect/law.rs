@@ -1,5 +1,6 @@
 //! What a kind of effect is.
 
+pub use super::place::Place;
 use super::probe::Probe;
 use crate::{Reading, Scalar, Setup};
 
@@ -8,52 +9,6 @@ pub const MAX_PARAMETERS: usize = 6;
 
 /// Parameter values in the order of [`Info::parameters`]; unused places are zero.
 pub type Parameters<T> = [T; MAX_PARAMETERS];
-
-/// Where an effect acts, and so what its index means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// In a joint.
-    Joint,
-    /// On a segment.
-    Segment,
-    /// On the whole arm.
-    Frame,
-    /// Between hand and robot.
-    Contact,
-    /// In a sensor of joint angles.
-    AngleSensor,
-    /// In one channel of the force sensor; the index is 0 = `Fy`, 1 = `Fz`, 2 = `Mx`.
-    ForceSensor,
-    /// At the hand, the tip of the last segment.
-    Hand,
-    /// In all channels of the sensors together.
-    Sensors,
-}
-
-impl Place {
-    /// The word for it in tables and files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Joint => "joint",
-            Self::Segment => "segment",
-            Self::Frame => "frame",
-            Self::Contact => "contact",
-            Self::AngleSensor => "angle sensor",
-            Self::ForceSensor => "force sensor",
-            Self::Hand => "hand",
-            Self::Sensors => "sensors",
-        }
-    }
-
-    /// What an effect here has to be told besides its values: `"joint"` (for a segment its number), `"channel"` or nothing.
-    pub const fn address(self) -> Option<&'static str> {
-        match self {
-            Self::Joint | Self::Segment | Self::AngleSensor => Some("joint"),
-            Self::ForceSensor => Some("channel"),
-            Self::Frame | Self::Contact | Self::Hand | Self::Sensors => None,
-        }
-    }
-}
 
 /// One parameter of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,13 +11,15 @@ mod law;
 // Firmware knows the catalogue alone, and pays nothing for what cannot be declared there.
 #[cfg_attr(not(feature = "own"), path = "own_absent.rs")]
 mod own;
+mod place;
 mod probe;
 mod state;
 
-pub use law::{ActsOn, Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters, Place};
+pub use law::{ActsOn, Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters};
 pub use own::Own;
 #[cfg(feature = "own")]
 pub use own::OwnLaw;
+pub use place::Place;
 pub use probe::{Family, Nature, Probe, Promise, Question, Values};
 pub use state::{advance_states, any_state};
 
@@ -408,6 +410,20 @@ pub fn applied<T: Scalar, const N: usize>(
     setup.chain().map_err(|why| (0, why))
 }
 
+/// The effects that are on in one of `N` joints, each with its state; those without one count as zero.
+#[inline]
+fn in_joints<'a, T: Scalar, const N: usize>(
+    effects: &'a [Effect<T>],
+    memory: &'a [T],
+) -> impl Iterator<Item = (&'a Effect<T>, T)> {
+    let state = |i| memory.get(i).copied().unwrap_or(T::ZERO);
+    effects
+        .iter()
+        .enumerate()
+        .filter(|(_, effect)| effect.on && effect.index < N)
+        .map(move |(i, effect)| (effect, state(i)))
+}
+
 /// Sum of what all effects resist with, shoulder first \[N m\].
 ///
 /// * `memory` - the state of each effect, in the same order; missing ones count as zero
@@ -418,11 +434,8 @@ pub fn resisting_torque<T: Scalar, const N: usize>(
     memory: &[T],
 ) -> Joints<T, N> {
     let mut total = joints([T::ZERO; N]);
-    for (i, effect) in effects.iter().enumerate() {
-        if effect.on && effect.index < N {
-            let state = memory.get(i).copied().unwrap_or(T::ZERO);
-            effect.resist(motion, state, &mut total);
-        }
+    for (effect, state) in in_joints::<T, N>(effects, memory) {
+        effect.resist(motion, state, &mut total);
     }
     total
 }
@@ -435,14 +448,11 @@ pub fn resisting_besides_dry<T: Scalar, const N: usize>(
     memory: &[T],
 ) -> Joints<T, N> {
     let mut total = joints([T::ZERO; N]);
-    for (i, effect) in effects.iter().enumerate() {
-        if effect.on && effect.index < N {
-            let state = memory.get(i).copied().unwrap_or(T::ZERO);
-            if effect.is_dry() {
-                total[effect.index] += effect.besides_dry(&motion.local(effect.index, state));
-            } else {
-                effect.resist(motion, state, &mut total);
-            }
+    for (effect, state) in in_joints::<T, N>(effects, memory) {
+        if effect.is_dry() {
+            total[effect.index] += effect.besides_dry(&motion.local(effect.index, state));
+        } else {
+            effect.resist(motion, state, &mut total);
         }
     }
     total
@@ -456,12 +466,9 @@ pub fn dry_friction<T: Scalar, const N: usize>(
     memory: &[T],
 ) -> [T; N] {
     let mut most = [T::ZERO; N];
-    for (i, effect) in effects.iter().enumerate() {
-        if effect.on && effect.is_dry() {
-            let state = memory.get(i).copied().unwrap_or(T::ZERO);
-            if let Some(most) = most.get_mut(effect.index) {
-                *most += effect.dry(&motion.local(effect.index, state));
-            }
+    for (effect, state) in in_joints::<T, N>(effects, memory) {
+        if effect.is_dry() {
+            most[effect.index] += effect.dry(&motion.local(effect.index, state));
         }
     }
     most

@@ -1,6 +1,6 @@
 //! How a search asks whether a kind is there.
 
-use super::law::Place;
+use super::place::Place;
 
 /// What a kind tells those who look for it in data.
 #[derive(Clone, Copy, Debug, PartialEq)]

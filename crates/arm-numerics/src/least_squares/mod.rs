@@ -3,6 +3,7 @@
 pub mod condense;
 mod equality;
 pub mod factor;
+mod factoring;
 pub mod outcome;
 mod polish;
 pub mod program;

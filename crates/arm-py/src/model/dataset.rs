@@ -6,8 +6,8 @@ use arm_model::{Refused, Table, Value};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
+use super::class::{built, table, value_class, wraps};
 use super::whole::{each, one, path_of};
-use super::{built, table, value_class, wraps};
 use crate::errors::refused;
 
 type Any<'a, 'py> = &'a Bound<'py, PyAny>;

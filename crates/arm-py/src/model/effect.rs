@@ -4,7 +4,8 @@ use arm_model::Table;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy};
 
-use super::{value, value_class, wraps};
+use super::class::{value_class, wraps};
+use super::value;
 use crate::errors::refused;
 
 /// One effect of the catalogue, with values.

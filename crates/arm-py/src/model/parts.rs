@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 
-use super::{built, table, value_class, wraps};
+use super::class::{built, table, value_class, wraps};
 
 type Any<'a, 'py> = &'a Bound<'py, PyAny>;
 

@@ -8,8 +8,9 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyMapping, PyString, PyTuple};
 use pyo3::{PyClass, PyTypeInfo};
 
+use super::class::{self, Wraps, value_class};
 use super::parameter::{AnyId, ParameterInfo};
-use super::{Contact, Effect, Joint, Robot, Segment, Wraps, value, value_class};
+use super::{Contact, Effect, Joint, Robot, Segment, value};
 use crate::errors::refused;
 
 /// An arm, what acts on it, and the rig that leads it.
@@ -100,7 +101,7 @@ impl Model {
         effects: Option<&Bound<'_, PyAny>>,
         joint_uncertainty: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let numbers = super::table([
+        let numbers = class::table([
             ("gravity", gravity),
             ("base", base),
             ("segment_uncertainty", segment_uncertainty),
