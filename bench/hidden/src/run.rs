@@ -5,7 +5,7 @@ use crate::motion::{Lead, RATE, STEPS};
 use crate::random::Random;
 use crate::rig::{Plane, Rig};
 use crate::start::{equilibrium, resting};
-use crate::world::World;
+use crate::world::{Bodies, World};
 
 /// What happened in a trial, at every `kept`th step.
 #[derive(Clone, Debug, Default)]
@@ -92,19 +92,7 @@ pub fn run(
         .iter()
         .filter_map(|effect| effect.acting(rig, trial, random))
         .collect();
-    let handle: Vec<Plane> = lead
-        .handle
-        .iter()
-        .enumerate()
-        .map(|(n, at)| {
-            let mut at = [at[0] + grip.in_room[0], at[1] + grip.in_room[1]];
-            for effect in hidden {
-                let [y, z] = effect.ripple(n as f64 * step);
-                at = [at[0] + y, at[1] + z];
-            }
-            at
-        })
-        .collect();
+    let handle = gripped(hidden, lead, grip);
     let hand = rig.size() - 1;
     let held_at = |time: f64| {
         let [x, y] = grip.at(time);
@@ -115,18 +103,7 @@ pub fn run(
     let dry = rubs(&acting, &resting(rig, &q));
     let mut world = World::new(rig, &q, step, (dry, conditions.friction_grip));
     let mut bodies = world.read();
-    // At rest the hinges carry what is in equilibrium.
-    let mut weights = Loads::none(rig.size());
-    for effect in &acting {
-        effect.act(&resting(rig, &q), &mut weights);
-    }
-    let held = rig.contact.force_on_arm(
-        gap(
-            &handle[0],
-            &grip_point_at(rig, &resting(rig, &q), grip_point),
-        ),
-        [0.0; 2],
-    );
+    let (weights, held) = at_rest(rig, &acting, &q, (handle[0], grip_point));
     world.note(&bodies, &bodies.clone(), &weights, held);
     let (mut speed_before, mut tip_before) = (bodies.qd.clone(), None);
     let mut truth = Truth {
@@ -134,21 +111,12 @@ pub fn run(
         ..Truth::default()
     };
     for n in 0..handle.len() {
-        // Speeds are known half a step before now; forces need them now.
-        let ahead = |k: usize| bodies.qd[k] + 0.5 * (bodies.qd[k] - speed_before[k]);
-        let (points, angles) = rig.points(&bodies.q);
-        let now = Instant {
-            time: n as f64 * step,
-            q: bodies.q.clone(),
-            qd: (0..rig.size()).map(ahead).collect(),
-            through: world
-                .reaction
-                .iter()
-                .map(|[y, z]| (y * y + z * z).sqrt())
-                .collect(),
-            points,
-            angles,
-        };
+        let now = instant(
+            rig,
+            (&bodies, &speed_before),
+            &world.reaction,
+            n as f64 * step,
+        );
         let grip_point = held_at(now.time);
         let (tip, velocity) = grip_motion(rig, &now, grip_point, &mut tip_before, step);
         let lead_velocity = Lead::velocity(&handle, n);
@@ -159,14 +127,7 @@ pub fn run(
             truth.force_on_arm.push(force);
             truth.robot.push(lead.robot[n]);
         }
-        let mut loads = passive(rig, &now);
-        for effect in &acting {
-            effect.act(&now, &mut loads);
-        }
-        // The guide of a base that moves does no work: what the base does to the arm turns the first joint.
-        let (_, per_angle) = rig.base_path.at(now.q[0]);
-        let [y, z] = world.reaction[0];
-        loads.resist[0] += per_angle[0] * y + per_angle[1] * z;
+        let loads = loads(rig, &acting, &now, world.reaction[0]);
         world
             .step(&bodies, &loads, (force, grip_point))
             .map_err(|joint| format!("joint {} left the world at {:.2} s", joint + 1, now.time))?;
@@ -181,6 +142,72 @@ pub fn run(
         true => Ok(truth),
         false => Err("the arm spun".to_owned()),
     }
+}
+
+/// Where the handle is that leads the arm \[m\], beside where the robot's angles say.
+fn gripped(hidden: &[Hidden], lead: &Lead, grip: &Grip) -> Vec<Plane> {
+    let step = 1.0 / STEPS;
+    let displaced = lead.handle.iter().enumerate().map(|(n, at)| {
+        let mut at = [at[0] + grip.in_room[0], at[1] + grip.in_room[1]];
+        for effect in hidden {
+            let [y, z] = effect.ripple(n as f64 * step);
+            at = [at[0] + y, at[1] + z];
+        }
+        at
+    });
+    displaced.collect()
+}
+
+/// What effects do in equilibrium, and the force of the contact there: what the hinges carry at rest.
+fn at_rest(
+    rig: &Rig,
+    acting: &[Box<dyn Acts>],
+    q: &[f64],
+    (handle, grip_point): (Plane, Plane),
+) -> (Loads, Plane) {
+    let rest = resting(rig, q);
+    let mut weights = Loads::none(rig.size());
+    for effect in acting {
+        effect.act(&rest, &mut weights);
+    }
+    let stretch = gap(&handle, &grip_point_at(rig, &rest, grip_point));
+    (weights, rig.contact.force_on_arm(stretch, [0.0; 2]))
+}
+
+/// What is known of the arm now. Speeds are known half a step before; forces need them now.
+fn instant(
+    rig: &Rig,
+    (bodies, speed_before): (&Bodies, &[f64]),
+    reaction: &[Plane],
+    time: f64,
+) -> Instant {
+    let ahead = |k: usize| bodies.qd[k] + 0.5 * (bodies.qd[k] - speed_before[k]);
+    let (points, angles) = rig.points(&bodies.q);
+    Instant {
+        time,
+        q: bodies.q.clone(),
+        qd: (0..rig.size()).map(ahead).collect(),
+        through: reaction
+            .iter()
+            .map(|[y, z]| (y * y + z * z).sqrt())
+            .collect(),
+        points,
+        angles,
+    }
+}
+
+/// What loads the arm now.
+///
+/// The guide of a base that moves does no work: what the base does to the arm turns the first joint.
+fn loads(rig: &Rig, acting: &[Box<dyn Acts>], now: &Instant, at_base: Plane) -> Loads {
+    let mut loads = passive(rig, now);
+    for effect in acting {
+        effect.act(now, &mut loads);
+    }
+    let (_, per_angle) = rig.base_path.at(now.q[0]);
+    let [y, z] = at_base;
+    loads.resist[0] += per_angle[0] * y + per_angle[1] * z;
+    loads
 }
 
 /// Whether any effect is dry friction.

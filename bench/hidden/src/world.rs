@@ -54,46 +54,9 @@ impl World {
     /// * `dry` - whether anything rubs
     /// * `grip` - damping of dry friction where it sticks \[N m s/rad\]
     pub fn new(rig: &Rig, q: &[f64], step: f64, (dry, grip): (bool, f64)) -> Self {
-        let rotors = rig.rotors.iter().any(|r| *r > 0.0);
-        let mut world = PhysicsWorld {
-            gravity: vector(rig.gravity),
-            integration_parameters: IntegrationParameters {
-                dt: step,
-                num_solver_iterations: 1,
-                num_internal_pgs_iterations: if dry || rotors {
-                    SWEEPS_WITH_MOTORS
-                } else {
-                    SWEEPS
-                },
-                // What a second pass would change is the half step by which speeds and places differ in time.
-                num_internal_stabilization_iterations: 0,
-                warmstart_joints: false,
-                max_ccd_substeps: 0,
-                normalized_max_linear_velocity: f64::MAX,
-                ..IntegrationParameters::default()
-            },
-            ..PhysicsWorld::default()
-        };
+        let mut world = empty(rig, step, dry);
         let (points, angles) = rig.points(q);
-        let last = rig.size() - 1;
-        let links: Vec<_> = (0..rig.size())
-            .map(|i| {
-                let link = &rig.links[i];
-                let mut mass =
-                    MassProperties::new(vector([link.com, 0.0]), link.mass, link.inertia);
-                if i == last && rig.hand_mass > 0.0 {
-                    mass += MassProperties::new(vector([link.length, 0.0]), rig.hand_mass, 0.0);
-                }
-                world.insert_body(
-                    RigidBodyBuilder::dynamic()
-                        .translation(vector(points[i]))
-                        .rotation(angles[i])
-                        .additional_mass_properties(mass)
-                        .can_sleep(false)
-                        .allow_fast_rotation(true),
-                )
-            })
-            .collect();
+        let links = insert_links(&mut world, rig, (&points, &angles));
         let ground = match rig.base_path {
             BasePath::Fixed => RigidBodyBuilder::fixed(),
             _ => RigidBodyBuilder::kinematic_position_based(),
@@ -281,6 +244,56 @@ impl World {
                 .set_next_kinematic_translation(vector([base[0] + shift[0], base[1] + shift[1]]));
         }
     }
+}
+
+/// A world without bodies.
+fn empty(rig: &Rig, step: f64, dry: bool) -> PhysicsWorld {
+    let rotors = rig.rotors.iter().any(|r| *r > 0.0);
+    PhysicsWorld {
+        gravity: vector(rig.gravity),
+        integration_parameters: IntegrationParameters {
+            dt: step,
+            num_solver_iterations: 1,
+            num_internal_pgs_iterations: if dry || rotors {
+                SWEEPS_WITH_MOTORS
+            } else {
+                SWEEPS
+            },
+            // What a second pass would change is the half step by which speeds and places differ in time.
+            num_internal_stabilization_iterations: 0,
+            warmstart_joints: false,
+            max_ccd_substeps: 0,
+            normalized_max_linear_velocity: f64::MAX,
+            ..IntegrationParameters::default()
+        },
+        ..PhysicsWorld::default()
+    }
+}
+
+/// The links where they are, with what the hand holds on the last.
+fn insert_links(
+    world: &mut PhysicsWorld,
+    rig: &Rig,
+    (points, angles): (&[Plane], &[f64]),
+) -> Vec<RigidBodyHandle> {
+    let last = rig.size() - 1;
+    (0..rig.size())
+        .map(|i| {
+            let link = &rig.links[i];
+            let mut mass = MassProperties::new(vector([link.com, 0.0]), link.mass, link.inertia);
+            if i == last && rig.hand_mass > 0.0 {
+                mass += MassProperties::new(vector([link.length, 0.0]), rig.hand_mass, 0.0);
+            }
+            world.insert_body(
+                RigidBodyBuilder::dynamic()
+                    .translation(vector(points[i]))
+                    .rotation(angles[i])
+                    .additional_mass_properties(mass)
+                    .can_sleep(false)
+                    .allow_fast_rotation(true),
+            )
+        })
+        .collect()
 }
 
 fn vector([y, z]: Plane) -> Vector {

@@ -27,7 +27,39 @@ pub enum Fmi {
 pub fn model_description(spec: &ArmSpec, fmi: Fmi) -> Result<String, Refused> {
     let table = variables(spec)?;
     let units = used_units(&table)?;
+    let exchange = spec.no_exchange().is_none();
     let mut xml = Xml::new();
+    open_root(&mut xml, spec, fmi, exchange)?;
+    interfaces(&mut xml, spec, fmi, exchange);
+    unit_definitions(&mut xml, &units);
+    log_categories(&mut xml);
+    xml.leaf(
+        "DefaultExperiment",
+        &[
+            ("startTime", "0.0"),
+            ("stopTime", "2.0"),
+            ("stepSize", "0.001"),
+        ],
+    );
+    xml.open("ModelVariables", &[]);
+    for (reference, variable) in table.iter().enumerate() {
+        // Value references are places from one in FMI 2.0, where time is left out.
+        let state = variable.quantity.state().filter(|_| exchange);
+        let state = state.and_then(|s| table.iter().position(|v| v.quantity == s));
+        match fmi {
+            Fmi::Two if variable.causality == Causality::Independent => {}
+            Fmi::Two => scalar_variable(&mut xml, reference, variable, state)?,
+            Fmi::Three => float64(&mut xml, reference, variable, state)?,
+        }
+    }
+    xml.close("ModelVariables");
+    structure(&mut xml, fmi, spec, &table);
+    xml.close("fmiModelDescription");
+    Ok(xml.text)
+}
+
+/// Opens the element of the whole: what the model is, and who made it.
+fn open_root(xml: &mut Xml, spec: &ArmSpec, fmi: Fmi, exchange: bool) -> Result<(), Refused> {
     let (version, token) = (env!("CARGO_PKG_VERSION"), token(spec)?);
     let port = match spec.port {
         Port::Force => "force port: force on the arm in, motion of its handle out",
@@ -39,7 +71,6 @@ pub fn model_description(spec: &ArmSpec, fmi: Fmi) -> Result<String, Refused> {
         Fmi::Two => ("2.0", "guid"),
         Fmi::Three => ("3.0", "instantiationToken"),
     };
-    let exchange = spec.no_exchange().is_none();
     let indicators: &[(&str, &str)] = match fmi {
         Fmi::Two if exchange => &[("numberOfEventIndicators", "0")],
         _ => &[],
@@ -66,8 +97,10 @@ pub fn model_description(spec: &ArmSpec, fmi: Fmi) -> Result<String, Refused> {
         ]
         .concat(),
     );
-    interfaces(&mut xml, spec, fmi, exchange);
-    unit_definitions(&mut xml, &units);
+    Ok(())
+}
+
+fn log_categories(xml: &mut Xml) {
     xml.open("LogCategories", &[]);
     xml.leaf(
         "Category",
@@ -84,29 +117,6 @@ pub fn model_description(spec: &ArmSpec, fmi: Fmi) -> Result<String, Refused> {
         ],
     );
     xml.close("LogCategories");
-    xml.leaf(
-        "DefaultExperiment",
-        &[
-            ("startTime", "0.0"),
-            ("stopTime", "2.0"),
-            ("stepSize", "0.001"),
-        ],
-    );
-    xml.open("ModelVariables", &[]);
-    for (reference, variable) in table.iter().enumerate() {
-        // Value references are places from one in FMI 2.0, where time is left out.
-        let state = variable.quantity.state().filter(|_| exchange);
-        let state = state.and_then(|s| table.iter().position(|v| v.quantity == s));
-        match fmi {
-            Fmi::Two if variable.causality == Causality::Independent => {}
-            Fmi::Two => scalar_variable(&mut xml, reference, variable, state)?,
-            Fmi::Three => float64(&mut xml, reference, variable, state)?,
-        }
-    }
-    xml.close("ModelVariables");
-    structure(&mut xml, fmi, spec, &table);
-    xml.close("fmiModelDescription");
-    Ok(xml.text)
 }
 
 /// `terminalsAndIcons.xml` of an arm: its port as the terminal `handle`.

@@ -225,9 +225,17 @@ fn inputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
     }
 }
 
+fn output(quantity: Quantity, name: String, unit: &'static str) -> Variable {
+    Variable::new(quantity, name, unit, Causality::Output)
+}
+
 fn outputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
-    let output =
-        |quantity, name: String, unit| Variable::new(quantity, name, unit, Causality::Output);
+    joint_outputs(spec, table);
+    tip_outputs(spec, table);
+    energy_outputs(spec, table);
+}
+
+fn joint_outputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
     for joint in 0..spec.joints() {
         let text = match joint {
             0 => "Angle of joint 1: that of segment 1 from +y, counter-clockwise.".to_owned(),
@@ -253,6 +261,9 @@ fn outputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
             .says(format!("Speed of joint {}.", joint + 1)),
         );
     }
+}
+
+fn tip_outputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
     for (axis, along) in AXES.iter().enumerate() {
         table.push(
             output(
@@ -287,6 +298,9 @@ fn outputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
             );
         }
     }
+}
+
+fn energy_outputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
     let energy =
         |quantity, name: &str, text: &str| output(quantity, name.to_owned(), "J").says(text);
     table.push(energy(

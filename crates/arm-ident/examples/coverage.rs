@@ -11,7 +11,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Joints, Limits, Segment, Setup, Shape, models};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
-use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Start, simulate};
+use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Recording, Start, simulate};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
@@ -24,6 +24,13 @@ const FORCE_NOISE: f64 = 0.2;
 const BRAKES: [f64; 2] = [0.139, 0.161];
 /// The robot's encoders are far better than the cameras \[m\].
 const HANDLE_NOISE: f64 = 1e-5;
+
+const NAMES: [&str; 4] = [
+    "m1*l1 + a1*m2",
+    "m2*l2",
+    "coulomb1 torque",
+    "coulomb2 torque",
+];
 
 /// A standard normal number (Box, Muller 1958).
 fn gaussian(random: &mut ChaCha8Rng) -> f64 {
@@ -46,15 +53,13 @@ struct Session {
     gain: [f64; 2],
 }
 
-fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    let repetitions: u64 = arguments.get(1).and_then(|a| a.parse().ok()).unwrap_or(20);
-    let braked = arguments.get(2).is_none_or(|a| a == "brakes");
-    let exact = arguments.get(3).is_none_or(|a| a == "exact");
+fn contact() -> Contact<f64> {
+    Contact::new([1e4; 2], [25.0; 2])
+}
 
+/// The experiment without noise.
+fn led(torque: [f64; 2]) -> Recording<2> {
     let truth = models::mechanical_arm();
-    let torque = if braked { BRAKES } else { [0.0; 2] };
-    let contact = Contact::new([1e4; 2], [25.0; 2]);
     let waypoints: Vec<Joints<f64, 2>> = [[-40.0_f64, 60.0], [-28.6, 71.5], [-40.0, 60.0]]
         .map(|w| Joints::from(w.map(f64::to_radians)))
         .to_vec();
@@ -65,94 +70,96 @@ fn main() {
     let movement =
         Movement::within(Shape::Trapezoid, &waypoints, &limits, 1.0).expect("a valid movement");
     let duration = (movement.duration() * RATE).ceil() / RATE + 1.0;
-    let path = HandlePath::of_arm(truth, movement.clone());
     let drive = Drive::Handle {
-        path,
+        path: HandlePath::of_arm(truth, movement),
         coupling: Coupling::Compliant,
     };
-    let mut experiment = Experiment::new(Setup::new(&truth, contact), drive, duration);
+    let mut experiment = Experiment::new(Setup::new(&truth, contact()), drive, duration);
     experiment.effects = brakes(torque);
     experiment.start = Start::Equilibrium { near: waypoints[0] };
     experiment.output_interval = Some(1.0 / RATE);
-    let run = simulate(&experiment).expect("the experiment runs");
+    simulate(&experiment).expect("the experiment runs")
+}
 
+/// What is known beforehand: 10 % wrong.
+fn assumed() -> Model<2> {
     let scale = [1.1, 0.9];
     let segments = core::array::from_fn(|j| {
-        let s: Segment<f64> = truth.segments()[j];
+        let s: Segment<f64> = models::mechanical_arm().segments()[j];
         Segment {
             mass: s.mass * scale[j],
             com: [s.com[0] * scale[1 - j], 0.0],
             ..s
         }
     });
-    let model = Model {
+    Model {
         chain: Chain::new(segments, [0.0; 2], [0.0, -9.81]).expect("a valid arm"),
         segment_uncertainty: 0.3,
         fitted: brakes([0.0; 2]),
         held: Vec::new(),
-        contact,
-    };
-    let none = Tolerance {
-        angle_offset: 0.0,
-        force_bias: 0.0,
-        force_gain: 0.0,
+        contact: contact(),
+    }
+}
+
+fn tolerance(exact: bool) -> Tolerance {
+    let share = if exact { 0.0 } else { 1.0 };
+    let usual = Tolerance::default();
+    Tolerance {
+        angle_offset: share * usual.angle_offset,
+        force_bias: share * usual.force_bias,
+        force_gain: share * usual.force_gain,
         time_delay: 0.0,
         handle_placement: 0.0,
+    }
+}
+
+/// One estimate: its value, the standard deviation stated, and whether the interval covers the truth.
+type Found = (f64, f64, bool);
+
+/// One session, identified.
+fn repetition(seed: u64, run: &Recording<2>, options: &Options, truth: [f64; 4]) -> [Found; 4] {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let t = options.tolerance;
+    let mut draw = |sd: f64| [(); 2].map(|()| sd * gaussian(&mut random));
+    let session = Session {
+        offset: draw(t.angle_offset),
+        bias: draw(t.force_bias),
+        gain: draw(t.force_gain),
     };
-    let tolerance = if exact {
-        none
-    } else {
-        Tolerance {
-            time_delay: 0.0,
-            handle_placement: 0.0,
-            ..Tolerance::default()
-        }
-    };
+    let trials: Vec<Trial<2>> = (0..TRIALS)
+        .map(|_| measured(run, &session, &mut random))
+        .collect();
+    let result = identify(&assumed(), &trials, options).expect("identification succeeds");
+    assert_eq!(result.rank, 6, "masses cannot be told apart");
+    let friction = result.parameters.iter();
+    let friction = friction.filter(|p| p.name.contains("coulomb"));
+    let estimates: Vec<_> = result.combinations[..2].iter().chain(friction).collect();
+    core::array::from_fn(|k| {
+        let e = estimates[k];
+        assert!(k > 1 || e.name == NAMES[k]);
+        let covers = e.interval[0] <= truth[k] && truth[k] <= e.interval[1];
+        (e.value, e.std, covers)
+    })
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let repetitions: u64 = arguments.get(1).and_then(|a| a.parse().ok()).unwrap_or(20);
+    let braked = arguments.get(2).is_none_or(|a| a == "brakes");
+    let exact = arguments.get(3).is_none_or(|a| a == "exact");
+
+    let torque = if braked { BRAKES } else { [0.0; 2] };
+    let [first, second] = *models::mechanical_arm().first_moments();
+    let truth = [first, second, torque[0], torque[1]];
     let options = Options {
-        tolerance,
+        tolerance: tolerance(exact),
         motion: MotionSource::Simulated,
         ..Options::default()
     };
-
-    let true_values = [
-        truth.first_moments()[0],
-        truth.first_moments()[1],
-        torque[0],
-        torque[1],
-    ];
-    let names = [
-        "m1*l1 + a1*m2",
-        "m2*l2",
-        "coulomb1 torque",
-        "coulomb2 torque",
-    ];
-    let mut found: [Vec<(f64, f64, bool)>; 4] = Default::default();
-    for seed in 1..=repetitions {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let t = options.tolerance;
-        let mut draw = |sd: f64| [(); 2].map(|()| sd * gaussian(&mut random));
-        let session = Session {
-            offset: draw(t.angle_offset),
-            bias: draw(t.force_bias),
-            gain: draw(t.force_gain),
-        };
-        let trials: Vec<Trial<2>> = (0..TRIALS)
-            .map(|_| measured(&run, &session, &mut random))
-            .collect();
-        let result = identify(&model, &trials, &options).expect("identification succeeds");
-        assert_eq!(result.rank, 6, "masses cannot be told apart");
-        let estimates = result.combinations[..2].iter().chain(
-            result
-                .parameters
-                .iter()
-                .filter(|p| p.name.contains("coulomb")),
-        );
-        for (k, e) in estimates.enumerate() {
-            assert!(k > 1 || e.name == names[k]);
-            let covers = e.interval[0] <= true_values[k] && true_values[k] <= e.interval[1];
-            found[k].push((e.value, e.std, covers));
-        }
-    }
+    let run = led(torque);
+    let found: Vec<[Found; 4]> = (1..=repetitions)
+        .map(|seed| repetition(seed, &run, &options, truth))
+        .collect();
     println!(
         "{repetitions} repetitions, {TRIALS} trials, {}, calibration {}",
         if braked { "brakes" } else { "no brakes" },
@@ -163,29 +170,27 @@ fn main() {
         "quantity", "truth", "mean", "scatter", "stated", "worst", "cover %"
     );
     for k in 0..4 {
-        let n = repetitions as f64;
-        let mean = found[k].iter().map(|f| f.0).sum::<f64>() / n;
-        let scatter = (found[k]
-            .iter()
-            .map(|f| (f.0 - mean) * (f.0 - mean))
-            .sum::<f64>()
-            / (n - 1.0))
-            .sqrt();
-        let stated = found[k].iter().map(|f| f.1).sum::<f64>() / n;
-        let worst = found[k]
-            .iter()
-            .map(|f| (f.0 - true_values[k]).abs())
-            .fold(0.0, f64::max);
-        let cover = found[k].iter().filter(|f| f.2).count() as f64 / n * 100.0;
-        println!(
-            "{:<16} {:>9.5} {:>9.5} {:>9.5} {:>9.5} {:>9.5} {:>8.1}",
-            names[k], true_values[k], mean, scatter, stated, worst, cover
-        );
+        let of_one: Vec<Found> = found.iter().map(|all| all[k]).collect();
+        print_row(NAMES[k], truth[k], &of_one);
     }
 }
 
+fn print_row(name: &str, truth: f64, found: &[Found]) {
+    let n = found.len() as f64;
+    let mean = found.iter().map(|f| f.0).sum::<f64>() / n;
+    let squares = found.iter().map(|f| (f.0 - mean) * (f.0 - mean));
+    let scatter = (squares.sum::<f64>() / (n - 1.0)).sqrt();
+    let stated = found.iter().map(|f| f.1).sum::<f64>() / n;
+    let worst = found.iter().map(|f| (f.0 - truth).abs());
+    let worst = worst.fold(0.0, f64::max);
+    let cover = found.iter().filter(|f| f.2).count() as f64 / n * 100.0;
+    println!(
+        "{name:<16} {truth:>9.5} {mean:>9.5} {scatter:>9.5} {stated:>9.5} {worst:>9.5} {cover:>8.1}"
+    );
+}
+
 /// One trial as the sensors see it.
-fn measured(run: &arm_sim::Recording<2>, session: &Session, random: &mut ChaCha8Rng) -> Trial<2> {
+fn measured(run: &Recording<2>, session: &Session, random: &mut ChaCha8Rng) -> Trial<2> {
     let n = run.time.len();
     let mut trial = Trial {
         speed: None,

@@ -63,8 +63,40 @@ pub fn declare(
             &format!("at most {MAX_PARAMETERS}"),
         ));
     }
+    let (low, high, speed, knee, angles, speeds) = grid;
+    let grid = Grid {
+        angle: [low, high],
+        speed,
+        knee,
+        count: [angles.max(4), speeds.max(4)],
+    };
+    let probe = Probe::lasting(leak(vec![question(&parameters)]));
+    let info: &'static Info = Box::leak(Box::new(Info {
+        kind: name.leak(),
+        place: Place::Joint,
+        summary: summary.leak(),
+        formula: formula.leak(),
+        reference: "of one's own",
+        parameters: leak(parameters.into_iter().map(parameter).collect()),
+        memory: false,
+    }));
+    let me = info.kind;
+    let ask = move |p: &[f64]| {
+        ask_once(me, &tabulate, grid, p)
+            .map_err(|error| {
+                *FAILED.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            })
+            .ok()
+    };
+    let law = Box::leak(Box::new(Tabulated::new(info, probe, grid, Box::new(ask))));
+    arm_model::declare(Kind::Own(Own::new(law))).map_err(refused)
+}
+
+/// How a search asks for the kind: all linear parameters are free, shapes with values are tried and refined.
+///
+/// A kind lives as long as the program, like those of the catalogue: models and results refer to it.
+fn question(parameters: &[Asked]) -> Question {
     let linear = parameters.iter().take_while(|p| p.5).count();
-    // A kind lives as long as the program, like those of the catalogue: models and results refer to it.
     let free: &'static [usize] = leak((0..linear).collect());
     let refined: &'static [usize] = leak((linear..parameters.len()).collect());
     let shapes: Vec<(usize, Values)> = parameters
@@ -73,61 +105,39 @@ pub fn declare(
         .filter(|(_, p)| !p.6.is_empty())
         .map(|(k, p)| (k, Values::Each(leak(p.6.clone()))))
         .collect();
-    let question = Question::of(free).shaped(leak(shapes)).refining(refined);
-    let info: &'static Info = Box::leak(Box::new(Info {
-        kind: name.leak(),
-        place: Place::Joint,
-        summary: summary.leak(),
-        formula: formula.leak(),
-        reference: "of one's own",
-        parameters: leak(
-            parameters
-                .into_iter()
-                .map(|(name, unit, min, max, default, linear, _)| Parameter {
-                    or_zero: false,
-                    name: name.leak(),
-                    unit: unit.leak(),
-                    min,
-                    max,
-                    default,
-                    linear,
-                })
-                .collect(),
-        ),
-        memory: false,
-    }));
-    let (low, high, speed, knee, angles, speeds) = grid;
-    let grid = Grid {
-        angle: [low, high],
-        speed,
-        knee,
-        count: [angles.max(4), speeds.max(4)],
-    };
-    let me = info.kind;
-    let ask = move |p: &[f64]| {
-        // A law that simulates an arm with this very effect would never end.
-        let again = ASKING.with_borrow(|laws| laws.contains(&me));
-        let answer = if again {
-            Err(bad_input(
-                &format!("law of {me}"),
-                "a law that simulates an arm with this effect",
-                "a function of angle and speed",
-            ))
-        } else {
-            ASKING.with_borrow_mut(|laws| laws.push(me));
-            let answer = Python::attach(|py| ask(py, &tabulate, grid, p));
-            ASKING.with_borrow_mut(Vec::pop);
-            answer
-        };
-        answer
-            .map_err(|error| {
-                *FAILED.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            })
-            .ok()
-    };
-    let probe = Probe::lasting(leak(vec![question]));
-    let law = Box::leak(Box::new(Tabulated::new(info, probe, grid, Box::new(ask))));
-    arm_model::declare(Kind::Own(Own::new(law))).map_err(refused)
+    Question::of(free).shaped(leak(shapes)).refining(refined)
+}
+
+fn parameter((name, unit, min, max, default, linear, _): Asked) -> Parameter {
+    Parameter {
+        or_zero: false,
+        name: name.leak(),
+        unit: unit.leak(),
+        min,
+        max,
+        default,
+        linear,
+    }
+}
+
+/// Asks a law for its table, unless it is being asked: one that simulates an arm with this very effect would never end.
+fn ask_once(
+    me: &'static str,
+    tabulate: &Py<PyAny>,
+    grid: Grid,
+    p: &[f64],
+) -> PyResult<Vec<Vec<f64>>> {
+    if ASKING.with_borrow(|laws| laws.contains(&me)) {
+        return Err(bad_input(
+            &format!("law of {me}"),
+            "a law that simulates an arm with this effect",
+            "a function of angle and speed",
+        ));
+    }
+    ASKING.with_borrow_mut(|laws| laws.push(me));
+    let answer = Python::attach(|py| ask(py, tabulate, grid, p));
+    ASKING.with_borrow_mut(Vec::pop);
+    answer
 }
 
 fn leak<T>(list: Vec<T>) -> &'static [T] {

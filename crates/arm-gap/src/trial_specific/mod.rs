@@ -4,4 +4,5 @@ pub mod component;
 pub(crate) mod contact_identification;
 pub mod disturbance;
 pub mod slow_ripple;
+mod spectral_line;
 pub mod tremor_detection;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
 use arm_core::{Contact, Joints, Pose, jacobian};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
@@ -13,7 +13,8 @@ use crate::measurement_model::prediction::{Channels, Course, smooth};
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::sensitivity::normal_equations::factor;
 use crate::trial_specific::component::{TrialSpecific, shapes_of};
-use arm_numerics::signal::spectrum::{Sum, coefficient, line};
+use crate::trial_specific::spectral_line::SpectralLine;
+use arm_numerics::signal::spectrum::{Sum, line};
 
 /// Where a line is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -313,95 +314,23 @@ impl<const N: usize> PreparedSession<'_, N> {
         (columns, answers): (&[Effect<f64>], &[Answer]),
     ) -> Option<Explained> {
         let rate = self.courses[self.fitted[0]].rate;
-        let channels = self.session.channels();
-        // The noise of each channel next to the line.
-        let beside = [-0.9, -0.6, 0.6, 0.9].map(|d| frequency + d);
-        let noise: Vec<f64> = (0..channels)
-            .map(|c| {
-                let powers = residuals.iter().flat_map(|r| {
-                    beside
-                        .iter()
-                        .map(move |&f| coefficient(&r[c], f, rate))
-                        .map(|[a, b]| a * a + b * b)
-                });
-                let (sum, count) = powers.fold((0.0, 0.0), |(s, n), p| (s + p, n + 1.0));
-                f64::max(sum / f64::max(count, 1.0), 1e-30)
-            })
+        let line = SpectralLine { frequency, rate };
+        let noise: Vec<f64> = (0..self.session.channels())
+            .map(|c| line.noise_beside(residuals, c))
             .collect();
-        let k = columns.len();
-        let (mut gain, mut sizes) = (0.0, Vec::new());
-        let mut information = 0.0;
+        let (mut gain, mut information, mut sizes) = (0.0, 0.0, Vec::new());
         for (residual, &trial) in residuals.iter().zip(&self.fitted) {
             let swings = answers[self.group_of[trial]].as_ref()?;
-            let swing = |column: &Channels, c: usize| coefficient(&column[c], frequency, rate);
-            // Complex least squares as real ones: each column turned by 0 and by 90°.
-            let mut gram = DMatrix::zeros(2 * k, 2 * k);
-            let mut score = DVector::zeros(2 * k);
-            for c in 0..channels {
-                let seen = coefficient(&residual[c], frequency, rate);
-                let turned: Vec<[f64; 2]> = swings
-                    .iter()
-                    .map(|column| swing(column, c))
-                    .flat_map(|[a, b]| [[a, b], [-b, a]])
-                    .collect();
-                for (a, x) in turned.iter().enumerate() {
-                    score[a] += (x[0] * seen[0] + x[1] * seen[1]) / noise[c];
-                    for (b, y) in turned.iter().enumerate() {
-                        gram[(a, b)] += (x[0] * y[0] + x[1] * y[1]) / noise[c];
-                    }
-                }
-            }
+            let (gram, score) = line.normal_equations(residual, swings, &noise);
             information += gram[(0, 0)];
             let solution = factor(gram)?.solve(&score);
             gain += 2.0 * solution.dot(&score);
             sizes.push(solution);
         }
-        let share = (0..channels)
-            .map(|c| {
-                let (mut line, mut all) = (0.0, 0.0);
-                for residual in residuals {
-                    let [a, b] = coefficient(&residual[c], frequency, rate);
-                    let count = residual[c].len() as f64;
-                    line += 0.5 * (a * a + b * b);
-                    let mean = residual[c].iter().sum::<f64>() / count;
-                    all += residual[c]
-                        .iter()
-                        .map(|v| (v - mean) * (v - mean))
-                        .sum::<f64>()
-                        / count;
-                }
-                line / f64::max(all, 1e-300)
-            })
+        let share = (0..noise.len())
+            .map(|c| line.share(residuals, c))
             .fold(0.0, f64::max);
-        let n = sizes.len() as f64;
-        let size = |a: usize| {
-            let square = |s: &DVector<f64>| s[2 * a] * s[2 * a] + s[2 * a + 1] * s[2 * a + 1];
-            libm::sqrt(sizes.iter().map(square).sum::<f64>() / n)
-        };
-        let mean = |i: usize| sizes.iter().map(|s| s[i]).sum::<f64>() / n;
-        let coherence = libm::hypot(mean(0), mean(1)) / size(0).max(1e-300);
-        let locked = coherence > LOCKED;
-        let phase = if locked {
-            libm::atan2(mean(1), mean(0))
-        } else {
-            libm::atan2(sizes[0][1], sizes[0][0])
-        };
-        // The columns are cosines, the kinds are sines.
-        let phase = phase + 0.5 * core::f64::consts::PI;
-        let mut effect = columns[0];
-        for (a, column) in columns.iter().enumerate() {
-            let p = size_of(column);
-            // Two axes swing in step or against each other.
-            let sign = if a > 0 && mean(0) * mean(2 * a) + mean(1) * mean(2 * a + 1) < 0.0 {
-                -1.0
-            } else {
-                1.0
-            };
-            effect.parameters[p] = sign * size(a);
-        }
-        let [f, ph] = shapes_of(effect.kind);
-        effect.parameters[f] = frequency;
-        effect.parameters[ph] = phase;
+        let (effect, locked) = common_swing(columns, &sizes, frequency);
         Some(Explained {
             effect,
             sd: 1.0 / libm::sqrt(2.0 * information.max(1e-300)),
@@ -412,6 +341,46 @@ impl<const N: usize> PreparedSession<'_, N> {
             share,
         })
     }
+}
+
+/// The swing of all trials in one effect, and whether it is locked to their starts.
+///
+/// * `sizes` - of each trial, two for each column: turned by 0 and by 90°
+fn common_swing(
+    columns: &[Effect<f64>],
+    sizes: &[DVector<f64>],
+    frequency: f64,
+) -> (Effect<f64>, bool) {
+    let n = sizes.len() as f64;
+    let size = |a: usize| {
+        let square = |s: &DVector<f64>| s[2 * a] * s[2 * a] + s[2 * a + 1] * s[2 * a + 1];
+        libm::sqrt(sizes.iter().map(square).sum::<f64>() / n)
+    };
+    let mean = |i: usize| sizes.iter().map(|s| s[i]).sum::<f64>() / n;
+    let coherence = libm::hypot(mean(0), mean(1)) / size(0).max(1e-300);
+    let locked = coherence > LOCKED;
+    let phase = if locked {
+        libm::atan2(mean(1), mean(0))
+    } else {
+        libm::atan2(sizes[0][1], sizes[0][0])
+    };
+    // The columns are cosines, the kinds are sines.
+    let phase = phase + 0.5 * core::f64::consts::PI;
+    let mut effect = columns[0];
+    for (a, column) in columns.iter().enumerate() {
+        let p = size_of(column);
+        // Two axes swing in step or against each other.
+        let sign = if a > 0 && mean(0) * mean(2 * a) + mean(1) * mean(2 * a + 1) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        effect.parameters[p] = sign * size(a);
+    }
+    let [f, ph] = shapes_of(effect.kind);
+    effect.parameters[f] = frequency;
+    effect.parameters[ph] = phase;
+    (effect, locked)
 }
 
 /// How far a force \[N\] stretches a spring \[N/m\] with a damper \[N s/m\] beside it \[m\], by the trapezoidal rule.
