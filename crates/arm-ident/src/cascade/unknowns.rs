@@ -46,17 +46,7 @@ pub(crate) fn unknowns<const N: usize>(model: &Model<N>, width: f64) -> Vec<Unkn
         }
     }
     for (e, effect) in model.fitted.iter().enumerate().filter(|(_, e)| is_found(e)) {
-        let info = effect.kind.info();
-        let parameter = &info.parameters[0];
-        list.push(Unknown {
-            source: Source::Effect(e, 0),
-            name: format!("{}{} {}", info.kind, effect.index + 1, parameter.name),
-            unit: parameter.unit,
-            mean: 0.0,
-            sd: f64::INFINITY,
-            min: parameter.min,
-            max: parameter.max,
-        });
+        list.push(Unknown::of_effect((e, effect), 0));
     }
     list
 }

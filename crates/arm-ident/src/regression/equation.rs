@@ -51,12 +51,8 @@ impl<'a, const N: usize> Building<'a, N> {
     /// The rows of the next samples.
     pub fn next(&mut self, count: usize) -> Rows {
         let samples = self.built..self.built + count;
-        self.built += count;
-        let mut rows = Rows::zeros::<N>(self.unknowns.len(), samples.collect());
-        for k in 0..count {
-            self.sample(&mut rows, k);
-        }
-        rows
+        self.built = samples.end;
+        Rows::of_samples::<N>(self.unknowns.len(), samples, |rows, k| self.sample(rows, k))
     }
 
     fn sample(&mut self, rows: &mut Rows, k: usize) {

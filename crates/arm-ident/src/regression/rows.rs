@@ -1,5 +1,7 @@
 //! Rows of a regression.
 
+use std::ops::Range;
+
 /// Rows of a regression over a whole trial, column by column.
 ///
 /// `columns[u][i * N + j]` belongs to unknown `u`, sample `i`, joint `j`; the right-hand side `rhs` is laid out alike.
@@ -19,6 +21,22 @@ impl Rows {
     /// Whether the row at a place in `rhs` is fitted.
     pub fn fits(&self, at: usize) -> bool {
         self.fits.as_ref().is_none_or(|fits| fits[at])
+    }
+
+    /// Rows of some samples, one after another.
+    ///
+    /// * `fill` - puts those of the sample at a place into the rows
+    pub(crate) fn of_samples<const N: usize>(
+        unknowns: usize,
+        samples: Range<usize>,
+        mut fill: impl FnMut(&mut Self, usize),
+    ) -> Self {
+        let count = samples.len();
+        let mut rows = Self::zeros::<N>(unknowns, samples.collect());
+        for k in 0..count {
+            fill(&mut rows, k);
+        }
+        rows
     }
 
     /// Rows of zeros.

@@ -69,6 +69,23 @@ pub struct Unknown {
     pub max: f64,
 }
 
+impl Unknown {
+    /// A parameter of a fitted effect, of which nothing is known but its bounds.
+    pub(crate) fn of_effect((number, effect): (usize, &Effect<f64>), position: usize) -> Self {
+        let info = effect.kind.info();
+        let parameter = &info.parameters[position];
+        Self {
+            source: Source::Effect(number, position),
+            name: format!("{}{} {}", info.kind, effect.index + 1, parameter.name),
+            unit: parameter.unit,
+            mean: 0.0,
+            sd: f64::INFINITY,
+            min: parameter.min,
+            max: parameter.max,
+        }
+    }
+}
+
 /// The unknowns of a model on given trials: segments, effects, calibration, in this order.
 pub fn unknowns<const N: usize>(
     model: &Model<N>,
@@ -86,16 +103,8 @@ pub fn unknowns<const N: usize>(
         if info.place != Place::Joint {
             continue;
         }
-        for (p, parameter) in info.parameters.iter().enumerate().filter(|(_, p)| p.linear) {
-            list.push(Unknown {
-                source: Source::Effect(i, p),
-                name: format!("{}{} {}", info.kind, effect.index + 1, parameter.name),
-                unit: parameter.unit,
-                mean: 0.0,
-                sd: f64::INFINITY,
-                min: parameter.min,
-                max: parameter.max,
-            });
+        for (p, _) in info.parameters.iter().enumerate().filter(|(_, p)| p.linear) {
+            list.push(Unknown::of_effect((i, effect), p));
         }
         list.extend(rest_torque(model, i));
     }
