@@ -10,11 +10,15 @@
 //! drifting.
 
 mod channel;
+mod estimate;
 mod information;
+mod sample;
 mod settings;
 mod window;
 
 pub use channel::Fault;
+pub use estimate::{Decision, Estimate, Health};
+pub use sample::{Sample, SampleStatus};
 pub use settings::Settings;
 
 use channel::{Channel, Smooth};
@@ -28,96 +32,7 @@ use crate::compensation::GravityCompensation;
 use crate::effect::Motion;
 use crate::equation::{Equation, Measured, Prior};
 use crate::scalar::Real;
-use crate::{Invalid, Joints, joints};
-
-/// What a value rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Decision {
-    /// The data.
-    Data,
-    /// What was assumed beforehand: the data leave it open.
-    Prior,
-    /// A bound that the data push against.
-    Bound,
-}
-
-impl Decision {
-    /// The word for it in tables and files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Data => "data",
-            Self::Prior => "prior",
-            Self::Bound => "bound",
-        }
-    }
-}
-
-/// The measurements of one control period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample<T, const N: usize> {
-    /// Joint angles \[rad\].
-    pub q: Joints<T, N>,
-    /// Joint angles from which speeds and accelerations are taken, where better ones are known than `q`: from the encoders
-    /// of the robot that leads the arm, or from its command \[rad\].
-    pub lead: Option<Joints<T, N>>,
-    /// What acts on the arm.
-    pub measured: Measured<T, N>,
-}
-
-/// What became of a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SampleStatus {
-    /// It counts.
-    Taken,
-    /// No joint moves: it says nothing.
-    Resting,
-    /// The filters have not yet settled after a start or a gap.
-    Settling,
-    /// It was refused.
-    Refused(Fault),
-}
-
-/// How well an estimator does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Health<T, const N: usize> {
-    /// What became of the last sample.
-    pub last: SampleStatus,
-    /// See [`Estimator::excess`].
-    pub excess: T,
-    /// Usual size of the torque that the estimate does not explain, by joint \[N m\].
-    pub residual: [T; N],
-    /// Time since a sample was last learned from \[s\].
-    pub age: T,
-    /// How often its state was not finite, and was started anew.
-    pub restarts: u32,
-}
-
-/// What is known of one unknown.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate<T> {
-    /// The value, within its bounds.
-    pub value: T,
-    /// Its standard deviation, never above the prior's.
-    pub sd: T,
-    /// What it rests on; anything but data is not yet identified.
-    pub decided_by: Decision,
-}
-
-impl<T: Real> Estimate<T> {
-    fn of_prior(p: &Prior<T>) -> Self {
-        Self {
-            value: p.mean.max(p.min).min(p.max),
-            sd: p.sd,
-            decided_by: Decision::Prior,
-        }
-    }
-
-    /// The interval of so many standard deviations, cut at the bounds.
-    pub fn interval(&self, deviations: T, prior: &Prior<T>) -> [T; 2] {
-        [-deviations, deviations].map(|k| (self.value + k * self.sd).max(prior.min).min(prior.max))
-    }
-}
+use crate::{Invalid, joints};
 
 /// Share of the prior's variance that the data must have taken away before an unknown counts as identified.
 const MEASURED: f64 = 0.9;
@@ -360,7 +275,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let mut filtered = |kind: usize| -> [Smooth<T>; N] {
             let farthest = if kind < 2 { turn } else { load };
             from_fn(|j| {
-                let value = sample.map(|s| of_joint(s, kind, j));
+                let value = sample.map(|s| s.of_joint(kind, j));
                 pass(&mut self.joints[kind][j], value, farthest)
             })
         };
@@ -368,7 +283,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let lead = if self.led { filtered(1) } else { angle };
         let torque = filtered(2);
         let hand: [Smooth<T>; 3] =
-            from_fn(|c| pass(&mut self.hand[c], sample.map(|s| of_hand(s, c)), load));
+            from_fn(|c| pass(&mut self.hand[c], sample.map(|s| s.of_hand(c)), load));
         let all = self.joints.iter().flatten().chain(&self.hand);
         if all.map(Channel::bridged).fold(0, Ord::max) > self.tuning.longest_gap {
             self.running = false;
@@ -442,11 +357,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let mut good = true;
         for (kind, channels) in self.joints.iter_mut().enumerate() {
             for (j, channel) in channels.iter_mut().enumerate() {
-                good &= channel.restart(of_joint(sample, kind, j));
+                good &= channel.restart(sample.of_joint(kind, j));
             }
         }
         for (c, channel) in self.hand.iter_mut().enumerate() {
-            good &= channel.restart(of_hand(sample, c));
+            good &= channel.restart(sample.of_hand(c));
         }
         if !good {
             return SampleStatus::Refused(Fault::NotFinite);
@@ -672,51 +587,5 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 Decision::Prior
             };
         }
-    }
-}
-
-impl<T: Real, const N: usize> Sample<T, N> {
-    fn finite(&self) -> bool {
-        let leads = self.lead.iter().flatten();
-        let angles = self.q.iter().chain(leads).chain(&self.measured.torque);
-        let mut all = angles.chain(&self.measured.force_on_arm);
-        all.all(|v| v.is_finite()) && self.measured.moment_on_arm.is_finite()
-    }
-}
-
-impl<T: Real, const N: usize> Tuning<T, N> {
-    /// Whether the arm can have these values. What is NaN is judged elsewhere.
-    fn plausible(&self, sample: &Sample<T, N>) -> bool {
-        let mut good = true;
-        for (j, [min, max]) in self.range.iter().enumerate() {
-            for angles in core::iter::once(&sample.q).chain(&sample.lead) {
-                good &= !(angles[j] < *min || angles[j] > *max);
-            }
-        }
-        let [force, torque] = self.largest;
-        let measured = &sample.measured;
-        let forces = measured.force_on_arm.iter().map(|f| (f.abs(), force));
-        let torques = measured
-            .torque
-            .iter()
-            .chain(core::iter::once(&measured.moment_on_arm));
-        let mut all = forces.chain(torques.map(|t| (t.abs(), torque)));
-        good && !all.any(|(found, most)| found > most)
-    }
-}
-
-fn of_joint<T: Real, const N: usize>(sample: &Sample<T, N>, kind: usize, j: usize) -> T {
-    match kind {
-        0 => sample.q[j],
-        1 => sample.lead.as_ref().unwrap_or(&sample.q)[j],
-        _ => sample.measured.torque[j],
-    }
-}
-
-fn of_hand<T: Real, const N: usize>(sample: &Sample<T, N>, channel: usize) -> T {
-    match channel {
-        0 => sample.measured.force_on_arm[0],
-        1 => sample.measured.force_on_arm[1],
-        _ => sample.measured.moment_on_arm,
     }
 }

@@ -1,6 +1,7 @@
 //! How an estimator works, and what follows from it for one control period.
 
 use super::channel::Cutoff;
+use super::sample::Sample;
 use crate::check::{SMALLEST, at_least_zero, finite, ordered, positive};
 use crate::scalar::Real;
 use crate::{Chain, Invalid};
@@ -263,4 +264,25 @@ fn in_range<T: Real>(name: &'static str, found: T, min: f64, max: f64) -> Result
         min,
         max,
     })
+}
+
+impl<T: Real, const N: usize> Tuning<T, N> {
+    /// Whether the arm can have these values. What is NaN is judged elsewhere.
+    pub(super) fn plausible(&self, sample: &Sample<T, N>) -> bool {
+        let mut good = true;
+        for (j, [min, max]) in self.range.iter().enumerate() {
+            for angles in core::iter::once(&sample.q).chain(&sample.lead) {
+                good &= !(angles[j] < *min || angles[j] > *max);
+            }
+        }
+        let [force, torque] = self.largest;
+        let measured = &sample.measured;
+        let forces = measured.force_on_arm.iter().map(|f| (f.abs(), force));
+        let torques = measured
+            .torque
+            .iter()
+            .chain(core::iter::once(&measured.moment_on_arm));
+        let mut all = forces.chain(torques.map(|t| (t.abs(), torque)));
+        good && !all.any(|(found, most)| found > most)
+    }
 }

@@ -1,0 +1,59 @@
+//! What an estimator is given in one control period, and what became of it.
+
+use super::channel::Fault;
+use crate::Joints;
+use crate::equation::Measured;
+use crate::scalar::Real;
+
+/// The measurements of one control period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<T, const N: usize> {
+    /// Joint angles \[rad\].
+    pub q: Joints<T, N>,
+    /// Joint angles from which speeds and accelerations are taken, where better ones are known than `q`: from the encoders
+    /// of the robot that leads the arm, or from its command \[rad\].
+    pub lead: Option<Joints<T, N>>,
+    /// What acts on the arm.
+    pub measured: Measured<T, N>,
+}
+
+/// What became of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleStatus {
+    /// It counts.
+    Taken,
+    /// No joint moves: it says nothing.
+    Resting,
+    /// The filters have not yet settled after a start or a gap.
+    Settling,
+    /// It was refused.
+    Refused(Fault),
+}
+
+impl<T: Real, const N: usize> Sample<T, N> {
+    /// Whether all that was measured is finite.
+    pub(super) fn finite(&self) -> bool {
+        let leads = self.lead.iter().flatten();
+        let angles = self.q.iter().chain(leads).chain(&self.measured.torque);
+        let mut all = angles.chain(&self.measured.force_on_arm);
+        all.all(|v| v.is_finite()) && self.measured.moment_on_arm.is_finite()
+    }
+
+    /// Angle, leading angle or torque of a joint.
+    pub(super) fn of_joint(&self, kind: usize, j: usize) -> T {
+        match kind {
+            0 => self.q[j],
+            1 => self.lead.as_ref().unwrap_or(&self.q)[j],
+            _ => self.measured.torque[j],
+        }
+    }
+
+    /// A force or the moment at the hand.
+    pub(super) fn of_hand(&self, channel: usize) -> T {
+        match channel {
+            0 => self.measured.force_on_arm[0],
+            1 => self.measured.force_on_arm[1],
+            _ => self.measured.moment_on_arm,
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Models and descriptions of data sets.
+
+mod dataset;
+mod model;
+mod refused;
