@@ -47,7 +47,7 @@ def test_angles_of_the_model_meet_the_handle() -> None:
         (lambda q: [np.pi / 2, 0.0, 0.0] - q, "vertical upwards, mirrored"),
         (lambda q: [np.pi, 0.0, 0.0] - q, "other side"),
         (lambda q: np.cumsum(q, axis=1) + np.pi / 2, "absolute angles, from the vertical downwards"),
-        (lambda q: q + np.array([0.0, 0.5, 0.0]), "q2 is off by -0.5"),
+        (lambda q: q + np.array([0.0, 0.5, 0.0]), "another zero: q2 is 0.5 rad too large"),
     ],
 )
 def test_another_convention_is_named(change: Callable[[np.ndarray], np.ndarray], says: str) -> None:

@@ -5,22 +5,21 @@ It is asked before any physics, so that a wrong column is named as such and not 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import permutations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import BadInput, Text
+from . import readings
 
 if TYPE_CHECKING:
     from ..model import Model, Robot
     from .dataset import Dataset
+    from .readings import Reading
     from .trial import Trial
 
 STILL = 1e-9
 """A channel that varies by no more than this says nothing: noise alone is more."""
-_DEGREE = float(np.radians(1.0))
 _FAR = 0.3
 """Distance of hand and handle, relative to the arm, beyond which angles of arm and robot contradict each other."""
 _SUSPECT = 0.05
@@ -29,8 +28,10 @@ _MEETS = 0.2
 """Another reading explains the columns when it brings hand and handle this much nearer."""
 _HELD = (0.002, 0.05)
 """An angle that never changes contradicts a handle that moves against the hand by more than this [m], and by this part of its path."""
-_MOST_SWAPPED = 4
-"""Joints up to which orders of columns are tried."""
+OTHER_ZERO = 0.2
+"""A smaller error of an angle's zero [rad] may be a poor calibration, which `angle_offset` of the catalogue names."""
+_PLAINER = 0.005
+"""A smaller error of zero is preferred while hand and handle are at most this much farther apart [m]: how well a handle is held."""
 
 
 def refuse_implausible(dataset: Dataset, *, robot_matters: bool = True) -> None:
@@ -86,16 +87,12 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
     gap = _tip(model, q) - handle
     own = _rms(gap)
     if own > _SUSPECT * reach:
-        others = [(_rms(_tip(model, a) - _handle(robot, b)), place, words) for place, words, a, b in _readings(q, robot_q)]
-        best, place, words = min(others)
-        if best < min(_MEETS * own, 0.1 * reach):
-            raise BadInput(place, Text(f"angles that put the hand {own:.3g} m from the robot's handle"), words, file=trial.file)
-        best, joint, offset = _other_zero(model, q, handle)
-        if best < min(_MEETS * own, 0.1 * reach):
-            words = f"angles with the model's zero (that of q{joint} is off by {offset:.3g} rad?)"
-            raise BadInput(
-                f"column q{joint}", Text(f"angles that put the hand {own:.3g} m from the robot's handle"), words, file=trial.file
-            )
+        best, reading = _other_reading(model, robot, q, robot_q)
+        if best >= min(_MEETS * own, 0.1 * reach):
+            best, reading = _other_zero(model, q, handle)
+        if reading is not None and best < min(_MEETS * own, 0.1 * reach):
+            found = Text(f"angles that put the hand {own:.3g} m from the robot's handle")
+            raise BadInput(reading.place, found, reading.allowed, file=trial.file)
     if not robot_matters:
         return
     path = _rms(handle - handle.mean(axis=0))
@@ -110,51 +107,35 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
         raise BadInput("q1 …, qr1, qr2", found, allowed, file=trial.file)
 
 
-def _readings(q: np.ndarray, robot_q: np.ndarray) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Give what the columns may be instead: their place, what is allowed there, and the angles that they would then hold."""
-    for place, wrong in (("columns q1 …", "q"), ("columns qr1, qr2", "qr")):
-        for factor, unit in ((_DEGREE, "degrees labelled as radians"), (1.0 / _DEGREE, "radians labelled as degrees")):
-            a, b = (q * factor, robot_q) if wrong == "q" else (q, robot_q * factor)
-            yield place, f"angles in the unit of their column ({unit}?)", a, b
-    yield "columns qr1, qr2", "qr1 of the robot's first joint, qr2 of its second (swapped columns?)", q, robot_q[:, ::-1]
-    yield from ((place, words, a, robot_q) for place, words, a in _conventions(q))
+def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray) -> tuple[float, Reading | None]:
+    """Return what the angles of arm or robot may be instead, and how far apart hand and handle are then [m]."""
+    handle = _handle(robot, robot_q)
+    found: list[tuple[float, Reading | None]] = [
+        (_rms(_tip(model, reading.angles(q)) - handle), reading) for reading in readings.of_angles(q.shape[1])
+    ]
+    tip = _tip(model, q)
+    found += [(_rms(tip - _handle(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
+    return min(found, key=lambda item: item[0])
+
+
+def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, Reading | None]:
+    """Return another zero of one joint's angle, and how far apart hand and handle are with it [m]; None where it is a small error."""
     n = q.shape[1]
-    for order in permutations(range(n)) if n <= _MOST_SWAPPED else ():
-        if order != tuple(range(n)):
-            yield "columns q1 …", "q1 of the first joint, the others outwards (swapped columns?)", q[:, order], robot_q
-
-
-def _conventions(q: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Give angles of other conventions as those of the model: counter-clockwise, the first from +y, the others from the segment before."""
-    relative = np.column_stack([q[:, :1], np.diff(q, axis=1)])
-    quarter = np.zeros(q.shape[1])
-    quarter[0] = np.pi / 2
-    for angles, kind in ((q, ""), (relative, "absolute angles, ")):
-        if kind:
-            yield "columns q1 …", "angles relative to the segment before (absolute angles?)", angles
-        yield "columns q1 …", f"angles counter-clockwise ({kind}mirrored?)", -angles
-        yield "columns q1 …", f"y forward ({kind}seen from the other side?)", 2 * quarter - angles
-        for sign, turned in ((1.0, ""), (-1.0, ", mirrored")):
-            yield "column q1", f"q1 from +y ({kind}from the vertical downwards{turned}?)", sign * angles - quarter
-            yield "column q1", f"q1 from +y ({kind}from the vertical upwards{turned}?)", sign * angles + quarter
-
-
-def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, int, float]:
-    """Return how near one joint's other zero brings hand and handle: the distance [m], the joint from 1, its angle there [rad]."""
     thin = slice(None, None, max(1, len(q) // 100))
     found = []
-    for j in range(q.shape[1]):
-        offset = np.zeros(q.shape[1])
-        for width, centre in ((np.pi, 0.0), (np.radians(2.0), None)):
-            middle = offset[j] if centre is None else centre
-            tried = middle + np.linspace(-width, width, 181)
+    for j in range(n):
+        offset = np.zeros(n)
+        for width in (np.pi, np.radians(2.0)):
+            tried = offset[j] + np.linspace(-width, width, 181)
             sizes = []
             for value in tried:
                 offset[j] = value
                 sizes.append(_rms(_tip(model, q[thin] + offset) - handle[thin]))
             offset[j] = tried[int(np.argmin(sizes))]
         found.append((min(sizes), j + 1, float(offset[j])))
-    return min(found)
+    nearest = min(found)[0]
+    best, joint, off = min((f for f in found if f[0] <= nearest + _PLAINER), key=lambda f: abs(f[2]))
+    return best, readings.other_zero(n, joint, off) if abs(off) >= OTHER_ZERO else None
 
 
 def hand_meets_handle(dataset: Dataset) -> bool:

@@ -24,6 +24,12 @@ def is_even(t: np.ndarray) -> bool:
     return bool(np.max(np.abs(t - t[0] - step * np.arange(len(t)))) <= EVEN * step)
 
 
+def complete_pieces(complete: np.ndarray) -> list[slice]:
+    """Return the stretches in which a flag, shape (n,), is true, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], complete.astype(np.int8), [0]])))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
 def usual_step(t: np.ndarray) -> float:
     """Return the sample interval [s]: the mean of the intervals that are no gaps.
 

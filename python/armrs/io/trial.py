@@ -145,8 +145,7 @@ class Trial:
 
     def pieces(self) -> list[slice]:
         """Return the stretches of valid samples, in order."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.valid.astype(np.int8), [0]])))
-        return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        return resample.complete_pieces(self.valid)
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..errors import ArmrsError, BadInput, BadInputs, Text
+from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
 from ..io.dataset import Dataset, describe, name_of, read_entry
 from ..io.trial import Trial
 from ..model import Description, Model, load_model
+from . import setup
 from .gap import suspicion
-from .importing import conventions
 
 _SLOW = 0.3
 """Joint speed up to which a movement counts as slow enough for passive moments [rad/s]."""
@@ -157,38 +157,13 @@ def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
 
 
 def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
-    """Compare the convention in which the arm balances with that of armrs: all trials together, and each where they disagree."""
-    trials = [t for t in dataset.trials if t.force_on_arm is not None and _alive(t)]
-    if not trials:
-        return
-    together = _imbalance(dataset.model, trials)
-    if together is None:
-        return
-    each = [(t, _imbalance(dataset.model, [t])) for t in trials]
-    wrong = [(t, problem) for t, problem in each if problem is not None]
-    if not wrong or len(wrong) == len(trials):
-        problems.append(together)
-    else:
-        problems += [Problem(p.level, f"{t.file}: {p.text}", p.next_step) for t, p in wrong]
-
-
-def _imbalance(model: Model, trials: list[Trial]) -> Problem | None:
-    """Return what is wrong with the conventions of trials, if anything is."""
-    refused: list[BadInput] = []
-    recordings = [(t.t, t.q, -t.force_on_arm) for t in trials if t.force_on_arm is not None]
-    found = conventions.decide(model, recordings, {}, refused)
-    if refused:
-        return Problem("warning", str(refused[0]), "compare with a photograph of one posture")
-    if (found.reference, found.zero, found.signs, found.force_on) == ("relative", "horizontal", (1,) * model.n_joints, "robot"):
-        return None
-    # The forces were turned to act on the robot, so the other side means that force_on says the wrong one.
-    words = found.words().split(";")[0] + ("" if found.force_on == "robot" else ", forces on the other side than force_on says")
-    text = BadInput("angles and forces", Text(f"an arm that balances only if read as {words}"), "the conventions of armrs")
-    return Problem("error", f"{text} ({found.why})", "armrs import converts recordings")
-
-
-def _alive(trial: Trial) -> bool:
-    return trial.force_on_arm is not None and all(plausibility.constant(values) is None for values in trial.force_on_arm.T)
+    """Ask each trial by itself, whatever all together say: one may have been recorded otherwise."""
+    trials = setup.balanced_trials(dataset)
+    met = plausibility.hand_meets_handle(dataset)
+    if dataset.model.gravity and setup.wrong_setup(dataset.model, trials, met=met) is None:
+        said = {p.text for p in problems}
+        found = [str(one) for one in setup.wrong_trials(dataset.model, trials, met=met)]
+        problems += [Problem("warning", text, "compare with the other trials") for text in found if text not in said]
 
 
 def _is_led(dataset: Dataset) -> bool:

@@ -18,6 +18,7 @@ from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial
 from ..model import Effect, Model, Segment, Tolerance
 from ..tabular import Tabular, Tidy
+from .setup import refuse_wrong_setup
 
 
 @dataclass(frozen=True)
@@ -227,6 +228,7 @@ def identify(
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
     settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
     refuse_implausible(dataset)
+    refuse_wrong_setup(dataset)
     configurations = sorted({t.configuration for t in dataset.trials})
     columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     with naming_trials(dataset.trials):

@@ -11,6 +11,7 @@ from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.plausibility import constant, refuse_implausible
 from ...io.trial import Trial
+from ..setup import refuse_wrong_setup
 
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
@@ -52,6 +53,7 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
                 found = Text(f"{level:g} N m in every sample")
                 raise BadInput(f"column {name}", found, "a torque that changes with the movement", file=trial.file, hint="a dead sensor?")
     _refuse_copies(dataset.trials)
+    refuse_wrong_setup(dataset)
     return lines + _moving_starts(dataset.trials, led) + _uneven_repeats(fit) + _saturated(dataset, led)
 
 

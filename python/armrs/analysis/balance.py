@@ -1,0 +1,120 @@
+"""Balance of the torques of the contact with gravity, inertia and passive joint laws near those of a model.
+
+The wrong convention of angles or forces leaves most of the torques unexplained, whatever springs, dampers and friction the joints have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _armrs
+from ..io.readings import Reading
+from ..io.resample import complete_pieces, uniform_grid, usual_step
+from ..model import Model
+
+_CUTOFF = 3.0
+"""Cutoff of the low-pass that angles and forces share [Hz]."""
+_SAMPLES = 800
+"""Samples that are regressed: more tell no more about a convention."""
+_SHORTEST = 1.0
+"""Shortest stretch of complete samples that is used [s]."""
+_FEWEST = 16
+"""Samples that it has at least."""
+_CREEPING = 0.03
+"""Joint speed over which dry friction turns round [rad/s]."""
+_FIRST_MOMENTS = (0.5, 1.6)
+"""First moments relative to the model's: literature values are that far off at most."""
+_INERTIA = (0.3, 3.0)
+"""Inertia relative to the model's."""
+_ELASTIC, _CONSTANT, _VISCOUS, _DRY = 5.0, 5.0, 3.0, 1.0
+"""Most of the passive laws, in weight moments of the whole stretched arm per rad, alone, per rad/s and alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Smoothed samples of movements with the force that the contact exerts.
+
+    Attributes
+    ----------
+    q, speed, acceleration : ndarray, shape (n, n_joints)
+        [rad], [rad/s], [rad/s²].
+    force : ndarray, shape (n, 2)
+        [N].
+    moment : ndarray, shape (n,)
+        [N m].
+    """
+
+    q: np.ndarray
+    speed: np.ndarray
+    acceleration: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+    def read_as(self, reading: Reading) -> Motion:
+        """Return the motion in another reading of its columns."""
+        turn = reading.turn.T
+        scale = float(np.sqrt(abs(np.linalg.det(reading.force))))
+        return Motion(
+            reading.angles(self.q), self.speed @ turn, self.acceleration @ turn, self.force @ reading.force.T, scale * self.moment
+        )
+
+
+def motion_of(recordings: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]]) -> Motion | None:
+    """Return the complete stretches of recordings, smoothed and thinned; None where none is long enough.
+
+    Parameters
+    ----------
+    recordings : sequence of (t, q, force, moment)
+        Time [s], angles (n, n_joints) [rad], force (n, 2) [N], and moment (n,) [N m] or None; NaN where a sample is missing.
+    """
+    pieces = []
+    for t, q, force, moment in recordings:
+        columns = np.column_stack([q, force, np.zeros(len(q)) if moment is None else moment])
+        for piece in complete_pieces(np.isfinite(columns).all(axis=1)):
+            if piece.stop - piece.start < _FEWEST or t[piece][-1] - t[piece][0] < _SHORTEST:
+                continue
+            grid = uniform_grid(t[piece])
+            pieces.append((1.0 / usual_step(t[piece]), np.column_stack([np.interp(grid, t[piece], c) for c in columns[piece].T])))
+    if not pieces:
+        return None
+    thin = max(1, sum(len(values) for _, values in pieces) // _SAMPLES)
+    smooth = [[a[::thin] for a in _armrs.smooth(values, rate, min(_CUTOFF, 0.2 * rate))] for rate, values in pieces]
+    values, speed, acceleration = (np.concatenate(parts) for parts in zip(*smooth, strict=True))
+    n = values.shape[1] - 3
+    return Motion(values[:, :n], speed[:, :n], acceleration[:, :n], values[:, n : n + 2], values[:, n + 2])
+
+
+def unexplained(model: Model, motion: Motion) -> float:
+    """Return the share (root mean square) of the contact torques that gravity, inertia and passive laws leave.
+
+    Bounded least squares over first moments and inertia near those of the model, and a spring, a constant moment, viscosity and dry
+    friction in each joint. Above 1 where the torques are too small to carry the arm.
+    """
+    from scipy.optimize import lsq_linear
+
+    arm = _armrs.Arm.from_model(model)
+    n, joints = motion.q.shape
+    torque = np.einsum("nij,ni->nj", arm.jacobian(motion.q)[:, :2, :], motion.force) + motion.moment[:, None]
+    regressor = arm.regressor(motion.q, motion.speed, motion.acceleration)
+    weight = model.gravity * float(np.sum(np.abs(arm.first_moments)))
+    columns = [*np.moveaxis(regressor[:, :, :joints] * np.array(arm.first_moments), 2, 0)]
+    columns.append(regressor[:, :, 2 * joints :] @ np.array(arm.second_moments))
+    bounds = [*[_FIRST_MOMENTS] * joints, _INERTIA]
+    for j in range(joints):
+        for law, least, most in (
+            (motion.q[:, j], 0.0, _ELASTIC),
+            (np.ones(n), -_CONSTANT, _CONSTANT),
+            (motion.speed[:, j], 0.0, _VISCOUS),
+            (np.tanh(motion.speed[:, j] / _CREEPING), 0.0, _DRY),
+        ):
+            columns.append(np.outer(law, np.eye(joints)[j]))
+            bounds.append((least * weight, most * weight))
+    # What matters of the tall system is its triangle.
+    triangle: np.ndarray = np.linalg.qr(np.column_stack([*(c.ravel() for c in columns), torque.ravel()]), mode="r")  # type: ignore[assignment]
+    low, high = (np.array(b) for b in zip(*bounds, strict=True))
+    solved = lsq_linear(triangle[:-1, :-1], triangle[:-1, -1], (low, high))
+    size = float(np.sum(torque**2))
+    return float(np.sqrt((2.0 * solved.cost + triangle[-1, -1] ** 2) / size)) if size > 0.0 else 1.0

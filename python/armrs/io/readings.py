@@ -1,0 +1,93 @@
+"""What columns of angles and forces may hold instead of what the model means by them: other conventions, units and orders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import permutations
+
+import numpy as np
+
+_MOST_SWAPPED = 4
+"""Joints up to which orders of columns are tried."""
+_DEGREE = float(np.radians(1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One way to read angles and forces.
+
+    Attributes
+    ----------
+    place, allowed : str
+        Where it differs from what the model means, and what is meant there, as a refusal says it.
+    turn : ndarray, shape (n_joints, n_joints)
+    shift : ndarray, shape (n_joints,)
+        The angles of the model are `turn` @ q + `shift` [rad].
+    force : ndarray, shape (2, 2)
+        The force meant is `force` @ F.
+    """
+
+    place: str
+    allowed: str
+    turn: np.ndarray
+    shift: np.ndarray
+    force: np.ndarray = field(default_factory=lambda: np.eye(2))
+
+    def angles(self, q: np.ndarray) -> np.ndarray:
+        """Return the angles of the model, (n_samples, n_joints) [rad]."""
+        return q @ self.turn.T + self.shift
+
+
+def of_angles(n: int) -> Iterator[Reading]:
+    """Give angles in the other unit, of other conventions and in another order."""
+    every, none, quarter = np.eye(n), np.zeros(n), np.zeros(n)
+    quarter[0] = np.pi / 2
+    yield from _other_unit("columns q1 …", n)
+    relative = every - np.eye(n, k=-1)
+    for angles, kind in ((every, ""), (relative, "absolute angles, "))[: min(n, 2)]:
+        if kind:
+            yield Reading("columns q1 …", "angles relative to the segment before (absolute angles?)", angles, none)
+        yield Reading("columns q1 …", f"angles counter-clockwise ({kind}mirrored?)", -angles, none)
+        yield Reading("columns q1 …", f"y forward ({kind}seen from the other side?)", -angles, 2 * quarter)
+        for sign, turned in ((1.0, ""), (-1.0, ", mirrored")):
+            yield Reading("column q1", f"q1 from +y ({kind}from the vertical downwards{turned}?)", sign * angles, -quarter)
+            yield Reading("column q1", f"q1 from +y ({kind}from the vertical upwards{turned}?)", sign * angles, quarter)
+    for order in permutations(range(n)) if n <= _MOST_SWAPPED else ():
+        if order != tuple(range(n)):
+            yield Reading("columns q1 …", "q1 of the first joint, the others outwards (swapped columns?)", every[list(order)], none)
+
+
+def of_robot_angles() -> Iterator[Reading]:
+    """Give the robot's angles in the other unit and in the other order."""
+    yield from _other_unit("columns qr1, qr2", 2)
+    swapped = "qr1 of the robot's first joint, qr2 of its second (swapped columns?)"
+    yield Reading("columns qr1, qr2", swapped, np.eye(2)[::-1], np.zeros(2))
+
+
+def _other_unit(place: str, n: int) -> Iterator[Reading]:
+    for factor, unit in ((_DEGREE, "degrees labelled as radians"), (1.0 / _DEGREE, "radians labelled as degrees")):
+        yield Reading(place, f"angles in the unit of their column ({unit}?)", factor * np.eye(n), np.zeros(n))
+
+
+def of_forces(n: int) -> Iterator[Reading]:
+    """Give forces in another unit, order or direction."""
+    for place, allowed, force in (
+        ("columns Fy, Fz", "Fy along the horizontal, Fz up (swapped columns?)", [[0.0, 1.0], [1.0, 0.0]]),
+        ("columns Fy, Fz", "forces in the unit of their column (kN labelled as N?)", [[1e3, 0.0], [0.0, 1e3]]),
+        ("columns Fy, Fz", "forces in the unit of their column (mN labelled as N?)", [[1e-3, 0.0], [0.0, 1e-3]]),
+        ("force_on", '"arm" or "robot", whichever the force acts on (the other one?)', [[-1.0, 0.0], [0.0, -1.0]]),
+        ("column Fy", "Fy along the horizontal, forward (a reversed axis?)", [[-1.0, 0.0], [0.0, 1.0]]),
+        ("column Fz", "Fz up (a reversed axis?)", [[1.0, 0.0], [0.0, -1.0]]),
+        ("columns Fy, Fz", "Fy along the horizontal, Fz up (axes turned by 90°?)", [[0.0, -1.0], [1.0, 0.0]]),
+        ("columns Fy, Fz", "Fy along the horizontal, Fz up (axes turned by -90°?)", [[0.0, 1.0], [-1.0, 0.0]]),
+    ):
+        yield Reading(place, allowed, np.eye(n), np.zeros(n), np.array(force))
+
+
+def other_zero(n: int, joint: int, offset: float) -> Reading:
+    """Return the angles with that of a joint, from 1, turned by `offset` [rad]."""
+    shift = np.zeros(n)
+    shift[joint - 1] = offset
+    size = f"{abs(offset):.2g} rad too {'large' if offset < 0.0 else 'small'}"
+    return Reading(f"column q{joint}", f"angles with the model's zero (another zero: q{joint} is {size}?)", np.eye(n), shift)

@@ -1,0 +1,143 @@
+"""Wrong setups: angles or forces in a convention in which the arm cannot balance, though in another it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..analysis.balance import Motion, motion_of, unexplained
+from ..errors import BadInput, Text
+from ..io import readings
+from ..io.dataset import Dataset
+from ..io.plausibility import OTHER_ZERO, constant, hand_meets_handle
+from ..io.readings import Reading
+from ..io.trial import Trial
+from ..model import Model
+
+_UNEXPLAINED = 0.04
+"""Share of the contact torques that gravity and passive joints leave, from which on another reading is looked for."""
+_MIXED = 0.08
+"""And from which on single trials are asked, where no reading of all together is better."""
+_BETTER = 2.0
+"""Another reading is named that leaves so many times less; in the right setup the best leaves at most 1.2 times less (128 sessions of two
+worlds with up to two hidden effects)."""
+_BETTER_ALONE = 4.0
+"""The same for a single trial."""
+_BALANCED = 0.1
+"""Another reading balances the arm that leaves at most this share; the right one leaves 0.07 in 99 of 100 of these sessions."""
+_UNEXPLAINED_BY_ZERO, _BETTER_BY_ZERO = 0.05, 2.5
+"""The same for another zero, whose number is fitted: in the right setup at most 2.0 times less."""
+_PLAINER = 1.5
+"""Another zero is named when it leaves so many times less than every other reading."""
+_TIED, _MUCH = 4.0, 0.125
+"""A second reading that leaves at most so many times what the best does, and this part of what was given, is named beside it."""
+_STEPS = (np.radians(10.0), np.radians(1.0))
+"""Steps in which another zero of an angle is looked for [rad]."""
+
+
+def refuse_wrong_setup(dataset: Dataset) -> None:
+    """Refuse a data set in which the contact forces carry the arm only if angles or forces are read otherwise.
+
+    Raises
+    ------
+    BadInput
+        Names the file, the column and what it probably holds.
+    """
+    if dataset.model.gravity == 0.0 or dataset.added:  # nothing to carry, or no one arm in all trials
+        return
+    found = first_wrong(dataset.model, balanced_trials(dataset), met=hand_meets_handle(dataset))
+    if found is not None:
+        raise found
+
+
+def first_wrong(model: Model, trials: Sequence[Trial], *, met: bool) -> BadInput | None:
+    """Return what is wrong with all trials together, or with the first of those without which the others balance, with the file."""
+    together = wrong_setup(model, trials, met=met)
+    motion = _motion(trials)
+    if motion is None or (together is None and unexplained(model, motion) <= _MIXED):
+        return None
+    alone = {t.file: found for t in trials if (found := wrong_setup(model, [t], met=met, alone=True)) is not None}
+    rest = _motion([t for t in trials if t.file not in alone])
+    if alone and rest is not None and unexplained(model, rest) < _UNEXPLAINED:
+        file, found = next(iter(alone.items()))
+        return found.within(file=file)
+    more = f" and {len(trials) - 1} more" if len(trials) > 1 else ""
+    return None if together is None else together.within(file=trials[0].file + more)
+
+
+def balanced_trials(dataset: Dataset) -> list[Trial]:
+    """Return the trials in which contact forces alone carry the arm."""
+    return [t for t in dataset.trials if t.force_on_arm is not None and t.tau is None and constant(t.force_on_arm[:, 1]) is None]
+
+
+def wrong_trials(model: Model, trials: Sequence[Trial], *, met: bool) -> Iterator[BadInput]:
+    """Give what is wrong with single trials, as `wrong_setup` finds it, with their files; another zero needs several movements."""
+    for trial in trials:
+        found = wrong_setup(model, [trial], met=met, alone=True)
+        if found is not None:
+            yield found.within(file=trial.file)
+
+
+def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool = False) -> BadInput | None:
+    """Return what only another reading of the columns explains, None where the arm balances or nothing else balances it.
+
+    Parameters
+    ----------
+    model : Model
+    trials : sequence of Trial
+        With contact forces.
+    met : bool
+        Whether the angles are known to be right, since they put the hand where the robot's put its handle.
+    alone : bool
+        Whether these are few of the trials, which must then be clearly wrong; no other zero of one angle is looked for.
+    """
+    motion = _motion(trials)
+    if motion is None:
+        return None
+    given = unexplained(model, motion)
+    if given < (_MIXED if alone else _UNEXPLAINED):
+        return None
+    n = model.n_joints
+    asked = [*readings.of_forces(n)] if met else [*readings.of_angles(n), *readings.of_forces(n)]
+    ranked = sorted(((unexplained(model, motion.read_as(r)), r) for r in asked), key=lambda item: item[0])
+    least = _BETTER_ALONE if alone else _BETTER
+    if not alone and not met and given >= _UNEXPLAINED_BY_ZERO:
+        zero = _other_zero(model, motion)
+        if zero is not None and _PLAINER * zero[0] < ranked[0][0]:
+            ranked, least = [zero], _BETTER_BY_ZERO
+    left, best = ranked[0]
+    if left > _BALANCED or least * left > given:
+        return None
+    also = ""
+    if len(ranked) > 1 and ranked[1][0] < min(_TIED * left, _MUCH * given):
+        also = f", or {ranked[1][1].place}: {ranked[1][1].allowed}"
+    share = f"{100 * given:.0f} %" if given < 1.0 else "all"
+    found = Text(f"{share} of the contact torques unexplained by gravity and passive joints, {100 * left:.2g} % if read otherwise")
+    return BadInput(best.place, found, best.allowed + also)
+
+
+def _motion(trials: Sequence[Trial]) -> Motion | None:
+    return motion_of(
+        [(t.t, np.where(t.valid[:, None], t.q, np.nan), t.force_on_arm, t.moment_on_arm) for t in trials if t.force_on_arm is not None]
+    )
+
+
+def _other_zero(model: Model, motion: Motion) -> tuple[float, Reading] | None:
+    """Return the zero of one angle with which the arm balances best, and what is left then.
+
+    None where it is a small error, or a quarter turn of the first angle, which is a convention.
+    """
+    found = []
+    n = model.n_joints
+    for j in range(1, n + 1):
+        centre, width = 0.0, np.pi
+        for step in _STEPS:
+            tried = centre + np.arange(-width, width + 0.5 * step, step)
+            left = [unexplained(model, motion.read_as(readings.other_zero(n, j, float(offset)))) for offset in tried]
+            centre, width = float(tried[int(np.argmin(left))]), step
+        found.append((min(left), j, centre))
+    least, joint, offset = min(found)
+    if abs(offset) < OTHER_ZERO or (joint == 1 and abs(abs(offset) - np.pi / 2) < OTHER_ZERO):
+        return None
+    return least, readings.other_zero(n, joint, offset)
