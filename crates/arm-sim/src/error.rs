@@ -126,3 +126,19 @@ pub enum SimulationError {
         what: &'static str,
     },
 }
+
+/// Refuses a setting that is not finite.
+pub(crate) fn finite(
+    name: &'static str,
+    found: f64,
+    allowed: &'static str,
+) -> Result<(), SimulationError> {
+    if found.is_finite() {
+        return Ok(());
+    }
+    Err(SimulationError::Setting {
+        name,
+        found,
+        allowed,
+    })
+}

@@ -4,6 +4,7 @@ use core::array::from_fn;
 
 use arm_core::{Chain, Plane, Robot, Scalar};
 
+use crate::error::finite;
 use crate::movement::Way;
 use crate::{Interpolation, Jet, JointMotion, Movement, Series, SimulationError};
 
@@ -41,13 +42,7 @@ impl<const N: usize> HandlePath<N> {
     /// [`SimulationError::Setting`] for a coordinate that is not finite.
     pub fn fixed(point: Plane<f64>) -> Result<Self, SimulationError> {
         for found in point {
-            if !found.is_finite() {
-                return Err(SimulationError::Setting {
-                    name: "handle position",
-                    found,
-                    allowed: "a finite number of metres",
-                });
-            }
+            finite("handle position", found, "a finite number of metres")?;
         }
         Ok(Self {
             source: Source::Fixed(point),

@@ -7,6 +7,7 @@ use arm_core::effect::{Effect, Place};
 use arm_core::{Joints, Scalar, Setup};
 
 use crate::discontinuities::Discontinuities;
+use crate::error::finite;
 use crate::model::{Link, Model};
 use crate::plain::Plain;
 use crate::schedule::Schedule;
@@ -248,7 +249,7 @@ fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
             }
         }
     }
-    let finite = [
+    let settings = [
         ("placement", setup.placement[0]),
         ("placement", setup.placement[1]),
         ("base motion", setup.base_motion[0]),
@@ -260,15 +261,8 @@ fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
         ("ripple phase", setup.ripple_phase),
         ("force delay", setup.force_delay),
     ];
-    for (name, found) in finite {
-        if !found.is_finite() {
-            let allowed = "a finite number";
-            return Err(SimulationError::Setting {
-                name,
-                found,
-                allowed,
-            });
-        }
+    for (name, found) in settings {
+        finite(name, found, "a finite number")?;
     }
     Ok(())
 }

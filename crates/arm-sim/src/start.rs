@@ -4,6 +4,7 @@ use arm_core::effect::{Motion, dry_friction};
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
+use crate::error::finite;
 use crate::model::{Link, Model};
 use crate::state::{Input, State};
 
@@ -20,14 +21,7 @@ pub(crate) fn given<const N: usize>(
 ) -> Result<(Joints<f64, N>, Joints<f64, N>), SimulationError> {
     for (name, values) in [("start angle", q), ("start speed", qd)] {
         for &found in values.iter() {
-            if !found.is_finite() {
-                let allowed = "a finite number";
-                return Err(SimulationError::Setting {
-                    name,
-                    found,
-                    allowed,
-                });
-            }
+            finite(name, found, "a finite number")?;
         }
     }
     let mut state = State {

@@ -3,9 +3,9 @@
 use arm_core::effect::Effect;
 use arm_core::{Joints, Plane, Pose, Setup};
 
+use crate::error::finite;
 use crate::experiment::altered;
-use crate::friction;
-use crate::friction::advance;
+use crate::friction::{self, advance};
 use crate::model::{Link, Model};
 use crate::native::{diverged, why};
 use crate::prepare::{add_ripple, assemble};
@@ -206,13 +206,7 @@ impl<const N: usize> Stepper<N> {
         qd: Joints<f64, N>,
         time: f64,
     ) -> Result<(), SimulationError> {
-        if !time.is_finite() {
-            return Err(SimulationError::Setting {
-                name: "start time",
-                found: time,
-                allowed: "a finite number of seconds",
-            });
-        }
+        finite("start time", time, "a finite number of seconds")?;
         let at = self.input(&Outside::default());
         let (q, qd) = start::given(&self.model, &at, (&q, &qd))?;
         stability::check(&self.model, (Integrator::Rk4, self.dt), &q)?;

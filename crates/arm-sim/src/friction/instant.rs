@@ -169,14 +169,7 @@ fn ambiguous<const N: usize>(
     (modes, solved): (&Modes<N>, &Solved<N>),
 ) -> Option<(usize, f64)> {
     let pose = Pose::new(q);
-    let arm = Arm {
-        model,
-        input,
-        pose: &pose,
-        qd,
-        force: solved.outcome.force_on_arm,
-        form: Form::at(model, &pose, qd),
-    };
+    let arm = Arm::at((model, input), (&pose, qd), solved.outcome.force_on_arm);
     let answer = Answer {
         qdd: solved.outcome.qdd,
         force: solved.outcome.force_on_arm,
@@ -234,14 +227,7 @@ pub(crate) fn growth<const N: usize>(
     }
     let [slow, fast] = [motion, faster].map(|m| dry_friction(&model.effects, &m, memory));
     let pose = Pose::new(q);
-    let arm = Arm {
-        model,
-        input,
-        pose: &pose,
-        qd,
-        force: [0.0; 2],
-        form: Form::at(model, &pose, qd),
-    };
+    let arm = Arm::at((model, input), (&pose, qd), [0.0; 2]);
     (0..N)
         .filter(|&j| fast[j] < slow[j])
         .map(|j| (slow[j] - fast[j]) / CHANGE * arm.column(j).0.qdd[j])
@@ -260,14 +246,7 @@ pub(crate) fn solve<const N: usize>(
 ) -> Solved<N> {
     let pose = Pose::new(q);
     let (force, lost) = model.contact(input, q, qd, &pose);
-    let arm = Arm {
-        model,
-        input,
-        pose: &pose,
-        qd,
-        force,
-        form: Form::at(model, &pose, qd),
-    };
+    let arm = Arm::at((model, input), (&pose, qd), force);
     let mut motion = Motion::new(input.time, *q, *qd);
     let mut rubbing = Rubbing {
         modes,
@@ -348,7 +327,23 @@ impl<const N: usize> Form<N> {
     }
 }
 
-impl<const N: usize> Arm<'_, N> {
+impl<'a, const N: usize> Arm<'a, N> {
+    #[inline]
+    fn at(
+        (model, input): (&'a Model<f64, N>, &'a Input<f64, N>),
+        (pose, qd): (&'a Pose<f64, N>, &'a Joints<f64, N>),
+        force: Plane<f64>,
+    ) -> Self {
+        Self {
+            model,
+            input,
+            pose,
+            qd,
+            force,
+            form: Form::at(model, pose, qd),
+        }
+    }
+
     #[inline]
     fn under(&self, torque: &Joints<f64, N>) -> Answer<N> {
         let (qdd, force) = match &self.form {
