@@ -174,7 +174,7 @@ def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small synthetic data set of a slow arm with dry friction that its model lacks; `truth.toml` and `movement.toml` lie beside it."""
     from armrs import Dataset, Sensors, Trial, simulate, write_dataset
     from armrs.workflows.demo import handed_over, true_model
-    from armrs.workflows.simulate import load_movement
+    from armrs.workflows.movement import load_movement
 
     folder = tmp_path_factory.mktemp("slow")
     truth = true_model()

@@ -28,7 +28,6 @@ LONG_FUNCTIONS: set[str] = {
 }
 LONG_FILES: set[str] = {
     "crates/arm-gap/src/sensitivity/linearized_run.rs",
-    "python/armrs/workflows/simulate.py",
 }
 CIRCLES: list[list[str]] = [
     ["arm-gap", "crate::data::prepared_session", "crate::sensitivity::linearization_point", "crate::sensitivity::rows"],

@@ -72,6 +72,8 @@ if TYPE_CHECKING:
     from .workflows.initialise import Worn as Worn
     from .workflows.initialise import initialise as initialise
     from .workflows.initialise import segment_expectations as segment_expectations
+    from .workflows.movement import Movement as Movement
+    from .workflows.movement import load_movement as load_movement
     from .workflows.passive import PassiveCurve as PassiveCurve
     from .workflows.passive import PassiveMoments as PassiveMoments
     from .workflows.passive import passive_moments as passive_moments
@@ -83,10 +85,8 @@ if TYPE_CHECKING:
     from .workflows.record import Recorded as Recorded
     from .workflows.record import record as record
     from .workflows.simulate import Channel as Channel
-    from .workflows.simulate import Movement as Movement
     from .workflows.simulate import Sensors as Sensors
     from .workflows.simulate import Simulated as Simulated
-    from .workflows.simulate import load_movement as load_movement
     from .workflows.simulate import simulate as simulate
 
 # No module or package directly below `armrs` is named like a public function: importing it would put it in the place of the function.
@@ -116,7 +116,8 @@ _HOMES = {
     "custom_effects": ("OwnEffect", "own_effect"),
     "workflows.plan": ("Instruments", "Limits", "Plan", "forecast", "plan"),
     "report.pages": ("write_report",),
-    "workflows.simulate": ("Channel", "Movement", "Sensors", "Simulated", "load_movement", "simulate"),
+    "workflows.movement": ("Movement", "load_movement"),
+    "workflows.simulate": ("Channel", "Sensors", "Simulated", "simulate"),
     "io.trial": ("Trial",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

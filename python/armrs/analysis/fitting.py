@@ -14,7 +14,8 @@ from ..catalogue import catalogue
 from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
-from ..workflows.simulate import DEFAULT_DT, DEFAULT_RATE, Movement, driven
+from ..workflows.movement import Movement
+from ..workflows.simulate import DEFAULT_DT, DEFAULT_RATE, driven
 
 
 @dataclass(frozen=True, eq=False)

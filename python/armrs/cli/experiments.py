@@ -79,7 +79,8 @@ def simulate(
     from ..report import words
     from ..report.plain import simulated_data
     from ..workflows.accuracy import WRONG, step_error
-    from ..workflows.simulate import is_doubtful, load_movement
+    from ..workflows.movement import load_movement
+    from ..workflows.simulate import is_doubtful
     from ..workflows.streamed import stream
 
     if (movement is None) == (trial is None):
@@ -154,7 +155,7 @@ def plan(
     from ..report import words
     from ..workflows import plan as planning
     from ..workflows.gap import detectable
-    from ..workflows.simulate import load_movement
+    from ..workflows.movement import load_movement
 
     folder = writable(out, json)
     arm = load_model(model)

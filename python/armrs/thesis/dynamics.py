@@ -14,7 +14,8 @@ from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table
 from ..workflows.experiment import THESIS_CONTACT
-from ..workflows.simulate import Movement, Simulated, simulate
+from ..workflows.movement import Movement
+from ..workflows.simulate import Simulated, simulate
 from . import drawing
 from .item import Found, Group, Sheet
 from .people import RATE, TABLE_4_10, WORKING_ROBOT, WRIST, arm, transverse

@@ -13,7 +13,8 @@ from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table, minus
 from ..workflows.identify import Identified, identify
-from ..workflows.simulate import Movement, Simulated
+from ..workflows.movement import Movement
+from ..workflows.simulate import Simulated
 from . import drawing, people
 from .item import Found, Group, Sheet
 from .printed import HUMAN, HUMAN_C, Row

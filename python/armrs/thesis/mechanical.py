@@ -14,8 +14,9 @@ from ..report.figures import Drawn
 from ..report.tables import Table
 from ..workflows import demo
 from ..workflows.identify import Identified, identify
+from ..workflows.movement import Movement
 from ..workflows.plan import Instruments, forecast
-from ..workflows.simulate import Movement, Simulated
+from ..workflows.simulate import Simulated
 from . import drawing, people
 from .item import Found, Group, Sheet
 from .printed import MECHANICAL, REFERENCE

@@ -15,7 +15,8 @@ from ..io.trial import Trial
 from ..model import Effect, Joint, Model, Robot, Segment, Subject
 from ..workflows import demo
 from ..workflows.experiment import JOINTS, THESIS_CONTACT, literature_arm
-from ..workflows.simulate import Movement, Sensors, Simulated, simulate
+from ..workflows.movement import Movement
+from ..workflows.simulate import Sensors, Simulated, simulate
 
 HANDLE = (0.277, 0.0844)
 """Mass of the handle [kg] and its place from the wrist [m]; section 3.1 prints 0.844 m, which is longer than the hand."""

@@ -10,8 +10,9 @@ import numpy as np
 from ..io.dataset import Dataset
 from ..model import AddedMass, Effect, Joint, Model, Segment, Subject
 from ..report.tables import minus
+from ..workflows.movement import Movement
 from ..workflows.passive import PassiveMoments, passive_moments
-from ..workflows.simulate import Movement, Simulated
+from ..workflows.simulate import Simulated
 from . import people
 
 SHOULDER_HELD = (-68.0, -40.0, -16.0, 10.0, 36.0)

@@ -14,8 +14,9 @@ from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table, minus
 from ..workflows.experiment import THESIS_ROBOT, Controller, Devices, Experiment, Run, Safety
+from ..workflows.movement import Movement
 from ..workflows.record import record
-from ..workflows.simulate import Movement, Simulated, simulate
+from ..workflows.simulate import Simulated, simulate
 from . import drawing
 from .animation import film
 from .item import Found, Group, Sheet

@@ -26,8 +26,9 @@ from .gap.headline import effect_name, headline, joined
 from .gap.results import gap_data, write_gap
 from .gap.summary import summary
 from .identify import Identified, identify
+from .movement import Movement
 from .passive import PassiveMoments, passive_moments
-from .simulate import Movement, Sensors, simulate
+from .simulate import Sensors, simulate
 
 BRAKES = (0.139, 0.161)
 """Dry friction of the brakes in shoulder and elbow, by their load cells [N m] (table 4.3)."""

@@ -15,7 +15,7 @@ from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Segment, Subject, Tolerance, load_model
-from .simulate import Movement, movement_of
+from .movement import Movement, movement_of
 
 THESIS_ROBOT = Robot(lengths=(0.45, 0.45), base=(1.05, -0.10))
 THESIS_CONTACT = Contact(stiffness=(10_000.0, 10_000.0), damping=(25.0, 25.0))

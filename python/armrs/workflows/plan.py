@@ -17,7 +17,8 @@ from ..report.plain import origin
 from ..tabular import Tabular, Tidy
 from .experiment import Safety
 from .identify import core_settings, effects_of
-from .simulate import Movement, about
+from .movement import Movement
+from .simulate import about
 
 
 @dataclass(frozen=True)

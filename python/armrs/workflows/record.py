@@ -18,7 +18,8 @@ from ..io.markers import Markers, planar_motion
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Effect, Model
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
-from .simulate import DEFAULT_DT, Channel, Movement, Sensors, Simulated, driven, simulate
+from .movement import Movement
+from .simulate import DEFAULT_DT, Channel, Sensors, Simulated, driven, simulate
 
 RECORDING_RATE = 500.0
 """Samples a second of the simulation, from which the devices take theirs [Hz]."""

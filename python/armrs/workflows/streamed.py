@@ -14,7 +14,8 @@ from .. import _armrs
 from ..io import files
 from ..io.trial import Trial
 from ..model import Model
-from .simulate import PIECE, Movement, Simulated, digested, simulate_in_pieces, warnings
+from .movement import Movement
+from .simulate import PIECE, Simulated, digested, simulate_in_pieces, warnings
 
 
 class Run(Protocol):

@@ -10,8 +10,9 @@ from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.trial import Trial
 from ...model import Model
+from ..movement import Movement
 from ..plan import Instruments
-from ..simulate import Channel, Movement, Sensors, simulate
+from ..simulate import Channel, Sensors, simulate
 from .found import Limit
 from .search import core_settings, core_trials
 from .stages import suspect

@@ -14,7 +14,8 @@ from ...errors import ArmrsError
 from ...io.trial import Trial
 from ...model import Model
 from ..identify import core_columns
-from ..simulate import Movement, Sensors, simulate
+from ..movement import Movement
+from ..simulate import Sensors, simulate
 from .found import Alternative, GapFound, Missing, Separation
 from .reading import is_led, lasting
 from .search import core_settings, core_trials
