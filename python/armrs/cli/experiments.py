@@ -178,7 +178,9 @@ def plan(
         with console.progress("looking for the smallest effects that they would show"):
             smallest = detectable(arm, found.movements, repeats=repeats)
     plain = planning.plan_data(found, beside, smallest, name=f"a plan for {model.name}", command=command_line(context))
-    written = planning.write_plan(found, plain, folder) if folder else []
+    if folder:
+        from ..report.results import write_planned
+    written = write_planned(found, plain, folder) if folder else []
     present(lambda: plain, json, lambda: words.planned(plain, written))
     return 0 if found.worst <= planning.MOST_UNCERTAIN else 1
 

@@ -124,6 +124,8 @@ def import_(
     Separators, decimal commas, encodings, units and columns are recognised. How angles are counted and what the force acts on are read off
     the static balance of the arm, unless you say them. Every decision is printed and kept in import.toml, which repeats the import.
     """
+    from ..io.dataset import load_dataset
+    from ..report.recording import write_recording
     from ..workflows.importing import import_recordings
 
     writable(out, json)
@@ -141,11 +143,14 @@ def import_(
             raise
         done = import_recordings(files, out, model=model, columns_map=",".join(filter(None, [columns, answers])), **options)  # type: ignore[arg-type]
 
+    picture = write_recording(load_dataset(done.folder), done.folder)
+
     def human() -> None:
         for note in done.notes:
             print(f"  {note}")
         count = len(done.recipe.trials)
-        print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}. Next: armrs check {done.folder}")
+        print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}.")
+        print(f"Look at {picture}: does the arm stand as it stood, and does the force carry it? Next: armrs check {done.folder}")
 
     present(done.to_dict, json, human)
 

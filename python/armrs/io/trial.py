@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from .. import checks
 from ..errors import BadInput, Text
 from . import columns, resample
 from .samples import Samples, read_samples
+
+if TYPE_CHECKING:
+    from ..model import Model
 
 FEWEST_SAMPLES = 16
 BRIDGED = 0.05
@@ -142,6 +147,19 @@ class Trial:
     def filled(self) -> np.ndarray:
         """Samples at which any column was bridged, shape (n,)."""
         return np.logical_or.reduce([np.zeros(len(self.t), dtype=bool), *self.filled_columns.values()])
+
+    def plot(self, model: Model | None = None) -> np.ndarray:
+        """Draw every channel over time where notebooks and windows show it; with a model also the arm in five instants.
+
+        Returns
+        -------
+        ndarray of matplotlib Axes, shape (n,)
+            `axes[0].figure` is the figure.
+        """
+        if model is not None and model.n_joints != self.q.shape[1]:
+            raise BadInput("model", Text(f"{model.n_joints} joints"), f"{self.q.shape[1]}, as the trial has")
+        axes: np.ndarray = importlib.import_module("armrs.report.recording").plot(self, model)
+        return axes
 
     def pieces(self) -> list[slice]:
         """Return the stretches of valid samples, in order."""

@@ -13,7 +13,7 @@ from ..io.samples import write_pieces
 from ..io.trial import Trial
 from ..workflows.identify import Identified
 from ..workflows.passive import PassiveMoments
-from ..workflows.plan import plan_data
+from ..workflows.plan import Plan, plan_data, write_movements
 from ..workflows.simulate import Simulated
 from ..workflows.streamed import Run
 from . import figures, pages, plain, plotting
@@ -123,3 +123,9 @@ def write_passive(result: PassiveMoments, data: dict[str, Any], folder: Path) ->
     """Write `passive.json`, figures and `report.html` below a folder; return the files, the report last."""
     drawn = figures.draw(figures.passive(result))
     return files.write_whole(folder, lambda out: write_result(out, "passive", data, drawn))
+
+
+def write_planned(result: Plan, data: dict[str, Any], folder: Path) -> list[Path]:
+    """Write movement files, `plan.toml`, `plan.json`, a figure and `report.html` below a folder; return the files, the report last."""
+    drawn = figures.draw(figures.planned(data))
+    return files.write_whole(folder, lambda out: [*write_movements(result, data, out), *write_result(out, "plan", data, drawn)])

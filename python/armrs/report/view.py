@@ -40,13 +40,7 @@ class View:
             raise BadInput("plot", Text("nothing to draw in this result"), "a result with values")
         if name is not None and checks.text("name", name) not in figures:
             raise unknown_name("name", name, figures, what="figure")
-        with plotting.style(), plotting.in_pyplot():
-            figure = figures[next(iter(figures)) if name is None else name]().figure
-            # Ticks and layout take the style that is in force when they are made.
-            figure.draw_without_rendering()
-        axes = np.empty(len(figure.axes), dtype=object)
-        axes[:] = figure.axes
-        return axes
+        return shown(figures[next(iter(figures)) if name is None else name])
 
     def report(self, result: object, path: str | os.PathLike[str]) -> Path:
         """Write the report as one HTML page with its figures in it."""
@@ -58,6 +52,17 @@ class View:
         for drawn in draw(self.figures(result, data)):
             pictures[drawn.section].append(_picture(drawn))
         return pages.write_page_of(data, pictures, target)
+
+
+def shown(draw: Callable[[], Drawn]) -> np.ndarray:
+    """Draw a figure where pyplot shows it, and return its Axes."""
+    with plotting.style(), plotting.in_pyplot():
+        figure = draw().figure
+        # Ticks and layout take the style that is in force when they are made.
+        figure.draw_without_rendering()
+    axes = np.empty(len(figure.axes), dtype=object)
+    axes[:] = figure.axes
+    return axes
 
 
 def _picture(drawn: Drawn) -> html.Picture:

@@ -391,8 +391,8 @@ def plan_data(
     return data
 
 
-def write_plan(found: Plan, data: dict[str, Any], folder: Path) -> list[Path]:
-    """Write `plan.toml`, whose tables belong into an EXPERIMENT.toml, a movement file for each movement, and `plan.json`."""
+def write_movements(found: Plan, data: dict[str, Any], folder: Path) -> list[Path]:
+    """Write `plan.toml`, whose tables belong into an EXPERIMENT.toml, and a movement file for each movement."""
     written = [folder / "plan.toml"]
     files.write_text(written[0], found.to_toml(), kind=".toml")
     for number, entry in enumerate(data["movements"], start=1):
@@ -400,8 +400,6 @@ def write_plan(found: Plan, data: dict[str, Any], folder: Path) -> list[Path]:
         table["waypoints_deg"] = np.round(table["waypoints_deg"], 3).tolist()
         written.append(folder / f"movement-{number}.toml")
         files.write_text(written[-1], "\n".join(["[movement]", *tomlfile.lines(table), ""]), kind=".toml")
-    written.append(folder / "plan.json")
-    files.write_json(written[-1], data)
     return written
 
 

@@ -59,7 +59,7 @@ def first_wrong(model: Model, trials: Sequence[Trial], *, met: bool) -> BadInput
         return None
     alone = {t.file: found for t in trials if (found := wrong_setup(model, [t], met=met, alone=True)) is not None}
     rest = _motion([t for t in trials if t.file not in alone])
-    if alone and rest is not None and unexplained(model, rest) < _UNEXPLAINED:
+    if 0 < 2 * len(alone) <= len(trials) and rest is not None and unexplained(model, rest) < _UNEXPLAINED:
         file, found = next(iter(alone.items()))
         return found.within(file=file)
     more = f" and {len(trials) - 1} more" if len(trials) > 1 else ""

@@ -1,0 +1,132 @@
+"""What was recorded, before anything is computed: the arm in five instants with weight and contact force, and each channel over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..io import files
+from ..io.dataset import Dataset
+from ..io.trial import Trial
+from ..model import Model
+from . import plotting
+from .figures import Drawn, slug
+from .view import shown
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_INSTANTS = 5
+_ARROW = 0.35
+"""Length of the largest force's arrow, relative to the arm."""
+_SAME = 0.06
+"""Hands that are nearer than this, relative to the arm, share a label."""
+
+
+def recording(trial: Trial, model: Model | None = None) -> Drawn:
+    """Draw a trial: with a model also the arm as a stick figure in five instants."""
+    names = [f"q{j}" for j in range(1, trial.q.shape[1] + 1)] if model is None else [joint.name for joint in model.joints]
+    panels = _panels(trial, names)
+    rows = -(-len(panels) // 2)
+    tall = 1.9 * rows + 0.4
+    if model is None:
+        figure = plotting.figure(10.4, tall)
+        axes = figure.subplots(rows, 2, squeeze=False, sharex=True).ravel()
+    else:
+        figure = plotting.figure(10.4, tall + 4.2)
+        grid = figure.add_gridspec(2, 1, height_ratios=(4.2, tall))
+        postures(trial, model, figure.add_subplot(grid[0]))
+        axes = grid[1].subgridspec(rows, 2).subplots(squeeze=False, sharex=True).ravel()
+    t = trial.t - trial.t[0]
+    for k, (ax, (label, values, colour)) in enumerate(zip(axes, panels, strict=False)):
+        ax.plot(t, values, color=colour, lw=1.2)
+        ax.set_title(label, fontsize="medium")
+        if k >= len(panels) - 2:
+            ax.set_xlabel("time [s]")
+            ax.tick_params(labelbottom=True)
+    for ax in axes[len(panels) :]:
+        ax.remove()
+    text = f"{trial.file}: each channel as it was read, in the units and directions of armrs."
+    if model is not None:
+        text += (
+            " Above, the arm from its first joint to the hand in five instants, pale to dark; blue arrows are the force on the arm, "
+            "the grey arrow is gravity. If the arm stands otherwise than it stood, the angles are counted otherwise; carried at rest, "
+            "the force points up."
+        )
+    return Drawn(f"recording-{slug(trial.configuration)}-{trial.repeat}", "What was recorded", text, figure)
+
+
+def plot(trial: Trial, model: Model | None) -> np.ndarray:
+    """Draw a trial where pyplot shows it, and return the Axes."""
+    return shown(lambda: recording(trial, model))
+
+
+def write_recording(dataset: Dataset, folder: Path) -> Path:
+    """Write `recording.png` below a folder: the trial of a data set whose joints move most."""
+    trial = max(dataset.trials, key=lambda t: float(np.sum(np.ptp(t.q[t.valid], axis=0))))
+    target = folder / "recording.png"
+    files.may_replace(target, ".png")
+    with plotting.style():
+        drawn = recording(trial, dataset.model)
+        drawn.figure.suptitle(trial.file)
+    with files.replacing(target) as temporary:
+        plotting.write_png(drawn.figure, temporary)
+    return target
+
+
+def postures(trial: Trial, model: Model, ax: Axes) -> None:
+    """Draw the arm in five instants at equal distances, with the contact force on it and the direction of gravity."""
+    complete = np.flatnonzero(trial.valid)
+    picked = complete[np.linspace(0, len(complete) - 1, _INSTANTS).astype(int)]
+    lengths = np.array([s.length for s in model.segments])
+    reach = float(lengths.sum())
+    base = np.asarray(model.base)
+    forces = trial.force_on_arm
+    most = 0.0 if forces is None else float(np.nanmax(np.hypot(*forces[picked].T)))
+    times: dict[tuple[float, ...], list[str]] = {}
+    for shade, k in zip(np.linspace(0.25, 1.0, _INSTANTS), picked, strict=True):
+        directions = np.cumsum(trial.q[k])
+        steps = lengths[:, None] * np.column_stack([np.cos(directions), np.sin(directions)])
+        points = np.vstack([base, base + np.cumsum(steps, axis=0)])
+        ax.plot(*points.T, color=plotting.INK, alpha=shade, lw=3.0, marker="o", ms=5, solid_capstyle="round")
+        if forces is not None and most > 0.0:
+            _arrow(ax, points[-1], _ARROW * reach / most * forces[k], plotting.BLUE, alpha=shade)
+        near = next((place for place in times if np.hypot(*(points[-1] - place)) < _SAME * reach), tuple(points[-1]))
+        times.setdefault(near, []).append(f"{trial.t[k] - trial.t[0]:.3g} s")
+    for place, said in times.items():
+        ax.annotate(", ".join(said), (place[0], place[1]), xytext=(8, -6), textcoords="offset points", fontsize=9, va="top")
+    ax.plot(*base, marker="s", ms=11, color=plotting.INK, zorder=3)
+    down = base + np.array([-0.25 * reach, 0.0])
+    _arrow(ax, down, np.array([0.0, -0.25 * reach * np.sign(model.gravity)]), plotting.GREY)
+    ax.annotate("gravity", (down[0], down[1]), xytext=(0, 4), textcoords="offset points", ha="center", fontsize=9, color=plotting.GREY)
+    if most > 0.0:
+        ax.set_title(f"Arm in five instants; largest arrow {most:.3g} N on the arm", fontsize="medium")
+    else:
+        ax.set_title("Arm in five instants", fontsize="medium")
+    ax.set(xlabel="forward, y [m]", ylabel="up, z [m]")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.12)
+
+
+def _arrow(ax: Axes, start: np.ndarray, along: np.ndarray, colour: str, alpha: float = 1.0) -> None:
+    end = start + along
+    style: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "alpha": alpha, "lw": 1.8, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=style)
+    ax.plot(*end, alpha=0.0)  # what is annotated does not widen the axes
+
+
+def _panels(trial: Trial, names: list[str]) -> list[tuple[str, np.ndarray, str]]:
+    """Return label, values and colour of each channel that was measured."""
+    blue, orange, green, grey = plotting.BLUE, plotting.ORANGE, plotting.GREEN, plotting.GREY
+    panels = [(f"{name}, angle [°]", np.degrees(q), blue) for name, q in zip(names, trial.q.T, strict=True)]
+    if trial.force_on_arm is not None:
+        panels += [(f"force on the arm, {axis} [N]", f, orange) for axis, f in zip(("forward", "up"), trial.force_on_arm.T, strict=True)]
+    if trial.moment_on_arm is not None:
+        panels.append(("moment on the arm [N m]", trial.moment_on_arm, orange))
+    if trial.tau is not None:
+        panels += [(f"{name}, measured torque [N m]", tau, green) for name, tau in zip(names, trial.tau.T, strict=True)]
+    if trial.robot_q is not None:
+        panels += [(f"robot's joint {k}, angle [°]", np.degrees(q), grey) for k, q in enumerate(trial.robot_q.T, start=1)]
+    return panels + [(name, values, grey) for name, values in trial.emg.items()]
