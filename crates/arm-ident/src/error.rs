@@ -30,9 +30,9 @@ pub enum IdentError {
     OtherMovement {
         /// One-based joint.
         joint: usize,
-        /// Root mean square difference [rad].
+        /// Root mean square difference \[rad\].
         found: f64,
-        /// Largest difference allowed [rad].
+        /// Largest difference allowed \[rad\].
         allowed: f64,
     },
     /// Something about one trial.

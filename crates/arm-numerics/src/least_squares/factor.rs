@@ -26,7 +26,7 @@ impl Factor {
     /// The least-squares solution `R⁻¹ z`.
     ///
     /// # Errors
-    /// [`NumericsError::Rank`] if a diagonal element of `R` is below `p ε` times the norm of its column: then [`crate::least_squares::program`] or [`crate::rank`] apply.
+    /// [`NumericsError::Rank`] if a diagonal element of `R` is below `p ε` times the norm of its column: then [`crate::least_squares::program`] or the rank analysis of `arm-ident` apply.
     pub fn solve(&self) -> Result<Vec<f64>, NumericsError> {
         self.check()?;
         let p = self.parameters();

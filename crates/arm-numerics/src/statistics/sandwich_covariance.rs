@@ -234,7 +234,7 @@ pub fn blocks(n: usize, shortest: usize) -> Result<Vec<Range<usize>>, NumericsEr
 /// Share of the prior's variance that the data removed, `1 − posterior/prior`, between 0 (nothing learnt) and 1.
 ///
 /// It says what the data **and the priors of the other parameters** imply: a parameter in the null space can have a large ratio. Read it with
-/// [`crate::rank::RankReport::undetermined_share`].
+/// `RankReport::undetermined_share` of `arm-ident`.
 ///
 /// # Errors
 /// [`NumericsError::OutOfRange`] unless both standard deviations are positive and finite (0 is allowed for the posterior).
