@@ -230,149 +230,96 @@ fn what_carries_an_arm_is_finite_or_nothing() {
 }
 
 #[test]
-fn paths_robots_and_monitors_take_numbers_only() {
+fn a_path_takes_numbers_only() {
+    let mut path: armrs_path = empty();
     let way = [[0.0; ARMRS_JOINTS], [0.5; ARMRS_JOINTS]];
-    let (mut path, mut robot, mut monitor) = (
-        empty::<armrs_path>(),
-        empty::<armrs_robot>(),
-        empty::<armrs_monitor>(),
-    );
     // SAFETY: all pointers are good.
-    unsafe {
-        for bad in NO_NUMBERS.into_iter().chain([-1.0]) {
-            let mut slow = LIMITS;
-            slow[0].speed = bad;
-            assert_ne!(
-                armrs_path_init(
-                    &mut path,
-                    way.as_ptr().cast(),
-                    2,
-                    slow.as_ptr(),
-                    0.0,
-                    1,
-                    null_mut()
-                ),
-                ARMRS_OK,
-                "{bad}"
-            );
-            slow = LIMITS;
-            slow[0].acceleration = bad;
-            assert_ne!(
-                armrs_path_init(
-                    &mut path,
-                    way.as_ptr().cast(),
-                    2,
-                    slow.as_ptr(),
-                    0.0,
-                    1,
-                    null_mut()
-                ),
-                ARMRS_OK,
-                "{bad}"
-            );
-            assert_ne!(
-                armrs_path_init(
-                    &mut path,
-                    way.as_ptr().cast(),
-                    2,
-                    LIMITS.as_ptr(),
-                    bad,
-                    1,
-                    null_mut()
-                ),
-                ARMRS_OK,
-                "{bad}"
-            );
-            assert_ne!(
-                armrs_robot_init(
-                    &mut robot,
-                    [0.45, bad].as_ptr(),
-                    [1.05, -0.1].as_ptr(),
-                    1,
-                    null_mut()
-                ),
-                ARMRS_OK
-            );
-        }
-        assert_eq!(
-            armrs_path_init(
-                &mut path,
-                way.as_ptr().cast(),
-                2,
-                LIMITS.as_ptr(),
-                0.0,
-                1,
-                null_mut()
-            ),
-            ARMRS_OK
-        );
-        assert_eq!(
-            armrs_robot_init(
-                &mut robot,
-                [0.45; 2].as_ptr(),
-                [1.05, -0.1].as_ptr(),
-                1,
-                null_mut()
-            ),
-            ARMRS_OK
-        );
-        for bad in NO_NUMBERS {
-            let mut away = way;
-            away[1][0] = bad;
-            assert_ne!(
-                armrs_path_init(
-                    &mut path,
-                    away.as_ptr().cast(),
-                    2,
-                    LIMITS.as_ptr(),
-                    0.0,
-                    1,
-                    null_mut()
-                ),
-                ARMRS_OK
-            );
-            let mut motion = moving();
-            assert_eq!(armrs_path_at(&path, bad, &mut motion), ARMRS_NOT_FINITE);
-            assert_eq!(motion, moving());
-            let mut out = [42.0; 2];
-            assert_eq!(
-                armrs_robot_handle(&robot, [0.1, bad].as_ptr(), out.as_mut_ptr()),
-                ARMRS_NOT_FINITE
-            );
-            assert_eq!(
-                armrs_robot_angles(&robot, [0.5, bad].as_ptr(), out.as_mut_ptr()),
-                ARMRS_NOT_FINITE
-            );
-            for (q, velocity) in [([bad, 1.0], [0.1; 2]), ([0.1, 1.0], [bad, 0.1])] {
-                assert_eq!(
-                    armrs_robot_speeds(&robot, q.as_ptr(), velocity.as_ptr(), out.as_mut_ptr()),
-                    ARMRS_NOT_FINITE
-                );
-            }
-            assert_eq!(
-                armrs_robot_speeds(
-                    &robot,
-                    [0.3, 0.0].as_ptr(),
-                    [0.1; 2].as_ptr(),
-                    out.as_mut_ptr()
-                ),
-                ARMRS_NOT_FINITE,
-                "at full stretch"
-            );
-            assert_eq!(out, [42.0; 2]);
-            let (none, mut odd) = (armrs_real::NAN, CHANNEL);
-            odd.max = none;
-            assert_ne!(
-                armrs_monitor_init(&mut monitor, &odd, 1, 1000, 2000, null_mut()),
-                ARMRS_OK
-            );
-            assert_eq!(
-                armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000, 2000, null_mut()),
-                ARMRS_OK
-            );
-            for place in [0, ARMRS_CHANNELS - 1] {
-                let mut seen: armrs_observation = empty();
-                seen.values[place] = bad;
+    let mut init = |way: &[[armrs_real; ARMRS_JOINTS]; 2], limits: &[_; ARMRS_JOINTS], pause| unsafe {
+        let (way, limits) = (way.as_ptr().cast(), limits.as_ptr());
+        armrs_path_init(&mut path, way, 2, limits, pause, 1, null_mut())
+    };
+    for bad in NO_NUMBERS.into_iter().chain([-1.0]) {
+        let (mut slow, mut lazy) = (LIMITS, LIMITS);
+        slow[0].speed = bad;
+        lazy[0].acceleration = bad;
+        assert_ne!(init(&way, &slow, 0.0), ARMRS_OK, "{bad}");
+        assert_ne!(init(&way, &lazy, 0.0), ARMRS_OK, "{bad}");
+        assert_ne!(init(&way, &LIMITS, bad), ARMRS_OK, "{bad}");
+    }
+    for bad in NO_NUMBERS {
+        let mut away = way;
+        away[1][0] = bad;
+        assert_ne!(init(&away, &LIMITS, 0.0), ARMRS_OK);
+    }
+    assert_eq!(init(&way, &LIMITS, 0.0), ARMRS_OK);
+    for bad in NO_NUMBERS {
+        let mut motion = moving();
+        // SAFETY: all pointers are good.
+        let status = unsafe { armrs_path_at(&path, bad, &mut motion) };
+        assert_eq!((status, motion), (ARMRS_NOT_FINITE, moving()));
+    }
+}
+
+#[test]
+fn a_robot_takes_numbers_only() {
+    let mut robot: armrs_robot = empty();
+    // SAFETY: all pointers are good.
+    let mut init = |lengths: [armrs_real; 2]| unsafe {
+        armrs_robot_init(
+            &mut robot,
+            lengths.as_ptr(),
+            [1.05, -0.1].as_ptr(),
+            1,
+            null_mut(),
+        )
+    };
+    for bad in NO_NUMBERS.into_iter().chain([-1.0]) {
+        assert_ne!(init([0.45, bad]), ARMRS_OK);
+    }
+    assert_eq!(init([0.45; 2]), ARMRS_OK);
+    let mut out = [42.0; 2];
+    let to = out.as_mut_ptr();
+    // SAFETY: all pointers are good.
+    let speeds = |q: [armrs_real; 2], velocity: [armrs_real; 2]| unsafe {
+        armrs_robot_speeds(&robot, q.as_ptr(), velocity.as_ptr(), to)
+    };
+    for bad in NO_NUMBERS {
+        // SAFETY: all pointers are good.
+        let (handle, angles) = unsafe {
+            (
+                armrs_robot_handle(&robot, [0.1, bad].as_ptr(), to),
+                armrs_robot_angles(&robot, [0.5, bad].as_ptr(), to),
+            )
+        };
+        assert_eq!((handle, angles), (ARMRS_NOT_FINITE, ARMRS_NOT_FINITE));
+        assert_eq!(speeds([bad, 1.0], [0.1; 2]), ARMRS_NOT_FINITE);
+        assert_eq!(speeds([0.1, 1.0], [bad, 0.1]), ARMRS_NOT_FINITE);
+    }
+    assert_eq!(
+        speeds([0.3, 0.0], [0.1; 2]),
+        ARMRS_NOT_FINITE,
+        "at full stretch"
+    );
+    assert_eq!(out, [42.0; 2]);
+}
+
+#[test]
+fn a_monitor_takes_numbers_only() {
+    let mut monitor: armrs_monitor = empty();
+    // SAFETY: all pointers are good.
+    let mut init = |channel: &armrs_channel| unsafe {
+        armrs_monitor_init(&mut monitor, channel, 1, 1000, 2000, null_mut())
+    };
+    let mut odd = CHANNEL;
+    odd.max = armrs_real::NAN;
+    assert_ne!(init(&odd), ARMRS_OK);
+    assert_eq!(init(&CHANNEL), ARMRS_OK);
+    for bad in NO_NUMBERS {
+        for place in [0, ARMRS_CHANNELS - 1] {
+            let mut seen: armrs_observation = empty();
+            seen.values[place] = bad;
+            // SAFETY: all pointers are good.
+            unsafe {
                 assert_eq!(
                     armrs_monitor_check(&mut monitor, &seen, null_mut()),
                     ARMRS_STOPPED

@@ -43,21 +43,26 @@ fn named(name: &core::ffi::CStr, joint: u32) -> armrs_effect {
     effect
 }
 
+/// What `armrs_arm_init` says of segments and of so many effects.
+///
+/// # Safety
+/// Every pointer is good or null.
+unsafe fn init(
+    arm: &mut armrs_arm,
+    segments: *const armrs_segment,
+    (effects, count): (*const armrs_effect, usize),
+) -> armrs_status {
+    let (base, gravity) = ([0.0; 2], [0.0, -9.81]);
+    let (base, gravity) = (base.as_ptr(), gravity.as_ptr());
+    // SAFETY: as promised.
+    unsafe { armrs_arm_init(arm, segments, base, gravity, effects, count, null_mut()) }
+}
+
 /// The arm with effects, where it takes them.
 fn arm_with(effects: &[armrs_effect]) -> Option<armrs_arm> {
     let mut arm = empty();
     // SAFETY: all pointers are good.
-    let status = unsafe {
-        armrs_arm_init(
-            &mut arm,
-            ARM.as_ptr(),
-            [0.0; 2].as_ptr(),
-            [0.0, -9.81].as_ptr(),
-            effects.as_ptr(),
-            effects.len(),
-            null_mut(),
-        )
-    };
+    let status = unsafe { init(&mut arm, ARM.as_ptr(), (effects.as_ptr(), effects.len())) };
     (status == ARMRS_OK).then_some(arm)
 }
 
@@ -403,7 +408,6 @@ fn a_monitor_stops_until_reset() {
 #[test]
 fn what_cannot_be_is_refused() {
     let (mut made, mut torque) = (empty::<armrs_arm>(), [0.0; ARMRS_JOINTS]);
-    let (base, gravity) = ([0.0; 2], [0.0, -9.81]);
     // SAFETY: the pointers are good, or null.
     unsafe {
         assert_eq!(
@@ -414,69 +418,20 @@ fn what_cannot_be_is_refused() {
             armrs_gravity(null(), [0.0; ARMRS_JOINTS].as_ptr(), torque.as_mut_ptr()),
             ARMRS_NULL
         );
+        assert_eq!(init(&mut made, null(), (null(), 0)), ARMRS_NULL);
+        assert_eq!(init(&mut made, ARM.as_ptr(), (null(), 1)), ARMRS_NULL);
         assert_eq!(
-            armrs_arm_init(
-                &mut made,
-                null(),
-                base.as_ptr(),
-                gravity.as_ptr(),
-                null(),
-                0,
-                null_mut()
-            ),
-            ARMRS_NULL
-        );
-        assert_eq!(
-            armrs_arm_init(
-                &mut made,
-                ARM.as_ptr(),
-                base.as_ptr(),
-                gravity.as_ptr(),
-                null(),
-                1,
-                null_mut()
-            ),
-            ARMRS_NULL
-        );
-        assert_eq!(
-            armrs_arm_init(
-                &mut made,
-                ARM.as_ptr(),
-                base.as_ptr(),
-                gravity.as_ptr(),
-                null(),
-                13,
-                null_mut()
-            ),
+            init(&mut made, ARM.as_ptr(), (null(), 13)),
             ARMRS_OUT_OF_RANGE
         );
         let mut bad = ARM;
         bad[1].mass = -1.0;
         assert_eq!(
-            armrs_arm_init(
-                &mut made,
-                bad.as_ptr(),
-                base.as_ptr(),
-                gravity.as_ptr(),
-                null(),
-                0,
-                null_mut()
-            ),
+            init(&mut made, bad.as_ptr(), (null(), 0)),
             ARMRS_OUT_OF_RANGE
         );
         bad[1].mass = armrs_real::NAN;
-        assert_eq!(
-            armrs_arm_init(
-                &mut made,
-                bad.as_ptr(),
-                base.as_ptr(),
-                gravity.as_ptr(),
-                null(),
-                0,
-                null_mut()
-            ),
-            ARMRS_NOT_FINITE
-        );
+        assert_eq!(init(&mut made, bad.as_ptr(), (null(), 0)), ARMRS_NOT_FINITE);
         let mut effect: armrs_effect = empty();
         assert_eq!(
             armrs_effect_named(c"colomb".as_ptr(), 0, &mut effect),
@@ -485,29 +440,10 @@ fn what_cannot_be_is_refused() {
         assert_eq!(armrs_effect_named(null(), 0, &mut effect), ARMRS_NULL);
         effect = named(c"coulomb", 7);
         assert_eq!(
-            armrs_arm_init(
-                &mut made,
-                ARM.as_ptr(),
-                base.as_ptr(),
-                gravity.as_ptr(),
-                &effect,
-                1,
-                null_mut()
-            ),
+            init(&mut made, ARM.as_ptr(), (&effect, 1)),
             ARMRS_OUT_OF_RANGE
         );
         effect.kind = 1_000_000;
-        assert_eq!(
-            armrs_arm_init(
-                &mut made,
-                ARM.as_ptr(),
-                base.as_ptr(),
-                gravity.as_ptr(),
-                &effect,
-                1,
-                null_mut()
-            ),
-            ARMRS_UNKNOWN
-        );
+        assert_eq!(init(&mut made, ARM.as_ptr(), (&effect, 1)), ARMRS_UNKNOWN);
     }
 }
