@@ -148,8 +148,21 @@ def _suffix_of(source: Path, readable: tuple[str, ...]) -> str:
 def report(
     sources: Annotated[list[Path], typer.Argument(metavar="RESULT.json…", help="Results that other verbs wrote.")],
     out: OutFolder = Path(),
+    summary: Annotated[bool, typer.Option("--summary", help="One page in plain words for a clinician, summary.html, instead.")] = False,
+    norms: Annotated[Path | None, typer.Option(metavar="FILE", help="TOML with what is usual, shown in the summary.")] = None,
 ) -> None:
-    """Make one self-contained HTML report, report.html, of any results."""
+    """Make one self-contained HTML report, report.html, of any results.
+
+    With --summary one page in plain words: stiffness, resistance and friction of each joint from results of identify and passive.
+    """
+    if norms is not None and not summary:
+        raise BadInput("--norms", Text("no --summary"), "--norms beside --summary")
+    if summary:
+        from ..report.clinic import load_norms, write_summary
+
+        usual = () if norms is None else load_norms(norms)
+        print(write_summary(sources, files.output_folder(out, "-o") / "summary.html", usual))
+        return
     from ..report.pages import write_report
 
     print(write_report(sources, files.output_folder(out, "-o") / "report.html"))

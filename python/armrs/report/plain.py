@@ -44,6 +44,7 @@ def data_of(dataset: Dataset) -> dict[str, Any]:
         "name": dataset.name,
         "synthetic": dataset.synthetic,
         "joints": [joint.name for joint in dataset.model.joints],
+        "range_deg": ranges(dataset),
         "configurations": list(dict.fromkeys(t.configuration for t in dataset.trials)),
         "fit": of("fit"),
         "test": of("test"),
@@ -51,6 +52,12 @@ def data_of(dataset: Dataset) -> dict[str, Any]:
         "torques": any(t.tau is not None for t in dataset.trials),
         "warnings": list(dataset.warnings),
     }
+
+
+def ranges(dataset: Dataset) -> list[list[float]] | None:
+    """Return the smallest and the largest angle of each joint [deg], None without a complete sample."""
+    q = np.concatenate([t.q[t.valid] for t in dataset.trials]) if dataset.trials else np.empty((0, 0))
+    return np.degrees(np.column_stack([q.min(axis=0), q.max(axis=0)])).tolist() if len(q) else None
 
 
 def identified_data(result: Identified, command: str | None = None) -> dict[str, Any]:

@@ -1,0 +1,308 @@
+"""One page for a clinician, in plain words: what was measured of each joint, how certain it is, and what was unusual."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import checks
+from ..errors import BadInput, Text
+from ..io import tomlfile
+from . import html, pages, plotting
+from .words import is_synthetic, name
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter of a joint as a clinician reads it."""
+
+    kind: str
+    parameter: str
+    title: str
+    meaning: str
+    unit: str
+    factor: float
+
+
+QUANTITIES = (
+    Quantity(
+        "elastic",
+        "stiffness",
+        "Stiffness",
+        "how strongly the joint pulls back for every 10° away from its resting angle",
+        "N m per 10°",
+        math.pi / 18.0,
+    ),
+    Quantity("elastic", "rest", "Resting angle", "where the joint goes by itself, without weight", "°", 180.0 / math.pi),
+    Quantity("viscous", "viscosity", "Resistance to speed", "what is added when the joint turns by 90° in a second", "N m", math.pi / 2.0),
+    Quantity("coulomb", "torque", "Friction", "resistance to any movement, however slow", "N m", 1.0),
+)
+HALF_WIDTH = Quantity(
+    "passive",
+    "half_width",
+    "Resistance to slow movement",
+    "half of the difference between moving to and fro, friction and speed together",
+    "N m",
+    1.0,
+)
+MOST_NOTES = 3
+"""Notes that find room on one page."""
+ANALYSED = ("identify", "passive")
+"""Results of which a summary is made."""
+
+
+@dataclass(frozen=True)
+class Norm:
+    """What is usual of a parameter: `low` to `high`, in SI units, and who says so."""
+
+    kind: str
+    name: str
+    joint: int
+    low: float
+    high: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Line:
+    """One quantity of one joint, in its unit: `value` is None where these movements do not measure it, `at_limit` says that it is 0."""
+
+    joint: str
+    quantity: Quantity
+    value: float | None
+    interval: tuple[float, float] | None
+    norm: Norm | None
+    trend: str | None
+    at_limit: bool = False
+
+    def norm_band(self) -> tuple[float, float] | None:
+        """Return the usual range in the unit of the quantity."""
+        return None if self.norm is None else (self.norm.low * self.quantity.factor, self.norm.high * self.quantity.factor)
+
+    @property
+    def beside_norm(self) -> str | None:
+        """Say where the interval lies beside what is usual."""
+        band = self.norm_band()
+        if band is None or self.interval is None:
+            return None
+        if self.interval[1] < band[0] or self.interval[0] > band[1]:
+            return "below" if self.interval[1] < band[0] else "above"
+        return "within" if band[0] <= self.interval[0] and self.interval[1] <= band[1] else "not clear"
+
+
+def load_norms(path: str | os.PathLike[str]) -> tuple[Norm, ...]:
+    """Read what is usual: `[[norm]]` tables with `kind`, `name`, `joint`, `low`, `high` in SI units, and `source`."""
+    return tomlfile.load(path, _norms)
+
+
+def _norms(document: Mapping[str, Any], _: Path) -> tuple[Norm, ...]:
+    checks.keys("", document, required=["norm"])
+    norms = []
+    for k, table in enumerate(checks.tables("norm", document["norm"]), start=1):
+        place = f"[[norm]] {k}"
+        checks.keys(place, table, required=["kind", "name", "joint", "low", "high", "source"])
+        known = [(q.kind, q.parameter) for q in (*QUANTITIES, HALF_WIDTH)]
+        if (table["kind"], table["name"]) not in known:
+            allowed = " or ".join(f"{kind} {parameter}" for kind, parameter in known)
+            raise BadInput(place, Text(f"{table['kind']} {table['name']}"), allowed)
+        low = checks.number(f"{place}, low", table["low"])
+        norms.append(
+            Norm(
+                table["kind"],
+                table["name"],
+                checks.whole(f"{place}, joint", table["joint"], least=1),
+                low,
+                checks.number(f"{place}, high", table["high"], above=low),
+                checks.text(f"{place}, source", table["source"]),
+            )
+        )
+    return tuple(norms)
+
+
+def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.PathLike[str], norms: Sequence[Norm] = ()) -> Path:
+    """Write one page about the results of one session.
+
+    Parameters
+    ----------
+    sources : sequence of path
+        JSON of `identify`, of `passive`, or of both.
+    path : path
+        The HTML file.
+    norms : sequence of Norm
+        What is usual, where it is known.
+    """
+    target = checks.path("path", path)
+    results = [pages.read_result(source) for source in sources]
+    for source, result in zip(sources, results, strict=True):
+        if result["verb"] not in ANALYSED:
+            raise BadInput("verb", result["verb"], f"a result of armrs {' or '.join(ANALYSED)}", file=source)
+    try:
+        for source, result in zip(sources, results, strict=True):
+            if name(result) != name(results[0]):
+                raise BadInput("data, name", name(result), f"the session of the others, {name(results[0])!r}", file=source)
+        found = [line for result in results for line in lines_of(result, norms)]
+        joints = results[0]["data"]["joints"]
+        lines = sorted(found, key=lambda line: joints.index(line.joint))
+        page = {
+            "name": name(results[0]),
+            "synthetic": any(map(is_synthetic, results)),
+            "measured": measured(results),
+            "lines": lines,
+            "words": [words_of(line) for line in lines],
+            "unusual": unusual(lines),
+            "notes": notes(results),
+            "since": min((c["dates"][0] for r in results for c in r.get("history", ())), default=None),
+            "sources": list(dict.fromkeys(line.norm.source for line in lines if line.norm is not None)),
+            "picture": _picture(lines),
+            "made_by": results[0].get("made_by", {}),
+        }
+    except BadInput:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
+        raise BadInput("content", Text(f"not what a result holds ({error})"), "whole results", file=sources[0]) from None
+    engine = html.environment()
+    html.write_page(engine, target, [html.render(engine, "summary.html.j2", page)], title="armrs summary")
+    return target
+
+
+def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = ()) -> list[Line]:
+    """Return the lines of a result, joint by joint."""
+    joints = result["data"]["joints"]
+    usual = {(n.kind, n.name, n.joint): n for n in norms}
+    if result["verb"] == "passive":
+        lines = []
+        for j, joint in enumerate(joints, start=1):
+            own = [c for c in result["curves"] if c["joint"] == j and c.get("half_width_mean_Nm") is not None]
+            if own:  # the movement with most repeats is known best
+                curve = max(own, key=lambda c: c["repeats"])
+                low, high = curve.get("half_width_interval_Nm") or (None, None)
+                interval = None if low is None or high is None else (low, high)
+                lines.append(Line(joint, HALF_WIDTH, curve["half_width_mean_Nm"], interval, usual.get(("passive", "half_width", j)), None))
+        return lines
+    lines = []
+    courses = {(c["kind"], c["name"], c["joint"]): c for c in result.get("history", ())}
+    for j, joint in enumerate(joints, start=1):
+        for quantity in QUANTITIES:
+            key = (quantity.kind, quantity.parameter, j)
+            item = next((e for e in result["parameters"] if (e["kind"], e["name"], e["joint"]) == key), None)
+            if item is None:
+                continue
+            known = item["decided_by"] != "prior"
+            interval = tuple(quantity.factor * x for x in item["interval"]) if known else None
+            value = quantity.factor * item["value"] if known else None
+            trend, at_limit = _trend(courses.get(key), quantity), item["decided_by"] == "bound" and item["value"] == 0.0
+            lines.append(Line(joint, quantity, value, interval, usual.get(key), trend, at_limit))
+    return lines
+
+
+def _trend(course: Mapping[str, Any] | None, quantity: Quantity) -> str | None:
+    """Say how the last session differs from those before."""
+    if course is None or len(course["dates"]) < 2 or course["change"] is None or not math.isfinite(course["change"]):
+        return None
+    change = quantity.factor * course["change"]
+    if not course["changed"]:
+        return "no clear change"
+    return f"{'higher' if change > 0.0 else 'lower'} by {_number(abs(change))}"
+
+
+def measured(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what was measured, a sentence each."""
+    data = results[0]["data"]
+    trials = data["fit"]["trials"] + data["test"]["trials"]
+    seconds = data["fit"]["duration_s"] + data["test"]["duration_s"]
+    lines = [
+        f"The relaxed arm was moved and measured {trials} times, {seconds / 60.0:.1f} minutes in all, in {len(data['configurations'])} "
+        f"different movement{'s' * (len(data['configurations']) > 1)}."
+    ]
+    ranges = data.get("range_deg")
+    if ranges:
+        said = [
+            f"{joint} from {low:.0f}° to {high:.0f}°".replace("-", "−") for joint, (low, high) in zip(data["joints"], ranges, strict=True)
+        ]
+        lines.append(f"Range that was moved through: {', '.join(said)}. This is no test of how far the joints can go.")
+    return lines
+
+
+def words_of(line: Line) -> list[str]:
+    """Return the cells of a line: joint, quantity with unit, value, interval, what is usual, trend."""
+    band = line.norm_band()
+    usual = "" if band is None else f"{_number(band[0])} to {_number(band[1])}"
+    if line.beside_norm is not None:
+        usual += {"within": ", usual", "not clear": ", not clear"}.get(line.beside_norm, f", {line.beside_norm} it")
+    value = "not measured" if line.value is None else _number(line.value, line)
+    between = "" if line.interval is None else f"{_number(line.interval[0], line)} to {_number(line.interval[1], line)}"
+    if line.at_limit and line.interval is not None:
+        value, between = "none seen", f"at most {_number(line.interval[1], line)}"
+    return [line.joint, f"{line.quantity.title} [{line.quantity.unit}]", value, between, usual, line.trend or ""]
+
+
+def unusual(lines: Sequence[Line]) -> list[str]:
+    """Return what is outside of what is usual, and what changed, in plain words."""
+    said = []
+    for line in lines:
+        title = f"{line.joint}: {line.quantity.title.lower()}"
+        if line.beside_norm in ("below", "above"):
+            said.append(f"{title} is {line.beside_norm} the usual range.")
+        if line.trend is not None and line.trend.startswith(("higher", "lower")):
+            said.append(f"{title} is {line.trend} {line.quantity.unit} than in the sessions before.")
+    return said
+
+
+def notes(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what the analysis says against its own numbers."""
+    said = [str(check["text"]) for result in results for check in result.get("checks", ()) if check["passed"] is False]
+    said += [str(warning) for result in results for warning in result.get("warnings", ())]
+    more = len(said) - MOST_NOTES
+    return said if more <= 0 else [*said[:MOST_NOTES], f"and {more} more, in the reports of the analysis"]
+
+
+def _number(value: float, line: Line | None = None) -> str:
+    """Write a number with two digits of its uncertainty, or three of its own."""
+    width = 0.0 if line is None or line.interval is None else 0.25 * (line.interval[1] - line.interval[0])
+    size = width if width > 0.0 else 0.1 * abs(value)
+    decimals = 0 if size <= 0.0 else min(max(1 - math.floor(math.log10(size)), 0), 3)
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def _picture(lines: Sequence[Line]) -> html.Picture | None:
+    """Draw every quantity with its interval, one panel each, the usual range behind."""
+    shown = [q for q in (*QUANTITIES, HALF_WIDTH) if any(line.quantity is q and line.value is not None for line in lines)]
+    if not shown:
+        return None
+    with plotting.style():
+        joints = list(dict.fromkeys(line.joint for line in lines))
+        columns = min(3, len(shown))
+        rows = -(-len(shown) // columns)
+        figure = plotting.figure(3.1 * columns + 0.8, (0.36 * len(joints) + 1.0) * rows)
+        axes = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+        for ax in axes[len(shown) :]:
+            ax.remove()
+        for ax, quantity in zip(axes, shown, strict=False):
+            for line in lines:
+                if line.quantity is not quantity or line.value is None:
+                    continue
+                row = joints.index(line.joint)
+                band = line.norm_band()
+                if band is not None:
+                    ax.barh(row, band[1] - band[0], left=band[0], height=0.62, color=plotting.FAINT)
+                if line.interval is not None:
+                    ax.hlines(row, *line.interval, color=plotting.BLUE, lw=2.6)
+                ax.plot(line.value, row, "o", color=plotting.BLUE, ms=7)
+            ax.set_title(quantity.title)
+            ax.set_xlabel(f"[{quantity.unit}]")
+            ax.grid(visible=False, axis="y")
+            ax.locator_params(axis="x", nbins=4)
+            if quantity.unit != "°":
+                ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
+        axes[0].set_yticks(range(len(joints)), joints)
+        axes[0].set_ylim(len(joints) - 0.4, -0.6)
+        image = io.BytesIO()
+        plotting.write_png(figure, image)
+    grey = " The grey bar is what is usual." if any(line.norm for line in lines) else ""
+    text = f"Points are what was measured; the true value lies within the line in 95 of 100 such measurements.{grey}"
+    return html.Picture("summary.png", "Each joint", text, html.data_uri(image.getvalue()))

@@ -1,0 +1,124 @@
+"""The page for a clinician: units of the bedside, what was not measured says so, norms and trends beside the values."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armrs import BadInput, cli
+from armrs.report import clinic
+
+NORMS = """\
+[[norm]]
+kind = "elastic"
+name = "stiffness"
+joint = 1
+low = 0.5
+high = 1.4
+source = "a table"
+"""
+
+
+def estimate(kind: str, name: str, joint: int, value: float, half: float, decided_by: str = "data") -> dict[str, Any]:
+    interval = [max(value - half, 0.0) if name != "rest" else value - half, value + half]
+    return {"kind": kind, "name": name, "joint": joint, "value": value, "interval": interval, "decided_by": decided_by, "unit": "SI"}
+
+
+def result(**changes: Any) -> dict[str, Any]:
+    """Return an identification as its JSON has it."""
+    change = {"kind": "elastic", "name": "stiffness", "joint": 1, "dates": ["2026-01-02", "2026-02-02"]}
+    return {
+        "verb": "identify",
+        "data": {
+            "name": "S1", "joints": ["shoulder", "elbow"], "configurations": ["slow"], "range_deg": [[-60.0, -10.0], [50.0, 95.0]],
+            "fit": {"trials": 4, "duration_s": 90.0}, "test": {"trials": 1, "duration_s": 30.0},
+        },
+        "parameters": [
+            estimate("elastic", "stiffness", 1, 1.8, 0.18),
+            estimate("elastic", "rest", 1, -1.0, 0.1),
+            estimate("coulomb", "torque", 1, 0.0, 0.03, "bound"),
+            estimate("viscous", "viscosity", 2, 0.1, 0.05, "prior"),
+        ],
+        "history": [{**change, "change": 0.9, "changed": True}],
+        "warnings": [],
+        "made_by": {"armrs": "0"},
+    } | changes  # fmt: skip
+
+
+@pytest.fixture
+def norms(tmp_path: Path) -> tuple[clinic.Norm, ...]:
+    (tmp_path / "norms.toml").write_text(NORMS, encoding="utf-8")
+    return clinic.load_norms(tmp_path / "norms.toml")
+
+
+def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic.Norm, ...]) -> None:
+    stiffness, rest, friction, speed = clinic.lines_of(result(), norms)
+    assert stiffness.value == pytest.approx(1.8 * math.radians(10.0))
+    assert rest.value == pytest.approx(math.degrees(-1.0))
+    assert clinic.words_of(stiffness) == [
+        "shoulder", "Stiffness [N m per 10°]", "0.314", "0.283 to 0.346", "0.087 to 0.244, above it", "higher by 0.157",
+    ]  # fmt: skip
+    assert clinic.words_of(friction)[2:4] == ["none seen", "at most 0.030"]
+    assert speed.value is None and clinic.words_of(speed)[2:4] == ["not measured", ""]
+
+
+def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> None:
+    said = clinic.unusual(clinic.lines_of(result(), norms))
+    assert said == [
+        "shoulder: stiffness is above the usual range.",
+        "shoulder: stiffness is higher by 0.157 N m per 10° than in the sessions before.",
+    ]
+    assert clinic.unusual(clinic.lines_of(result(history=[]))) == []
+    assert len(clinic.notes([result(warnings=list("abcdef"))])) == clinic.MOST_NOTES + 1
+
+
+@pytest.mark.parametrize(("value", "said"), [(0.6, "within"), (0.5, "not clear"), (0.1, "below"), (3.0, "above")])
+def test_the_interval_is_compared_with_the_norm_not_the_value(value: float, said: str, norms: tuple[clinic.Norm, ...]) -> None:
+    lines = clinic.lines_of(result(parameters=[estimate("elastic", "stiffness", 1, value, 0.05)]), norms)
+    assert [line.beside_norm for line in lines] == [said]
+
+
+def test_the_verb_writes_one_page(norms: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, out = tmp_path / "identified.json", tmp_path / "out"
+    source.write_text(json.dumps(result()), encoding="utf-8")
+    assert cli.main(["report", str(source), "--summary", "--norms", str(tmp_path / "norms.toml"), "-o", str(out)]) == 0
+    assert capsys.readouterr().out.strip() == str(out / "summary.html")
+    page = (out / "summary.html").read_text(encoding="utf-8")
+    for words in (
+        "moved and measured 5 times, 2.0 minutes",
+        "shoulder from −60° to −10°",
+        "Usual values: a table",
+        "no diagnosis",
+        "change since 2026-01-02",
+    ):
+        assert words in page
+    assert page.count('src="data:image/png') == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"verb": "gap"}, "verb: found 'gap', allowed a result of armrs identify or passive"),
+        ({"data": {}}, "found not what a result holds"),
+    ],
+)
+def test_what_no_summary_is_made_of_is_refused(change: dict[str, Any], message: str, tmp_path: Path) -> None:
+    source = tmp_path / "x.json"
+    source.write_text(json.dumps(result(**change)), encoding="utf-8")
+    with pytest.raises(BadInput, match=message):
+        clinic.write_summary([source], tmp_path / "summary.html")
+
+
+def test_norms_are_refused_with_their_place(tmp_path: Path) -> None:
+    for old, new, message in (
+        ("high = 1.4", "high = 0.4", r"\[\[norm\]\] 1, high: found 0.4"),
+        ('name = "stiffness"', 'name = "stifness"', r"\[\[norm\]\] 1: found elastic stifness, allowed elastic stiffness or "),
+    ):
+        (tmp_path / "n.toml").write_text(NORMS.replace(old, new), encoding="utf-8")
+        with pytest.raises(BadInput, match=message):
+            clinic.load_norms(tmp_path / "n.toml")
+    assert cli.main(["report", "x.json", "--norms", "n.toml"]) == 2
