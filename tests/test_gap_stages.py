@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
@@ -52,6 +53,20 @@ def test_calibration_and_a_first_look(found: armrs.GapFound) -> None:
         assert gap.after is None
         assert gap.before == pytest.approx(found.gap[name].before, rel=1e-12)
         assert gap.calibrated == pytest.approx(found.gap[name].calibrated, rel=1e-3)
+
+
+def test_the_stages_draw_themselves(found: armrs.GapFound, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(mpl.rcParams, "backend", "agg")
+    data = found.dataset
+    seen = compare(data)
+    axes = seen.plot()
+    assert [ax.get_title(loc="left") for ax in axes[: data.model.n_joints]] == [f"joint {j}, model as given" for j in (1, 2)]
+    first = calibrate(data, threads=2)
+    (ax,) = first.plot()
+    widths = [bar.get_width() for bar in ax.patches]
+    assert widths == sorted(widths, reverse=True) and widths[0] == pytest.approx(max(s.gain / s.price for s in first.suspects))
+    with pytest.raises(armrs.BadInput, match="plot: found no fit trial"):
+        dataclasses.replace(seen, discrepancies=()).plot()
 
 
 def test_a_result_is_confirmed_on_its_own_test_trials_as_it_was_measured(found: armrs.GapFound) -> None:

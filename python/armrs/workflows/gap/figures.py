@@ -11,7 +11,7 @@ import numpy as np
 from ...report import plotting
 from ...report.figures import Drawn, Figures, slug
 from . import maps
-from .found import GapFound, Missing
+from .found import GapFound, Missing, Suspect
 from .headline import place_of
 from .reading import channel_names, is_led
 from .shapes import Portrait, portrait, telling_trial
@@ -35,7 +35,7 @@ def gap(result: GapFound) -> Figures:
         figures["before-and-after"] = partial(_before_and_after, result)
     missing = _missing_torques(result)
     if all(missing.values()):
-        figures["maps"] = partial(_maps, result, missing)
+        figures["maps"] = partial(missing_torque, [j.name for j in result.dataset.model.joints], missing)
     if result.ladder:
         figures["ladder"] = partial(_ladder, result)
     return figures | {_name_of(k, e): partial(_effect, result, k, e) for k, e in enumerate(result.effects)}
@@ -102,10 +102,9 @@ def _missing_torques(result: GapFound) -> dict[str, list[maps.Discrepancy]]:
     return {v: [d for d in maps.discrepancies(result.dataset, led, plays, v) if d.trial.role == "fit"] for v in versions}
 
 
-def _maps(result: GapFound, found: Mapping[str, Sequence[maps.Discrepancy]]) -> Drawn:
-    """Draw the torque that is missing over angle and speed, before and after."""
+def missing_torque(joints: Sequence[str], found: Mapping[str, Sequence[maps.Discrepancy]]) -> Drawn:
+    """Draw the torque that is missing over angle and speed, a row for each model."""
     versions = list(found)
-    joints = [j.name for j in result.dataset.model.joints]
     figure = plotting.figure(4.4 * len(joints) + 0.4, 2.9 * len(versions) + 0.2)
     axes = figure.subplots(len(versions), len(joints), squeeze=False, sharex="col", sharey="col")
     for j, name in enumerate(joints):
@@ -224,3 +223,31 @@ def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=2, columnspacing=1.2, handlelength=1.6)
     ax.axhline(0.0, color=plotting.INK, lw=0.8)
     ax.set(xlabel=f"joint {seen.against} [{unit}]" if seen.against != "time" else "time [s]", ylabel="resisting torque [N m]")
+
+
+_SUSPECTS = 12
+"""Effects that are drawn of a first look."""
+
+
+def first_look(suspects: Sequence[Suspect], joints: Sequence[str]) -> Drawn:
+    """Draw what each effect alone would explain, relative to what it must explain to be named."""
+    shown = sorted(suspects, key=lambda s: -s.gain / s.price)[:_SUSPECTS]
+    figure = plotting.figure(7.6, 0.32 * len(shown) + 1.1)
+    ax = figure.subplots()
+    ratios = np.array([s.gain / s.price for s in shown])
+    ax.barh(range(len(shown)), ratios, color=[plotting.BLUE if r > 1.0 else plotting.SILVER for r in ratios], height=0.7)
+    ax.axvline(1.0, color=plotting.ORANGE, lw=1.6)
+    ax.set_xscale("log")
+    ax.set_xlim(left=min(0.1, 0.5 * max(float(ratios.min(initial=0.1)), 1e-3)))
+    ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    ax.minorticks_off()
+    places = [joints[s.joint - 1] if s.joint is not None else s.channel or "" for s in shown]
+    ax.set_yticks(range(len(shown)), [f"{s.kind}, {place}" if place else s.kind for s, place in zip(shown, places, strict=True)])
+    ax.set_ylim(len(shown) - 0.4, -0.6)
+    ax.grid(visible=False, axis="y")
+    ax.set_xlabel("explained, relative to what must be explained to be named")
+    text = (
+        "Each effect alone and to first order, after calibration. Beyond the line it may be there; several that are may be one, "
+        "which `find_gap` tells."
+    )
+    return Drawn("first-look", "What may be missing", text, figure)

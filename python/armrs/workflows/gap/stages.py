@@ -8,13 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ... import _armrs, checks
 from ...catalogue import catalogue
 from ...custom_effects import OwnEffect
+from ...errors import BadInput, Text
 from ...io.dataset import Dataset, load_dataset, naming_trials
 from ...model import Contact, Model, Robot
 from ...report.plain import data_of, origin
-from . import maps, reading, suspicion
+from ...report.view import shown
+from . import figures, maps, reading, suspicion
 from .found import Absorbed, ChannelGap, GapFound, Place, Suspect, gap_to_dict
 from .search import core_settings, core_trials
 
@@ -42,6 +46,14 @@ class Compared:
     discrepancies: tuple[maps.Discrepancy, ...] = field(repr=False)
     warnings: tuple[str, ...]
 
+    def plot(self) -> np.ndarray:
+        """Draw the torque that the model lacks over angle and speed of each joint, in the fit trials; return the Axes."""
+        found = [d for d in self.discrepancies if d.trial.role == "fit"]
+        if not found:
+            raise BadInput("plot", Text("no fit trial that the model could be simulated on"), "one or more")
+        joints = [f"joint {j}" for j in range(1, found[0].torque.shape[1] + 1)]
+        return shown(lambda: figures.missing_torque(joints, {"given": found}))
+
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
@@ -68,6 +80,12 @@ class Calibrated:
     suspects: tuple[Suspect, ...]
     warnings: tuple[str, ...]
     dataset: Dataset = field(repr=False)
+
+    def plot(self) -> np.ndarray:
+        """Draw what each effect alone would explain, the likeliest first; return the Axes."""
+        if not self.suspects:
+            raise BadInput("plot", Text("no effect that was asked"), "one or more")
+        return shown(lambda: figures.first_look(self.suspects, [j.name for j in self.dataset.model.joints]))
 
     def to_dict(self, command: str | None = None) -> dict[str, Any]:
         """Return the result as it is written to JSON."""
