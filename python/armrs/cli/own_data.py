@@ -122,7 +122,7 @@ def import_(
     """Turn own recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO) into a data set.
 
     Separators, decimal commas, encodings, units and columns are recognised. How angles are counted and what the force acts on are read off
-    the static balance of the arm, unless you say them. Every decision is printed and kept in import.toml, which repeats the import.
+    the balance of the arm, unless you say them. Every decision is printed and kept in import.toml, which repeats the import.
     """
     from ..io.dataset import load_dataset
     from ..report.recording import write_recording

@@ -267,18 +267,17 @@ def _known(value: float | None) -> str:
 
 
 def movements(data: Mapping[str, Any]) -> Table:
-    """Return planned movements: repeats, speeds and waypoints."""
+    """Return planned movements: repeats and speeds."""
     rows = [
         [
             f"movement {k}",
             m["repeats"],
             f"{m['speed_rad_s']:.3g}",
             f"{m['acceleration_rad_s2']:.3g}",
-            "; ".join(", ".join(f"{angle:.0f}" for angle in point) for point in m["waypoints_deg"]),
         ]
         for k, m in enumerate(data["movements"], start=1)
     ]
-    return Table(["", "repeats", "speed [rad/s]", "acceleration [rad/s²]", "waypoints [°]"], rows)
+    return Table(["", "repeats", "speed [rad/s]", "acceleration [rad/s²]"], rows)
 
 
 def history(courses: Sequence[Mapping[str, Any]]) -> Table:

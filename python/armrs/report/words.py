@@ -290,11 +290,15 @@ def recorded(result: Mapping[str, Any]) -> None:
 def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print a plan and what it will show."""
     other = result.get("compared")
+    robot = (
+        f"the robot's up to {result['largest_robot_speed_rad_s']:.3g} rad/s and {result['largest_robot_acceleration_rad_s2']:.3g} rad/s²; "
+        if result["largest_robot_speed_rad_s"]
+        else "no robot in the model; "
+    )
     show("", tables.predictions(result))
     print(
         f"{len(result['movements'])} movements, {result['duration_s']:.3g} s with all repeats; force on the arm up to "
-        f"{result['largest_force_N']:.3g} N, joints up to {result['largest_speed_rad_s']:.3g} rad/s, "
-        f"the robot's up to {result['largest_robot_speed_rad_s']:.3g} rad/s and {result['largest_robot_acceleration_rad_s2']:.3g} rad/s²; "
+        f"{result['largest_force_N']:.3g} N, joints up to {result['largest_speed_rad_s']:.3g} rad/s, {robot}"
         f"worst relative deviation {tables.percent(result['worst_relative_std'])}"
         + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
     )
@@ -306,6 +310,15 @@ def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         print()
         show("The smallest effects that `armrs gap` would name on such a session", limits({"would_have_seen": result["would_show"]}))
     print("\n".join(str(path) for path in written))
+
+
+def waypoints(result: Mapping[str, Any]) -> list[str]:
+    """Return the angles that each planned movement goes through, a line each."""
+    lines = []
+    for k, m in enumerate(result["movements"], start=1):
+        points = "; ".join(", ".join(f"{angle:.0f}" for angle in point) for point in m["waypoints_deg"])
+        lines.append(f"movement {k} goes through {points}.".replace("-", "−"))
+    return lines
 
 
 def slowed(result: Mapping[str, Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""How raw angles and forces are counted, read off the static balance of the arm.
+"""How raw angles and forces are counted, read off the balance of the arm.
 
 For each convention that laboratories use, the torques of the contact force are regressed on gravity, inertia and passive joint laws
 (`armrs.analysis.balance`); the wrong convention leaves most of them unexplained.
@@ -106,7 +106,7 @@ def decide(
         problems.append(BadInput("angles and forces", both, "one; state it with --angles, --zero, --clockwise or --force-on"))
     c = best.convention
     next_best = f", the next best {100 * rivals[0].unexplained:.0f} %" if rivals else ""
-    why = f"static balance leaves {100 * best.unexplained:.0f} % of the contact torques unexplained{next_best}"
+    why = f"the balance leaves {100 * best.unexplained:.0f} % of the contact torques unexplained{next_best}"
     return Convention(c.reference, c.zero, c.signs, c.force_on, why)
 
 

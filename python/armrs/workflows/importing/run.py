@@ -87,7 +87,7 @@ def import_recordings(
     out : path
         Folder of the data set.
     model : Model or path
-        Literature values as `armrs init` writes them are enough: conventions are read off the static balance.
+        Literature values as `armrs init` writes them are enough: conventions are read off the balance.
     columns_map : str
         `t=COLUMN,q1=COLUMN,Fy=-COLUMN,…` for columns whose names do not say what they are; a minus turns the sign.
     angles : {"relative", "absolute"}, optional
