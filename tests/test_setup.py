@@ -72,6 +72,10 @@ WRONG: dict[str, tuple[Callable[[Table], Table], str]] = {
     "forces swapped": (lambda t: t | {"Fy_N": t["Fz_N"], "Fz_N": t["Fy_N"]}, "(swapped columns?)"),
     "kN": (lambda t: t | {"Fy_N": 1e-3 * t["Fy_N"], "Fz_N": 1e-3 * t["Fz_N"]}, "(kN labelled as N?)"),
     "ms": (lambda t: t | {"t_s": 1e3 * t["t_s"]}, "(milliseconds?)"),
+    "seconds as ms": (
+        lambda t: {"t_ms" if name == "t_s" else name: values for name, values in t.items()},
+        "(seconds labelled as milliseconds?)",
+    ),
     "other side": (lambda t: t | {"Fy_N": -t["Fy_N"], "Fz_N": -t["Fz_N"]}, "force_on: found "),
 }
 
@@ -118,6 +122,20 @@ def every_reading() -> Iterator[readings.Reading]:
     yield from readings.of_angles(3)
     yield from readings.of_forces(3)
     yield readings.other_zero(3, 2, 0.6)
+
+
+@pytest.mark.parametrize("session", ["without"], indirect=True)
+def test_passive_moments_warn_of_a_wrong_setup(session: Path, tmp_path: Path) -> None:
+    assert not any("if read otherwise" in line for line in armrs.passive_moments(session).warnings)
+    wrong = rewritten(session, tmp_path / "wrong", WRONG["forces swapped"][0])
+    assert "(swapped columns?)" in armrs.passive_moments(wrong).warnings[0]
+
+
+@pytest.mark.parametrize("session", ["without"], indirect=True)
+def test_newtons_labelled_as_kilonewtons_are_named(session: Path, tmp_path: Path) -> None:
+    wrong = rewritten(session, tmp_path / "wrong", lambda t: {n.replace("_N", "_kN"): 10.0 * v if n[0] == "F" else v for n, v in t.items()})
+    with pytest.raises(armrs.BadInput, match=r"_kN: found .*, allowed -10 to 10 kN \(N labelled as kN\?\)"):
+        armrs.load_dataset(wrong)
 
 
 @pytest.mark.parametrize("session", ["without"], indirect=True)

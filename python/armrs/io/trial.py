@@ -26,6 +26,8 @@ SAME_RATE = 0.01
 """Time stamps that depart from the stated rate by more than this are said."""
 SLOWEST = 0.5
 """Samples that are as far apart [s] show no movement of an arm; a recording in milliseconds at 1 kHz has 1."""
+SHORTEST, FASTEST = 0.5, 2e-4
+"""A recording shorter than this [s] whose samples are nearer than this [s] is in another unit; one in seconds at 25 Hz has 4e-5 s."""
 _TURN = 2.0 * np.pi
 
 
@@ -287,7 +289,9 @@ def _check_size(column: columns.Column, values: np.ndarray, samples: Samples) ->
             f"{samples.place_of(row)}, column {column.name}",
             float(values[row] / column.factor),
             f"{-most:g} to {most:g}" + (f" {column.name.partition('_')[2]}" if column.quantity is not columns.ACTIVITY else ""),
-            hint=column.quantity.hint if column.factor == 1.0 else None,
+            hint=column.quantity.hint
+            if column.factor == 1.0
+            else f"{column.si_name.partition('_')[2]} labelled as {column.name.partition('_')[2]}?",
         )
 
 
@@ -304,6 +308,9 @@ def _check_time(t: np.ndarray, samples: Samples) -> None:
     step = resample.usual_step(t)
     if step >= SLOWEST:
         raise BadInput("time", Text(f"{step:g} s between samples"), f"less than {SLOWEST:g} s", hint=columns.TIME.hint)
+    if t[-1] - t[0] < SHORTEST and step < FASTEST:
+        found, allowed = Text(f"{len(t)} samples in {t[-1] - t[0]:.3g} s"), f"{SHORTEST:g} s or more, or {FASTEST:g} s between samples"
+        raise BadInput("time", found, allowed, hint="seconds labelled as milliseconds?")
     if t[-1] - t[0] > 10.0 * step * len(t):
         row = int(np.argmax(np.diff(t)))
         found = Text(f"{float(t[row + 1])!r} s after {float(t[row])!r} s")

@@ -16,6 +16,7 @@ from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..tabular import Tabular, Tidy
+from .setup import find_wrong_setup
 
 DEFAULT_CUTOFF = 1.0
 """Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
@@ -240,7 +241,8 @@ def passive_moments(
     cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
     refuse_implausible(dataset, robot_matters=False)
     trials = tuple(_of_trial(dataset, trial, cutoff) for trial in dataset.trials)
-    curves, warnings = [], []
+    wrong = find_wrong_setup(dataset)
+    curves, warnings = [], [] if wrong is None else [str(wrong)]
     for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
         repeats = [m for m in trials if m.trial.configuration == configuration]
         lost = []

@@ -44,11 +44,16 @@ def refuse_wrong_setup(dataset: Dataset) -> None:
     BadInput
         Names the file, the column and what it probably holds.
     """
-    if dataset.model.gravity == 0.0 or dataset.added:  # nothing to carry, or no one arm in all trials
-        return
-    found = first_wrong(dataset.model, balanced_trials(dataset), met=hand_meets_handle(dataset))
+    found = find_wrong_setup(dataset)
     if found is not None:
         raise found
+
+
+def find_wrong_setup(dataset: Dataset) -> BadInput | None:
+    """Return what `refuse_wrong_setup` refuses a data set for."""
+    if dataset.model.gravity == 0.0 or dataset.added:  # nothing to carry, or no one arm in all trials
+        return None
+    return first_wrong(dataset.model, balanced_trials(dataset), met=hand_meets_handle(dataset))
 
 
 def first_wrong(model: Model, trials: Sequence[Trial], *, met: bool) -> BadInput | None:
@@ -110,7 +115,7 @@ def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool
     if left > _BALANCED or least * left > given:
         return None
     also = ""
-    if len(ranked) > 1 and ranked[1][0] < min(_TIED * left, _MUCH * given):
+    if len(ranked) > 1 and ranked[1][0] < max(min(_TIED * left, _MUCH * given), _PLAINER * left):
         also = f", or {ranked[1][1].place}: {ranked[1][1].allowed}"
     share = f"{100 * given:.0f} %" if given < 1.0 else "all"
     found = Text(f"{share} of the contact torques unexplained by gravity and passive joints, {100 * left:.2g} % if read otherwise")
