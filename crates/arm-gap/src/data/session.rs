@@ -43,9 +43,6 @@ pub enum ComparisonMode {
     Torque,
 }
 
-/// A promise of the calibration is kept within this share of the tolerance (standard deviation): twice as far is the
-/// tolerance itself.
-const KEPT: f64 = 0.5;
 /// Standard deviations beyond which nothing that is known is refitted: what is further off is a fault, and has a name.
 pub(crate) const FURTHEST: f64 = 4.0;
 /// Relative standard deviation of what the model says of its own effects, and of the compliance of its contact.
@@ -185,19 +182,19 @@ impl<const N: usize> Session<N> {
         }
         for (e, effect) in given.calibration.iter().enumerate() {
             if let Some(promise) = effect.kind.probe().promise {
-                let sd = KEPT * self.promised(promise);
+                let sd = self.promised(promise);
                 add(Target::Calibration(e), sd, f64::NEG_INFINITY, f64::INFINITY);
             }
         }
         if self.comparison == ComparisonMode::Torque {
-            let sd = KEPT * self.tolerance.angle_offset;
+            let sd = self.tolerance.angle_offset;
             for (j, part) in (0..N).flat_map(|j| [(j, 0), (j, 1)]) {
                 let target = Target::Eccentricity(j, part);
                 add(target, sd, f64::NEG_INFINITY, f64::INFINITY);
             }
         }
         if self.comparison == ComparisonMode::Led {
-            let sd = KEPT * self.tolerance.handle_placement;
+            let sd = self.tolerance.handle_placement;
             for axis in 0..2 {
                 add(Target::Contact(0, axis), KNOWN, -0.3, 0.5);
                 // A contact that damps much more cannot be stepped through.
@@ -233,7 +230,7 @@ impl<const N: usize> Session<N> {
 
     /// What differs from one trial to the next: where the hand holds the handle, and where the handle is in the room.
     pub fn by_trial(&self) -> Vec<Coordinate> {
-        let sd = KEPT * self.tolerance.handle_placement;
+        let sd = self.tolerance.handle_placement;
         let placed = |target| Coordinate {
             target,
             prior: Some((0.0, sd)),
