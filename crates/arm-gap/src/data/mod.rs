@@ -3,6 +3,7 @@
 pub mod noise;
 pub mod passive_law;
 pub mod prepared_session;
+mod repeated;
 pub mod repeats;
 pub mod session;
 pub(crate) mod unrepeated;

@@ -22,7 +22,7 @@ const LEAST_LEFT: f64 = 0.15;
 
 /// What rest takes from the comparison of a movement.
 #[derive(Clone, Debug, Default)]
-struct Rest {
+pub(crate) struct Rest {
     /// Samples that are left out.
     left_out: Vec<bool>,
     /// What the force tells where it does not tell both components.
@@ -50,7 +50,7 @@ pub struct PreparedSession<'a, const N: usize> {
     /// Joints with dry friction: where they rest, less is compared.
     pub dry: [bool; N],
     /// At every sample of each group.
-    resting: Vec<Rest>,
+    pub(crate) resting: Vec<Rest>,
     /// What disturbances have touched: trial, start and end \[s\].
     touched: Vec<(usize, f64, f64)>,
     /// Which laws of the passive base are dropped.
@@ -137,39 +137,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut deviations = Vec::new();
         // For each deviation what a trial may differ by without noise.
         let mut shifts: Vec<Arc<Vec<Vec<Vec<f64>>>>> = Vec::new();
-        for group in 0..self.references.len() {
-            let members: Vec<usize> = (0..self.fitted.len())
-                .filter(|&m| self.group_of[self.fitted[m]] == group)
-                .collect();
-            let Some(&first) = members.first() else {
-                continue;
-            };
-            let n = members.len();
-            let valid_segments = &self.valid_segments[self.fitted[first]];
-            let same = |m: &usize| self.valid_segments[self.fitted[*m]] == *valid_segments;
-            if n < 2 || !members.iter().all(same) {
-                continue;
-            }
-            let scale = libm::sqrt(n as f64 / (n as f64 - 1.0));
-            let picked: Vec<Vec<Vec<f64>>> = members
-                .iter()
-                .map(|&m| flat(&point.residuals[m], valid_segments))
-                .collect();
+        for repeats in self.repeats(point) {
             let own = point.own.iter();
-            let columns = Arc::new(
-                own.map(|r| flat(&r.0[group], valid_segments))
-                    .collect::<Vec<_>>(),
-            );
-            for one in &picked {
-                let deviation: Vec<Vec<f64>> = (0..channels)
-                    .map(|c| {
-                        let mean =
-                            |i: usize| picked.iter().map(|p| p[c][i]).sum::<f64>() / n as f64;
-                        (0..one[c].len())
-                            .map(|i| scale * (one[c][i] - mean(i)))
-                            .collect()
-                    })
-                    .collect();
+            let columns = own.map(|r| flat(&r.0[repeats.group], &repeats.samples));
+            let columns = Arc::new(columns.collect::<Vec<_>>());
+            for deviation in repeats.deviations() {
                 deviations.push(deviation);
                 shifts.push(Arc::clone(&columns));
             }
@@ -192,6 +164,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.noise_of_residuals(point, (&range, &observed_share))?
         };
         Ok(())
+    }
+
+    /// The most of some fitted trials, by their places among them, that have the same samples, and these samples.
+    pub(crate) fn agreeing(&self, members: &[usize]) -> Option<(Vec<usize>, ValidSegments)> {
+        let all: Vec<_> = members
+            .iter()
+            .map(|&m| &self.valid_segments[self.fitted[m]])
+            .collect();
+        let (agreeing, samples) = ValidSegments::agreeing(&all)?;
+        Some((agreeing.into_iter().map(|i| members[i]).collect(), samples))
     }
 
     /// The share of the samples of each channel that tell anything.
@@ -307,7 +289,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Chooses the samples that are compared, and the trials that have any.
-    fn cut(&mut self) {
+    pub(crate) fn cut(&mut self) {
         /// How long a disturbance is felt before and after, the low-pass included \[s\].
         const AROUND: (f64, f64) = (0.2, 0.5);
         for i in 0..self.courses.len() {

@@ -44,12 +44,12 @@ pub fn same_rate(a: f64, b: f64) -> bool {
 }
 
 impl<const N: usize> Course<N> {
-    /// Whether another trial makes the same movement at the same times.
+    /// Whether another trial makes the same movement at the same times. One of both may have been broken off after half of the way.
     fn is_like(&self, other: &Self, allowed: f64) -> bool {
         let (mine, theirs) = (self.path(), other.path());
         let count = mine.len().min(theirs.len());
-        let longest = mine.len().max(theirs.len());
-        if count < longest - longest / 10 {
+        let longer = if mine.len() > count { &mine } else { &theirs };
+        if reach(&longer[..count]) < 0.5 * reach(longer) {
             return false;
         }
         let square: f64 = std::iter::zip(&mine, &theirs)
@@ -57,4 +57,13 @@ impl<const N: usize> Course<N> {
             .sum();
         square <= allowed * allowed * count as f64
     }
+}
+
+/// How far a path goes from its start.
+fn reach(path: &[Vec<f64>]) -> f64 {
+    let from_start = |point: &Vec<f64>| {
+        let square = std::iter::zip(point, &path[0]).map(|(a, b)| (a - b) * (a - b));
+        libm::sqrt(square.sum())
+    };
+    path.iter().map(from_start).fold(0.0, f64::max)
 }

@@ -29,7 +29,7 @@ pub enum ObservableForce {
 }
 
 /// The samples of a trial that are compared: stretches without a gap, thinned to the common band.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ValidSegments {
     samples: Vec<Vec<usize>>,
     /// What the force tells at every sample of the trial; both components where nothing is listed.
@@ -67,6 +67,49 @@ impl ValidSegments {
             samples,
             observable,
         }
+    }
+
+    /// Those before a sample.
+    fn until(&self, end: usize) -> Self {
+        let before = |stretch: &Vec<usize>| stretch.iter().copied().filter(|&i| i < end).collect();
+        let mut samples: Vec<Vec<usize>> = self.samples.iter().map(before).collect();
+        samples.retain(|stretch| stretch.len() >= SHORTEST);
+        Self {
+            samples,
+            observable: Arc::clone(&self.observable),
+        }
+    }
+
+    /// One sample after the last.
+    fn end(&self) -> usize {
+        self.samples().last().map_or(0, |last| last + 1)
+    }
+
+    /// Those of two repeats of which one may have been broken off; `None` where they differ before.
+    pub fn shared(&self, other: &Self) -> Option<Self> {
+        let end = self.end().min(other.end());
+        let own = self.until(end);
+        (!own.is_empty() && own == other.until(end)).then_some(own)
+    }
+
+    /// The most of some repeats that have the same samples, up to where the shortest ends, and these samples.
+    ///
+    /// A repeat that holds less than half of another's samples is none of its kind.
+    pub fn agreeing(all: &[&Self]) -> Option<(Vec<usize>, Self)> {
+        let with = |one: &Self| -> Vec<usize> {
+            let far = |other: &Self| one.shared(other).is_some_and(|s| 2 * s.len() >= one.len());
+            (0..all.len()).filter(|&o| far(all[o])).collect()
+        };
+        let mut most: Option<(Vec<usize>, &Self)> = None;
+        for one in all {
+            let agreeing = with(one);
+            if agreeing.len() > most.as_ref().map_or(0, |(m, _)| m.len()) {
+                most = Some((agreeing, one));
+            }
+        }
+        let (members, one) = most?;
+        let end = members.iter().map(|&o| all[o].end()).min()?;
+        Some((members, one.until(end)))
     }
 
     /// Number of samples.
@@ -173,4 +216,32 @@ pub fn widened<const N: usize>(flags: &[bool], course: &Course<N>) -> Vec<bool> 
 /// The samples of `n` that are no further than `reach` from one.
 fn around(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
     i.saturating_sub(reach)..(i + reach + 1).min(n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(samples: Vec<Vec<usize>>) -> ValidSegments {
+        ValidSegments {
+            samples,
+            observable: Arc::default(),
+        }
+    }
+
+    #[test]
+    fn a_repeat_that_was_broken_off_agrees_up_to_its_end() {
+        let whole = of(vec![(0..30).collect(), (40..80).collect()]);
+        let broken = of(vec![(0..30).collect(), (40..55).collect()]);
+        let disturbed = of(vec![(0..10).collect(), (40..80).collect()]);
+        let stub = of(vec![(0..12).collect()]);
+        assert_eq!(whole.shared(&broken), Some(broken.clone()));
+        assert_eq!(whole.shared(&disturbed), None);
+        let (members, samples) =
+            ValidSegments::agreeing(&[&disturbed, &whole, &broken]).expect("two repeats");
+        assert_eq!((members, samples), (vec![1, 2], broken));
+        let (members, samples) = ValidSegments::agreeing(&[&whole, &disturbed]).expect("one");
+        assert_eq!((members, samples), (vec![0], whole.clone()));
+        assert_eq!(whole.shared(&stub), Some(stub));
+    }
 }

@@ -35,16 +35,10 @@ pub fn lack_of_fit<const N: usize>(
                 prepared.group_of[trial] == group
             })
             .collect();
-        let Some(&first) = members.first() else {
+        let Some((members, valid_segments)) = prepared.agreeing(&members) else {
             continue;
         };
-        let valid_segments = &prepared.valid_segments[prepared.fitted[first]];
-        if members
-            .iter()
-            .any(|&m| prepared.valid_segments[prepared.fitted[m]] != *valid_segments)
-        {
-            continue;
-        }
+        let valid_segments = &valid_segments;
         let own = point.own.iter();
         let columns = orthogonal(
             own.map(|r| prepared.noise.whiten(&r.0[group], valid_segments))

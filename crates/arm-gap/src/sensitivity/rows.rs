@@ -73,11 +73,12 @@ impl Rows {
             }
             let known = classes
                 .iter_mut()
-                .find(|c| c.group == group && c.valid_segments == *valid_segments);
+                .find(|c| c.reference == group && c.valid_segments == *valid_segments);
             match known {
                 Some(class) => class.members.push(m),
                 None => classes.push(Class {
-                    group,
+                    // What is broken off or disturbed has another score than its repeats, without any noise.
+                    group: classes.len(),
                     reference: group,
                     rows: valid_segments
                         .rows_per_channel(prepared.session.channels())

@@ -5,6 +5,7 @@ use arm_core::effect::{Effect, KINDS, Nature};
 use crate::candidates::candidate::price;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
+use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
 use crate::selection::lack_of_fit::{orthogonal, project_off};
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -18,34 +19,18 @@ impl<const N: usize> PreparedSession<'_, N> {
     ///
     /// * `scale` - misfit for each degree of freedom
     pub fn disturbance(&self, point: &LinearizationPoint<N>, scale: f64) -> Option<TrialSpecific> {
-        let white: Vec<Vec<f64>> = self
-            .fitted
-            .iter()
-            .zip(&point.residuals)
-            .map(|(&t, r)| self.noise.whiten(r, &self.valid_segments[t]))
-            .collect();
-        // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
-        let each = self.fitted.iter();
-        let usual: Vec<Vec<Vec<f64>>> = each.map(|&trial| self.usual(point, trial)).collect();
-        let deviations: Vec<Vec<f64>> = (0..self.fitted.len())
-            .map(|m| {
-                let mut deviation = self.deviation(&white, m);
-                project_off(&mut deviation, &usual[m]);
-                deviation
-            })
-            .collect();
-        let suspects: Vec<usize> = (0..self.fitted.len())
-            .filter(|&m| self.has_repeat(m))
-            .filter(|&m| stands_out(&deviations[m], self.session.channels(), scale))
+        let compared: Vec<Compared> = (0..self.fitted.len())
+            .filter_map(|m| self.compared(point, m))
+            .filter(|one| stands_out(&one.deviation, self.session.channels(), scale))
             .collect();
         let tried = self.fitted.len() * 4 * N * 100;
         let price = price(1, tried, self.rows_of_references());
         let mut best: Option<TrialSpecific> = None;
-        for m in suspects {
-            let trial = self.fitted[m];
+        for suspect in &compared {
+            let trial = self.fitted[suspect.place];
             let see = |(effect, response): (Effect<f64>, Channels)| {
-                let mut row = self.noise.whiten(&response, &self.valid_segments[trial]);
-                project_off(&mut row, &usual[m]);
+                let mut row = self.noise.whiten(&response, &suspect.samples);
+                project_off(&mut row, &suspect.usual);
                 let square = dot(&row, &row);
                 (square > 0.0).then_some(Asked {
                     effect,
@@ -58,13 +43,15 @@ impl<const N: usize> PreparedSession<'_, N> {
                 .into_iter()
                 .filter_map(see)
                 .collect();
-            let others = self.repeats_of(m);
-            let shrink = shrunk(others.len());
+            let shrink = shrunk(suspect.others.len());
             for one in &asked {
-                let along = dot(&one.row, &deviations[m]);
+                let along = dot(&one.row, &suspect.deviation);
                 // Of two repeats both deviate alike: the disturbed one is further from the model.
-                let own = dot(&one.row, &white[m]).abs();
-                let further = others.iter().all(|&o| own > dot(&one.row, &white[o]).abs());
+                let own = dot(&one.row, &suspect.own).abs();
+                let further = suspect
+                    .others
+                    .iter()
+                    .all(|other| own > dot(&one.row, other).abs());
                 let size = along / one.square;
                 // A sensor that moves within what the calibration promises of it is no finding.
                 let promised = match one.effect.kind.probe().promise {
@@ -76,8 +63,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 if !further || size.abs() <= promised || gain <= least {
                     continue;
                 }
-                let group = others.iter().chain([&m]).map(|&o| deviations[o].as_slice());
-                let scatter = scatter_elsewhere(one, &asked, &group.collect::<Vec<_>>());
+                let scatter = scatter_elsewhere(one, &asked, &suspect.deviations());
                 let gain = gain / scatter;
                 if gain > least {
                     let mut effect = one.effect;
@@ -98,9 +84,33 @@ impl<const N: usize> PreparedSession<'_, N> {
         best
     }
 
+    /// A fitted trial beside its repeats; `None` where it has none.
+    fn compared(&self, point: &LinearizationPoint<N>, place: usize) -> Option<Compared> {
+        let trial = self.fitted[place];
+        let (others, samples) = self.repeats_of(place)?;
+        let white = |m: &usize| self.noise.whiten(&point.residuals[*m], &samples);
+        // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
+        let usual = self.usual(point, trial, &samples);
+        let (own, others): (_, Vec<Vec<f64>>) = (white(&place), others.iter().map(white).collect());
+        let mut deviation = deviation(&own, &others);
+        project_off(&mut deviation, &usual);
+        Some(Compared {
+            place,
+            samples,
+            usual,
+            own,
+            others,
+            deviation,
+        })
+    }
+
     /// Whitened columns of what differs from trial to trial without being a disturbance, each orthogonal to the others.
-    fn usual(&self, point: &LinearizationPoint<N>, trial: usize) -> Vec<Vec<f64>> {
-        let valid_segments = &self.valid_segments[trial];
+    fn usual(
+        &self,
+        point: &LinearizationPoint<N>,
+        trial: usize,
+        samples: &ValidSegments,
+    ) -> Vec<Vec<f64>> {
         let length = self.session.trials[trial].len();
         let constant = |j: usize| {
             let mut channels = vec![vec![0.0; length]; self.session.channels()];
@@ -108,47 +118,38 @@ impl<const N: usize> PreparedSession<'_, N> {
             channels
         };
         let own = point.own.iter();
-        let placed = own.map(|r| {
-            self.noise
-                .whiten(&r.0[self.group_of[trial]], valid_segments)
-        });
+        let placed = own.map(|r| self.noise.whiten(&r.0[self.group_of[trial]], samples));
         let columns: Vec<Vec<f64>> = placed
-            .chain((0..N).map(|j| self.noise.whiten(&constant(j), valid_segments)))
+            .chain((0..N).map(|j| self.noise.whiten(&constant(j), samples)))
             .collect();
         orthogonal(columns)
     }
 
-    /// Other fitted trials with the same movement and the same samples.
-    fn repeats_of(&self, m: usize) -> Vec<usize> {
-        let group = self.group_of[self.fitted[m]];
-        (0..self.fitted.len())
-            .filter(|&o| {
-                let trial = self.fitted[o];
-                o != m
-                    && self.group_of[trial] == group
-                    && self.valid_segments[trial] == self.valid_segments[self.fitted[m]]
-            })
-            .collect()
-    }
-
-    fn has_repeat(&self, m: usize) -> bool {
-        !self.repeats_of(m).is_empty()
-    }
-
-    /// A trial's whitened residual less the mean of its repeats, scaled to the noise of one trial.
-    fn deviation(&self, white: &[Vec<f64>], m: usize) -> Vec<f64> {
-        let others = self.repeats_of(m);
-        if others.is_empty() {
-            return white[m].clone();
-        }
-        let n = others.len() as f64;
-        let shrink = shrunk(others.len());
-        (0..white[m].len())
-            .map(|i| {
-                let mean = others.iter().map(|&o| white[o][i]).sum::<f64>() / n;
-                shrink * (white[m][i] - mean)
-            })
-            .collect()
+    /// Other fitted trials with the same movement and the samples in which they are compared: all of them with repeats that are as long,
+    /// else those of the longest that was broken off.
+    fn repeats_of(&self, place: usize) -> Option<(Vec<usize>, ValidSegments)> {
+        /// Share of its samples that a repeat has to hold.
+        const WHOLE: f64 = 0.9;
+        const HALF: f64 = 0.5;
+        let own = &self.valid_segments[self.fitted[place]];
+        let group = self.group_of[self.fitted[place]];
+        let others = |least: f64| -> Vec<(usize, ValidSegments)> {
+            (0..self.fitted.len())
+                .filter(|&o| o != place && self.group_of[self.fitted[o]] == group)
+                .filter_map(|o| {
+                    let shared = own.shared(&self.valid_segments[self.fitted[o]])?;
+                    (shared.len() as f64 >= least * own.len() as f64).then_some((o, shared))
+                })
+                .collect()
+        };
+        let found = [WHOLE, HALF].map(others);
+        let found = found.into_iter().find(|f| !f.is_empty())?;
+        let shortest = found
+            .iter()
+            .map(|(_, s)| s)
+            .min_by_key(|s| s.len())?
+            .clone();
+        Some((found.into_iter().map(|(o, _)| o).collect(), shortest))
     }
 
     /// Unit disturbances of a trial with what they would show: bursts in every joint, slips of every angle sensor.
@@ -211,6 +212,44 @@ impl<const N: usize> PreparedSession<'_, N> {
     }
 }
 
+/// A fitted trial beside its repeats, all whitened in the samples that they share.
+struct Compared {
+    /// Its place among the fitted trials.
+    place: usize,
+    samples: ValidSegments,
+    /// What differs from trial to trial without being a disturbance.
+    usual: Vec<Vec<f64>>,
+    /// What the model leaves of it, and of its repeats.
+    own: Vec<f64>,
+    others: Vec<Vec<f64>>,
+    /// How it differs from them, without what is usual.
+    deviation: Vec<f64>,
+}
+
+impl Compared {
+    /// How each of the trials differs from the others, without what is usual.
+    fn deviations(&self) -> Vec<Vec<f64>> {
+        let mut all = vec![self.deviation.clone()];
+        for (o, other) in self.others.iter().enumerate() {
+            let rest = self.others.iter().enumerate().filter(|(r, _)| *r != o);
+            let rest = rest.map(|(_, r)| r.clone()).chain([self.own.clone()]);
+            let mut own = deviation(other, &rest.collect::<Vec<_>>());
+            project_off(&mut own, &self.usual);
+            all.push(own);
+        }
+        all
+    }
+}
+
+/// A whitened residual less the mean of its repeats, scaled to the noise of one trial.
+fn deviation(own: &[f64], others: &[Vec<f64>]) -> Vec<f64> {
+    let n = others.len() as f64;
+    let shrink = shrunk(others.len());
+    (0..own.len())
+        .map(|i| shrink * (own[i] - others.iter().map(|o| o[i]).sum::<f64>() / n))
+        .collect()
+}
+
 /// Factor by which the difference of a trial and the mean of some repeats has the noise of one trial; one without repeats.
 fn shrunk(repeats: usize) -> f64 {
     match repeats {
@@ -232,7 +271,7 @@ struct Asked {
 /// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like bursts at many times.
 ///
 /// * `deviations` - of the trial and its repeats
-fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[&[f64]]) -> f64 {
+fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[Vec<f64>]) -> f64 {
     /// Nine of ten squares of a standard normal number are smaller.
     const NINE_OF_TEN: f64 = 2.706;
     /// How long a burst is felt around it \[s\].
@@ -313,10 +352,13 @@ mod tests {
         let once: Vec<f64> = (0..95)
             .map(|k| if (40..50).contains(&k) { 9.0 } else { 1.0 })
             .collect();
-        assert_eq!(scatter_elsewhere(&asked[45], &asked, &[&once]), 1.0);
+        assert_eq!(
+            scatter_elsewhere(&asked[45], &asked, std::slice::from_ref(&once)),
+            1.0
+        );
         // As much all the time is no burst.
         let always = vec![9.0; 95];
-        let scatter = scatter_elsewhere(&asked[45], &asked, &[&once, &always]);
+        let scatter = scatter_elsewhere(&asked[45], &asked, &[once, always]);
         assert!((scatter - 81.0 / 2.706).abs() < 1e-12, "{scatter}");
     }
 }

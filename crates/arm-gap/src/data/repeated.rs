@@ -1,0 +1,136 @@
+//! What the repeats of a movement differ by, which noise is read off.
+
+use crate::data::prepared_session::{PreparedSession, flat};
+use crate::data::valid_segments::ValidSegments;
+use crate::sensitivity::linearization_point::LinearizationPoint;
+
+/// Mean square of a deviation, in medians of those of all trials, beyond which a trial tells of something else than noise: a sensor
+/// that slipped, a muscle that acted.
+const OUTLIER: f64 = 25.0;
+/// Part of all trials that are left out for that at most.
+const MOST: f64 = 0.25;
+
+/// Repeats of one movement: the channels of each at the samples that they share.
+pub(crate) struct Repeats {
+    /// The movement.
+    pub group: usize,
+    /// The samples.
+    pub samples: ValidSegments,
+    /// Channels of each trial.
+    trials: Vec<Vec<Vec<f64>>>,
+}
+
+impl Repeats {
+    /// What each trial differs by from the mean of all, scaled to the noise of one trial.
+    pub fn deviations(&self) -> Vec<Vec<Vec<f64>>> {
+        let n = self.trials.len() as f64;
+        let scale = libm::sqrt(n / (n - 1.0));
+        let off = |c: usize, i: usize, value: f64| {
+            let mean = self.trials.iter().map(|t| t[c][i]).sum::<f64>() / n;
+            scale * (value - mean)
+        };
+        let one = |trial: &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+            let channels = trial.iter().enumerate();
+            channels
+                .map(|(c, own)| own.iter().enumerate().map(|(i, v)| off(c, i, *v)).collect())
+                .collect()
+        };
+        self.trials.iter().map(one).collect()
+    }
+}
+
+impl<const N: usize> PreparedSession<'_, N> {
+    /// The repeats of every movement that has some, without trials that differ from theirs by far more than trials usually do.
+    pub(crate) fn repeats(&self, point: &LinearizationPoint<N>) -> Vec<Repeats> {
+        let of_group = |group: usize| {
+            let members: Vec<usize> = (0..self.fitted.len())
+                .filter(|&m| self.group_of[self.fitted[m]] == group)
+                .collect();
+            let (members, samples) = self.agreeing(&members)?;
+            let trials = members
+                .iter()
+                .map(|&m| flat(&point.residuals[m], &samples))
+                .collect();
+            Some(Repeats {
+                group,
+                samples,
+                trials,
+            })
+        };
+        let groups = (0..self.references.len()).filter_map(of_group);
+        usual(groups.filter(|g| g.trials.len() > 1).collect())
+    }
+}
+
+/// Repeats without outliers, the furthest first.
+fn usual(mut repeats: Vec<Repeats>) -> Vec<Repeats> {
+    let all: usize = repeats.iter().map(|r| r.trials.len()).sum();
+    for _ in 0..(MOST * all as f64) as usize {
+        let Some((group, trial)) = outlier(&repeats) else {
+            break;
+        };
+        repeats[group].trials.remove(trial);
+        repeats.retain(|r| r.trials.len() > 1);
+    }
+    repeats
+}
+
+/// The group and the place in it of the trial that differs most from its repeats, where that is far more than usual.
+fn outlier(repeats: &[Repeats]) -> Option<(usize, usize)> {
+    let square = |series: &Vec<f64>| {
+        let sum: f64 = series.iter().map(|v| v * v).sum();
+        sum / series.len().max(1) as f64
+    };
+    let squares: Vec<(usize, usize, Vec<f64>)> = repeats
+        .iter()
+        .enumerate()
+        .flat_map(|(g, repeats)| {
+            let trials = repeats.deviations().into_iter().enumerate();
+            trials.map(move |(t, channels)| (g, t, channels.iter().map(square).collect()))
+        })
+        .collect();
+    let channels = squares.first().map_or(0, |(_, _, own)| own.len());
+    let far = (0..channels).filter_map(|c| {
+        let mut sorted: Vec<f64> = squares.iter().map(|(_, _, own)| own[c]).collect();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted[sorted.len() / 2];
+        let (g, t, own) = squares.iter().max_by(|a, b| a.2[c].total_cmp(&b.2[c]))?;
+        (own[c] > OUTLIER * median).then(|| (own[c] / median, (*g, *t)))
+    });
+    far.max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, place)| place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_that_slips_tells_nothing_of_noise() {
+        let trial = |seed: usize, slip: f64| {
+            let noise = |i: usize| libm::sin((i * i + 7 * seed * i + 13 * seed) as f64);
+            vec![
+                (0..50)
+                    .map(|i| noise(i) + if i > 30 { slip } else { 0.0 })
+                    .collect::<Vec<f64>>(),
+            ]
+        };
+        let group = |group: usize, slip: f64| Repeats {
+            group,
+            samples: ValidSegments::default(),
+            trials: (0..3)
+                .map(|k| trial(3 * group + k, if k == 1 { slip } else { 0.0 }))
+                .collect(),
+        };
+        let sizes = |slip| -> Vec<usize> {
+            let kept = usual(
+                (0..4)
+                    .map(|g| group(g, if g == 2 { slip } else { 0.0 }))
+                    .collect(),
+            );
+            kept.iter().map(|r| r.trials.len()).collect()
+        };
+        assert_eq!(sizes(0.0), [3, 3, 3, 3]);
+        assert_eq!(sizes(20.0), [3, 3, 2, 3]);
+    }
+}
