@@ -46,6 +46,10 @@ const PIECE: f64 = 1.0;
 const TOLERATED: f64 = 0.1;
 /// Standard normal quantile of the test's level, 0.001 for each channel.
 const LEVEL: f64 = 3.09;
+/// Times its floor above which a gap is plain to see,
+const PLAIN: f64 = 1.5;
+/// and standard deviations of the floor that it must exceed it by then.
+const UNCERTAIN: f64 = 2.0;
 
 /// A piece of a trial: its mean square, and when it starts and ends \[s\].
 #[derive(Clone, Copy)]
@@ -60,7 +64,8 @@ struct Piece {
 /// The mean square left on the test trials is compared with that of the deviations of these trials from the mean of their repeats (of other
 /// movements where no test trial has a repeat). Both are means over pieces of a second; the scatter of the pieces tells how many degrees of
 /// freedom each has (Satterthwaite 1946). A gap is open where their ratio, less what is tolerated, exceeds the 0.999 quantile of Fisher's
-/// distribution (cube-root approximation of Wilson and Hilferty 1931, Paulson 1942).
+/// distribution (cube-root approximation of Wilson and Hilferty 1931, Paulson 1942). Few pieces decide little at that level: what anybody
+/// sees in the table, a gap half as large again as its floor and more than twice its standard deviation above it, is open as well.
 pub fn held_out(trials: &[Left]) -> Vec<Gap> {
     let channels = trials
         .iter()
@@ -113,7 +118,9 @@ fn channel(trials: &[Left], c: usize) -> Gap {
     };
     if let Some(size) = size {
         let ratio = size / (floor * (1.0 + TOLERATED));
-        if gap.open.is_none() && fisher(ratio * ratio, own.max(1.0), freedom.all) > LEVEL {
+        let plain = size > floor * f64::max(PLAIN, 1.0 + UNCERTAIN * libm::sqrt(relative));
+        let beyond_chance = fisher(ratio * ratio, own.max(1.0), freedom.all) > LEVEL;
+        if gap.open.is_none() && (plain || beyond_chance) {
             gap.open = left
                 .iter()
                 .filter_map(|(t, own)| worst(*t, own, floor * floor))
@@ -142,29 +149,33 @@ fn floor(trials: &[Left], c: usize, test: bool) -> Option<(f64, Freedom)> {
             .iter()
             .filter(|t| t.group == group && t.residuals.is_some())
             .collect();
-        let n = members.len() as f64;
-        let Some(length) = members
-            .iter()
-            .map(|t| t.counted.len())
-            .min()
-            .filter(|_| members.len() > 1)
-        else {
+        if members.len() < 2 {
             continue;
-        };
+        }
+        let n = members.len() as f64;
+        let length = members.iter().map(|t| t.counted.len()).max().unwrap_or(0);
         let of = |t: &Left, i: usize| t.residuals.as_ref().map_or(0.0, |r| r[c][i]);
-        let valid: Vec<usize> = (0..length)
-            .filter(|&i| members.iter().all(|t| t.counted[i]))
+        // At every sample those that last so long.
+        let present = |i: usize| {
+            let lasting = members
+                .iter()
+                .filter(move |t| t.counted.get(i) == Some(&true));
+            lasting.map(|t| of(t, i)).collect::<Vec<f64>>()
+        };
+        let means: Vec<Option<(f64, f64)>> = (0..length)
+            .map(|i| {
+                let values = present(i);
+                let n = values.len() as f64;
+                (values.len() > 1)
+                    .then(|| (values.iter().sum::<f64>() / n, libm::sqrt(n / (n - 1.0))))
+            })
             .collect();
         let used: Vec<&&Left> = members.iter().filter(|t| t.test == test).collect();
-        let scale = libm::sqrt(n / (n - 1.0));
         let mut made = 0;
         for member in &used {
-            let deviation: Vec<(usize, f64)> = valid
-                .iter()
-                .map(|&i| {
-                    let mean = members.iter().map(|t| of(t, i)).sum::<f64>() / n;
-                    (i, scale * (of(member, i) - mean))
-                })
+            let deviation: Vec<(usize, f64)> = (0..member.counted.len())
+                .filter(|&i| member.counted[i])
+                .filter_map(|i| means[i].map(|(mean, scale)| (i, scale * (of(member, i) - mean))))
                 .collect();
             let own = pieces(&deviation, member.rate);
             made += own.len();
@@ -308,6 +319,30 @@ mod tests {
         let mut trials = trials(3, 0.0);
         trials[5].residuals = None;
         assert_eq!(held_out(&trials)[0].open.map(|o| o.trial), Some(5));
+    }
+
+    /// Three seconds of each trial tell little at the level of the test.
+    #[test]
+    fn a_gap_that_anybody_sees_is_open() {
+        let open = |bump: f64| {
+            let short = |seed| {
+                let mut trials = trials(seed, bump);
+                for trial in &mut trials {
+                    let own = trial.residuals.as_mut().expect("residuals");
+                    own[0] = own[0][150..300].to_vec();
+                    trial.counted.truncate(150);
+                }
+                trials
+            };
+            let seeds = 1..200;
+            seeds
+                .filter(|&s| held_out(&short(s))[0].open.is_some())
+                .count()
+        };
+        // Without a bump, and where it makes the gap 1.7 and 2 times its floor.
+        let [none, more, twice] = [0.0, 1.0, 1.25].map(open);
+        assert!(none <= 1, "{none}");
+        assert!(more >= 190 && twice >= 198, "{more} {twice}");
     }
 
     #[test]
