@@ -213,7 +213,6 @@ fn a_changed_hypothesis_is_followed_as_it_is_simulated() {
     let session = session(&[], (1e-4, 0.01));
     let prepared = PreparedSession::new(&session, 1).expect("a sound session");
     let plain = session.given();
-    let point = prepared.linearize(&plain).expect("a run");
     let strong = [
         ("viscous", 1, &[0.5][..]),
         ("coulomb", 0, &[0.4]),
@@ -228,28 +227,75 @@ fn a_changed_hypothesis_is_followed_as_it_is_simulated() {
         let mut changed = plain.clone();
         let effect = Effect::new(Kind::named(kind).expect("known"), index).with(values);
         changed.named.push(effect);
-        let read = |h: &Hypothesis<2>| {
-            let run = session.run(h, &prepared.courses[0]).expect("a stable run");
-            session
-                .read(h, &prepared.courses[0], &run)
-                .expect("readings")
-        };
-        let (now, then) = (read(&changed), read(&plain));
-        let followed = prepared
-            .residuals(&point, &changed)
-            .unwrap_or_else(|e| panic!("{kind}: {e}"));
-        for channels in [0..2, 2..4] {
-            let (mut off, mut whole) = (0.0, 0.0);
-            for c in channels {
-                let count = now[c].len();
-                for i in 20..count - 20 {
-                    let seen = prepared.courses[0].seen[c][i] - followed[0][c][i];
-                    off += (seen - now[c][i]) * (seen - now[c][i]);
-                    whole += (now[c][i] - then[c][i]) * (now[c][i] - then[c][i]);
-                }
+        is_followed(&prepared, (&plain, &changed), 0.02, kind);
+    }
+}
+
+/// Checks that what is followed from the run of one hypothesis to another differs from its simulation by no more than a share of what
+/// the two simulations differ by.
+fn is_followed(
+    prepared: &PreparedSession<2>,
+    (plain, changed): (&Hypothesis<2>, &Hypothesis<2>),
+    share: f64,
+    what: &str,
+) {
+    let (session, course) = (prepared.session, &prepared.courses[0]);
+    let read = |h: &Hypothesis<2>| {
+        let run = session.run(h, course).expect("a stable run");
+        session.read(h, course, &run).expect("readings")
+    };
+    let (now, then) = (read(changed), read(plain));
+    let point = prepared.linearize(plain).expect("a run");
+    let followed = prepared
+        .residuals(&point, changed)
+        .unwrap_or_else(|e| panic!("{what}: {e}"));
+    for channels in [0..2, 2..4] {
+        let (mut off, mut whole) = (0.0, 0.0);
+        for c in channels {
+            let count = now[c].len();
+            for i in 20..count - 20 {
+                let seen = course.seen[c][i] - followed[0][c][i];
+                off += (seen - now[c][i]) * (seen - now[c][i]);
+                whole += (now[c][i] - then[c][i]) * (now[c][i] - then[c][i]);
             }
-            assert!(off <= 0.02 * 0.02 * whole, "{kind}: {off} of {whole}");
         }
+        assert!(off <= share * share * whole, "{what}: {off} of {whole}");
+    }
+}
+
+#[test]
+fn a_joint_that_sticks_is_followed_as_it_is_simulated() {
+    let session = session(&[], (1e-4, 0.01));
+    let prepared = PreparedSession::new(&session, 1).expect("a sound session");
+    let sticking = |torque: f64| {
+        let mut hypothesis = session.given();
+        let coulomb = Kind::named("coulomb").expect("known");
+        let effects = (0..2).map(|j| Effect::new(coulomb, j).with(&[torque, 0.0]));
+        hypothesis.named.extend(effects);
+        hypothesis
+    };
+    let with = |mut hypothesis: Hypothesis<2>, kind: &str, values: &[f64]| {
+        let kind = Kind::named(kind).expect("known");
+        hypothesis.named.push(Effect::new(kind, 1).with(values));
+        hypothesis
+    };
+    let cases = [
+        ("more friction", sticking(0.1), sticking(0.3)),
+        ("friction at all", sticking(0.0), sticking(0.3)),
+        ("no friction", sticking(0.3), sticking(0.0)),
+        (
+            "a spring where it sticks",
+            sticking(0.2),
+            with(sticking(0.2), "elastic", &[1.0, 1.0]),
+        ),
+        (
+            "smooth in place of set-valued friction",
+            sticking(0.0),
+            with(sticking(0.0), "coulomb", &[0.2, 0.01]),
+        ),
+    ];
+    for (what, plain, changed) in &cases {
+        is_followed(&prepared, (plain, changed), 0.05, what);
     }
 }
 

@@ -270,18 +270,6 @@ impl<T: Scalar> Effect<T> {
         smoothing.is_some_and(|s| s.every(|s| s == 0.0))
     }
 
-    /// The same effect with friction that is smooth over 30 µrad/s in place of set-valued dry friction: for derivatives along a
-    /// simulated motion, whose speeds are exact.
-    pub fn differentiable(mut self) -> Self {
-        const SMOOTHING: f64 = 3e-5;
-        if self.is_dry()
-            && let Some(at) = self.kind.smoothed_by()
-        {
-            self.parameters[at] = T::of(SMOOTHING);
-        }
-        self
-    }
-
     /// Checks the values against the bounds of the kind, and the index against the number of joints.
     ///
     /// # Errors

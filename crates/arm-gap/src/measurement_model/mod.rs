@@ -3,3 +3,4 @@
 pub mod hypothesis;
 pub mod in_trial;
 pub mod prediction;
+pub(crate) mod start;

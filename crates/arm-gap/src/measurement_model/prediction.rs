@@ -30,6 +30,8 @@ const HANDLE_BAND: f64 = 4.0;
 pub(crate) const STEPS: [f64; 3] = [1e-3, 5e-4, 2.5e-4];
 /// Samples at the start whose mean tells where the arm was at rest.
 const START: usize = 5;
+/// Time at the start over which forces are averaged \[s\].
+const START_TIME: f64 = 0.2;
 
 /// A trial made ready: what was measured in the common band, and what drives the simulation.
 #[derive(Clone, Debug)]
@@ -47,7 +49,9 @@ pub struct Course<const N: usize> {
     pub counted: Vec<bool>,
     times: Vec<f64>,
     handle: Vec<Plane<f64>>,
-    start: Joints<f64, N>,
+    /// Angles and force on the arm that are measured at the start.
+    pub(crate) start: Joints<f64, N>,
+    pub(crate) start_force: Plane<f64>,
     motion: Option<Kinematics<N>>,
 }
 
@@ -67,6 +71,11 @@ impl<const N: usize> Course<N> {
             .map(|p| [p[0] + shift[0], p[1] + shift[1]])
             .collect();
         HandlePath::through_points(&self.times, &points)
+    }
+
+    /// Angles that are measured where the movement starts, as a hypothesis has them.
+    pub fn start(&self, hypothesis: &Hypothesis<N>) -> Joints<f64, N> {
+        self.start - offsets(&hypothesis.effects())
     }
 
     /// Where the movement goes: the handle of a led arm \[m\], else the joints \[rad\].
@@ -126,6 +135,12 @@ impl<const N: usize> Session<N> {
         let span = first..(first + START).min(trial.len());
         let count = span.len() as f64;
         let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
+        let resting =
+            first..(first + START.max((START_TIME * trial.rate) as usize)).min(trial.len());
+        let start_force = trial.force_on_arm.as_ref().map_or([0.0; 2], |force| {
+            let count = resting.len() as f64;
+            [0, 1].map(|a| force[resting.clone()].iter().map(|f| f[a]).sum::<f64>() / count)
+        });
         let motion = match self.comparison {
             ComparisonMode::Led => None,
             ComparisonMode::Torque => Some(motion(trial, band)?),
@@ -143,6 +158,7 @@ impl<const N: usize> Session<N> {
             times: (0..trial.len()).map(|i| i as f64 / trial.rate).collect(),
             handle,
             start,
+            start_force,
             motion,
         })
     }
@@ -211,8 +227,7 @@ impl<const N: usize> Session<N> {
         let mut experiment = Experiment::new(setup, drive, duration);
         experiment.effects = hypothesis.effects();
         experiment.output_interval = Some(interval);
-        let near = course.start - offsets(&experiment.effects);
-        experiment.start = Start::Equilibrium { near };
+        let near = course.start(hypothesis);
         let limit = friction_limit(&experiment, &near);
         let mut last = None;
         for (i, step) in STEPS.into_iter().enumerate() {
@@ -220,7 +235,11 @@ impl<const N: usize> Session<N> {
                 continue;
             }
             experiment.dt = interval / libm::ceil(interval / step - 1e-9);
-            let mut outcome = simulate(&experiment);
+            let start = self.start(hypothesis, course, &experiment);
+            let mut outcome = start.and_then(|start| {
+                experiment.start = start;
+                simulate(&experiment)
+            });
             if matches!(outcome, Err(SimulationError::NoEquilibrium { .. })) {
                 experiment.start = Start::Given {
                     q: near,

@@ -2,28 +2,51 @@
 //!
 //! A change of the rig, an effect or the handle's path leaves a torque over in the equation of motion of the run. The
 //! arm answers it as a linear system with coefficients that follow the run; that system is solved implicitly, so that a
-//! stiff contact and dry friction need no short steps. A hundred candidates cost less than one simulation each.
-//!
-//! The same scheme, with Newton's method in every step, follows a change that is not small ([`Linear::play`]): what it
-//! gives is the run itself and, on top, what two coarse solutions differ by, so that their common error drops out.
+//! stiff contact needs no short steps. A joint that set-valued friction holds in the run does not answer, and one that slips
+//! does so against its friction. A hundred candidates cost less than one simulation each.
 
-use arm_core::effect::{Effect, Motion, Place, advance_states, any_state, resisting_torque};
-use arm_core::{
-    Chain, Contact, Joints, Placement, Plane, Pose, Reading, Scalar, Setup, inverse_dynamics,
-    jacobian, joint_force, static_torque, tip,
-};
-use arm_sim::{HandlePath, SimulationError};
+use arm_core::effect::{advance_states, any_state};
+use arm_core::{Joints, Plane, Reading, Setup};
+use arm_sim::SimulationError;
 use nalgebra::SMatrix;
 use std::sync::Arc;
 
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
+use crate::measurement_model::start::held_at_start;
+use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
+use crate::sensitivity::sliding::Mode;
 
-/// Steps of the solution for each sample of the trial.
-const PARTS: usize = 2;
 /// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
-const THETA: f64 = 0.55;
+pub(super) const THETA: f64 = 0.55;
+
+/// The instants at which a run is recorded and solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Grid {
+    /// Records for each sample of the trial.
+    parts: usize,
+    /// Records for each step of the solution.
+    stride: usize,
+}
+
+impl Grid {
+    /// Steps a second at least: movements and the band in which they are compared ask for no more, however fast one samples.
+    const RATE: f64 = 100.0;
+
+    fn of(rate: f64) -> Self {
+        match rate < Self::RATE {
+            true => Self {
+                parts: libm::ceil(Self::RATE / rate) as usize,
+                stride: 1,
+            },
+            false => Self {
+                parts: 1,
+                stride: (rate / Self::RATE) as usize,
+            },
+        }
+    }
+}
 
 /// The refusal of a hypothesis that cannot be followed from a simulated run.
 pub const ASTRAY: SimulationError = SimulationError::Setting {
@@ -32,170 +55,41 @@ pub const ASTRAY: SimulationError = SimulationError::Setting {
     allowed: "one within 1 rad of it",
 };
 
-/// What moves a led arm, besides its own state.
-struct Plant<const N: usize> {
-    setup: Setup<f64, N>,
-    chain: Chain<f64, N>,
-    contact: Contact<f64>,
-    /// Effects that resist in joints: they alone count in every step.
-    resisting: Vec<Effect<f64>>,
-    /// Effects that the sensors show.
-    sensing: Vec<Effect<f64>>,
-    /// Whether the forces through the joints count.
-    feels_force: bool,
-}
-
-impl<const N: usize> Plant<N> {
-    fn new(session: &Session<N>, hypothesis: &Hypothesis<N>) -> Result<Self, SimulationError> {
-        let setup = session.rig(hypothesis)?;
-        let (resisting, sensing): (Vec<_>, Vec<_>) = hypothesis
-            .effects()
-            .into_iter()
-            .filter(|e| e.on)
-            .map(Effect::differentiable)
-            .partition(|e| e.kind.info().place == Place::Joint);
-        Ok(Self {
-            chain: setup.chain()?,
-            contact: setup.contact,
-            feels_force: setup.base_motion != [0.0; 2]
-                || resisting.iter().any(|e| e.kind.feels_force()),
-            setup,
-            resisting,
-            sensing,
-        })
-    }
-
-    /// The chain as seen from its base, and how far and how fast the base has moved with the first joint.
-    ///
-    /// A base that is accelerated is one that stands in another gravity.
-    fn based(&self, state: &State<N>) -> (Chain<f64, N>, Hand) {
-        let u = self.setup.base_motion;
-        if u == [0.0; 2] {
-            return (self.chain, ([0.0; 2], [0.0; 2]));
-        }
-        let angle = state.q[0] - self.setup.base_rest;
-        let mut setup = self.setup;
-        for axis in 0..2 {
-            setup.gravity[axis] -= u[axis] * state.qdd[0];
-        }
-        // The segments were accepted before, and gravity may be any.
-        let chain = setup.chain().unwrap_or(self.chain);
-        (chain, (u.map(|u| u * angle), u.map(|u| u * state.qd[0])))
-    }
-
-    /// The handle with the robot's ripple on it.
-    fn handle(&self, time: f64, (mut at, mut rate): Hand) -> Hand {
-        if self.setup.ripple != [0.0; 2] {
-            let omega = core::f64::consts::TAU * self.setup.ripple_frequency;
-            let (sin, cos) = Scalar::sin_cos(omega * time + self.setup.ripple_phase);
-            for axis in 0..2 {
-                at[axis] += self.setup.ripple[axis] * sin;
-                rate[axis] += self.setup.ripple[axis] * omega * cos;
-            }
-        }
-        (at, rate)
-    }
-}
-
-/// Position and velocity of the handle.
-type Hand = (Plane<f64>, Plane<f64>);
-
-/// The arm's own state at one instant.
-#[derive(Clone, Copy)]
-struct State<const N: usize> {
-    time: f64,
-    q: Joints<f64, N>,
-    qd: Joints<f64, N>,
-    qdd: Joints<f64, N>,
-}
-
-impl<const N: usize> State<N> {
-    /// The state with changes on it.
-    fn moved(&self, q: &Joints<f64, N>, qd: &Joints<f64, N>, qdd: &Joints<f64, N>) -> Self {
-        Self {
-            time: self.time,
-            q: self.q + q,
-            qd: self.qd + qd,
-            qdd: self.qdd + qdd,
-        }
-    }
-
-    /// The motion as the states of effects see it.
-    fn motion(&self) -> Motion<f64, N> {
-        let mut motion = Motion::new(self.time, self.q, self.qd);
-        motion.qdd = self.qdd;
-        motion
-    }
-}
-
-/// What the equation of motion says of a state.
-#[derive(Clone, Copy)]
-struct Balance<const N: usize> {
-    /// Torque left over.
-    torque: Joints<f64, N>,
-    /// Force on the arm.
-    force: Plane<f64>,
-    /// The motion as joint effects see it.
-    motion: Motion<f64, N>,
-}
-
-fn balance<const N: usize>(
-    plant: &Plant<N>,
-    state: &State<N>,
-    hand: Hand,
-    memory: &[f64],
-) -> Balance<N> {
-    let pose = Pose::new(&state.q);
-    let (at, rate) = plant.handle(state.time, hand);
-    let (chain, (shift, drift)) = plant.based(state);
-    let place = tip(&chain, &pose);
-    let moving = jacobian(&chain, &pose) * state.qd;
-    let placement = Placement::of(&plant.setup);
-    let beside = placement.map_or([0.0; 2], |p| p.arm(&pose));
-    let turning = placement.map_or([0.0; 2], |p| p.velocity(&pose, &state.qd));
-    let force = plant.contact.force_on_arm(
-        [0, 1].map(|a| at[a] - place[a] - beside[a] - shift[a]),
-        [0, 1].map(|a| rate[a] - moving[a] - turning[a] - drift[a]),
-    );
-    let moment = placement.map_or(0.0, |p| p.moment(&pose, force));
-    let mut motion = state.motion();
-    let mut torque = inverse_dynamics(&chain, &pose, &state.qd, &state.qdd)
-        - static_torque(&chain, &pose, force, moment);
-    if plant.feels_force {
-        let through = joint_force(&chain, &pose, (&state.qd, &state.qdd), force);
-        motion = motion.with_joint_force(&through);
-        // The guide of a moving base carries the force through the first joint.
-        let u = plant.setup.base_motion;
-        torque[0] += u[0] * through[0][0] + u[1] * through[0][1];
-    }
-    torque += resisting_torque(&plant.resisting, &motion, memory);
-    Balance {
-        torque,
-        force,
-        motion,
-    }
-}
-
 /// One run with the linear system along it.
 pub struct Linear<'a, const N: usize> {
-    session: &'a Session<N>,
-    course: Arc<Course<N>>,
-    step: f64,
+    pub(super) session: &'a Session<N>,
+    pub(super) course: Arc<Course<N>>,
+    grid: Grid,
+    /// Length of a step of the solution \[s\].
+    pub(super) step: f64,
     setup: Setup<f64, N>,
-    states: Vec<State<N>>,
-    hands: Vec<Hand>,
-    /// What joint effects resist with.
+    /// The run at every record.
+    records: Vec<State<N>>,
+    /// Force on the arm at every record.
+    recorded_force: Vec<Plane<f64>>,
+    /// The run at every step.
+    pub(super) states: Vec<State<N>>,
+    pub(super) hands: Vec<Hand>,
+    /// Whether some joint has dry friction that is set-valued.
+    pub(super) dry: bool,
+    /// Direction in which each joint slips, 0 for none.
+    ways: Vec<Joints<f64, N>>,
+    /// What joint effects resist with where joints slip.
     resisted: Vec<Joints<f64, N>>,
-    /// What the run itself leaves over: the error of its own sampling.
-    balances: Vec<Balance<N>>,
-    damping: Vec<SMatrix<f64, N, N>>,
-    stiffness: Vec<SMatrix<f64, N, N>>,
-    /// Inverse of what multiplies the new accelerations of each step.
-    inverse: Vec<SMatrix<f64, N, N>>,
+    pub(super) balances: Vec<Balance<N>>,
+    pub(super) damping: Vec<SMatrix<f64, N, N>>,
+    pub(super) stiffness: Vec<SMatrix<f64, N, N>>,
+    /// What multiplies the new accelerations of each step, and its inverse for the joints that friction does not hold.
+    pub(super) slope: Vec<SMatrix<f64, N, N>>,
+    pub(super) inverse: Vec<SMatrix<f64, N, N>>,
+    /// Which joints friction holds.
+    held: Vec<[bool; N]>,
     /// How the force follows angles and speeds.
     force: Vec<(SMatrix<f64, 2, N>, SMatrix<f64, 2, N>)>,
     /// Angles of the first instant for one unit of torque left over at rest.
-    rest: SMatrix<f64, N, N>,
+    pub(super) rest: SMatrix<f64, N, N>,
+    /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
+    start: (Joints<f64, N>, Joints<f64, N>),
     base: Channels,
 }
 
@@ -212,58 +106,69 @@ impl<'a, const N: usize> Linear<'a, N> {
         let mut plant = Plant::new(session, hypothesis)?;
         // Effects that are asked later may feel them.
         plant.feels_force = true;
-        let run = session.run_finely(hypothesis, course, PARTS)?;
+        let grid = Grid::of(course.rate);
+        let run = session.run_finely(hypothesis, course, grid.parts)?;
         let recording = run.recording();
-        let step = 1.0 / course.rate / PARTS as f64;
+        let interval = 1.0 / course.rate / grid.parts as f64;
         let at = |v: &[f64], i: usize| Joints::from_column_slice(&v[i * N..(i + 1) * N]);
-        let states: Vec<State<N>> = (0..recording.len())
+        let records: Vec<State<N>> = (0..recording.len())
             .map(|i| State {
-                time: i as f64 * step,
+                time: i as f64 * interval,
                 q: at(&recording.q, i),
                 qd: at(&recording.qd, i),
                 qdd: at(&recording.qdd, i),
             })
             .collect();
-        let hands = hands(&course.handle_path(hypothesis)?, states.len(), step);
-        let count = states.len();
+        let path = course.handle_path(hypothesis)?;
         let mut linear = Self {
             session,
             course: Arc::clone(course),
-            step,
-            balances: Vec::with_capacity(count),
-            damping: Vec::with_capacity(count),
-            stiffness: Vec::with_capacity(count),
-            inverse: Vec::with_capacity(count),
-            force: Vec::with_capacity(count),
-            rest: SMatrix::zeros(),
-            base: Vec::new(),
+            grid,
+            step: interval * grid.stride as f64,
             setup: plant.setup,
-            resisted: Vec::with_capacity(count),
-            states,
-            hands,
+            dry: plant.dry,
+            recorded_force: Vec::with_capacity(records.len()),
+            states: records.iter().step_by(grid.stride).copied().collect(),
+            records,
+            hands: Vec::new(),
+            ways: Vec::new(),
+            resisted: Vec::new(),
+            balances: Vec::new(),
+            damping: Vec::new(),
+            stiffness: Vec::new(),
+            slope: Vec::new(),
+            inverse: Vec::new(),
+            held: Vec::new(),
+            force: Vec::new(),
+            rest: SMatrix::zeros(),
+            start: (
+                course.start(hypothesis),
+                session.friction_at_start(hypothesis, course)?,
+            ),
+            base: Vec::new(),
         };
+        let every = hands(&path, linear.records.len(), interval);
+        for (record, hand) in std::iter::zip(&linear.records, &every) {
+            let force = balance(&plant, record, *hand, &[]).force;
+            linear.recorded_force.push(force);
+        }
+        linear.hands = every.into_iter().step_by(grid.stride).collect();
         let memories = linear.memories(&plant);
-        for i in 0..count {
+        for i in 0..linear.states.len() {
             let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
             linear.differentiate(&plant, i, memory);
-            let motion = &linear.balances[i].motion;
-            let torque = resisting_torque(&plant.resisting, motion, memory);
-            linear.resisted.push(torque);
         }
-        let first = linear
-            .stiffness
-            .first()
-            .copied()
-            .unwrap_or_else(SMatrix::zeros);
-        linear.rest = first.try_inverse().unwrap_or_else(SMatrix::zeros);
+        linear.rest = linear.stiffness.first().map_or_else(SMatrix::zeros, |k| {
+            inverse_of_free(k, &held_at_start(&linear.balances[0].friction))
+        });
         linear.base = linear.sensed(&plant, None);
         Ok(linear)
     }
 
     /// Angles \[rad\], speeds \[rad/s\] and accelerations \[rad/s²\] of the joints at a sample of the trial.
     pub fn state(&self, sample: usize) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
-        let last = self.states.len().saturating_sub(1);
-        let State { q, qd, qdd, .. } = self.states[(sample * PARTS).min(last)];
+        let last = self.records.len().saturating_sub(1);
+        let State { q, qd, qdd, .. } = self.records[(sample * self.grid.parts).min(last)];
         (q, qd, qdd)
     }
 
@@ -300,13 +205,14 @@ impl<'a, const N: usize> Linear<'a, N> {
         let mut by_angle = SMatrix::<f64, 2, N>::zeros();
         let mut by_speed = SMatrix::<f64, 2, N>::zeros();
         let middle = balance(plant, &state, hand, memory);
+        let way = Joints::from_fn(|j, _| Mode::of(state.qd[j]).way());
+        let held: [bool; N] = std::array::from_fn(|j| middle.friction[j] > 0.0 && way[j] == 0.0);
+        let left_over = |there: &Balance<N>| there.torque + there.friction.component_mul(&way);
         for j in 0..N {
             let mut moved = state;
             moved.qdd[j] += 1.0;
-            mass.set_column(
-                j,
-                &(balance(plant, &moved, hand, memory).torque - middle.torque),
-            );
+            let there = balance(plant, &moved, hand, memory);
+            mass.set_column(j, &(left_over(&there) - left_over(&middle)));
             let both = |change: &dyn Fn(&mut State<N>, f64), size: f64| {
                 let (mut up, mut down) = (state, state);
                 change(&mut up, size);
@@ -316,7 +222,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                     balance(plant, &down, hand, memory),
                 );
                 let force = [0, 1].map(|c| (up.force[c] - down.force[c]) / (2.0 * size));
-                ((up.torque - down.torque) / (2.0 * size), force)
+                ((left_over(&up) - left_over(&down)) / (2.0 * size), force)
             };
             let (torque, pull) = both(&|s, d| s.q[j] += d, ANGLE);
             stiffness.set_column(j, &torque);
@@ -326,9 +232,13 @@ impl<'a, const N: usize> Linear<'a, N> {
             by_speed.set_column(j, &pull.into());
         }
         let h = self.step * THETA;
-        let left = mass + damping * h + stiffness * (h * h);
-        self.inverse
-            .push(left.try_inverse().unwrap_or_else(SMatrix::zeros));
+        let slope = mass + damping * h + stiffness * (h * h);
+        self.inverse.push(inverse_of_free(&slope, &held));
+        self.slope.push(slope);
+        self.held.push(held);
+        let resisted = plant.resisted(&middle.motion, memory, &way);
+        self.resisted.push(resisted);
+        self.ways.push(way);
         self.damping.push(damping);
         self.stiffness.push(stiffness);
         self.force.push((by_angle, by_speed));
@@ -364,7 +274,12 @@ impl<'a, const N: usize> Linear<'a, N> {
         (sensing, moves_handle): (bool, bool),
     ) -> Result<Channels, SimulationError> {
         let plant = Plant::new(self.session, changed)?;
-        let sensed = if sensing {
+        let nowhere = [Joints::<f64, N>::zeros(); 2];
+        let start = match self.dry || plant.dry {
+            true => self.start_of(&plant, changed)?,
+            false => nowhere,
+        };
+        let sensed = if sensing && start == nowhere {
             self.sensed(&plant, None)
         } else {
             let own;
@@ -375,7 +290,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             } else {
                 &self.hands
             };
-            let answer = self.solve(&plant, hands);
+            let answer = self.solve(&plant, hands, start);
             self.sensed(&plant, Some(&answer))
         };
         let mut out = sensed;
@@ -387,8 +302,32 @@ impl<'a, const N: usize> Linear<'a, N> {
         Ok(out)
     }
 
+    /// How far another hypothesis starts from the run: the joints that dry friction holds where they are measured, and what dry friction
+    /// resists less with in the others.
+    fn start_of(
+        &self,
+        plant: &Plant<N>,
+        changed: &Hypothesis<N>,
+    ) -> Result<[Joints<f64, N>; 2], SimulationError> {
+        let (near, friction) = self.start;
+        let most = plant.friction(&self.balances[0].motion, &[]);
+        let held = held_at_start(&most);
+        let moved = self.course.start(changed) - near;
+        Ok([
+            Joints::from_fn(|j, _| if held[j] { moved[j] } else { 0.0 }),
+            friction - self.session.friction_at_start(changed, &self.course)?,
+        ])
+    }
+
     /// Changes of angles and forces along the run when another plant takes its place.
-    fn solve(&self, plant: &Plant<N>, hands: &[Hand]) -> Vec<(Joints<f64, N>, Plane<f64>)> {
+    ///
+    /// * `start` - see [`Linear::start_of`]
+    fn solve(
+        &self,
+        plant: &Plant<N>,
+        hands: &[Hand],
+        [moved, released]: [Joints<f64, N>; 2],
+    ) -> Vec<(Joints<f64, N>, Plane<f64>)> {
         let h = self.step;
         let memories = self.memories(plant);
         let (mut q, mut qd, mut qdd) = (Joints::zeros(), Joints::zeros(), Joints::zeros());
@@ -399,15 +338,19 @@ impl<'a, const N: usize> Linear<'a, N> {
             let own = &self.balances[i];
             let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
             let (push, force) = if same_rig {
-                let changed = resisting_torque(&plant.resisting, &own.motion, memory);
+                let changed = plant.resisted(&own.motion, memory, &self.ways[i]);
                 (self.resisted[i] - changed, own.force)
             } else {
                 let changed = balance(plant, &self.states[i], hands[i], memory);
-                (own.torque - changed.torque, changed.force)
+                let friction = (own.friction - changed.friction).component_mul(&self.ways[i]);
+                (own.torque - changed.torque + friction, changed.force)
             };
             if i == 0 {
-                q = self.rest * push;
+                q = moved + self.rest * (push + released - self.stiffness[i] * moved);
             } else {
+                for j in (0..N).filter(|&j| self.held[i][j]) {
+                    (qd[j], qdd[j]) = (0.0, 0.0);
+                }
                 let speed = qd + qdd * (h * (1.0 - THETA));
                 let angle = q + speed * (h * THETA) + qd * (h * (1.0 - THETA));
                 let next =
@@ -424,137 +367,63 @@ impl<'a, const N: usize> Linear<'a, N> {
         out
     }
 
-    /// What the sensors would read under another hypothesis, which need not be near, on a trial of the same movement;
-    /// before the low-pass.
-    ///
-    /// # Errors
-    /// [`SimulationError`] for a rig that cannot be, and an arm that leaves the run.
-    pub fn play(
-        &self,
-        changed: &Hypothesis<N>,
-        course: &Course<N>,
-    ) -> Result<Channels, SimulationError> {
-        let plant = Plant::new(self.session, changed)?;
-        let path = course.handle_path(changed)?;
-        let hands = hands(&path, self.states.len(), self.step);
-        let answer = self.follow(&plant, &hands).ok_or(ASTRAY)?;
-        Ok(self.sensed(&plant, Some(&answer)))
+    /// Steps to beyond so many samples of the trial.
+    pub(super) fn steps_until(&self, samples: usize) -> usize {
+        samples * self.grid.parts / self.grid.stride + 2
     }
 
-    /// Changes of angles and forces along the run when another plant takes its place, however large.
-    fn follow(
-        &self,
-        plant: &Plant<N>,
-        hands: &[Hand],
-    ) -> Option<Vec<(Joints<f64, N>, Plane<f64>)>> {
-        /// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
-        const NUDGE: (f64, f64) = (1e-7, 1e-5);
-        /// Steps without a solution, in percent: a contact that closes takes hold in no time.
-        const UNSOLVED: usize = 3;
-        /// Distance from the run at which an arm is lost \[rad\].
-        const ASTRAY: f64 = 1.0;
-        let h = self.step;
-        let remembers = any_state(&plant.resisting);
-        let mut memory = vec![0.0; if remembers { plant.resisting.len() } else { 0 }];
-        let zero = Joints::<f64, N>::zeros();
-        let (mut q, mut qd, mut qdd) = (zero, zero, zero);
-        let mut out = Vec::with_capacity(self.states.len());
-        let mut before = self.states[0].moved(&q, &qd, &qdd);
-        // What the inverse slope differed by from that of the run itself in the last step.
-        let mut other = SMatrix::<f64, N, N>::zeros();
-        // What accelerations differed by from those that nothing pushes, in the last two steps.
-        let mut pushed = [zero; 2];
-        let mut unsolved = 0;
-        for i in 0..self.states.len() {
-            let (own, state) = (&self.balances[i], &self.states[i]);
-            let found = if i == 0 {
-                // At rest: the angles give way.
-                let missing = |angle: &Joints<f64, N>| {
-                    let moved = state.moved(angle, &zero, &zero);
-                    let there = balance(plant, &moved, hands[i], &memory);
-                    (own.torque - there.torque, there)
-                };
-                let solved = newton(zero, [&self.rest; 2], missing, NUDGE.0)?;
-                q = solved.at;
-                solved.there
-            } else {
-                let speed = qd + qdd * (h * (1.0 - THETA));
-                let angle = q + speed * (h * THETA) + qd * (h * (1.0 - THETA));
-                let reach = h * THETA;
-                let place = |next: &Joints<f64, N>| {
-                    state.moved(
-                        &(angle + next * (reach * reach)),
-                        &(speed + next * reach),
-                        next,
-                    )
-                };
-                let carry = |to: &State<N>, memory: &mut Vec<f64>| {
-                    let motions = (&before.motion(), &to.motion());
-                    advance_states(&plant.resisting, motions, memory, h);
-                };
-                let free =
-                    -(self.inverse[i] * (self.damping[i] * speed + self.stiffness[i] * angle));
-                let start = free + pushed[0] * 2.0 - pushed[1];
-                // States of effects follow slowly: where the step is expected to end is near enough.
-                let mut expected = memory.clone();
-                if remembers {
-                    carry(&place(&start), &mut expected);
-                }
-                let missing = |next: &Joints<f64, N>| {
-                    let there = balance(plant, &place(next), hands[i], &expected);
-                    (own.torque - there.torque, there)
-                };
-                let own = &self.inverse[i];
-                let solved = newton(start, [&(own + other), own], missing, NUDGE.1 / reach)?;
-                let (next, there) = (solved.at, solved.there);
-                other = solved.inverse - own;
-                pushed = [next - free, pushed[0]];
-                unsolved += usize::from(!solved.exact);
-                q = angle + next * (reach * reach);
-                qd = speed + next * reach;
-                qdd = next;
-                if remembers {
-                    carry(&place(&next), &mut memory);
-                }
-                there
-            };
-            let astray = q.iter().any(|v| !v.is_finite() || v.abs() > ASTRAY);
-            if astray || unsolved > UNSOLVED * self.states.len() / 100 {
-                return None;
-            }
-            before = state.moved(&q, &qd, &qdd);
-            out.push((q, [0, 1].map(|c| found.force[c] - own.force[c])));
-        }
-        Some(out)
+    /// What the run itself leaves over: the error of its own sampling. What holds a joint is no error.
+    pub(super) fn error(&self, i: usize) -> Joints<f64, N> {
+        let Balance {
+            torque, friction, ..
+        } = &self.balances[i];
+        Joints::from_fn(|j, _| match self.ways[i][j] {
+            0.0 => torque[j] - torque[j].clamp(-friction[j], friction[j]),
+            way => torque[j] + way * friction[j],
+        })
     }
 
     /// What the sensors read of the run with changes on it, at the samples of the trial.
-    fn sensed(
+    pub(super) fn sensed(
         &self,
         plant: &Plant<N>,
         changes: Option<&[(Joints<f64, N>, Plane<f64>)]>,
     ) -> Channels {
+        let Grid { parts, stride } = self.grid;
         let count = self.course.raw[0].len();
         let mut channels = vec![Vec::with_capacity(count); N + 2];
-        let last = self.states.len() - 1;
+        let last = self.records.len() - 1;
+        // Between two steps changes go straight.
+        let change = |record: f64| {
+            let changes = changes?;
+            let place = record / stride as f64;
+            let i = (place as usize).min(changes.len() - 1);
+            let share = place - i as f64;
+            let ((q, force), (next_q, next_force)) =
+                (changes[i], changes[(i + 1).min(changes.len() - 1)]);
+            Some((
+                q + (next_q - q) * share,
+                [0, 1].map(|c| force[c] + share * (next_force[c] - force[c])),
+            ))
+        };
         let force_at = |place: f64| {
             let place = place.clamp(0.0, last as f64);
             let i = (place as usize).min(last.saturating_sub(1));
             let share = place - i as f64;
-            let force = |k: usize| {
-                let own = self.balances[k].force;
-                let more = changes.map_or([0.0; 2], |c| c[k].1);
-                [own[0] + more[0], own[1] + more[1]]
-            };
-            let (a, b) = (force(i), force((i + 1).min(last)));
-            [0, 1].map(|c| a[c] + share * (b[c] - a[c]))
+            let (a, b) = (
+                self.recorded_force[i],
+                self.recorded_force[(i + 1).min(last)],
+            );
+            let (_, more) = change(place).unwrap_or((Joints::zeros(), [0.0; 2]));
+            [0, 1].map(|c| a[c] + share * (b[c] - a[c]) + more[c])
         };
-        let delay = plant.setup.force_delay / self.step;
+        let delay = plant.setup.force_delay / self.step * stride as f64;
         for sample in 0..count {
-            let i = (sample * PARTS).min(last);
+            let i = (sample * parts).min(last);
+            let more = change(i as f64).map_or_else(Joints::zeros, |c| c.0);
             let mut reading = Reading::<f64, N> {
-                time: i as f64 * self.step,
-                q: self.states[i].q + changes.map_or_else(Joints::zeros, |c| c[i].0),
+                time: self.records[i].time,
+                q: self.records[i].q + more,
                 force_on_arm: force_at(i as f64 - delay),
                 moment_on_arm: 0.0,
             };
@@ -572,91 +441,20 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 }
 
-/// The unknown at which nothing is missing, or as little as can be.
-struct Solved<const N: usize> {
-    at: Joints<f64, N>,
-    there: Balance<N>,
-    /// The inverse slope that led there.
-    inverse: SMatrix<f64, N, N>,
-    exact: bool,
-}
-
-/// Solves for the unknown at which nothing is missing; `None` where that leads beyond all numbers.
-///
-/// First with given inverse slopes, one after the other and corrected on the way (Broyden 1965), which is enough for what is
-/// smooth or small; then with slopes of its own and shorter steps, for friction that reverses and a contact that opens.
-///
-/// * `missing` - the torque missing at an unknown
-/// * `nudge` - a change of the unknown that tells a slope
-fn newton<const N: usize>(
-    start: Joints<f64, N>,
-    [first, second]: [&SMatrix<f64, N, N>; 2],
-    missing: impl Fn(&Joints<f64, N>) -> (Joints<f64, N>, Balance<N>),
-    nudge: f64,
-) -> Option<Solved<N>> {
-    /// Torque that may be missing, and that is missing at most where a step finds no better \[N m\].
-    const ENOUGH: (f64, f64) = (1e-7, 1e-3);
-    /// Share of what is missing that a step of a good slope leaves at most.
-    const GOOD: f64 = 0.3;
-    const ROUNDS: usize = 30;
-    const HALVINGS: usize = 6;
-    let size = |r: &Joints<f64, N>| r.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-    let (mut at, (mut left, mut there)) = (start, missing(&start));
-    let (mut inverse, mut fallback) = (*first, (first != second).then_some(second));
-    for _ in 0..ROUNDS {
-        if size(&left) < ENOUGH.0 {
-            break;
-        }
-        let step = inverse * left;
-        let next = at + step;
-        let (rest, balance) = missing(&next);
-        if size(&rest) < GOOD * size(&left) {
-            let answered = inverse * (left - rest);
-            let along = step.dot(&answered);
-            if along > 0.0 {
-                inverse += (step - answered) * (step.transpose() * inverse) / along;
-            }
-            (at, left, there) = (next, rest, balance);
-            continue;
-        }
-        if let Some(given) = fallback.take() {
-            inverse = *given;
-            continue;
-        }
-        let mut slope = SMatrix::<f64, N, N>::zeros();
-        for j in 0..N {
-            let mut beside = at;
-            beside[j] += nudge;
-            slope.set_column(j, &((left - missing(&beside).0) / nudge));
-        }
-        inverse = slope.try_inverse()?;
-        let whole = inverse * left;
-        let mut share = 1.0;
-        let better = (0..HALVINGS).find_map(|_| {
-            let next = at + whole * share;
-            let (rest, balance) = missing(&next);
-            share *= 0.5;
-            (size(&rest) < size(&left)).then_some((next, rest, balance))
-        });
-        let Some((next, rest, balance)) = better else {
-            break;
-        };
-        (at, left, there) = (next, rest, balance);
+/// The inverse of a slope for the joints that nothing holds; those that are held answer nothing.
+fn inverse_of_free<const N: usize>(
+    slope: &SMatrix<f64, N, N>,
+    held: &[bool; N],
+) -> SMatrix<f64, N, N> {
+    let mut free = *slope;
+    for j in (0..N).filter(|&j| held[j]) {
+        free.fill_row(j, 0.0);
+        free.fill_column(j, 0.0);
+        free[(j, j)] = 1.0;
     }
-    size(&left).is_finite().then(|| Solved {
-        at,
-        there,
-        inverse,
-        exact: size(&left) < ENOUGH.1,
-    })
-}
-
-fn hands<const N: usize>(path: &HandlePath<N>, count: usize, step: f64) -> Vec<Hand> {
-    let (_, end) = path.span();
-    (0..count)
-        .map(|i| {
-            let handle = path.at((i as f64 * step).min(end));
-            (handle.position, handle.velocity)
-        })
-        .collect()
+    let mut inverse = free.try_inverse().unwrap_or_else(SMatrix::zeros);
+    for j in (0..N).filter(|&j| held[j]) {
+        inverse[(j, j)] = 0.0;
+    }
+    inverse
 }

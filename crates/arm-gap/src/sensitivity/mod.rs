@@ -1,6 +1,10 @@
 //! How the channels change with small changes of a hypothesis, from the equation of motion linearised along a simulated run.
 
+mod follower;
 pub mod linearization_point;
 pub mod linearized_run;
+mod newton;
 pub mod normal_equations;
+mod plant;
 pub(crate) mod rows;
+mod sliding;

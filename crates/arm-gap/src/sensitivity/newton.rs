@@ -1,0 +1,169 @@
+//! Newton's method for the equation of motion at one instant.
+
+use arm_core::Joints;
+use nalgebra::SMatrix;
+
+use crate::sensitivity::plant::Balance;
+use crate::sensitivity::sliding::{LinearStep, Mode};
+
+/// The unknown at which nothing is missing, or as little as can be.
+pub(super) struct Solved<const N: usize> {
+    pub at: Joints<f64, N>,
+    pub there: Balance<N>,
+    /// The inverse slope that led there.
+    pub inverse: SMatrix<f64, N, N>,
+    pub exact: bool,
+}
+
+/// Solves for the unknown at which nothing is missing; `None` where that leads beyond all numbers.
+///
+/// First with given inverse slopes, one after the other and corrected on the way (Broyden 1965), which is enough for what is
+/// smooth or small; then with slopes of its own and shorter steps, for friction that reverses and a contact that opens.
+///
+/// * `missing` - the torque missing at an unknown
+/// * `nudge` - a change of the unknown that tells a slope
+pub(super) fn newton<const N: usize>(
+    start: Joints<f64, N>,
+    [first, second]: [&SMatrix<f64, N, N>; 2],
+    missing: impl Fn(&Joints<f64, N>) -> (Joints<f64, N>, Balance<N>),
+    nudge: f64,
+) -> Option<Solved<N>> {
+    /// Torque that may be missing, and that is missing at most where a step finds no better \[N m\].
+    const ENOUGH: (f64, f64) = (1e-7, 1e-3);
+    /// Share of what is missing that a step of a good slope leaves at most.
+    const GOOD: f64 = 0.3;
+    const ROUNDS: usize = 30;
+    const HALVINGS: usize = 6;
+    let size = |r: &Joints<f64, N>| r.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let (mut at, (mut left, mut there)) = (start, missing(&start));
+    let (mut inverse, mut fallback) = (*first, (first != second).then_some(second));
+    for _ in 0..ROUNDS {
+        if size(&left) < ENOUGH.0 {
+            break;
+        }
+        let step = inverse * left;
+        let next = at + step;
+        let (rest, balance) = missing(&next);
+        if size(&rest) < GOOD * size(&left) {
+            let answered = inverse * (left - rest);
+            let along = step.dot(&answered);
+            if along > 0.0 {
+                inverse += (step - answered) * (step.transpose() * inverse) / along;
+            }
+            (at, left, there) = (next, rest, balance);
+            continue;
+        }
+        if let Some(given) = fallback.take() {
+            inverse = *given;
+            continue;
+        }
+        let mut slope = SMatrix::<f64, N, N>::zeros();
+        for j in 0..N {
+            let mut beside = at;
+            beside[j] += nudge;
+            slope.set_column(j, &((left - missing(&beside).0) / nudge));
+        }
+        inverse = slope.try_inverse()?;
+        let whole = inverse * left;
+        let mut share = 1.0;
+        let better = (0..HALVINGS).find_map(|_| {
+            let next = at + whole * share;
+            let (rest, balance) = missing(&next);
+            share *= 0.5;
+            (size(&rest) < size(&left)).then_some((next, rest, balance))
+        });
+        let Some((next, rest, balance)) = better else {
+            break;
+        };
+        (at, left, there) = (next, rest, balance);
+    }
+    size(&left).is_finite().then(|| Solved {
+        at,
+        there,
+        inverse,
+        exact: size(&left) < ENOUGH.1,
+    })
+}
+
+/// What is missing at an unknown where joints have dry friction.
+pub(super) struct Missing<const N: usize> {
+    /// Torque missing, friction apart \[N m\].
+    pub torque: Joints<f64, N>,
+    /// Speeds at the end of the step \[rad/s\].
+    pub speed: Joints<f64, N>,
+    /// What the equation of motion says there.
+    pub there: Balance<N>,
+}
+
+/// Solves for the accelerations at which nothing is missing but what dry friction resists with; `None` where that leads beyond all
+/// numbers.
+///
+/// The torques besides friction are made linear with a slope that is corrected on the way (Broyden 1965); friction obeys its law in each
+/// linear problem.
+///
+/// * `slope` - torque that one unit of acceleration answers, and `reach` the change of speed that it makes \[s\]
+/// * `modes` - what the friction of each joint did before, and does at the solution
+/// * `missing` - what is missing at accelerations
+pub(super) fn slide<const N: usize>(
+    start: Joints<f64, N>,
+    (mut slope, reach): (SMatrix<f64, N, N>, f64),
+    modes: &mut [Mode; N],
+    missing: impl Fn(&Joints<f64, N>) -> Missing<N>,
+) -> Option<Slid<N>> {
+    /// Change of speed by which a slope is told \[rad/s\].
+    const NUDGE: f64 = 1e-5;
+    /// Torque that a further step answers where the solution is good enough, and at most where no step helps \[N m\].
+    const ENOUGH: (f64, f64) = (1e-7, 1e-3);
+    const ROUNDS: usize = 14;
+    /// Rounds after which the slope is taken anew, for a contact that opens and the end of a range.
+    const RENEWED: usize = 6;
+    let (mut at, mut now) = (start, missing(&start));
+    let mut answered = f64::INFINITY;
+    for round in 0..ROUNDS {
+        if round == RENEWED {
+            for j in 0..N {
+                let mut beside = at;
+                beside[j] += NUDGE / reach;
+                slope.set_column(
+                    j,
+                    &((now.torque - missing(&beside).torque) / (NUDGE / reach)),
+                );
+            }
+        }
+        let step = LinearStep {
+            slope: &slope,
+            missing: now.torque,
+            friction: now.there.friction,
+            speed: now.speed,
+            reach,
+        };
+        let (change, found) = step.solve(*modes)?;
+        *modes = found;
+        answered = (slope * change).amax();
+        if !answered.is_finite() {
+            return None;
+        }
+        if answered < ENOUGH.0 {
+            break;
+        }
+        at += change;
+        let next = missing(&at);
+        let gained = now.torque - next.torque;
+        slope += (gained - slope * change) * change.transpose() / change.norm_squared();
+        now = next;
+    }
+    Some(Slid {
+        at,
+        there: now.there,
+        slope,
+        exact: answered < ENOUGH.1,
+    })
+}
+
+/// A solution with dry friction, with the slope that led there.
+pub(super) struct Slid<const N: usize> {
+    pub at: Joints<f64, N>,
+    pub there: Balance<N>,
+    pub slope: SMatrix<f64, N, N>,
+    pub exact: bool,
+}
