@@ -20,15 +20,11 @@ LONGEST_FILE = 600
 
 # What is not mended yet; these lists only become shorter.
 LONG_FUNCTIONS: set[str] = {
-    "crates/arm-gap/src/selection/lack_of_fit.rs: lack_of_fit",
     "crates/arm-gap/src/selection/model_selection.rs: rivals",
     "crates/arm-gap/src/selection/score_test.rs: new",
     "crates/arm-gap/src/selection/search.rs: round",
-    "crates/arm-gap/src/sensitivity/linearized_run.rs: follow",
 }
-LONG_FILES: set[str] = {
-    "crates/arm-gap/src/sensitivity/linearized_run.rs",
-}
+LONG_FILES: set[str] = set()
 CIRCLES: list[list[str]] = [
     ["arm-gap", "crate::data::prepared_session", "crate::sensitivity::linearization_point", "crate::sensitivity::rows"],
     ["arm-gap", "crate::selection::model_selection", "crate::selection::search_state"],

@@ -4,7 +4,7 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::model_selection::Named;
@@ -58,7 +58,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         } = state;
         progress("judging the passive base", 0.88)?;
         let found = current.asked.len();
-        let ((mut amended, mut point), base) = self.judged_base((current, point), scale)?;
+        let settled = self.afresh((current, point));
+        let settled = self.with_friction_at_rest(settled)?;
+        let ((mut amended, mut point), base) = self.judged_base(settled, scale)?;
         if amended.asked.len() > found {
             let judging = (asked, scale, apart.periodic);
             (amended, point, named) =
@@ -68,7 +70,20 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut precision = self.precision(&point, &amended, scale)?;
         for one in &named {
             let missed = amended.asked[one.slot].kind().probe().missed;
-            precision.widen(one.slot, missed, one.gain);
+            precision.widen(
+                |t| matches!(t, Target::Named(own, _) if own == one.slot),
+                missed,
+                one.gain,
+            );
+        }
+        for law in &base {
+            let known = self.session.effects.len() + law.base;
+            let missed = law.question.kind().probe().missed;
+            precision.widen(
+                |t| matches!(t, Target::Known(own, _) if own == known),
+                missed,
+                law.gain,
+            );
         }
         let gained: Vec<f64> = base.iter().map(|law| law.gain).collect();
         if let Some(rigid) = self.rigid(&gained) {

@@ -8,7 +8,7 @@ use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
 use crate::measurement_model::prediction::Channels;
 use crate::selection::score_variance::spread;
-use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
 use crate::sensitivity::normal_equations::{Cluster, Normal, factor, solve};
 
 /// Most steps of a fit.
@@ -20,6 +20,8 @@ const DAMPING: [f64; 5] = [0.0, 0.01, 0.1, 1.0, 10.0];
 const ENOUGH: f64 = 0.2;
 /// and where the model is far from the data, less than this share of the cost.
 const SHARE: f64 = 1e-4;
+/// A step that gains less than so many times as much leads so near that the next one takes its slopes.
+const NEAR: f64 = 30.0;
 /// Times that a fit is simulated anew from where it ended.
 const AGAIN: usize = 4;
 
@@ -84,14 +86,25 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
-        more: &[&crate::sensitivity::linearization_point::Response],
+        more: &[&Response],
     ) -> Result<(Vec<Coordinate>, Vec<Cluster>), GapError> {
         let own = fitted.named();
         let responses = self.responses_at(point, &fitted.hypothesis, &own)?;
         let extra: Vec<_> = responses.iter().chain(more.iter().copied()).collect();
-        let clusters = point.rows.clusters(self, &extra, &fitted.residuals);
+        Ok(self.equations_with(point, fitted, &extra))
+    }
+
+    /// The same with responses that are known.
+    fn equations_with(
+        &self,
+        point: &LinearizationPoint<N>,
+        fitted: &Fitted<N>,
+        responses: &[&Response],
+    ) -> (Vec<Coordinate>, Vec<Cluster>) {
+        let clusters = point.rows.clusters(self, responses, &fitted.residuals);
+        let own = fitted.named();
         let coordinates = point.coordinates.iter().copied().chain(own).collect();
-        Ok((coordinates, clusters))
+        (coordinates, clusters)
     }
 
     /// Fits the nuisances and the named effects of a hypothesis, followed from an anchor.
@@ -107,12 +120,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         asked: Vec<Candidate>,
     ) -> Result<Fitted<N>, GapError> {
         let mut fitted = self.state(point, start, asked)?;
+        let mut slopes: Option<Vec<Response>> = None;
         for _ in 0..STEPS {
             let hypothesis = &fitted.hypothesis;
+            let old = slopes.is_some();
+            let fresh = || self.responses_at(point, hypothesis, &fitted.named());
             // What cannot be followed a little further on is fitted as far as it was.
-            let Ok((coordinates, clusters)) = self.equations(point, &fitted, &[]) else {
+            let Ok(responses) = slopes.take().map_or_else(fresh, Ok) else {
                 break;
             };
+            let each: Vec<&Response> = responses.iter().collect();
+            let (coordinates, clusters) = self.equations_with(point, &fitted, &each);
             let damped = |damping: &f64| {
                 let (usable, step) = stepped(&clusters, hypothesis, &coordinates, *damping)?;
                 let moved =
@@ -126,6 +144,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands.
             let Some(next) = DAMPING.iter().find_map(damped) else {
+                if old {
+                    continue;
+                }
                 break;
             };
             let gained = fitted.cost - next.cost;
@@ -133,6 +154,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             if gained < enough(fitted.cost) {
                 break;
             }
+            slopes = (gained < NEAR * enough(fitted.cost)).then_some(responses);
         }
         Ok(fitted)
     }
@@ -252,13 +274,14 @@ impl Precision {
     /// Share of what a law may miss of what it shows that may lie along one of its parameters, as sums of squares.
     const ALONG: f64 = 1.0 / 9.0;
 
-    /// Widens what is known of the parameters of a named effect by what its law may miss.
+    /// Widens what is known of the parameters of an effect by what its law may miss.
     ///
+    /// * `own` - tells its parameters
     /// * `gain` - what the effect explains, in units of twice the log-likelihood
-    pub fn widen(&mut self, slot: usize, missed: f64, gain: f64) {
+    pub fn widen(&mut self, own: impl Fn(Target) -> bool, missed: f64, gain: f64) {
         let wider = libm::sqrt(1.0 + Self::ALONG * missed * gain.max(0.0));
         for (c, sd) in self.coordinates.iter().zip(&mut self.sd) {
-            if matches!(c.target, Target::Named(own, _) if own == slot) {
+            if own(c.target) {
                 *sd *= wider;
             }
         }

@@ -3,6 +3,7 @@
 pub mod conclusion;
 pub mod first_order_screening;
 pub mod fit;
+mod friction_at_rest;
 pub mod held_out;
 pub mod lack_of_fit;
 pub mod model_discrimination;

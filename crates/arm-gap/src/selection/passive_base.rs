@@ -17,7 +17,7 @@ use crate::GapError;
 use crate::candidates::candidate::{Candidate, Library, Twin};
 use crate::data::passive_law::{Free, Passive};
 use crate::data::prepared_session::PreparedSession;
-use crate::data::session::Session;
+use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
@@ -29,8 +29,8 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 const LIKELY: f64 = 2.0;
 /// Square of the same beyond which a law stays once it was refitted by simulation: 2 standard deviations,
 const STAYS: f64 = 4.0;
-/// and what it must gain to be named: with nine such laws an arm without any has one false name in two hundred sessions.
-pub(crate) const NAMED: f64 = 12.0;
+/// and what it must gain to be named, 3: with nine such laws an arm without any has a false name in one of eighty sessions.
+pub(crate) const NAMED: f64 = 9.0;
 /// Part of the whole arm's weight moment that each joint's typical sizes are read off at least: muscles that cross a wrist are made
 /// for more than the weight of a hand.
 const OF_THE_ARM: f64 = 0.3;
@@ -112,6 +112,12 @@ impl<const N: usize> Session<N> {
             let (value, sd) = estimate(place);
             let effect = model.fitted[place];
             let mut passive = self.passive(effect, column);
+            if let Some(smoothing) = column.kind.smoothed_by()
+                && self.comparison == ComparisonMode::Led
+            {
+                // A joint that rests sticks, until the data say otherwise.
+                passive.effect.parameters[smoothing] = 0.0;
+            }
             place += 1;
             let mut size = value;
             if let Some(rest) = column.rest {
@@ -128,6 +134,9 @@ impl<const N: usize> Session<N> {
             }
             passive.likely = size > 0.0 && size > LIKELY * sd;
             passive.effect.parameters[0] = if passive.likely { size } else { 0.0 };
+            if self.comparison == ComparisonMode::Led && self.hardly_moves(column.joint) {
+                self.hold(&mut passive);
+            }
             self.base.push(passive);
         }
         let (chain, nominal) = (found.chain, self.chain);
@@ -184,6 +193,34 @@ impl<const N: usize> Session<N> {
             (f64::min(a, q), f64::max(b, q))
         });
         0.5 * (low + high)
+    }
+
+    /// Whether a joint stays where it is in all fit trials but for noise. In one of them a sensor may slip.
+    pub fn hardly_moves(&self, joint: usize) -> bool {
+        /// Range of the angle in the common band \[rad\].
+        const STILL: f64 = 0.01;
+        let fit = self.fit_trials();
+        let moving = fit.iter().filter(|&&trial| {
+            let Ok(course) = self.course(trial) else {
+                return true;
+            };
+            let angles = std::iter::zip(&course.seen[joint], &course.counted);
+            let counted = angles.filter(|(_, counted)| **counted).map(|(q, _)| *q);
+            let (low, high) = counted.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
+                (a.min(q), b.max(q))
+            });
+            high - low > STILL
+        });
+        moving.count() <= usize::from(fit.len() > 1)
+    }
+
+    /// Makes of a law of a joint that hardly moves what holds it: friction that sticks, larger than any torque that it must hold. How
+    /// large it is cannot be told, nor anything else of the joint.
+    fn hold(&self, passive: &mut Passive) {
+        passive.likely = passive.effect.is_dry();
+        let holding = self.weight_moment(0);
+        passive.effect.parameters[0] = if passive.likely { holding } else { 0.0 };
+        passive.free.clear();
     }
 
     /// A law with what is known of its numbers beforehand.
@@ -285,7 +322,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if !self.session.base.is_empty() {
             self.start = Some(settled.0.hypothesis.clone());
         }
-        Ok(settled)
+        self.with_friction_at_rest(settled)
     }
 
     /// Asks for the laws of the base once more that were dropped before anything was named: what was named since may have hidden

@@ -4,7 +4,7 @@ use crate::GapError;
 use crate::candidates::candidate::{Candidate, Library};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::selection::conclusion::Finding;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
@@ -202,21 +202,31 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(state)
     }
 
-    /// What was found, fitted once more with segments and sensors as given, where much is left: without it they were bent far,
-    /// and may not find back by themselves.
-    fn afresh(&self, (fitted, point): Settled<'a, N>) -> Settled<'a, N> {
+    /// What was found, fitted once more with segments and sensors as given, where much is left or a sensor is far from what was
+    /// promised of it: without what was found they were bent far, and may not find back by themselves.
+    pub(crate) fn afresh(&self, (fitted, point): Settled<'a, N>) -> Settled<'a, N> {
         /// Misfit for each row beyond which much is left.
         const MUCH: f64 = 1.5;
+        /// Standard deviations beyond which a sensor is far from what was promised.
+        const BENT: f64 = 2.0;
         let channels = self.session.channels();
         let told = self
             .fitted
             .iter()
             .map(|&t| self.valid_segments[t].rows_per_channel(channels));
         let rows: usize = told.flatten().sum();
-        if fitted.cost < MUCH * rows as f64 {
+        let bent = |c: &&Coordinate| match (c.target, c.prior) {
+            (Target::Calibration(_), Some((mean, sd))) => {
+                (fitted.hypothesis.get(c.target) - mean).abs() > BENT * sd
+            }
+            _ => false,
+        };
+        let is_bent = point.coordinates.iter().any(|c| bent(&c));
+        if fitted.cost < MUCH * rows as f64 && !is_bent {
             return (fitted, point);
         }
         let start = Hypothesis {
+            known: fitted.hypothesis.known.clone(),
             named: fitted.hypothesis.named.clone(),
             ..self.given()
         };
