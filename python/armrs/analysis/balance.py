@@ -17,7 +17,7 @@ from ..model import Model
 
 _CUTOFF = 3.0
 """Cutoff of the low-pass that angles and forces share [Hz]."""
-_SAMPLES = 800
+SAMPLES = 800
 """Samples that are regressed: more tell no more about a convention."""
 _SHORTEST = 1.0
 """Shortest stretch of complete samples that is used [s]."""
@@ -62,13 +62,15 @@ class Motion:
         )
 
 
-def motion_of(recordings: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]]) -> Motion | None:
+def motion_of(recordings: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]], samples: int = SAMPLES) -> Motion | None:
     """Return the complete stretches of recordings, smoothed and thinned; None where none is long enough.
 
     Parameters
     ----------
     recordings : sequence of (t, q, force, moment)
         Time [s], angles (n, n_joints) [rad], force (n, 2) [N], and moment (n,) [N m] or None; NaN where a sample is missing.
+    samples : int
+        About so many are kept.
     """
     pieces = []
     for t, q, force, moment in recordings:
@@ -80,7 +82,7 @@ def motion_of(recordings: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.
             pieces.append((1.0 / usual_step(t[piece]), np.column_stack([np.interp(grid, t[piece], c) for c in columns[piece].T])))
     if not pieces:
         return None
-    thin = max(1, sum(len(values) for _, values in pieces) // _SAMPLES)
+    thin = max(1, sum(len(values) for _, values in pieces) // samples)
     smooth = [[a[::thin] for a in _armrs.smooth(values, rate, min(_CUTOFF, 0.2 * rate))] for rate, values in pieces]
     values, speed, acceleration = (np.concatenate(parts) for parts in zip(*smooth, strict=True))
     n = values.shape[1] - 3

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..analysis.balance import Motion, motion_of, unexplained
+from ..analysis.balance import SAMPLES, Motion, motion_of, unexplained
 from ..errors import BadInput, Text
 from ..io import readings
 from ..io.dataset import Dataset
@@ -24,8 +24,11 @@ _BETTER = 2.0
 worlds with up to two hidden effects)."""
 _BETTER_ALONE = 4.0
 """The same for a single trial."""
-_BALANCED = 0.1
-"""Another reading balances the arm that leaves at most this share; the right one leaves 0.07 in 99 of 100 of these sessions."""
+_SAMPLES_ALONE = 200
+"""Samples of a single trial that are regressed."""
+_BALANCED, _AT_ALL = 0.1, 0.5
+"""Another reading balances the arm that leaves at most this share; the right one leaves 0.07 in 99 of 100 of these sessions.
+Where the given one leaves ten times as much, as forces in another unit do, the second share is enough."""
 _UNEXPLAINED_BY_ZERO, _BETTER_BY_ZERO = 0.05, 2.5
 """The same for another zero, whose number is fitted: in the right setup at most 2.0 times less."""
 _PLAINER = 1.5
@@ -97,7 +100,7 @@ def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool
     alone : bool
         Whether these are few of the trials, which must then be clearly wrong; no other zero of one angle is looked for.
     """
-    motion = _motion(trials)
+    motion = _motion(trials, _SAMPLES_ALONE if alone else SAMPLES)
     if motion is None:
         return None
     given = unexplained(model, motion)
@@ -112,7 +115,7 @@ def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool
         if zero is not None and _PLAINER * zero[0] < ranked[0][0]:
             ranked, least = [zero], _BETTER_BY_ZERO
     left, best = ranked[0]
-    if left > _BALANCED or least * left > given:
+    if left > max(_BALANCED, min(_AT_ALL, 0.1 * given)) or least * left > given:
         return None
     also = ""
     if len(ranked) > 1 and ranked[1][0] < max(min(_TIED * left, _MUCH * given), _PLAINER * left):
@@ -122,10 +125,11 @@ def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool
     return BadInput(best.place, found, best.allowed + also)
 
 
-def _motion(trials: Sequence[Trial]) -> Motion | None:
-    return motion_of(
-        [(t.t, np.where(t.valid[:, None], t.q, np.nan), t.force_on_arm, t.moment_on_arm) for t in trials if t.force_on_arm is not None]
-    )
+def _motion(trials: Sequence[Trial], samples: int = SAMPLES) -> Motion | None:
+    recordings = [
+        (t.t, np.where(t.valid[:, None], t.q, np.nan), t.force_on_arm, t.moment_on_arm) for t in trials if t.force_on_arm is not None
+    ]
+    return motion_of(recordings, samples)
 
 
 def _other_zero(model: Model, motion: Motion) -> tuple[float, Reading] | None:
