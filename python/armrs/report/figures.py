@@ -51,6 +51,17 @@ def draw(figures: Figures) -> list[Drawn]:
         return [one() for one in figures.values()]
 
 
+def shown(one: Callable[[], Drawn]) -> np.ndarray:
+    """Draw a figure where pyplot shows it, and return its Axes."""
+    with plotting.style(), plotting.in_pyplot():
+        figure = one().figure
+        # Ticks and layout take the style that is in force when they are made.
+        figure.draw_without_rendering()
+    axes = np.empty(len(figure.axes), dtype=object)
+    axes[:] = figure.axes
+    return axes
+
+
 def identified(result: Identified, data: Mapping[str, Any]) -> Figures:
     """Return the figures of an identification: parameters with intervals, and torques measured and fitted for every movement."""
     joints = data["data"]["joints"]

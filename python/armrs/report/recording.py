@@ -12,8 +12,7 @@ from ..io.dataset import Dataset
 from ..io.trial import Trial
 from ..model import Model
 from . import plotting
-from .figures import Drawn, slug
-from .view import shown
+from .figures import Drawn, shown, slug
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,7 +15,7 @@ import numpy as np
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from . import html, pages, plotting
-from .figures import Drawn, Figures, draw
+from .figures import Drawn, Figures, draw, shown
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,6 @@ class View:
         for drawn in draw(self.figures(result, data)):
             pictures[drawn.section].append(_picture(drawn))
         return pages.write_page_of(data, pictures, target)
-
-
-def shown(draw: Callable[[], Drawn]) -> np.ndarray:
-    """Draw a figure where pyplot shows it, and return its Axes."""
-    with plotting.style(), plotting.in_pyplot():
-        figure = draw().figure
-        # Ticks and layout take the style that is in force when they are made.
-        figure.draw_without_rendering()
-    axes = np.empty(len(figure.axes), dtype=object)
-    axes[:] = figure.axes
-    return axes
 
 
 def _picture(drawn: Drawn) -> html.Picture:

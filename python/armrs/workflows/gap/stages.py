@@ -16,8 +16,8 @@ from ...custom_effects import OwnEffect
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset, load_dataset, naming_trials
 from ...model import Contact, Model, Robot
+from ...report.figures import shown
 from ...report.plain import data_of, origin
-from ...report.view import shown
 from . import figures, maps, reading, suspicion
 from .found import Absorbed, ChannelGap, GapFound, Place, Suspect, gap_to_dict
 from .search import core_settings, core_trials
