@@ -18,7 +18,7 @@ from armrs.model import AddedMass
 from armrs.workflows.gap import calibrate, compare
 from armrs.workflows.gap.results import gap_data, write_gap
 from armrs.workflows.gap.shapes import portrait
-from armrs.workflows.gap.suspicion import examine
+from armrs.workflows.gap.suspicion import _still_joints, examine
 from browser import opened
 from gap_sessions import session
 from markup import assert_escaped
@@ -277,6 +277,19 @@ def test_a_trial_that_begins_while_the_robot_moves_is_warned_of() -> None:
     changed_data = data.replace(trials=tuple(cut if t is late else t for t in data.trials))
     (line,) = [line for line in examine(changed_data, led=True) if "when these begin" in line]
     assert late.file in line and line.count(" rad/s") == 1
+
+
+def test_a_joint_that_hardly_moves_is_warned_of() -> None:
+    """By its sensor's noise, and by one trial in which the sensor slips."""
+    data = session()
+    trials = []
+    for k, trial in enumerate(data.fit_trials):
+        q = trial.q.copy()
+        q[:, 1] = 0.5 + 2e-3 * np.sin(np.arange(len(q))) + (0.05 * (np.arange(len(q)) > 40) if k == 0 else 0.0)
+        trials.append(dataclasses.replace(trial, q=q))
+    (line,) = _still_joints(trials, led=True)
+    assert line.startswith("joint 2 moves by ")
+    assert _still_joints(data.fit_trials, led=True) == []
 
 
 def test_a_gap_that_keeps_repeats_from_being_compared_is_warned_of() -> None:

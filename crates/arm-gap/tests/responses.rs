@@ -377,3 +377,29 @@ fn the_laws_of_a_passive_joint_are_named_with_what_could_stand_in_their_place() 
         }
     }
 }
+
+#[test]
+fn whole_trials_tell_whether_friction_sticks_or_creeps() {
+    let of = |kind: &str, index, values: &[f64]| {
+        Effect::new(Kind::named(kind).expect("known"), index).with(values)
+    };
+    for smoothing in [0.0, 0.03] {
+        let hidden = [
+            of("elastic", 0, &[1.0, -1.0]),
+            of("elastic", 1, &[1.5, 1.0]),
+            of("coulomb", 1, &[0.3, smoothing]),
+        ];
+        let mut session = session(&hidden, (3e-4, 0.03));
+        session.effects = Vec::new();
+        let session = session.with_base();
+        let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+        let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+        let named = &finding.amended.hypothesis.named;
+        let friction = named
+            .iter()
+            .find(|e| e.kind == hidden[2].kind && e.index == 1);
+        let found = friction.expect("dry friction").parameters;
+        assert_eq!(found[1], smoothing, "{named:?}");
+        assert!((found[0] - 0.3).abs() < 0.02, "{found:?}");
+    }
+}

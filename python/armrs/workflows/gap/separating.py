@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import _armrs
 from ...catalogue import catalogue
-from ...errors import ArmrsError
+from ...errors import ArmrsError, SimulationError
 from ...io.trial import Trial
 from ...model import Model
 from ..identify import core_columns
@@ -84,13 +84,17 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
     own = [e for e in model.effects if (e.kind, e.joint, e.channel) == (effect.kind, effect.joint, effect.channel)][-1]
     others = [e for e in model.all_effects if e is not own]
     rivals = [(entry[0], entry[1], list(entry[2]), list(free)) for (entry, free), *_ in raw["alternatives"]]
-    rows = _armrs.distances(
-        _armrs.Rig(model, [*others, own]),
-        core_trials(result.dataset),
-        core_settings(result.dataset, True, threads),
-        [core_columns(c.trial) | {"configuration": 0} for c in family],
-        rivals,
-    )
+    try:
+        rows = _armrs.distances(
+            _armrs.Rig(model, [*others, own]),
+            core_trials(result.dataset),
+            core_settings(result.dataset, True, threads),
+            [core_columns(c.trial) | {"configuration": 0} for c in family],
+            rivals,
+        )
+    except SimulationError:
+        # Of an arm that cannot be simulated no movement can be proposed.
+        return effect
     now = rows[0] or []
     # What no choice explains counts as noise, as it does in the search.
     noise = float(np.sqrt(max(result.raw["scale"], 1.0)))
