@@ -329,13 +329,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ) -> Result<Vec<Rival<N>>, GapError> {
         let own = &fitted.asked[slot];
         let refitted = ScoreTest::new(self, less, point, library)?;
-        let others: Vec<usize> = (0..refitted.len())
-            .filter(|&c| {
-                let effect = &library.candidates[c].effect;
-                let is_named = less.asked.iter().any(|a| a.is_same_effect(effect));
-                !is_named && !own.is_same_effect(effect)
-            })
-            .collect();
+        let others = others(own, &less.asked, library);
         // What the effect itself would gain to first order: what others gain to first order is held against that.
         let gain = (0..refitted.len())
             .filter(|&c| own.is_same_effect(&library.candidates[c].effect))
@@ -411,4 +405,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let shapes: f64 = asked.iter().map(Candidate::shapes).sum();
         shapes * libm::log(self.rows_of_references() as f64)
     }
+}
+
+/// The candidates that are neither an effect nor among those that are named beside it.
+fn others(own: &Candidate, named: &[Candidate], library: &Library) -> Vec<usize> {
+    let is_other = |candidate: &Candidate| {
+        let is_named = named.iter().any(|a| a.is_same_effect(&candidate.effect));
+        !is_named && !own.is_same_effect(&candidate.effect)
+    };
+    (0..library.candidates.len())
+        .filter(|&c| is_other(&library.candidates[c]))
+        .collect()
 }

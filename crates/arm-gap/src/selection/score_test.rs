@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::GapError;
 use crate::candidates::candidate::{Library, Twin, price};
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::hypothesis::priors;
+use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, priors};
 use crate::selection::fit::{Fitted, regularise};
 use crate::selection::score_variance::{spread, unlike};
 use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
@@ -65,15 +65,7 @@ impl ScoreTest {
         prior.resize(known.len() + asked.len(), None);
         let mut normal = Normal::new(&clusters, &prior);
         regularise(&mut normal.gram, hypothesis, &known);
-        // Columns that nothing excites drop out of the projection, and so does what would leave its bounds.
-        let base: Vec<usize> = (0..known.len())
-            .filter(|&i| normal.gram[(i, i)] > 0.0)
-            .filter(|&i| {
-                let value = hypothesis.get(known[i].target);
-                let pull = normal.score[i];
-                !(value <= known[i].lower && pull < 0.0 || value >= known[i].upper && pull > 0.0)
-            })
-            .collect();
+        let base = projected_off(&normal, &known, hypothesis);
         let first = known.len();
         let count = asked.len();
         let left = DMatrix::from_fn(base.len(), base.len(), |a, b| {
@@ -288,4 +280,19 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
         rows.max(1)
     }
+}
+/// What is always refitted and can be: what nothing excites is left out, and what would leave its bounds.
+fn projected_off<const N: usize>(
+    normal: &Normal,
+    known: &[Coordinate],
+    hypothesis: &Hypothesis<N>,
+) -> Vec<usize> {
+    let free = |&i: &usize| {
+        let (value, pull) = (hypothesis.get(known[i].target), normal.score[i]);
+        !(value <= known[i].lower && pull < 0.0 || value >= known[i].upper && pull > 0.0)
+    };
+    (0..known.len())
+        .filter(|&i| normal.gram[(i, i)] > 0.0)
+        .filter(free)
+        .collect()
 }

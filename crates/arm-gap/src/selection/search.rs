@@ -277,30 +277,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             .into_iter()
             .filter(|c| c.gain > c.members.iter().map(least).sum())
             .collect();
-        let mut contenders: Vec<Choice> = Vec::new();
-        let most = choices.first().map_or(0.0, |c| c.worth);
-        for choice in choices.iter().filter(|c| c.worth > 0.5 * most) {
-            if contenders.len() >= CONTENDERS {
-                break;
-            }
-            // Another shape of the same effects is refined by the fit, it need not be converged by itself.
-            let same = |other: &Choice| {
-                other.members.len() == choice.members.len()
-                    && std::iter::zip(&other.members, &choice.members).all(|(&a, &b)| {
-                        library.candidates[a].is_same_effect(&library.candidates[b].effect)
-                    })
-            };
-            if !contenders.iter().any(same) {
-                contenders.push(choice.clone());
-            }
-        }
-        if let Some(single) = choices
-            .iter()
-            .find(|c| c.members.len() == 1 && c.worth > 0.0)
-            && !contenders.iter().any(|c| c.members == single.members)
-        {
-            contenders.push(single.clone());
-        }
+        let contenders = contenders(&choices, library);
         let mut worthy: Vec<(f64, Fitted<N>)> = Vec::new();
         let mut tried = Vec::new();
         for choice in &contenders {
@@ -382,4 +359,33 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             })
             .collect()
     }
+}
+
+/// The choices that are converged by simulation: the best, each with other effects, and the best of a single effect.
+fn contenders(choices: &[Choice], library: &Library) -> Vec<Choice> {
+    let mut contenders: Vec<Choice> = Vec::new();
+    let most = choices.first().map_or(0.0, |c| c.worth);
+    for choice in choices.iter().filter(|c| c.worth > 0.5 * most) {
+        if contenders.len() >= CONTENDERS {
+            break;
+        }
+        // Another shape of the same effects is refined by the fit, it need not be converged by itself.
+        let same = |other: &Choice| {
+            other.members.len() == choice.members.len()
+                && std::iter::zip(&other.members, &choice.members).all(|(&a, &b)| {
+                    library.candidates[a].is_same_effect(&library.candidates[b].effect)
+                })
+        };
+        if !contenders.iter().any(same) {
+            contenders.push(choice.clone());
+        }
+    }
+    if let Some(single) = choices
+        .iter()
+        .find(|c| c.members.len() == 1 && c.worth > 0.0)
+        && !contenders.iter().any(|c| c.members == single.members)
+    {
+        contenders.push(single.clone());
+    }
+    contenders
 }
