@@ -10,7 +10,8 @@ use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::sensitivity::linearization_point::{Change, LinearizationPoint, Response};
+use crate::sensitivity::linearization_point::{Change, LinearizationPoint};
+use crate::sensitivity::response::Response;
 
 /// Share of a joint's torque that an effect has in the change with which its response is taken.
 const SHARE: f64 = 0.02;

@@ -6,8 +6,9 @@ use crate::data::noise::{Noise, dot};
 use crate::data::prepared_session::{PreparedSession, flat};
 use crate::measurement_model::hypothesis::priors;
 use crate::measurement_model::prediction::Channels;
-use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::solve;
+use crate::sensitivity::response::Response;
 
 /// Samples of the common band, on either side, among which the size of what is left is measured.
 const AROUND: usize = 32;

@@ -8,8 +8,9 @@ use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
 use crate::measurement_model::prediction::Channels;
 use crate::selection::score_variance::spread;
-use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, factor, solve};
+use crate::sensitivity::response::Response;
 
 /// Most steps of a fit.
 const STEPS: usize = 6;

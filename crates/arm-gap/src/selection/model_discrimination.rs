@@ -11,8 +11,9 @@ use crate::measurement_model::hypothesis::priors;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::prediction::{Channels, difference};
 use crate::selection::fit::regularise;
-use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
+use crate::sensitivity::response::Response;
 
 /// A named effect, and others that would do instead.
 pub struct Contest<'a, const N: usize> {

@@ -11,7 +11,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::score_test::{Choice, ScoreTest};
-use crate::selection::search_state::{Progress, Settled};
+use crate::selection::search_state::{Progress, SearchState, Settled};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use arm_numerics::statistics::distributions::chi_square_tail;
 
@@ -404,6 +404,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn price_of_shapes(&self, asked: &[Candidate]) -> f64 {
         let shapes: f64 = asked.iter().map(Candidate::shapes).sum();
         shapes * libm::log(self.rows_of_references() as f64)
+    }
+}
+
+impl<const N: usize> SearchState<'_, N> {
+    /// What a further effect must gain so as not to be the imperfect shape of a named one.
+    pub fn least(&self, effect: &Effect<f64>) -> f64 {
+        let explained = self.calibrated.cost - self.current.cost;
+        f64::max(
+            FLOOR * explained,
+            mimicked_by_any(effect, &self.current.asked, explained),
+        )
     }
 }
 

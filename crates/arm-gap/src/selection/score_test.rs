@@ -8,8 +8,9 @@ use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, priors};
 use crate::selection::fit::{Fitted, regularise};
 use crate::selection::score_variance::{spread, unlike};
-use crate::sensitivity::linearization_point::{LinearizationPoint, Response};
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Normal, factor, solve};
+use crate::sensitivity::response::Response;
 
 /// The candidates' normal equations after everything else was projected off.
 pub struct ScoreTest {

@@ -1,12 +1,9 @@
 //! How far a search is, and what it tells.
 
-use arm_core::effect::Effect;
-
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::selection::fit::{Fitted, enough};
 use crate::selection::lack_of_fit::LackOfFit;
-use crate::selection::model_selection::{FLOOR, mimicked_by_any};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// One round of the search.
@@ -70,14 +67,5 @@ impl<const N: usize> SearchState<'_, N> {
         });
         self.been.push((asked.clone(), dry, *cost));
         back
-    }
-
-    /// What a further effect must gain so as not to be the imperfect shape of a named one.
-    pub fn least(&self, effect: &Effect<f64>) -> f64 {
-        let explained = self.calibrated.cost - self.current.cost;
-        f64::max(
-            FLOOR * explained,
-            mimicked_by_any(effect, &self.current.asked, explained),
-        )
     }
 }

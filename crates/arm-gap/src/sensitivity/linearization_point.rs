@@ -14,11 +14,8 @@ use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
+use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::Rows;
-
-/// Response of the channels to one unit of a number, by group.
-#[derive(Clone, Debug)]
-pub struct Response(pub Vec<Channels>);
 
 /// A change of a hypothesis whose response is asked.
 #[derive(Clone, Debug)]

@@ -6,5 +6,6 @@ pub mod linearized_run;
 mod newton;
 pub mod normal_equations;
 mod plant;
+pub mod response;
 pub(crate) mod rows;
 mod sliding;

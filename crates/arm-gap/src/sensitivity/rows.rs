@@ -8,8 +8,8 @@ use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
-use crate::sensitivity::linearization_point::Response;
 use crate::sensitivity::normal_equations::{Cluster, factor};
+use crate::sensitivity::response::Response;
 
 /// Parts of a trial that are predicted from each other where no movement is repeated.
 pub const PARTS: usize = 5;

@@ -1,0 +1,131 @@
+//! The noise of a session, read off what its repeats differ by or off what a hypothesis leaves.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::GapError;
+use crate::data::noise::{Noise, dot};
+use crate::data::prepared_session::{PreparedSession, flat};
+use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::sensitivity::normal_equations::factor;
+
+impl<const N: usize> PreparedSession<'_, N> {
+    /// Reads the noise anew: what repeats differ in, or without repeats what a hypothesis leaves.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for series that no noise can be read off.
+    pub fn measure_noise(&mut self, point: &LinearizationPoint<N>) -> Result<(), GapError> {
+        let channels = self.session.channels();
+        let observed_share = self.observed_share();
+        let mut deviations = Vec::new();
+        // For each deviation what a trial may differ by without noise.
+        let mut shifts: Vec<Arc<Vec<Vec<Vec<f64>>>>> = Vec::new();
+        for repeats in self.repeats(point) {
+            let own = point.own.iter();
+            let columns = own.map(|r| flat(&r.0[repeats.group], &repeats.samples));
+            let columns = Arc::new(columns.collect::<Vec<_>>());
+            for deviation in repeats.deviations() {
+                deviations.push(deviation);
+                shifts.push(Arc::clone(&columns));
+            }
+        }
+        self.repeated = !deviations.is_empty();
+        let range: Vec<f64> = (0..channels)
+            .map(|c| {
+                // An arm that swings freely has no torque to show, but its inertia has.
+                let seen = self.fitted.iter().flat_map(|&t| &self.courses[t].seen[c]);
+                let all = seen.chain(point.residuals.iter().flat_map(|r| &r[c]));
+                let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                    (a.min(*v), b.max(*v))
+                });
+                (high - low).max(0.0)
+            })
+            .collect();
+        self.noise = if self.repeated {
+            self.noise_of(&deviations, &shifts, (&range, &observed_share))?
+        } else {
+            self.noise_of_residuals(point, (&range, &observed_share))?
+        };
+        Ok(())
+    }
+
+    /// The share of the samples of each channel that tell anything.
+    fn observed_share(&self) -> Vec<f64> {
+        let channels = self.session.channels();
+        let all: usize = self
+            .fitted
+            .iter()
+            .map(|&t| self.valid_segments[t].len())
+            .sum();
+        let told = self
+            .fitted
+            .iter()
+            .map(|&t| self.valid_segments[t].rows_per_channel(channels));
+        let sum = told.fold(vec![0; channels], |sum, own| {
+            std::iter::zip(sum, own).map(|(a, b)| a + b).collect()
+        });
+        sum.into_iter()
+            .map(|n: usize| n as f64 / all.max(1) as f64)
+            .collect()
+    }
+
+    /// The noise of deviations, and how far each is shifted, found in turns: as much is taken for a shift as the noise and
+    /// what is known of shifts allow.
+    fn noise_of(
+        &self,
+        deviations: &[Vec<Vec<f64>>],
+        shifts: &[Arc<Vec<Vec<Vec<f64>>>>],
+        (range, told): (&[f64], &[f64]),
+    ) -> Result<Noise, GapError> {
+        const TURNS: usize = 3;
+        let known: Vec<f64> = self
+            .session
+            .by_trial()
+            .iter()
+            .map(|c| c.prior.map_or(f64::INFINITY, |(_, sd)| sd))
+            .collect();
+        let mut noise = Noise::of(deviations, &[], range, told)?;
+        for _ in 0..TURNS {
+            if known.is_empty() {
+                break;
+            }
+            let mut clean = deviations.to_vec();
+            let mut taken = Vec::new();
+            for (deviation, columns) in clean.iter_mut().zip(shifts) {
+                let row = noise.whiten_thinned(deviation);
+                let each = columns.iter().map(|c| noise.whiten_thinned(c));
+                let whitened: Vec<Vec<f64>> = each.collect();
+                let k = known.len();
+                let gram = DMatrix::from_fn(k, k, |a, b| {
+                    let own = if a == b {
+                        1.0 / (known[a] * known[a])
+                    } else {
+                        0.0
+                    };
+                    dot(&whitened[a], &whitened[b]) + own
+                });
+                let score = DVector::from_fn(k, |a, _| dot(&whitened[a], &row));
+                let Some(solver) = factor(gram) else { continue };
+                add(deviation, columns, (-solver.solve(&score)).as_slice());
+                taken.extend(solver.spread().iter().map(|shares| {
+                    let mut series: Vec<Vec<f64>> =
+                        deviation.iter().map(|c| vec![0.0; c.len()]).collect();
+                    add(&mut series, columns, shares.as_slice());
+                    series
+                }));
+            }
+            noise = Noise::of(&clean, &taken, range, told)?;
+        }
+        Ok(noise)
+    }
+}
+
+/// Adds shares of columns, each with its channels, to a series.
+fn add(series: &mut [Vec<f64>], columns: &[Vec<Vec<f64>>], shares: &[f64]) {
+    for (share, column) in shares.iter().zip(columns) {
+        for (value, part) in series.iter_mut().flatten().zip(column.iter().flatten()) {
+            *value += share * part;
+        }
+    }
+}

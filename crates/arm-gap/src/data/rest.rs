@@ -1,0 +1,146 @@
+//! Where joints with dry friction rest: what they hold there is not known, and less is compared.
+
+use std::sync::Arc;
+
+use arm_core::effect::{Local, Place};
+use arm_core::{Pose, jacobian};
+
+use crate::data::prepared_session::{PreparedSession, Rest};
+use crate::data::session::ComparisonMode;
+use crate::data::valid_segments::{ObservableForce, ValidSegments, widened};
+use crate::measurement_model::hypothesis::Hypothesis;
+use crate::sensitivity::linearization_point::LinearizationPoint;
+
+/// Share of the samples that must be left when those at which joints with dry friction rest are left out.
+const LEAST_LEFT: f64 = 0.15;
+
+impl<const N: usize> PreparedSession<'_, N> {
+    /// Leaves out what dry friction makes unknowable where its joint rests or reverses: there friction is whatever holds it.
+    ///
+    /// Whether anything changed since the last time; then anchors are to be made anew. The samples of repeats stay the same:
+    /// they rest together.
+    pub fn leave_out_rest(&mut self, point: &LinearizationPoint<N>) -> bool {
+        let dry = dry_joints(&point.hypothesis);
+        if dry == self.dry {
+            return false;
+        }
+        self.dry = dry;
+        let one = |group: usize| self.rest(point, group);
+        self.resting = (0..self.references.len()).map(one).collect();
+        let compared = |prepared: &Self| -> usize {
+            prepared.valid_segments.iter().map(ValidSegments::len).sum()
+        };
+        let before = compared(self);
+        self.cut();
+        if (compared(self) as f64) < LEAST_LEFT * before as f64 {
+            // Then some joint rests at any time, and imperfect samples are better than none.
+            self.resting.clear();
+            self.cut();
+        }
+        true
+    }
+
+    /// What the rest of joints with dry friction takes from the comparison of a movement.
+    ///
+    /// The contact alone places an arm of one or two joints: what holds a resting joint shows in one component of the force
+    /// and nowhere else. A longer arm gives way to it, and nothing is known then.
+    fn rest(&self, point: &LinearizationPoint<N>, group: usize) -> Rest {
+        let course = &self.courses[self.references[group]];
+        let joints: Vec<Vec<bool>> = (0..N)
+            .map(|j| match self.dry[j] {
+                true => widened(&self.resting_joint(point, (group, j)), course),
+                false => vec![false; course.seen[0].len()],
+            })
+            .collect();
+        let held = |i: usize| -> Vec<usize> { (0..N).filter(|&j| joints[j][i]).collect() };
+        let count = course.seen[0].len();
+        match point.lines.get(group) {
+            Some(line) if N <= 2 && self.session.comparison == ComparisonMode::Led => {
+                let told = |i: usize| match held(i)[..] {
+                    [] => ObservableForce::Both,
+                    // The torque of the other joint, as a component of the force.
+                    [j] if N == 2 => {
+                        let moves = jacobian(&self.session.chain, &Pose::new(&line.state(i).0));
+                        let column = moves.column(1 - j);
+                        match column.norm() {
+                            size if size > 0.0 => {
+                                ObservableForce::Along([column[0] / size, column[1] / size])
+                            }
+                            _ => ObservableForce::Neither,
+                        }
+                    }
+                    _ => ObservableForce::Neither,
+                };
+                Rest {
+                    left_out: Vec::new(),
+                    told: Arc::new((0..count).map(told).collect()),
+                }
+            }
+            _ => Rest {
+                left_out: (0..count).map(|i| !held(i).is_empty()).collect(),
+                told: Arc::default(),
+            },
+        }
+    }
+
+    /// The samples of a movement at which a joint rests.
+    fn resting_joint(
+        &self,
+        point: &LinearizationPoint<N>,
+        (group, j): (usize, usize),
+    ) -> Vec<bool> {
+        /// Share of its fastest speed below which a joint rests, the speed below which it always does, and the one above
+        /// which it never does \[rad/s\].
+        const SLOW: (f64, f64, f64) = (0.25, 0.005, 0.03);
+        let course = &self.courses[self.references[group]];
+        let speed = |i: usize| match (course.motion(), point.lines.get(group)) {
+            (Some(motion), _) => motion.qd[i][j].abs(),
+            (None, Some(line)) => line.state(i).1[j].abs(),
+            (None, None) => f64::INFINITY,
+        };
+        let speeds: Vec<f64> = (0..course.seen[0].len()).map(speed).collect();
+        let fastest = speeds.iter().copied().fold(0.0, f64::max);
+        let limit = (SLOW.0 * fastest).clamp(SLOW.1, SLOW.2);
+        let mut rest: Vec<bool> = speeds.into_iter().map(|v| v <= limit).collect();
+        if self.session.comparison == ComparisonMode::Torque {
+            // A joint that reverses on the way does not rest: the law of its friction holds through zero.
+            let shortest = (course.rate / course.band) as usize;
+            for run in rest.chunk_by_mut(|a, b| a == b) {
+                if run.len() < shortest {
+                    run.fill(false);
+                }
+            }
+        }
+        rest
+    }
+}
+
+/// Joints in which something resists as much at a crawl as in motion.
+fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
+    const CRAWL: f64 = 0.03;
+    const MOTION: f64 = 0.3;
+    let mut dry = [false; N];
+    for effect in hypothesis.known.iter().chain(&hypothesis.named) {
+        if effect.kind.info().place != Place::Joint || effect.index >= N {
+            continue;
+        }
+        let at = |speed: f64| {
+            let local = Local {
+                time: 0.0,
+                q: 0.0,
+                qd: speed,
+                qdd: 0.0,
+                proximal_q: 0.0,
+                joint_force: 1.0,
+                memory: 0.0,
+            };
+            0.5 * (effect.torque(&local)
+                - effect.torque(&Local {
+                    qd: -speed,
+                    ..local
+                }))
+        };
+        dry[effect.index] |= at(CRAWL) > 0.5 * at(MOTION).abs() && at(CRAWL) > 0.0;
+    }
+    dry
+}
