@@ -1,5 +1,6 @@
 //! What was measured, made ready: session, repeats, the samples that are compared, noise.
 
+pub mod identified_base;
 mod measured_noise;
 pub mod noise;
 pub mod passive_law;

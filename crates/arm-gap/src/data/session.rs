@@ -28,7 +28,7 @@ pub struct Session<const N: usize> {
     pub comparison: ComparisonMode,
     /// Kinds of one's own that are asked besides those of the catalogue.
     pub own: Vec<Kind>,
-    /// Laws of joints that the model leaves without one; see [`crate::selection::passive_base`].
+    /// Laws of joints that the model leaves without one; see [`crate::data::identified_base`].
     pub base: Vec<Passive>,
     /// Relative changes of the segments from which calibration starts.
     pub start: [[f64; 3]; N],
