@@ -154,7 +154,12 @@ def command(*arguments: str) -> list[str]:
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
 def test_a_process_that_is_asked_to_end_leaves_nothing(number: signal.Signals, status: int, tmp_path: Path) -> None:
-    running = subprocess.Popen(command("demo", "-o", str(tmp_path / "demo")), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def heed() -> None:
+        """Let the signal end the process, whatever started the tests ignores."""
+        signal.signal(number, signal.SIG_DFL)
+
+    piped = subprocess.PIPE
+    running = subprocess.Popen(command("demo", "-o", str(tmp_path / "demo")), stdout=piped, stderr=piped, text=True, preexec_fn=heed)
     time.sleep(3.0)
     running.send_signal(number)
     start = time.monotonic()
