@@ -106,6 +106,7 @@ def test_a_wrong_setup_is_named_in_one_line(
 
 def test_the_right_setup_is_not_questioned(session: Path) -> None:
     refuse_wrong_setup(armrs.load_dataset(session))
+    assert [p.text for p in armrs.check_dataset(session).problems if p.level == "error"] == []
 
 
 def test_check_names_a_wrong_setup_and_the_one_trial_that_is_wrong(session: Path, tmp_path: Path) -> None:

@@ -63,6 +63,10 @@ impl<const N: usize> Session<N> {
             let e = found.parameters.iter().find(own);
             e.map_or((0.0, f64::INFINITY), |e| (e.value, e.std))
         };
+        let still = match self.comparison {
+            ComparisonMode::Led => self.hardly_moving(),
+            ComparisonMode::Torque => [false; N],
+        };
         let mut place = 0;
         for column in &columns {
             let (value, sd) = estimate(place);
@@ -90,7 +94,7 @@ impl<const N: usize> Session<N> {
             }
             passive.likely = size > 0.0 && size > LIKELY * sd;
             passive.effect.parameters[0] = if passive.likely { size } else { 0.0 };
-            if self.comparison == ComparisonMode::Led && self.hardly_moves(column.joint) {
+            if still[column.joint] {
                 self.hold(&mut passive);
             }
             self.base.push(passive);
@@ -151,23 +155,28 @@ impl<const N: usize> Session<N> {
         0.5 * (low + high)
     }
 
-    /// Whether a joint stays where it is in all fit trials but for noise. In one of them a sensor may slip.
-    pub fn hardly_moves(&self, joint: usize) -> bool {
+    /// Which joints stay where they are in all fit trials but for noise. In one of them a sensor may slip.
+    fn hardly_moving(&self) -> [bool; N] {
         /// Range of the angle in the common band \[rad\].
         const STILL: f64 = 0.01;
         let fit = self.fit_trials();
-        let moving = fit.iter().filter(|&&trial| {
-            let Ok(course) = self.course(trial) else {
-                return true;
-            };
-            let angles = std::iter::zip(&course.seen[joint], &course.counted);
-            let counted = angles.filter(|(_, counted)| **counted).map(|(q, _)| *q);
-            let (low, high) = counted.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
-                (a.min(q), b.max(q))
-            });
-            high - low > STILL
-        });
-        moving.count() <= usize::from(fit.len() > 1)
+        let mut moving = [0; N];
+        for &trial in &fit {
+            let course = self.course(trial);
+            for (joint, count) in moving.iter_mut().enumerate() {
+                let range = course.as_ref().map_or(f64::INFINITY, |course| {
+                    let angles = std::iter::zip(&course.seen[joint], &course.counted);
+                    let counted = angles.filter(|(_, counted)| **counted).map(|(q, _)| *q);
+                    let (low, high) = counted
+                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
+                            (a.min(q), b.max(q))
+                        });
+                    high - low
+                });
+                *count += usize::from(range > STILL);
+            }
+        }
+        moving.map(|count| count <= usize::from(fit.len() > 1))
     }
 
     /// Makes of a law of a joint that hardly moves what holds it: friction that sticks, larger than any torque that it must hold. How

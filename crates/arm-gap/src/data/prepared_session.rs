@@ -118,8 +118,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
-    /// The most of some fitted trials, by their places among them, that have the same samples, and these samples.
-    pub(crate) fn agreeing(&self, members: &[usize]) -> Option<(Vec<usize>, ValidSegments)> {
+    /// The most of the fitted trials of a movement, by their places among them, that have the same samples, and these samples.
+    pub(crate) fn agreeing(&self, group: usize) -> Option<(Vec<usize>, ValidSegments)> {
+        let members: Vec<usize> = (0..self.fitted.len())
+            .filter(|&m| self.group_of[self.fitted[m]] == group)
+            .collect();
         let all: Vec<_> = members
             .iter()
             .map(|&m| &self.valid_segments[self.fitted[m]])

@@ -43,10 +43,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// The repeats of every movement that has some, without trials that differ from theirs by far more than trials usually do.
     pub(crate) fn repeats(&self, point: &LinearizationPoint<N>) -> Vec<Repeats> {
         let of_group = |group: usize| {
-            let members: Vec<usize> = (0..self.fitted.len())
-                .filter(|&m| self.group_of[self.fitted[m]] == group)
-                .collect();
-            let (members, samples) = self.agreeing(&members)?;
+            let (members, samples) = self.agreeing(group)?;
             let trials = members
                 .iter()
                 .map(|&m| flat(&point.residuals[m], &samples))

@@ -90,7 +90,7 @@ impl<const N: usize> Session<N> {
 }
 
 /// Whether an effect is dry friction that is set-valued.
-fn is_rubbing(effect: &Effect<f64>) -> bool {
+pub(crate) fn is_rubbing(effect: &Effect<f64>) -> bool {
     effect.on && effect.is_dry() && effect.parameters[0] > 0.0
 }
 

@@ -29,13 +29,7 @@ pub fn lack_of_fit<const N: usize>(
     let (mut common, mut common_dof, mut trial_specific, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
     let mut runs = Vec::new();
     for group in 0..prepared.references.len() {
-        let members: Vec<usize> = (0..prepared.fitted.len())
-            .filter(|&m| {
-                let trial = prepared.fitted[m];
-                prepared.group_of[trial] == group
-            })
-            .collect();
-        let Some((members, valid_segments)) = prepared.agreeing(&members) else {
+        let Some((members, valid_segments)) = prepared.agreeing(group) else {
             continue;
         };
         let valid_segments = &valid_segments;

@@ -16,7 +16,7 @@ use crate::selection::model_selection::{Alternative, Named};
 use crate::selection::search_state::Settled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
-/// Square of the same beyond which a law stays once it was refitted by simulation: 2 standard deviations,
+/// Square of the standard deviations from zero beyond which a law stays once it was refitted by simulation, 2,
 const STAYS: f64 = 4.0;
 /// and what it must gain to be named, 3: with nine such laws an arm without any has a false name in one of eighty sessions.
 pub(crate) const NAMED: f64 = 9.0;

@@ -215,13 +215,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             .iter()
             .map(|&t| self.valid_segments[t].rows_per_channel(channels));
         let rows: usize = told.flatten().sum();
-        let bent = |c: &&Coordinate| match (c.target, c.prior) {
+        let bent = |c: &Coordinate| match (c.target, c.prior) {
             (Target::Calibration(_), Some((mean, sd))) => {
                 (fitted.hypothesis.get(c.target) - mean).abs() > BENT * sd
             }
             _ => false,
         };
-        let is_bent = point.coordinates.iter().any(|c| bent(&c));
+        let is_bent = point.coordinates.iter().any(bent);
         if fitted.cost < MUCH * rows as f64 && !is_bent {
             return (fitted, point);
         }

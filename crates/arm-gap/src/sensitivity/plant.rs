@@ -9,6 +9,7 @@ use arm_sim::{HandlePath, SimulationError};
 
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::start::is_rubbing;
 
 /// What moves a led arm, besides its own state.
 pub(super) struct Plant<const N: usize> {
@@ -36,9 +37,7 @@ impl<const N: usize> Plant<N> {
         Ok(Self {
             chain: setup.chain()?,
             contact: setup.contact,
-            dry: resisting
-                .iter()
-                .any(|e| e.is_dry() && e.parameters[0] > 0.0),
+            dry: resisting.iter().any(is_rubbing),
             feels_force: setup.base_motion != [0.0; 2]
                 || resisting.iter().any(|e| e.kind.feels_force()),
             setup,
