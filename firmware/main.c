@@ -113,9 +113,6 @@ static int set_up(void) {
 
   armrs_settings settings;
   if (armrs_estimator_settings(&settings, &arm, PERIOD) != ARMRS_OK) return 1;
-  settings.cutoff = (armrs_real)10;
-  settings.forgetting = (armrs_real)120;
-  for (size_t j = 0; j < ARMRS_JOINTS; j++) settings.noise[j] = (armrs_real)0.03;
   if (armrs_estimator_init(&estimator, &arm, (armrs_real)0.1, &settings, 0) != ARMRS_OK) return 1;
 
   /* Angles, speeds, forces, power into the arm. */

@@ -655,7 +655,7 @@ ARMRS_MUST_USE
 armrs_status armrs_estimator_health(const struct armrs_estimator *estimator,
                                     struct armrs_health *health);
 
-// Makes a monitor of `count` channels, 1 to ARMRS_CHANNELS; the others are not watched, but their values must be finite.
+// Makes a monitor of `count` channels, 1 to ARMRS_CHANNELS; of the others no value is read.
 // `oldest`: greatest age of the data that is allowed [us]. `period`: longest time from one check to the next [us], usually two
 // control periods. `problem`, if not null, says what was refused.
 //

@@ -111,7 +111,7 @@ type Core = Monitor<armrs_real, ARMRS_CHANNELS>;
 
 held!(armrs_monitor holds Core, b"monit0.1");
 
-/// Makes a monitor of `count` channels, 1 to ARMRS_CHANNELS; the others are not watched, but their values must be finite.
+/// Makes a monitor of `count` channels, 1 to ARMRS_CHANNELS; of the others no value is read.
 /// `oldest`: greatest age of the data that is allowed [us]. `period`: longest time from one check to the next [us], usually two
 /// control periods. `problem`, if not null, says what was refused.
 ///
@@ -151,7 +151,7 @@ pub unsafe extern "C" fn armrs_monitor_init(
                 .farthest(any(given.farthest));
             channel.frozen_after = (given.frozen_after > 0).then_some(given.frozen_after);
         }
-        monitor.keep(&Monitor::new(kept, Times { oldest, period })?);
+        monitor.keep(&Monitor::new(kept, Times { oldest, period })?.watching(count)?);
         Ok(())
     };
     // SAFETY: as promised by the caller.

@@ -3,7 +3,7 @@
 use core::array::from_fn;
 
 use crate::effect::Motion;
-use crate::equation::Equation;
+use crate::equation::{Equation, Needed};
 use crate::scalar::Real;
 use crate::{Invalid, Joints, check, joints};
 
@@ -78,7 +78,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
     ///
     /// * `memory` - the state of each effect; zeros where none has any
     pub fn carry(&self, motion: &Motion<T, N>, memory: &[T; E]) -> GravityCompensation<T, N> {
-        let rows = self.equation.carrying(motion, memory);
+        let mut rows = Needed::none();
+        self.equation.add_carrying(motion, memory, &mut rows);
         let deviation = |row: &[T; P]| {
             let mut sum = T::ZERO;
             for k in 0..P {

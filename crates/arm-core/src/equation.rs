@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::effect::{ActsOn, Effect, Motion, Place, advance_states, resisting_torque};
+use crate::effect::{ActsOn, Effect, Motion, Place, advance_states, any_state, resisting_torque};
 use crate::scalar::Real;
 use crate::{
     Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, regressor, static_torque,
@@ -46,6 +46,8 @@ pub struct Equation<T, const N: usize, const P: usize, const E: usize> {
     linear: [usize; E],
     used: usize,
     feels_force: bool,
+    /// Whether some effect has a state of its own.
+    remembers: bool,
 }
 
 /// One row a joint: `columns · unknowns + known` is the torque that the motion needs \[N m\].
@@ -58,13 +60,32 @@ pub struct Needed<T, const N: usize, const P: usize> {
 }
 
 impl<T: Scalar, const N: usize, const P: usize> Needed<T, N, P> {
+    /// No torque.
+    #[inline]
+    pub(crate) fn none() -> Self {
+        Self {
+            columns: [[T::ZERO; P]; N],
+            known: joints([T::ZERO; N]),
+        }
+    }
+
     /// The torques at values of the unknowns \[N m\].
     #[inline]
     pub fn torque(&self, unknowns: &[T; P]) -> Joints<T, N> {
-        joints(from_fn(|j| {
-            let columns = self.columns[j].iter().zip(unknowns);
-            columns.fold(self.known[j], |sum, (&c, &x)| sum + c * x)
-        }))
+        self.torque_of(|i| unknowns[i])
+    }
+
+    /// The same of values that are asked for by the number of the unknown.
+    #[inline]
+    pub(crate) fn torque_of(&self, unknown: impl Fn(usize) -> T) -> Joints<T, N> {
+        let mut sums = self.known;
+        for i in 0..P {
+            let value = unknown(i);
+            for j in 0..N {
+                sums[j] += self.columns[j][i] * value;
+            }
+        }
+        sums
     }
 }
 
@@ -77,6 +98,17 @@ pub struct Measured<T, const N: usize> {
     pub force_on_arm: [T; 2],
     /// Moment on the arm at its tip \[N m\].
     pub moment_on_arm: T,
+}
+
+impl<T: Scalar, const N: usize> Measured<T, N> {
+    /// Nothing acts.
+    pub fn none() -> Self {
+        Self {
+            torque: joints([T::ZERO; N]),
+            force_on_arm: [T::ZERO; 2],
+            moment_on_arm: T::ZERO,
+        }
+    }
 }
 
 impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P, E> {
@@ -112,6 +144,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
             effects,
             linear: leading,
             used,
+            remembers: any_state(&effects),
             feels_force: effects.iter().any(|e| e.on && e.kind.feels_force()),
         })
     }
@@ -233,90 +266,113 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         memory: &[T; E],
         measured: &Measured<T, N>,
     ) -> (Needed<T, N, P>, Joints<T, N>) {
+        let mut rows = Needed::none();
+        let acting = self.add_needed(motion, memory, measured, &mut rows);
+        (rows, acting)
+    }
+
+    /// [`Equation::needed`], into rows that hold nothing yet; what acts.
+    #[inline]
+    pub(crate) fn add_needed(
+        &self,
+        motion: &Motion<T, N>,
+        memory: &[T; E],
+        measured: &Measured<T, N>,
+        rows: &mut Needed<T, N, P>,
+    ) -> Joints<T, N> {
         let pose = Pose::new(&motion.q);
-        let mut seen = *motion;
+        self.add_inertial(&pose, [&motion.qd, &motion.qdd], rows);
         if self.feels_force() {
             let moving = (&motion.qd, &motion.qdd);
             let force = joint_force(&self.chain, &pose, moving, measured.force_on_arm);
-            seen = seen.with_joint_force(&force);
+            self.add_effects(&motion.with_joint_force(&force), memory, rows);
+        } else {
+            self.add_effects(motion, memory, rows);
         }
-        let mut rows = self.inertial(&pose, &motion.qd, &motion.qdd);
-        self.add_effects(&seen, memory, &mut rows);
         let acting = static_torque(
             &self.chain,
             &pose,
             measured.force_on_arm,
             measured.moment_on_arm,
         );
-        (rows, joints(from_fn(|j| acting[j] + measured.torque[j])))
+        joints(from_fn(|j| acting[j] + measured.torque[j]))
     }
 
     /// The torques that carry the arm: its weight, and what its effects resist with at this motion. Inertia is left out.
     pub fn carrying(&self, motion: &Motion<T, N>, memory: &[T; E]) -> Needed<T, N, P> {
-        let rest = joints([T::ZERO; N]);
-        let pose = Pose::new(&motion.q);
-        let mut rows = self.inertial(&pose, &rest, &rest);
-        self.add_effects(motion, memory, &mut rows);
+        let mut rows = Needed::none();
+        self.add_carrying(motion, memory, &mut rows);
         rows
+    }
+
+    /// [`Equation::carrying`], into rows that hold nothing yet.
+    #[inline]
+    pub(crate) fn add_carrying(
+        &self,
+        motion: &Motion<T, N>,
+        memory: &[T; E],
+        rows: &mut Needed<T, N, P>,
+    ) {
+        // The regressor of an arm at rest.
+        let pose = Pose::new(&motion.q);
+        let [gy, gz] = self.chain.gravity;
+        for k in 0..N {
+            let x = gy * pose.sin[k] - gz * pose.cos[k];
+            let h = (gy * pose.cos[k] + gz * pose.sin[k]) * self.chain.h[k];
+            for j in 0..=k {
+                rows.known[j] += h;
+                if k < P {
+                    rows.columns[j][k] = x;
+                }
+            }
+        }
+        self.add_effects(motion, memory, rows);
     }
 
     /// The states of the effects one period later, the motion taken as constant in it.
     /// No period and no speed makes a state run away, see [`advance_states`].
     pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [T; E], period: T) {
-        advance_states(&self.effects, (motion, motion), memory, period);
+        if self.remembers {
+            advance_states(&self.effects, (motion, motion), memory, period);
+        }
     }
 
-    fn inertial(
+    #[inline(never)]
+    fn add_inertial(
         &self,
         pose: &Pose<T, N>,
-        qd: &Joints<T, N>,
-        qdd: &Joints<T, N>,
-    ) -> Needed<T, N, P> {
+        [qd, qdd]: [&Joints<T, N>; 2],
+        rows: &mut Needed<T, N, P>,
+    ) {
         let y = regressor(&self.chain, pose, qd, qdd);
-        let mut columns = [[T::ZERO; P]; N];
-        let mut known = [T::ZERO; N];
         for j in 0..N {
             let moments = (0..N).map(|k| y.x[(j, k)]);
             let inertias = (0..N).map(|k| y.j[(j, k)]);
-            for (place, value) in columns[j].iter_mut().zip(moments.chain(inertias)) {
+            for (place, value) in rows.columns[j].iter_mut().zip(moments.chain(inertias)) {
                 *place = value;
             }
-            known[j] = self.chain.rotor[j] * qdd[j];
+            let mut known = self.chain.rotor[j] * qdd[j];
             for k in 0..N {
-                known[j] += y.h[(j, k)] * self.chain.h[k];
+                known += y.h[(j, k)] * self.chain.h[k];
             }
-        }
-        Needed {
-            columns,
-            known: joints(known),
+            rows.known[j] = known;
         }
     }
 
+    #[inline(never)]
     fn add_effects(&self, motion: &Motion<T, N>, memory: &[T; E], rows: &mut Needed<T, N, P>) {
         let mut column = 2 * N;
-        let effects = self.effects.iter().zip(&self.linear).zip(memory);
-        for ((effect, &count), &state) in effects.filter(|((e, _), _)| e.on) {
+        for ((effect, &count), &state) in self.effects.iter().zip(&self.linear).zip(memory) {
+            if !effect.on {
+                continue;
+            }
             if count == 0 {
                 let one = core::slice::from_ref(effect);
                 rows.known += resisting_torque(one, motion, &[state]);
-                continue;
+            } else {
+                effect.add_columns(motion, state, column, &mut rows.columns);
+                column += count;
             }
-            let crosses = effect.kind.crosses() && effect.index > 0;
-            let share = effect.proximal_share();
-            let gradient = effect.gradient(&motion.local(effect.index, state));
-            let mut add = |joint: usize, share: T| {
-                if let Some(row) = rows.columns.get_mut(joint) {
-                    let places = row.iter_mut().skip(column).take(count);
-                    for (place, &value) in places.zip(&gradient) {
-                        *place = share * value;
-                    }
-                }
-            };
-            add(effect.index, T::ONE);
-            if crosses {
-                add(effect.index - 1, share);
-            }
-            column += count;
         }
     }
 }

@@ -189,6 +189,8 @@ pub struct Monitor<T, const C: usize> {
     /// flips is seen for certain.
     sums: [u32; C],
     next: usize,
+    /// How many channels are watched, from the first one on.
+    watched: usize,
     last: Option<Seen<T, C>>,
     stop: Option<Stop<T>>,
 }
@@ -219,12 +221,36 @@ impl<T: Real, const C: usize> Monitor<T, C> {
             }
         }
         Ok(Self {
-            sums: from_fn(|i| sum_of(&channels[i], &times)),
+            sums: from_fn(|i| sum_of(&channels[i], &times, C)),
             next: 0,
+            watched: C,
             channels,
             times,
             last: None,
             stop: None,
+        })
+    }
+
+    /// The same monitor of fewer channels: those before `count`. Of the others no value is read.
+    ///
+    /// # Errors
+    /// [`Invalid`] for no channel, and for more than there are.
+    pub fn watching(self, count: usize) -> Result<Self, Invalid> {
+        at_least_one("number of channels", count as u64)?;
+        if count > C {
+            return Err(Invalid::OutOfRange {
+                name: "number of channels",
+                index: 0,
+                found: count as f64,
+                min: 1.0,
+                max: C as f64,
+            });
+        }
+        let sums = from_fn(|i| sum_of(&self.channels[i], &self.times, count));
+        Ok(Self {
+            sums,
+            watched: count,
+            ..self
         })
     }
 
@@ -269,8 +295,13 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     /// A limit that is not what it was. One channel in each period.
     fn memory_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
         let index = self.next;
-        self.next = if index + 1 < C { index + 1 } else { 0 };
-        let found = self.channels.get(index).map(|c| sum_of(c, &self.times));
+        self.next = if index + 1 < self.watched {
+            index + 1
+        } else {
+            0
+        };
+        let channel = self.channels.get(index);
+        let found = channel.map(|c| sum_of(c, &self.times, self.watched));
         (found != self.sums.get(index).copied()).then_some(Stop {
             reason: Reason::Memory,
             channel: Some(index),
@@ -321,7 +352,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         let passed: T = seconds(seen.stamp.saturating_sub(last.stamp));
         (last.now, last.stamp) = (seen.now, seen.stamp);
         let mut found = None;
-        for index in 0..C {
+        for index in 0..self.watched.min(C) {
             let (channel, value) = (&self.channels[index], seen.values[index]);
             let moved = (value - last.values[index]).abs();
             let before = last.values[index];
@@ -362,10 +393,10 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     }
 }
 
-/// What must not change in memory: the limits of a channel, and the times.
-fn sum_of<T: Real>(channel: &Channel<T>, times: &Times) -> u32 {
+/// What must not change in memory: the limits of a channel, the times, and how many channels are watched.
+fn sum_of<T: Real>(channel: &Channel<T>, times: &Times, watched: usize) -> u32 {
     let limits = [channel.min, channel.max, channel.fastest, channel.farthest];
-    let sum = added(added(0, times.oldest), times.period);
+    let sum = added(added(added(0, watched as u64), times.oldest), times.period);
     let sum = limits
         .iter()
         .fold(sum, |sum, limit| added(sum, limit.bits()));

@@ -20,3 +20,13 @@ mod resources;
 mod shared;
 
 pub use instance::{Handle, guarded};
+
+const MARK: &str = concat!("armrs library for FMUs ", env!("CARGO_PKG_VERSION"), "\0");
+
+/// Names the library and its version in the file, for whoever packs libraries of several machines into one FMU.
+#[unsafe(no_mangle)]
+pub static ARMRS_LIBRARY: [u8; MARK.len()] = {
+    let mut bytes = [0; MARK.len()];
+    bytes.copy_from_slice(MARK.as_bytes());
+    bytes
+};

@@ -7,7 +7,7 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import files
 from ..model import Effect, Model, load_model
+
+if TYPE_CHECKING:
+    from .._armrs import _Firmware
 
 _POSTURES = 12
 """Test vectors."""
@@ -154,7 +157,7 @@ class _Parts:
         model: Model,
         precision: str,
         digest: str,
-        told: dict[str, Any],
+        told: _Firmware,
         effects: list[Effect],
         sd: list[float],
         vectors: np.ndarray,

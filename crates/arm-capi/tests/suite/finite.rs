@@ -307,13 +307,14 @@ fn a_robot_takes_numbers_only() {
 fn a_monitor_takes_numbers_only() {
     let mut monitor: armrs_monitor = empty();
     // SAFETY: all pointers are good.
-    let mut init = |channel: &armrs_channel| unsafe {
-        armrs_monitor_init(&mut monitor, channel, 1, 1000, 2000, null_mut())
+    let mut init = |channels: &[armrs_channel]| unsafe {
+        let (first, count) = (channels.as_ptr(), channels.len());
+        armrs_monitor_init(&mut monitor, first, count, 1000, 2000, null_mut())
     };
     let mut odd = CHANNEL;
     odd.max = armrs_real::NAN;
-    assert_ne!(init(&odd), ARMRS_OK);
-    assert_eq!(init(&CHANNEL), ARMRS_OK);
+    assert_ne!(init(&[odd]), ARMRS_OK);
+    assert_eq!(init(&[CHANNEL; ARMRS_CHANNELS]), ARMRS_OK);
     for bad in NO_NUMBERS {
         for place in [0, ARMRS_CHANNELS - 1] {
             let mut seen: armrs_observation = empty();
@@ -326,6 +327,30 @@ fn a_monitor_takes_numbers_only() {
                 );
                 armrs_monitor_reset(&mut monitor);
             }
+        }
+    }
+}
+
+#[test]
+fn a_monitor_reads_nothing_of_channels_that_it_does_not_watch() {
+    let mut monitor: armrs_monitor = empty();
+    let mut seen: armrs_observation = empty();
+    seen.values[1] = armrs_real::NAN;
+    // SAFETY: all pointers are good.
+    unsafe {
+        let channels = [CHANNEL; 2];
+        for (count, status) in [(1, ARMRS_OK), (2, ARMRS_STOPPED)] {
+            let made = armrs_monitor_init(
+                &mut monitor,
+                channels.as_ptr(),
+                count,
+                1000,
+                2000,
+                null_mut(),
+            );
+            assert_eq!(made, ARMRS_OK);
+            let found = armrs_monitor_check(&mut monitor, &seen, null_mut());
+            assert_eq!(found, status);
         }
     }
 }

@@ -422,40 +422,63 @@ fn a_monitor_watches_something_and_for_some_time() {
     }
 }
 
+/// Whether a monitor of all channels stops when one of its words is not what it was. One channel is compared in each period.
+fn stops(word: usize, change: impl Fn(*mut u32) -> bool) -> Option<bool> {
+    let (mut monitor, mut stop) = (empty::<armrs_monitor>(), empty::<armrs_stop>());
+    let (seen, channels): (armrs_observation, _) = (empty(), [CHANNEL; ARMRS_CHANNELS]);
+    // SAFETY: all pointers are good; only numbers are changed.
+    unsafe {
+        let (first, count) = (channels.as_ptr(), ARMRS_CHANNELS);
+        let status = armrs_monitor_init(&mut monitor, first, count, 1000, 2000, null_mut());
+        assert_eq!(status, ARMRS_OK);
+        if !change((&raw mut monitor).cast::<u32>().add(word)) {
+            return None;
+        }
+        // Before its channel is compared a limit that now excludes the value may stop it.
+        let stopped = (0..ARMRS_CHANNELS)
+            .any(|_| armrs_monitor_check(&mut monitor, &seen, &mut stop) == ARMRS_STOPPED);
+        assert!(!stopped || stop.reason != armrs_reason::ARMRS_REASON_CLOCK);
+        Some(stopped)
+    }
+}
+
 #[test]
 fn a_bit_that_flips_in_a_limit_stops_the_device() {
-    let mut found = 0;
-    let words = size_of::<armrs_monitor>() / 4;
-    for word in 2..words {
+    let (mut limits, mut counts) = (0, 0);
+    let high = size_of::<armrs_real>() / 4 - 1;
+    for word in 2..size_of::<armrs_monitor>() / 4 {
         for bit in [0, 7, 20, 23, 30, 31] {
-            let (mut monitor, mut stop) = (empty::<armrs_monitor>(), empty::<armrs_stop>());
-            let seen: armrs_observation = empty();
-            // SAFETY: all pointers are good; only the limits are changed, which are numbers.
-            unsafe {
-                let status = armrs_monitor_init(&mut monitor, &CHANNEL, 1, 1000, 2000, null_mut());
-                assert_eq!(status, ARMRS_OK);
-                let place = (&raw mut monitor).cast::<u32>().add(word);
+            // SAFETY: the word is one of the monitor.
+            let of_limit = stops(word, |place| unsafe {
                 let value = (place as *const armrs_real).read_unaligned();
-                let aligned = word % (size_of::<armrs_real>() / 4) == 0;
-                if !(aligned && (value.abs() == 1.0 || value.is_infinite())) {
-                    continue;
+                let limit = word % (high + 1) == 0 && (value.abs() == 1.0 || value.is_infinite());
+                if limit {
+                    // The high word of a number.
+                    let high = place.add(high);
+                    high.write(high.read() ^ (1 << bit));
                 }
-                // The high word of a number.
-                let high = place.add(size_of::<armrs_real>() / 4 - 1);
-                high.write(high.read() ^ (1 << bit));
-                // One channel is compared in each period. Before that a limit that now
-                // excludes the value may stop it.
-                let stopped = (0..ARMRS_CHANNELS)
-                    .any(|_| armrs_monitor_check(&mut monitor, &seen, &mut stop) == ARMRS_STOPPED);
-                // Some of what looks like a limit lies in places that are not in use.
-                if stopped {
-                    assert_ne!(stop.reason, armrs_reason::ARMRS_REASON_CLOCK);
-                    found += 1;
+                limit
+            });
+            limits += usize::from(of_limit == Some(true));
+            // SAFETY: the word is one of the monitor.
+            let of_count = stops(word, |place| unsafe {
+                let count = place.read() == ARMRS_CHANNELS as u32;
+                if count {
+                    place.write(place.read() ^ (1 << bit));
                 }
-            }
+                count
+            });
+            counts += usize::from(of_count == Some(true));
+            assert_ne!(of_count, Some(false), "the number of channels");
         }
     }
-    assert_eq!(found, 4 * ARMRS_CHANNELS * 6, "four limits of each channel");
+    // Some of what looks like a limit lies in places that are not in use.
+    assert_eq!(
+        limits,
+        4 * ARMRS_CHANNELS * 6,
+        "four limits of each channel"
+    );
+    assert_eq!(counts, 6, "the number of channels");
 }
 
 #[test]

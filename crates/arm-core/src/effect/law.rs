@@ -128,6 +128,10 @@ pub enum ActsOn {
 }
 
 impl ActsOn {
+    /// Whether a kind at a place has a column in the equation of motion: a torque in a joint, or the rotor there.
+    pub(super) const fn joints(self, place: Place) -> bool {
+        matches!((self, place), (Self::Joints, _) | (_, Place::Joint))
+    }
     /// What an effect at a place acts on unless its law says otherwise.
     const fn at(place: Place) -> Self {
         match place {

@@ -115,6 +115,30 @@ macro_rules! catalogue {
                     Kind::Own(_) => [T::ZERO; MAX_PARAMETERS],
                 }
             }
+            /// Writes the derivatives to the linear parameters, which come first, into the columns from `column` on of all joints
+            /// in which it resists; nothing for an index beyond the arm.
+            #[inline]
+            pub(crate) fn add_columns<const N: usize, const P: usize>(
+                &self,
+                motion: &Motion<T, N>,
+                memory: T,
+                column: usize,
+                rows: &mut [[T; P]; N],
+            ) {
+                match self.kind {
+                    // Of a gradient of which less is read, less is computed.
+                    $(Kind::$law => if <$module::$law as Law>::ACTS_ON.joints(<$module::$law as Law>::INFO.place) {
+                        const LINEAR: usize = linear_parameters(<$module::$law as Law>::INFO.parameters);
+                        let gradient = $module::$law::gradient(&self.parameters, &motion.local(self.index, memory));
+                        write_columns::<T, N, P, LINEAR>(&gradient, self.index, T::ONE, column, rows);
+                        if $module::$law::CROSSES && self.index > 0 {
+                            let share = $module::$law::proximal_share(&self.parameters);
+                            write_columns::<T, N, P, LINEAR>(&gradient, self.index - 1, share, column, rows);
+                        }
+                    })*
+                    Kind::Own(_) => {}
+                }
+            }
             /// Factor with which the same torque also resists in the joint before.
             #[inline]
             pub fn proximal_share(&self) -> T {
@@ -194,6 +218,32 @@ catalogue! {
     force_misalignment::ForceMisalignment,
     angle_offset::AngleOffset,
     time_delay::TimeDelay,
+}
+
+/// How many parameters of a kind its torque is linear in.
+const fn linear_parameters(parameters: &[Parameter]) -> usize {
+    let (mut count, mut i) = (0, 0);
+    while i < parameters.len() {
+        count += parameters[i].linear as usize;
+        i += 1;
+    }
+    count
+}
+
+/// Writes the leading values of a gradient, times a factor, into the row of a joint.
+#[inline(always)]
+fn write_columns<T: Scalar, const N: usize, const P: usize, const LINEAR: usize>(
+    gradient: &Parameters<T>,
+    joint: usize,
+    factor: T,
+    column: usize,
+    rows: &mut [[T; P]; N],
+) {
+    let row = rows.get_mut(joint).and_then(|row| row.get_mut(column..));
+    let places = row.and_then(|row| row.first_chunk_mut::<LINEAR>());
+    for (place, &value) in places.into_iter().flatten().zip(gradient) {
+        *place = factor * value;
+    }
 }
 
 /// An entry of the catalogue, its prose only where that is wanted.

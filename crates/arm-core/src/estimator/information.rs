@@ -1,5 +1,7 @@
 //! Least squares one row at a time: the square root of the information matrix.
 
+use core::array::from_fn;
+
 use crate::scalar::Real;
 
 /// The triangular system `R x = z` whose least-squares solution is the estimate, with `RᵀR = UᵀDU` the inverse covariance.
@@ -14,6 +16,14 @@ pub(crate) struct Information<T, const P: usize> {
     d: [T; P],
     /// `U x = z`.
     z: [T; P],
+}
+
+/// `columns · x = value`, with a weight: one over its variance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Row<T, const P: usize> {
+    pub columns: [T; P],
+    pub value: T,
+    pub weight: T,
 }
 
 impl<T: Real, const P: usize> Information<T, P> {
@@ -40,13 +50,13 @@ impl<T: Real, const P: usize> Information<T, P> {
         }
     }
 
-    /// Takes in `row · x = value`, which has a weight: one over its variance.
-    pub fn absorb(&mut self, row: &[T; P], value: T, weight: T) {
-        self.rotate(*row, value, weight, 0);
-    }
-
-    fn rotate(&mut self, mut row: [T; P], mut value: T, mut weight: T, first: usize) {
-        for i in first..P {
+    /// Takes in what some of the unknowns, `first` to before `end`, have of a row; the row goes on with what is left.
+    // Once in the code: its loop is what a period of a device costs.
+    #[inline(never)]
+    pub fn absorb(&mut self, taken: &mut Row<T, P>, first: usize, end: usize) {
+        let (mut value, mut weight) = (taken.value, taken.weight);
+        let row = &mut taken.columns;
+        for i in first..end.min(P) {
             let own = row[i];
             if own == T::ZERO {
                 continue;
@@ -57,14 +67,15 @@ impl<T: Real, const P: usize> Information<T, P> {
             let gain = pushed * reciprocal;
             weight = weight * (self.d[i] * reciprocal);
             self.d[i] = sum;
-            for k in i + 1..P {
-                let left = row[k] - own * self.u[i][k];
-                self.u[i][k] += gain * left;
-                row[k] = left;
+            for (r, u) in beyond(row, i).iter_mut().zip(beyond(&mut self.u[i], i)) {
+                let left = *r - own * *u;
+                *u += gain * left;
+                *r = left;
             }
             value -= own * self.z[i];
             self.z[i] += gain * value;
         }
+        (taken.value, taken.weight) = (value, weight);
     }
 
     /// Makes all that is known weaker by a factor of its weights.
@@ -75,16 +86,17 @@ impl<T: Real, const P: usize> Information<T, P> {
     }
 
     /// The estimate.
-    pub fn solve(&self) -> [T; P] {
-        let mut x = self.z;
+    #[inline(never)]
+    pub fn solve(&self, x: &mut [T; P]) {
+        *x = self.z;
         for i in (0..P).rev() {
             let mut value = x[i];
-            for k in i + 1..P {
-                value -= self.u[i][k] * x[k];
+            let row = self.u[i].get(i + 1..).unwrap_or_default();
+            for (&x, &u) in beyond(x, i).iter().zip(row) {
+                value -= u * x;
             }
             x[i] = value;
         }
-        x
     }
 
     /// Sets one unknown to a value; the others become the best under this condition.
@@ -97,27 +109,46 @@ impl<T: Real, const P: usize> Information<T, P> {
             self.u[i][unknown] = T::ZERO;
         }
         // Without its column, the unknown's own row is one more row for those that follow.
-        let (row, value) = (self.u[unknown], self.z[unknown] - to);
-        self.rotate(row, value, self.d[unknown], unknown + 1);
+        let mut row = Row {
+            columns: self.u[unknown],
+            value: self.z[unknown] - to,
+            weight: self.d[unknown],
+        };
+        self.absorb(&mut row, unknown + 1, P);
         self.u[unknown] = [T::ZERO; P];
         self.z[unknown] = to;
     }
 
-    /// Standard deviation of a weighted sum of the unknowns, `‖R⁻ᵀ w‖`.
-    pub fn deviation(&self, weights: &[T; P]) -> T {
-        let mut w = *weights;
-        let mut sum = T::ZERO;
-        for i in 0..P {
-            let own = w[i];
-            if own == T::ZERO {
-                continue;
+    /// Standard deviations of weighted sums of the unknowns, `‖R⁻ᵀ w‖` each; the weights are spent.
+    ///
+    /// Two columns of `U` in one loop, whose sums stay in registers.
+    pub fn deviations<const N: usize>(&self, w: &mut [[T; P]; N]) -> [T; N] {
+        let mut sums = [T::ZERO; N];
+        let mut k = 0;
+        while k < P {
+            // The last of an odd number stands beside itself.
+            let next = if k + 1 < P { k + 1 } else { k };
+            let mut here: [T; N] = from_fn(|j| w[j][k]);
+            let mut there: [T; N] = from_fn(|j| w[j][next]);
+            for i in 0..k {
+                let [u, v] = [self.u[i][k], self.u[i][next]];
+                for j in 0..N {
+                    here[j] -= u * w[j][i];
+                    there[j] -= v * w[j][i];
+                }
             }
-            sum += own.squared() / self.d[i];
-            for k in i + 1..P {
-                w[k] -= self.u[i][k] * own;
+            for j in 0..N {
+                w[j][k] = here[j];
+                sums[j] += here[j].squared() / self.d[k];
+                if next > k {
+                    there[j] -= self.u[k][next] * here[j];
+                    w[j][next] = there[j];
+                    sums[j] += there[j].squared() / self.d[next];
+                }
             }
+            k += 2;
         }
-        sum.sqrt()
+        sums.map(T::sqrt)
     }
 
     /// One over the variance of an unknown, were those that follow it known; it serves to compare unknowns of different
@@ -125,13 +156,10 @@ impl<T: Real, const P: usize> Information<T, P> {
     pub fn sharpness(&self, unknown: usize) -> T {
         self.d.get(unknown).copied().unwrap_or(T::ZERO)
     }
+}
 
-    /// Standard deviation of one unknown.
-    pub fn deviation_of(&self, unknown: usize) -> T {
-        let mut weights = [T::ZERO; P];
-        if let Some(weight) = weights.get_mut(unknown) {
-            *weight = T::ONE;
-        }
-        self.deviation(&weights)
-    }
+/// What stands behind the place `i` of an array.
+#[inline(always)]
+fn beyond<T, const P: usize>(values: &mut [T; P], i: usize) -> &mut [T] {
+    values.get_mut(i + 1..).unwrap_or_default()
 }

@@ -13,8 +13,10 @@ mod channel;
 mod estimate;
 mod information;
 mod sample;
+mod schedule;
 mod settings;
 mod window;
+mod work;
 
 pub use channel::Fault;
 pub use estimate::{Decision, Estimate, Health};
@@ -22,7 +24,8 @@ pub use sample::{Sample, SampleStatus};
 pub use settings::Settings;
 
 use channel::{Channel, Smooth};
-use information::Information;
+use information::{Information, Row};
+use schedule::Work;
 use settings::Tuning;
 use window::Window;
 
@@ -30,37 +33,12 @@ use core::array::from_fn;
 
 use crate::compensation::GravityCompensation;
 use crate::effect::Motion;
-use crate::equation::{Equation, Measured, Prior};
+use crate::equation::{Equation, Measured, Needed, Prior};
 use crate::scalar::Real;
 use crate::{Invalid, joints};
 
-/// Share of the prior's variance that the data must have taken away before an unknown counts as identified.
-const MEASURED: f64 = 0.9;
-/// Windows over which the size of the residual is averaged.
-const LONG: f64 = 100.0;
-/// Largest correlation between neighbouring windows that is believed.
-const MOST_CORRELATED: f64 = 0.9;
 /// Rows over which the usual size of the unexplained torque is averaged.
 const USUAL: f64 = 50.0;
-
-/// What is left to do with a full window.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Work {
-    /// Nothing.
-    Idle,
-    /// To wait for so many periods.
-    Wait(u32),
-    /// To forget, and to bring back one prior row.
-    Forget,
-    /// To take in the row of a joint.
-    Row(usize),
-    /// To prepare what the bounds change.
-    Copy,
-    /// To solve; once more for each unknown that is fixed to a bound.
-    Solve,
-    /// To say how certain an unknown is.
-    Deviation(usize),
-}
 
 /// Identifies `P` unknowns of an arm of `N` joints and `E` effects while it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,15 +70,21 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     window: Window<T, N, P>,
     full: Window<T, N, P>,
     work: Work,
+    /// The row that is being taken in.
+    row: Option<Row<T, P>>,
     information: Information<T, P>,
     /// The same with unknowns fixed to their bounds.
     bounded: Information<T, P>,
     fixed: [bool; P],
+    /// The last that was solved for.
+    solution: [T; P],
     prior_row: usize,
     /// Running means of squared residuals and of products of neighbouring ones, in units of the noise; windows so far.
     residual: [T; 2],
     last_residual: [Option<T>; N],
     windows: T,
+    /// See [`Estimator::excess`].
+    excess: T,
     estimates: [Estimate<T>; P],
 }
 
@@ -141,13 +125,16 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             window: Window::EMPTY,
             full: Window::EMPTY,
             work: Work::Idle,
+            row: None,
             information,
             bounded: information,
             fixed: [false; P],
+            solution: [T::ZERO; P],
             prior_row: 0,
             residual: [T::ZERO; 2],
             last_residual: [None; N],
             windows: T::ZERO,
+            excess: T::ONE,
             estimates,
         })
     }
@@ -172,10 +159,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     /// How much larger the standard deviations are than the noise that was declared would make them: by residuals that are
     /// larger, and by neighbouring ones that resemble each other. Never below one.
     pub fn excess(&self) -> T {
-        let [square, product] = self.residual;
-        let alike = T::if_less(T::ZERO, square, product / square, T::ZERO);
-        let alike = alike.max(T::ZERO).min(T::of(MOST_CORRELATED));
-        (square.max(T::ONE) * (T::ONE + alike) / (T::ONE - alike)).sqrt()
+        self.excess
     }
 
     /// How well it does.
@@ -194,18 +178,17 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     /// With their standard deviation from the covariance of all unknowns. Give a motion without speed for the weight and
     /// the passive moments alone.
     pub fn carry(&self, motion: &Motion<T, N>) -> GravityCompensation<T, N> {
-        let rows = self.equation.carrying(motion, &self.memory);
-        let excess = self.excess();
-        let torque = rows.torque(&self.values());
-        let expected = rows.torque(&self.priors.map(|p| p.mean));
+        let mut rows = Needed::none();
+        self.equation.add_carrying(motion, &self.memory, &mut rows);
+        let torque = rows.torque_of(|i| self.estimates[i].value);
+        let expected = rows.torque_of(|i| self.priors[i].mean);
         let far = |j: usize| (torque[j] - expected[j]).abs();
+        let sd = self.information.deviations(&mut rows.columns);
         GravityCompensation {
             // Not a number is not within.
             within: (0..N).all(|j| far(j) <= self.tuning.envelope[j]),
             torque,
-            sd: joints(from_fn(|j| {
-                excess * self.information.deviation(&rows.columns[j])
-            })),
+            sd: joints(sd.map(|sd| self.excess * sd)),
         }
     }
 
@@ -226,17 +209,17 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     fn step(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
-        let sensed = self.sense(sample);
+        let mut motion = Motion::new(T::ZERO, joints([T::ZERO; N]), joints([T::ZERO; N]));
+        let mut measured = Measured::none();
+        let sensed = self.sense(sample, &mut motion, &mut measured);
         self.since_row = self.since_row.saturating_add(1);
         let due = self.since_row >= self.tuning.stride && sensed.is_ok();
         // A row and the work on the last window take turns, so that no period has both.
         if self.tuning.stride == 1 || !due {
-            for _ in 0..self.tuning.pace_of_work {
-                self.work();
-            }
+            self.work();
         }
         let fault = match sensed {
-            Ok((motion, measured)) => return self.learn(&motion, &measured, due),
+            Ok(()) => return self.learn(&motion, &measured, due),
             Err(heed) => heed,
         };
         if fault == SampleStatus::Refused(Fault::Frozen) {
@@ -251,10 +234,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     /// Checks and filters a sample.
+    #[inline]
     fn sense(
         &mut self,
         sample: Option<&Sample<T, N>>,
-    ) -> Result<(Motion<T, N>, Measured<T, N>), SampleStatus> {
+        motion: &mut Motion<T, N>,
+        measured: &mut Measured<T, N>,
+    ) -> Result<(), SampleStatus> {
         // A lead that comes or goes is another sensor.
         if !self.running || sample.is_some_and(|s| s.lead.is_some() != self.led) {
             return Err(self.start(sample));
@@ -293,21 +279,16 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let [angles, leads, torques] = &mut self.joints;
         let leads = if self.led { leads } else { &mut *angles };
         let rates: [[T; 2]; N] = from_fn(|j| leads[j].rates(&lead[j], cutoff));
-        let mut motion = Motion::new(
-            T::ZERO,
-            joints(from_fn(|j| angles[j].value(&angle[j], cutoff))),
-            joints(rates.map(|[rate, _]| rate * pace)),
-        );
+        motion.q = joints(from_fn(|j| angles[j].value(&angle[j], cutoff)));
+        motion.qd = joints(rates.map(|[rate, _]| rate * pace));
         motion.qdd = joints(rates.map(|[_, rate]| rate * pace.squared()));
-        let measured = Measured {
-            torque: joints(from_fn(|j| torques[j].value(&torque[j], cutoff))),
-            force_on_arm: from_fn(|c| self.hand[c].value(&hand[c], cutoff)),
-            moment_on_arm: self.hand[2].value(&hand[2], cutoff),
-        };
+        measured.torque = joints(from_fn(|j| torques[j].value(&torque[j], cutoff)));
+        measured.force_on_arm = from_fn(|c| self.hand[c].value(&hand[c], cutoff));
+        measured.moment_on_arm = self.hand[2].value(&hand[2], cutoff);
         self.moving = motion.qd.iter().any(|qd| qd.abs() > self.tuning.dead_band);
         self.equation
-            .advance(&motion, &mut self.memory, self.tuning.period);
-        if !self.finite(&motion, &measured) {
+            .advance(motion, &mut self.memory, self.tuning.period);
+        if !self.finite(motion, measured) {
             self.restart();
             return Err(SampleStatus::Refused(Fault::Restarted));
         }
@@ -318,7 +299,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             self.settling -= 1;
             return Err(SampleStatus::Settling);
         }
-        Ok((motion, measured))
+        Ok(())
     }
 
     /// Whether nothing that is filtered has become NaN or infinite.
@@ -399,8 +380,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> SampleStatus {
-        let (rows, acting) = self.equation.needed(motion, &self.memory, measured);
-        let expected = rows.torque(&self.values());
+        let mut rows = Needed::none();
+        let acting = self
+            .equation
+            .add_needed(motion, &self.memory, measured, &mut rows);
+        let expected = rows.torque_of(|i| self.estimates[i].value);
         let rest: [T; N] = from_fn(|j| (acting[j] - expected[j]).abs());
         // What is still uncertain may show at any time; correlations would only lessen it.
         let doubt = |j: usize| {
@@ -437,155 +421,6 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 self.work = Work::Wait(self.tuning.quarantine);
             }
             self.window = Window::EMPTY;
-        }
-    }
-
-    /// One unit of work on the full window.
-    fn work(&mut self) {
-        self.work = match self.work {
-            Work::Idle => Work::Idle,
-            Work::Wait(0) => Work::Forget,
-            Work::Wait(periods) => Work::Wait(periods - 1),
-            Work::Forget => {
-                if self.tuning.fade < T::ONE {
-                    self.forget();
-                }
-                Work::Row(0)
-            }
-            Work::Row(j) => {
-                if let Some((row, value, weight)) = self.full.mean(j, &self.tuning) {
-                    self.information.absorb(&row, value, weight);
-                }
-                if j + 1 < N {
-                    Work::Row(j + 1)
-                } else {
-                    Work::Copy
-                }
-            }
-            Work::Copy => {
-                self.bounded = self.information;
-                self.fixed = [false; P];
-                Work::Solve
-            }
-            Work::Solve => self.solve(),
-            Work::Deviation(unknown) => {
-                self.judge(unknown);
-                if unknown + 1 < P {
-                    Work::Deviation(unknown + 1)
-                } else {
-                    Work::Idle
-                }
-            }
-        }
-    }
-
-    fn forget(&mut self) {
-        self.information.fade(self.tuning.fade);
-        let mut row = [T::ZERO; P];
-        let prior = self.priors.get(self.prior_row);
-        if let Some((place, prior)) = row.get_mut(self.prior_row).zip(prior) {
-            *place = T::ONE;
-            let weight = self.tuning.refresh / prior.sd.squared();
-            self.information.absorb(&row, prior.mean, weight);
-        }
-        self.prior_row = if self.prior_row + 1 < P {
-            self.prior_row + 1
-        } else {
-            0
-        };
-    }
-
-    /// Solves, and fixes the unknown that lies farthest outside its bounds; when none does, the values stand.
-    fn solve(&mut self) -> Work {
-        let values = self.bounded.solve();
-        let mut worst: Option<(usize, T)> = None;
-        let mut most = T::ZERO;
-        for i in 0..P {
-            let prior = &self.priors[i];
-            let within = values[i].max(prior.min).min(prior.max);
-            let outside = (values[i] - within).squared() * self.bounded.sharpness(i);
-            if outside > most && !self.fixed[i] {
-                most = outside;
-                worst = Some((i, within));
-            }
-        }
-        if let Some((unknown, to)) = worst {
-            self.bounded.fix(unknown, to);
-            if let Some(fixed) = self.fixed.get_mut(unknown) {
-                *fixed = true;
-            }
-            return Work::Solve;
-        }
-        if !values.iter().all(|value| value.is_finite()) {
-            return self.forget_all();
-        }
-        for i in 0..P {
-            let prior = &self.priors[i];
-            self.estimates[i].value = values[i].max(prior.min).min(prior.max);
-        }
-        self.look_back();
-        Work::Deviation(0)
-    }
-
-    /// Starts anew from the priors: what was learned holds a value that is not finite.
-    #[cold]
-    #[inline(never)]
-    fn forget_all(&mut self) -> Work {
-        self.information
-            .restart(self.priors.iter().map(|p| (p.mean, p.sd)));
-        for (estimate, prior) in self.estimates.iter_mut().zip(&self.priors) {
-            *estimate = Estimate::of_prior(prior);
-        }
-        self.residual = [T::ZERO; 2];
-        self.last_residual = [None; N];
-        self.windows = T::ZERO;
-        self.restart();
-        Work::Idle
-    }
-
-    /// Counts what the new values leave of the window.
-    fn look_back(&mut self) {
-        let values = self.values();
-        self.windows = (self.windows + T::ONE).min(T::of(LONG));
-        let (mut square, mut product, mut count) = (T::ZERO, T::ZERO, T::ZERO);
-        for j in 0..N {
-            let Some((row, value, weight)) = self.full.mean(j, &self.tuning) else {
-                self.last_residual[j] = None;
-                continue;
-            };
-            let rest = row.iter().zip(&values).fold(value, |r, (&c, &x)| r - c * x);
-            square += weight * rest.squared();
-            product += weight * rest * self.last_residual[j].unwrap_or(T::ZERO);
-            count += T::ONE;
-            self.last_residual[j] = Some(rest);
-        }
-        if count > T::ZERO {
-            let share = T::ONE / self.windows;
-            let [old_square, old_product] = self.residual;
-            self.residual = [
-                old_square + share * (square / count - old_square),
-                old_product + share * (product / count - old_product),
-            ];
-        }
-    }
-
-    /// How certain an unknown is, and by what.
-    fn judge(&mut self, unknown: usize) {
-        let sd = self.information.deviation_of(unknown) * self.excess();
-        let places = self
-            .estimates
-            .get_mut(unknown)
-            .zip(self.priors.get(unknown));
-        if let (Some((estimate, prior)), Some(&fixed)) = (places, self.fixed.get(unknown)) {
-            let left = (sd / prior.sd).squared();
-            estimate.sd = sd.min(prior.sd);
-            estimate.decided_by = if fixed {
-                Decision::Bound
-            } else if left < T::of(1.0 - MEASURED) {
-                Decision::Data
-            } else {
-                Decision::Prior
-            };
         }
     }
 }

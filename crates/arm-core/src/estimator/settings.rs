@@ -2,6 +2,7 @@
 
 use super::channel::Cutoff;
 use super::sample::Sample;
+use super::schedule::budget;
 use crate::check::{SMALLEST, at_least_zero, finite, ordered, positive};
 use crate::scalar::Real;
 use crate::{Chain, Invalid};
@@ -124,8 +125,8 @@ pub(super) struct Tuning<T, const N: usize> {
     pub settling: u32,
     /// Periods that a full window waits, so that a sensor found frozen can still spoil it.
     pub quarantine: u32,
-    /// Units of work in each period.
-    pub pace_of_work: u32,
+    /// Multiplications that a period may spend on the last window.
+    pub budget: usize,
     /// Factor of the weight of what was learned, for each window; one to forget nothing.
     pub fade: T,
     /// Share of its weight with which one prior row comes back for each window.
@@ -144,7 +145,7 @@ const ENOUGH: f64 = 0.5;
 const FEWEST_ROWS: u32 = 20;
 
 impl<T: Real, const N: usize> Tuning<T, N> {
-    /// * `unknowns` - how many there are: the work to be spread over a window
+    /// * `unknowns` - how many there are: they make the work that is spread over a window
     pub fn new(s: &Settings<T, N>, unknowns: usize) -> Result<Self, Invalid> {
         let (period, cutoff, window) = (s.period, s.cutoff, s.window);
         positive("control period", 0, s.period)?;
@@ -185,9 +186,8 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             .min(length / FEWEST_ROWS)
             .max(1);
         let rows = length / stride;
-        let quarantine = periods(s.frozen_after / period).min(length / 2);
-        // Rows, forgetting, a copy, a publication, and at most every unknown to its bound and its deviation.
-        let work = (N + 3 + 2 * unknowns) as u32;
+        let frozen = periods(s.frozen_after / period);
+        let quarantine = quarantine(frozen, length);
         // Done in the periods that have no row, if there are such.
         let free = length - quarantine;
         let free = if stride > 1 {
@@ -212,15 +212,25 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             largest: [s.largest_force, s.largest_torque],
             farthest: [s.fastest * s.period, s.steepest * s.period],
             envelope: s.envelope,
-            frozen_after: periods(s.frozen_after / period),
+            frozen_after: frozen,
             longest_gap: periods(T::of(LONGEST_GAP) / period).max(2),
             settling: periods(T::of(SETTLING) / (cutoff * period)),
             quarantine,
-            pace_of_work: work.div_ceil(free.max(1)),
+            budget: budget([N, unknowns], free),
             fade: forgotten,
             // One of the unknowns in turn, so that each comes back at the pace at which it fades.
             refresh: (T::ONE - forgotten) * T::of_count(unknowns as u64),
         })
+    }
+}
+
+/// Periods that a full window waits. Where a sensor is found frozen only after most of a window, waiting does not help: the
+/// windows before are taken in.
+fn quarantine(frozen: u32, length: u32) -> u32 {
+    if frozen <= length / 2 {
+        frozen
+    } else {
+        length / 4
     }
 }
 

@@ -1,5 +1,6 @@
 //! The rows of a few control periods, added up.
 
+use super::information::Row;
 use super::settings::Tuning;
 use crate::scalar::Real;
 
@@ -36,10 +37,11 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
         }
     }
 
-    /// The mean row of a joint and its value, and their weight: one over the variance. `None` with too few rows.
+    /// The mean row of a joint. `None` with too few rows.
     ///
     /// A window with gaps counts less, as a mean of fewer rows does.
-    pub fn mean(&self, joint: usize, tuning: &Tuning<T, N>) -> Option<([T; P], T, T)> {
+    #[inline(never)]
+    pub fn mean(&self, joint: usize, tuning: &Tuning<T, N>) -> Option<Row<T, P>> {
         let count = *self.counts.get(joint)?;
         if count < tuning.enough {
             return None;
@@ -48,6 +50,10 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
         let [count, full] = [count, tuning.rows].map(|n| T::of_count(u64::from(n)));
         let share = T::ONE / count;
         let weight = *tuning.weight.get(joint)? * count / full;
-        Some((columns.map(|c| c * share), value * share, weight))
+        Some(Row {
+            columns: columns.map(|c| c * share),
+            value: value * share,
+            weight,
+        })
     }
 }
