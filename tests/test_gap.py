@@ -18,7 +18,7 @@ from armrs.model import AddedMass
 from armrs.workflows.gap import calibrate, compare
 from armrs.workflows.gap.results import gap_data, write_gap
 from armrs.workflows.gap.shapes import portrait
-from armrs.workflows.gap.suspicion import _still_joints, examine
+from armrs.workflows.gap.suspicion import _still_joints, examine, refuse_mislabelled
 from browser import opened
 from gap_sessions import session
 from markup import assert_escaped
@@ -47,7 +47,7 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
     written = write_gap(viscous, gap_data(viscous, "armrs gap hidden -o out"), tmp_path)
     told = sum(a.separation is not None for a in viscous.effects[0].alternatives)
     separating = [f"separating-{k + 1}.toml" for k in range(told)]
-    assert [p.name for p in written if p.suffix != ".png"] == ["amended.toml", *separating, "gap.json", "report.html"]
+    assert [p.name for p in written if p.suffix != ".png"] == ["amended.toml", *separating, "live.json", "gap.json", "report.html"]
     verdict = look(
         written[-1],
         figures=5,
@@ -167,6 +167,21 @@ def test_one_trial_with_another_label_is_refused(change: Callable[[np.ndarray], 
     for function in (armrs.find_gap, compare):
         with pytest.raises(BadInput, match=word):
             function(other)
+
+
+def test_a_movement_that_all_repeats_show_against_the_model_is_not_a_wrong_label() -> None:
+    data = session()
+
+    def plays(measured: Callable[[armrs.Trial], float], given: Callable[[armrs.Trial], float]) -> list[dict[str, np.ndarray]]:
+        sides = [
+            (np.column_stack((t.q, measured(t) * t.force_on_arm)), np.column_stack((t.q, given(t) * t.force_on_arm))) for t in data.trials
+        ]
+        return [{"measured": m, "given": g} for m, g in sides]
+
+    first = data.trials[0]
+    refuse_mislabelled(data, True, plays(lambda t: 1.0, lambda t: -1.0 if t.configuration == first.configuration else 1.0))
+    with pytest.raises(BadInput, match=rf"{first.file}: force_on"):
+        refuse_mislabelled(data, True, plays(lambda t: -1.0 if t is first else 1.0, lambda t: 1.0))
 
 
 def copied(data: Dataset, into: str, source: str, *, length: int | None = None, **columns: Callable[[np.ndarray], np.ndarray]) -> Dataset:

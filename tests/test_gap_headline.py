@@ -9,6 +9,7 @@ import pytest
 from armrs.catalogue import catalogue
 from armrs.workflows.gap.found import ChannelGap, Missing
 from armrs.workflows.gap.headline import headline, still_open
+from armrs.workflows.gap.reading import verdict_of
 from armrs.workflows.gap.summary import marks
 from armrs.workflows.gap.words import gap, left
 
@@ -115,3 +116,25 @@ def test_no_more_than_all_of_a_gap_is_closed() -> None:
     assert table.rows[0][table.head.index("gap closed")] == "100%"
     assert ChannelGap(3.0, 2.4, 0.10, 0.15).closed == 1.0
     assert ChannelGap(3.0, 2.4, 1.275, 0.15).closed == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({}, "explained"),
+        ({"named": False}, "nothing_missing"),
+        ({"is_open": True}, "unexplained"),
+        ({"is_open": True, "named": False}, "unexplained"),
+        ({"z": 5.99, "share": 1.0, "ratio": 9.0}, "explained"),
+        ({"z": 5.99, "share": 1.0, "ratio": 9.0, "named": False}, "nothing_missing"),
+        ({"z": 6.0, "share": 1.0, "ratio": 9.0}, "unexplained"),
+        ({"z": 6.0, "share": 0.049, "ratio": 1.99}, "explained"),
+        ({"z": 60.0, "share": 0.049, "ratio": 1.99}, "explained"),
+        ({"z": 6.0, "share": 0.05, "ratio": 1.99}, "unexplained"),
+        ({"z": 6.0, "share": 0.049, "ratio": 2.0}, "unexplained"),
+        ({"z": 6.0, "share": 0.0, "ratio": 1.0, "named": False}, "unexplained"),
+    ],
+)
+def test_the_rule_of_the_verdict(change: dict[str, Any], verdict: str) -> None:
+    """Each limit from both sides: 6 standard deviations, 5 % that may be left where effects were named, twice the noise."""
+    assert verdict_of(**({"named": True, "is_open": False, "z": 0.0, "ratio": 1.0, "share": 0.0} | change)) == verdict

@@ -40,3 +40,17 @@ fn run(threads: usize, jobs: usize, one: &(dyn Fn(usize) + Sync)) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_stand_in_the_order_of_their_jobs_whatever_the_number_of_threads() {
+        for threads in [1, 2, 7, 40] {
+            let squares = parallel(threads, 20, |i| i * i);
+            assert!(squares.into_iter().eq((0..20).map(|i| i * i)), "{threads}");
+        }
+        assert!(parallel(3, 0, |i| i).is_empty());
+    }
+}

@@ -33,7 +33,7 @@ pub struct Candidate {
     /// Position of a rest angle that is free with them.
     pub rest: Option<usize>,
     /// Positions of shapes that are refined once it is named.
-    pub refined: &'static [usize],
+    pub refined: Vec<usize>,
     /// How many shapes were tried of this question.
     pub tried: usize,
     /// Change of the free parameters with which responses are taken.
@@ -137,7 +137,7 @@ impl Candidate {
             question: number,
             free: free.to_vec(),
             rest: question.rest,
-            refined: question.refined,
+            refined: refined(&effect, question),
             tried: 1,
             step: question.step,
             price: 0.0,
@@ -155,11 +155,20 @@ impl Candidate {
     /// * `rows` - rows of data that decide it
     pub fn passive(self, expected: Vec<Free>, rows: usize) -> Self {
         Self {
-            refined: &[],
+            refined: Vec::new(),
             price: price(self.width(), 1, rows),
             expected,
             ..self
         }
+    }
+
+    /// The same about an effect that sticks or creeps at rest as another one of its kind.
+    pub fn at_rest_as(mut self, effect: &Effect<f64>) -> Self {
+        if let Some(smoothing) = effect.kind.smoothed_by() {
+            self.effect.parameters[smoothing] = effect.parameters[smoothing];
+            self.refined.retain(|&p| p != smoothing || !effect.is_dry());
+        }
+        self
     }
 
     /// The effect with the coefficients of its columns.
@@ -191,7 +200,7 @@ impl Candidate {
     pub fn coordinates(&self, slot: usize, effect: &Effect<f64>) -> Vec<Coordinate> {
         let info = effect.kind.info();
         let free = self.free.iter().map(|&p| (p, self.step));
-        let shapes = self.rest.iter().chain(self.refined);
+        let shapes = self.rest.iter().chain(&self.refined);
         let share = match effect.kind.probe().nature {
             // A frequency that is a little off is out of step at the end of a trial.
             Nature::Periodic => 0.0,
@@ -278,10 +287,12 @@ impl Library {
         for kind in prepared.session.kinds() {
             for index in places(prepared.session, kind).filter(|&i| is_asked(kind, i)) {
                 for asked in kind.probe().questions.iter().enumerate() {
-                    let mut own = ask(prepared.session, &motions, (kind, index), asked, waves);
+                    let mut plain = Effect::new(kind, index);
+                    hypothesis.share_rest(&mut plain);
+                    let mut own = ask(prepared.session, &motions, plain, asked, waves);
                     // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
                     if !prepared.repeated && kind.probe().nature != Nature::Periodic {
-                        own.iter_mut().for_each(|c| c.refined = &[]);
+                        own.iter_mut().for_each(|c| c.refined.clear());
                     }
                     candidates.extend(own);
                 }
@@ -473,19 +484,27 @@ fn motions<const N: usize>(
     prepared.parallel(prepared.references.len(), one)
 }
 
+/// The shapes of an effect that are refined once it is named: of friction that sticks, not the speed below which it would creep.
+fn refined(effect: &Effect<f64>, question: &Question) -> Vec<usize> {
+    let held = effect.kind.smoothed_by().filter(|_| effect.is_dry());
+    let shapes = question.refined.iter().copied();
+    shapes.filter(|&p| Some(p) != held).collect()
+}
+
 /// The candidates of one question about a kind at a place.
+///
+/// * `plain` - the effect, with what it shares with others in its place
 fn ask<const N: usize>(
     session: &Session<N>,
     movements: &[Movement<N>],
-    (kind, index): (Kind, usize),
+    mut plain: Effect<f64>,
     (number, question): (usize, &'static Question),
     waves: &[[f64; 2]],
 ) -> Vec<Candidate> {
-    let nature = kind.probe().nature;
+    let nature = plain.kind.probe().nature;
     if matches!(nature, Nature::Rhythm | Nature::Burst) {
         return Vec::new();
     }
-    let mut plain = Effect::<f64>::new(kind, index);
     for &p in question.free {
         plain.parameters[p] = 0.0;
     }
@@ -501,7 +520,7 @@ fn ask<const N: usize>(
         };
         shapes = waves.iter().map(shape).collect();
     }
-    let joint = index.min(N - 1);
+    let joint = plain.index.min(N - 1);
     let angles = || {
         let all = movements.iter().flat_map(|m| &m.motion).map(|m| m.q[joint]);
         all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
@@ -534,7 +553,7 @@ fn ask<const N: usize>(
             question: number,
             free: question.free.to_vec(),
             rest: question.rest,
-            refined: question.refined,
+            refined: refined(&effect, question),
             tried,
             step: question.step,
             price: 0.0,

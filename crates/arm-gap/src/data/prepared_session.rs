@@ -148,6 +148,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.cut();
     }
 
+    /// Number of rows that the fit trials are compared by.
+    pub(crate) fn rows_told(&self) -> usize {
+        let channels = self.session.channels();
+        let fitted = self.fitted.iter();
+        fitted
+            .flat_map(|&t| self.valid_segments[t].rows_per_channel(channels))
+            .sum()
+    }
+
     /// Chooses the samples that are compared, and the trials that have any.
     pub(crate) fn cut(&mut self) {
         /// How long a disturbance is felt before and after, the low-pass included \[s\].

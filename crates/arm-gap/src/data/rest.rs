@@ -144,3 +144,39 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
     }
     dry
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::{Effect, Kind};
+
+    use super::*;
+
+    fn with(known: Vec<Effect<f64>>) -> Hypothesis<2> {
+        Hypothesis {
+            segments: [[0.0; 3]; 2],
+            contact: [[0.0; 2]; 2],
+            shift: [0.0; 2],
+            placement: [0.0; 2],
+            eccentricity: [[0.0; 2]; 2],
+            known,
+            calibration: Vec::new(),
+            named: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn joints_are_dry_in_which_something_resists_as_much_at_a_crawl_as_in_motion() {
+        let of = |kind: &str, values: &[f64]| {
+            let kind = Kind::named(kind).expect("known");
+            dry_joints(&with(vec![Effect::new(kind, 1).with(values)]))
+        };
+        assert_eq!(of("coulomb", &[0.2, 0.0]), [false, true]);
+        assert_eq!(of("coulomb", &[0.2, 0.01]), [false, true]);
+        // So smooth that it is half as large at 0.03 rad/s: it does not hold the joint.
+        assert_eq!(of("coulomb", &[0.2, 0.1]), [false; 2]);
+        assert_eq!(of("coulomb", &[0.0, 0.0]), [false; 2]);
+        assert_eq!(of("viscous", &[0.5]), [false; 2]);
+        assert_eq!(of("elastic", &[2.0, 1.0]), [false; 2]);
+        assert_eq!(dry_joints(&with(Vec::new())), [false; 2]);
+    }
+}

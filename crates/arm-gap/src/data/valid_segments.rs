@@ -244,4 +244,38 @@ mod tests {
         assert_eq!((members, samples), (vec![0], whole.clone()));
         assert_eq!(whole.shared(&stub), Some(stub));
     }
+
+    #[test]
+    fn a_stretch_of_less_than_eight_samples_is_not_used() {
+        let until = |end| of(vec![(0..20).collect()]).until(end).len();
+        assert_eq!((until(7), until(8), until(30)), (0, 8, 20));
+    }
+
+    #[test]
+    fn parts_have_equal_numbers_of_samples_across_stretches() {
+        let all = of(vec![(0..10).collect(), (20..33).collect()]);
+        let parts = all.parts(5);
+        let sizes: Vec<usize> = parts.iter().map(ValidSegments::len).collect();
+        assert_eq!(sizes, [5, 5, 5, 5, 3]);
+        let joined: Vec<usize> = parts.iter().flat_map(ValidSegments::samples).collect();
+        assert!(joined.iter().copied().eq(all.samples()));
+    }
+
+    #[test]
+    fn where_a_joint_rests_one_component_of_the_force_is_compared_or_none() {
+        let mut told = vec![ObservableForce::Both; 8];
+        told[1] = ObservableForce::Along([0.6, 0.8]);
+        told[2] = ObservableForce::Neither;
+        let segments = ValidSegments {
+            samples: vec![(0..8).collect()],
+            observable: Arc::new(told),
+        };
+        assert_eq!(segments.rows_per_channel(3), [8, 7, 6]);
+        let picked = segments.pick(&vec![vec![1.0; 8], vec![10.0; 8], vec![20.0; 8]]);
+        assert_eq!(picked[0][0], [1.0; 8]);
+        // 0.6 · 10 + 0.8 · 20.
+        assert_eq!(picked[1][0][..3], [10.0, 22.0, 0.0]);
+        assert_eq!(picked[2][0][..3], [20.0, 0.0, 0.0]);
+        assert_eq!(of(vec![(0..8).collect()]).rows_per_channel(3), [8; 3]);
+    }
 }

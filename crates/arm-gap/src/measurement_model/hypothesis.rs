@@ -111,6 +111,18 @@ impl<const N: usize> Hypothesis<N> {
         parts.into_iter().flatten().copied().collect()
     }
 
+    /// Lets an effect stick or creep at rest as the friction that acts in its joint does.
+    pub fn share_rest(&self, effect: &mut Effect<f64>) {
+        let Some(smoothing) = effect.kind.smoothed_by() else {
+            return;
+        };
+        let acting = self.known.iter().chain(&self.named);
+        let mut own = acting.filter(|e| e.index == effect.index && e.parameters[0] != 0.0);
+        if own.any(Effect::is_dry) {
+            effect.parameters[smoothing] = 0.0;
+        }
+    }
+
     /// The segments as believed.
     pub fn believed(&self, nominal: &[Segment<f64>; N]) -> [Segment<f64>; N] {
         core::array::from_fn(|k| {

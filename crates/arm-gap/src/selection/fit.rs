@@ -19,17 +19,12 @@ const STEPS: usize = 6;
 const DAMPING: [f64; 5] = [0.0, 0.01, 0.1, 1.0, 10.0];
 /// A step that gains less than this, in units of the noise, is the last,
 const ENOUGH: f64 = 0.2;
-/// and where the model is far from the data, less than this share of the cost.
+/// and where the model is far from the data, less than this share of what the cost exceeds the number of rows by.
 const SHARE: f64 = 1e-4;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
 /// Times that a fit is simulated anew from where it ended.
 const AGAIN: usize = 4;
-
-/// A gain below this is none.
-pub(crate) fn enough(cost: f64) -> f64 {
-    ENOUGH + SHARE * cost
-}
 
 /// A hypothesis fitted to the fit trials.
 #[derive(Clone, Debug)]
@@ -40,11 +35,18 @@ pub struct Fitted<const N: usize> {
     pub asked: Vec<Candidate>,
     /// Whitened residual squares, and what the values cost against what was known of them.
     pub cost: f64,
+    /// Number of rows behind them.
+    pub rows: usize,
     /// Residuals of the fitted trials.
     pub residuals: Vec<Channels>,
 }
 
 impl<const N: usize> Fitted<N> {
+    /// A gain below this is none.
+    pub(crate) fn enough(&self) -> f64 {
+        ENOUGH + SHARE * (self.cost - self.rows as f64).max(0.0)
+    }
+
     /// The numbers of the named effects that a fit may change.
     pub fn named(&self) -> Vec<Coordinate> {
         named(&self.hypothesis, &self.asked)
@@ -74,6 +76,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             hypothesis,
             asked,
             cost,
+            rows: self.rows_told(),
             residuals,
         })
     }
@@ -152,10 +155,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             let gained = fitted.cost - next.cost;
             fitted = next;
-            if gained < enough(fitted.cost) {
+            if gained < fitted.enough() {
                 break;
             }
-            slopes = (gained < NEAR * enough(fitted.cost)).then_some(responses);
+            slopes = (gained < NEAR * fitted.enough()).then_some(responses);
         }
         Ok(fitted)
     }
@@ -205,7 +208,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for _ in 0..AGAIN {
             let after = self.fit(&point, before.hypothesis.clone(), before.asked.clone())?;
             let gained = before.cost - after.cost;
-            if gained < 2.0 * enough(after.cost) {
+            if gained < 2.0 * after.enough() {
                 return Ok((after, point));
             }
             let there = match self.linearize(&after.hypothesis) {

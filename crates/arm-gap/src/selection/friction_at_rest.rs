@@ -1,4 +1,4 @@
-//! What dry friction of the passive base does at rest: it sticks, or it creeps below some speed. Whole trials tell, rest included.
+//! What dry friction does at rest: it sticks, or it creeps below some speed. Whole trials tell, rest included.
 
 use arm_core::effect::Kind;
 
@@ -6,15 +6,15 @@ use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
-use crate::selection::fit::enough;
+use crate::selection::fit::Fitted;
 use crate::selection::search_state::Settled;
 
 /// Speeds below which friction may creep \[rad/s\]; with zero it sticks.
 const SMOOTHING: [f64; 4] = [0.0, 0.003, 0.01, 0.03];
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// Chooses for each dry law of the base the speed below which it creeps that whole fit trials show, and fits anew where that is
-    /// another one.
+    /// Chooses for each dry law of the base and each named one the speed below which it creeps that whole fit trials show, and fits
+    /// anew where that is another one.
     ///
     /// # Errors
     /// As [`PreparedSession::settle`].
@@ -22,18 +22,27 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &mut self,
         settled: Settled<'a, N>,
     ) -> Result<Settled<'a, N>, GapError> {
-        let before = &settled.0.hypothesis;
-        let dry = self.dry_base_laws();
-        if dry.is_empty() || self.session.comparison != ComparisonMode::Led {
+        if self.session.comparison != ComparisonMode::Led {
             return Ok(settled);
         }
-        let chosen = self.over_whole_trials(|whole| whole.smoothed(before.clone(), &dry));
-        if chosen == *before {
+        let (base, named) = (self.dry_base_laws(), creeping(&settled.0));
+        if base.is_empty() && named.is_empty() {
             return Ok(settled);
         }
-        self.start = Some(chosen.clone());
-        let asked = settled.0.asked.clone();
-        self.settle(chosen, asked).or(Ok(settled))
+        let before = &settled.0;
+        let chosen = self.over_whole_trials(|whole| {
+            let smoothed = whole.smoothed(before, &base);
+            named
+                .iter()
+                .fold(smoothed, |best, &slot| whole.sticking(best, slot))
+        });
+        if chosen.hypothesis == before.hypothesis {
+            return Ok(settled);
+        }
+        if before.asked.is_empty() {
+            self.start = Some(chosen.hypothesis.clone());
+        }
+        self.settle(chosen.hypothesis, chosen.asked).or(Ok(settled))
     }
 
     /// The smoothing of each dry law of the base that is not dropped.
@@ -58,26 +67,51 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         found
     }
 
-    /// The hypothesis with the smoothing of each law that costs least.
-    fn smoothed(&self, mut best: Hypothesis<N>, laws: &[Target]) -> Hypothesis<N> {
-        let cost = |hypothesis: &Hypothesis<N>| {
-            let state = self
-                .linearize(hypothesis)
-                .and_then(|point| self.state(&point, hypothesis.clone(), Vec::new()));
-            // What cannot be simulated is not chosen.
-            state.map_or(f64::INFINITY, |fitted| fitted.cost)
+    /// The hypothesis with the smoothing of each law of the base that costs least.
+    fn smoothed(&self, fitted: &Fitted<N>, laws: &[Target]) -> Fitted<N> {
+        // What cannot be simulated is not chosen.
+        let simulated = |hypothesis: Hypothesis<N>| {
+            let point = self.linearize(&hypothesis).ok()?;
+            self.state(&point, hypothesis, fitted.asked.clone()).ok()
         };
-        let mut least = cost(&best);
+        let mut best = simulated(fitted.hypothesis.clone()).unwrap_or_else(|| fitted.clone());
         for &law in laws {
-            let present = best.get(law);
+            let present = best.hypothesis.get(law);
             for smoothing in SMOOTHING.into_iter().filter(|&s| s != present) {
-                let other = best.clone().with(law, smoothing);
-                let its = cost(&other);
-                if its + enough(its) < least {
-                    (best, least) = (other, its);
-                }
+                let other = simulated(best.hypothesis.clone().with(law, smoothing));
+                best = cheaper(best, other);
             }
         }
         best
     }
+
+    /// The same with a named law that sticks, where that costs less once its other numbers are fitted anew.
+    fn sticking(&self, fitted: Fitted<N>, slot: usize) -> Fitted<N> {
+        let mut sticking = fitted.clone();
+        let named = &mut sticking.hypothesis.named[slot];
+        if let Some(smoothing) = named.kind.smoothed_by() {
+            named.parameters[smoothing] = 0.0;
+        }
+        let question = sticking.asked[slot].clone().at_rest_as(named);
+        sticking.asked[slot] = question;
+        let refitted = self.settle(sticking.hypothesis, sticking.asked);
+        cheaper(fitted, refitted.ok().map(|(refitted, _)| refitted))
+    }
+}
+
+/// Another fit, where it costs less by more than nothing.
+fn cheaper<const N: usize>(present: Fitted<N>, other: Option<Fitted<N>>) -> Fitted<N> {
+    let least = present.cost;
+    other
+        .filter(|o| o.cost + o.enough() < least)
+        .unwrap_or(present)
+}
+
+/// The places of named dry laws that creep at rest.
+fn creeping<const N: usize>(fitted: &Fitted<N>) -> Vec<usize> {
+    let named = fitted.hypothesis.named.iter().enumerate();
+    named
+        .filter(|(_, effect)| effect.kind.smoothed_by().is_some() && !effect.is_dry())
+        .map(|(slot, _)| slot)
+        .collect()
 }

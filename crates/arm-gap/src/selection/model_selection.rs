@@ -124,6 +124,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 hypothesis,
                 asked,
                 cost: f64::INFINITY,
+                rows: fitted.rows,
                 residuals: fitted.residuals.clone(),
             },
             |(less, _)| less,

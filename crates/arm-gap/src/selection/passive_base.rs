@@ -358,6 +358,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 hypothesis,
                 asked: Vec::new(),
                 cost: f64::INFINITY,
+                rows: 0,
                 residuals: Vec::new(),
             };
             (fitted, lack)

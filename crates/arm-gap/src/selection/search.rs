@@ -146,6 +146,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             state.search_trace.push(step);
             let settled = self.afresh(settled);
+            let settled = self.with_friction_at_rest(settled)?;
             (state.current, state.point) = self.pruned(settled, &state.calibrated, state.scale)?;
             if self.leave_out_rest(&state.point) {
                 state = self.renewed(state)?;
@@ -209,12 +210,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         const MUCH: f64 = 1.5;
         /// Standard deviations beyond which a sensor is far from what was promised.
         const BENT: f64 = 2.0;
-        let channels = self.session.channels();
-        let told = self
-            .fitted
-            .iter()
-            .map(|&t| self.valid_segments[t].rows_per_channel(channels));
-        let rows: usize = told.flatten().sum();
         let bent = |c: &Coordinate| match (c.target, c.prior) {
             (Target::Calibration(_), Some((mean, sd))) => {
                 (fitted.hypothesis.get(c.target) - mean).abs() > BENT * sd
@@ -222,7 +217,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             _ => false,
         };
         let is_bent = point.coordinates.iter().any(bent);
-        if fitted.cost < MUCH * rows as f64 && !is_bent {
+        if fitted.cost < MUCH * fitted.rows as f64 && !is_bent {
             return (fitted, point);
         }
         let start = Hypothesis {

@@ -2,7 +2,7 @@
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::selection::fit::{Fitted, enough};
+use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::LackOfFit;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
@@ -56,15 +56,17 @@ impl<const N: usize> SearchState<'_, N> {
     /// Whether it has been here before and was no worse off: from here it would go round in a circle.
     pub fn is_back(&mut self, dry: [bool; N]) -> bool {
         let Fitted { asked, cost, .. } = &self.current;
+        let enough = self.current.enough();
         let same = |other: &[Candidate]| {
             other.len() == asked.len()
                 && other
                     .iter()
                     .all(|o| asked.iter().any(|a| a.is_same_question(o)))
         };
-        let back = self.been.iter().any(|(named, then, before)| {
-            *then == dry && same(named) && before - cost < enough(*cost)
-        });
+        let back = self
+            .been
+            .iter()
+            .any(|(named, then, before)| *then == dry && same(named) && before - cost < enough);
         self.been.push((asked.clone(), dry, *cost));
         back
     }

@@ -5,13 +5,13 @@
 
 use arm_core::effect::{advance_states, any_state};
 use arm_core::{Joints, Plane};
-use arm_sim::SimulationError;
+use arm_sim::{Change, SimulationError};
 use nalgebra::SMatrix;
 
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course};
 use crate::measurement_model::start::held_at_start;
-use crate::sensitivity::linearized_run::{ASTRAY, Linear, THETA};
+use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::newton::{Missing, newton, slide};
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;
@@ -80,16 +80,16 @@ impl<const N: usize> Linear<'_, N> {
                 let (found, exact) = follower.step(&instant, *hand, &expected)?;
                 unsolved += usize::from(!exact);
                 if remembers {
-                    carry(&instant.place(&follower.qdd), &mut memory);
+                    carry(&instant.place(&follower.change.qdd), &mut memory);
                 }
                 found
             };
-            let q = follower.q;
+            let Change { q, qd, qdd } = follower.change;
             let astray = q.iter().any(|v| !v.is_finite() || v.abs() > LOST);
             if astray || unsolved > UNSOLVED * self.states.len() / 100 {
                 return None;
             }
-            before = self.states[i].moved(&q, &follower.qd, &follower.qdd);
+            before = self.states[i].moved(&q, &qd, &qdd);
             let own = self.balances[i].force;
             out.push((q, [0, 1].map(|c| found.force[c] - own[c])));
         }
@@ -104,9 +104,7 @@ const NUDGE: (f64, f64) = (1e-7, 1e-5);
 pub(super) struct Follower<'l, 's, const N: usize> {
     line: &'l Linear<'s, N>,
     plant: &'l Plant<N>,
-    pub q: Joints<f64, N>,
-    pub qd: Joints<f64, N>,
-    pub qdd: Joints<f64, N>,
+    pub change: Change<N>,
     /// What the inverse slope differed by from that of the run itself in the last step, and the slope with dry friction.
     other: SMatrix<f64, N, N>,
     /// What accelerations differed by from those that nothing pushes, in the last two steps.
@@ -152,9 +150,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         Self {
             line,
             plant,
-            q: zero,
-            qd: zero,
-            qdd: zero,
+            change: Change::default(),
             other: SMatrix::zeros(),
             pushed: [zero; 2],
             modes: [Mode::Sticks; N],
@@ -182,7 +178,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
                 (error - there.torque, there)
             };
             let solved = newton(zero, [&line.rest; 2], missing, NUDGE.0)?;
-            self.q = solved.at;
+            self.change.q = solved.at;
             return Some(solved.there);
         }
         let missing = |angle: &Joints<f64, N>| {
@@ -197,21 +193,20 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
                 there,
             }
         };
-        let slope = (line.stiffness[0], 1.0);
+        let slope = (line.slopes[0].stiffness, 1.0);
         let slid = slide(zero, slope, &mut self.modes, missing)?;
-        self.q = slid.at;
+        self.change.q = slid.at;
         Some(slid.there)
     }
 
     /// A step before it is solved.
     pub fn instant(&self, i: usize) -> Instant<'l, N> {
-        let h = self.line.step;
         let line = self.line;
-        let speed = self.qd + self.qdd * (h * (1.0 - THETA));
-        let angle = self.q + speed * (h * THETA) + self.qd * (h * (1.0 - THETA));
-        let free = -(line.inverse[i] * (line.damping[i] * speed + line.stiffness[i] * angle));
+        let (angle, speed, reach) = self.change.coast(line.step);
+        let slopes = &line.slopes[i];
+        let free = -(line.inverse[i] * (slopes.damping * speed + slopes.stiffness * angle));
         let start = match self.dry {
-            true => self.qdd,
+            true => self.change.qdd,
             false => free + self.pushed[0] * 2.0 - self.pushed[1],
         };
         Instant {
@@ -219,7 +214,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             state: &line.states[i],
             speed,
             angle,
-            reach: h * THETA,
+            reach,
             free,
             start,
         }
@@ -245,9 +240,10 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
                     there,
                 }
             };
-            let slope = (line.slope[i] + self.other, reach);
+            let own = line.slopes[i].of_step(line.step);
+            let slope = (own + self.other, reach);
             let slid = slide(instant.start, slope, &mut self.modes, missing)?;
-            self.other = slid.slope - line.slope[i];
+            self.other = slid.slope - own;
             (slid.at, slid.there, slid.exact)
         } else {
             let missing = |next: &Joints<f64, N>| {
@@ -261,9 +257,11 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             (solved.at, solved.there, solved.exact)
         };
         self.pushed = [next - instant.free, self.pushed[0]];
-        self.q = instant.angle_with(&next);
-        self.qd = instant.speed_with(&next);
-        self.qdd = next;
+        self.change = Change {
+            q: instant.angle_with(&next),
+            qd: instant.speed_with(&next),
+            qdd: next,
+        };
         Some((found, exact))
     }
 }

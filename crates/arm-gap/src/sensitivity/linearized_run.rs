@@ -1,13 +1,12 @@
 //! Responses of a led arm to small changes, from the equation of motion linearised along one simulated run.
 //!
 //! A change of the rig, an effect or the handle's path leaves a torque over in the equation of motion of the run. The
-//! arm answers it as a linear system with coefficients that follow the run; that system is solved implicitly, so that a
-//! stiff contact needs no short steps. A joint that set-valued friction holds in the run does not answer, and one that slips
-//! does so against its friction. A hundred candidates cost less than one simulation each.
+//! arm answers it as a linear system with coefficients that follow the run ([`Slopes`]). A joint that set-valued friction holds in the
+//! run does not answer, and one that slips does so against its friction. A hundred candidates cost less than one simulation each.
 
 use arm_core::effect::{advance_states, any_state};
 use arm_core::{Joints, Plane, Reading, Setup};
-use arm_sim::SimulationError;
+use arm_sim::{Change, SimulationError, Slopes};
 use nalgebra::SMatrix;
 use std::sync::Arc;
 
@@ -17,9 +16,6 @@ use crate::measurement_model::prediction::{Channels, Course, smooth};
 use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;
-
-/// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
-pub(super) const THETA: f64 = 0.55;
 
 /// The instants at which a run is recorded and solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,15 +73,12 @@ pub struct Linear<'a, const N: usize> {
     /// What joint effects resist with where joints slip.
     resisted: Vec<Joints<f64, N>>,
     pub(super) balances: Vec<Balance<N>>,
-    pub(super) damping: Vec<SMatrix<f64, N, N>>,
-    pub(super) stiffness: Vec<SMatrix<f64, N, N>>,
-    /// What multiplies the new accelerations of each step, and its inverse for the joints that friction does not hold.
-    pub(super) slope: Vec<SMatrix<f64, N, N>>,
+    /// How what is left over and the force follow the motion in each step.
+    pub(super) slopes: Vec<Slopes<N>>,
+    /// The inverse of what multiplies new accelerations, for the joints that friction does not hold.
     pub(super) inverse: Vec<SMatrix<f64, N, N>>,
     /// Which joints friction holds.
     held: Vec<[bool; N]>,
-    /// How the force follows angles and speeds.
-    force: Vec<(SMatrix<f64, 2, N>, SMatrix<f64, 2, N>)>,
     /// Angles of the first instant for one unit of torque left over at rest.
     pub(super) rest: SMatrix<f64, N, N>,
     /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
@@ -134,12 +127,9 @@ impl<'a, const N: usize> Linear<'a, N> {
             ways: Vec::new(),
             resisted: Vec::new(),
             balances: Vec::new(),
-            damping: Vec::new(),
-            stiffness: Vec::new(),
-            slope: Vec::new(),
+            slopes: Vec::new(),
             inverse: Vec::new(),
             held: Vec::new(),
-            force: Vec::new(),
             rest: SMatrix::zeros(),
             start: (
                 course.start(hypothesis),
@@ -158,8 +148,11 @@ impl<'a, const N: usize> Linear<'a, N> {
             let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
             linear.differentiate(&plant, i, memory);
         }
-        linear.rest = linear.stiffness.first().map_or_else(SMatrix::zeros, |k| {
-            inverse_of_free(k, &held_at_start(&linear.balances[0].friction))
+        linear.rest = linear.slopes.first().map_or_else(SMatrix::zeros, |slopes| {
+            inverse_of_free(
+                &slopes.stiffness,
+                &held_at_start(&linear.balances[0].friction),
+            )
         });
         linear.base = linear.sensed(&plant, None);
         Ok(linear)
@@ -196,52 +189,24 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 
     fn differentiate(&mut self, plant: &Plant<N>, i: usize, memory: &[f64]) {
-        const ANGLE: f64 = 1e-6;
-        const SPEED: f64 = 1e-5;
         let (state, hand) = (self.states[i], self.hands[i]);
-        let mut mass = SMatrix::<f64, N, N>::zeros();
-        let mut damping = SMatrix::<f64, N, N>::zeros();
-        let mut stiffness = SMatrix::<f64, N, N>::zeros();
-        let mut by_angle = SMatrix::<f64, 2, N>::zeros();
-        let mut by_speed = SMatrix::<f64, 2, N>::zeros();
         let middle = balance(plant, &state, hand, memory);
         let way = Joints::from_fn(|j, _| Mode::of(state.qd[j]).way());
         let held: [bool; N] = std::array::from_fn(|j| middle.friction[j] > 0.0 && way[j] == 0.0);
         let left_over = |there: &Balance<N>| there.torque + there.friction.component_mul(&way);
-        for j in 0..N {
-            let mut moved = state;
-            moved.qdd[j] += 1.0;
-            let there = balance(plant, &moved, hand, memory);
-            mass.set_column(j, &(left_over(&there) - left_over(&middle)));
-            let both = |change: &dyn Fn(&mut State<N>, f64), size: f64| {
-                let (mut up, mut down) = (state, state);
-                change(&mut up, size);
-                change(&mut down, -size);
-                let (up, down) = (
-                    balance(plant, &up, hand, memory),
-                    balance(plant, &down, hand, memory),
-                );
-                let force = [0, 1].map(|c| (up.force[c] - down.force[c]) / (2.0 * size));
-                ((left_over(&up) - left_over(&down)) / (2.0 * size), force)
-            };
-            let (torque, pull) = both(&|s, d| s.q[j] += d, ANGLE);
-            stiffness.set_column(j, &torque);
-            by_angle.set_column(j, &pull.into());
-            let (torque, pull) = both(&|s, d| s.qd[j] += d, SPEED);
-            damping.set_column(j, &torque);
-            by_speed.set_column(j, &pull.into());
-        }
-        let h = self.step * THETA;
-        let slope = mass + damping * h + stiffness * (h * h);
-        self.inverse.push(inverse_of_free(&slope, &held));
-        self.slope.push(slope);
+        let at = [state.q, state.qd, state.qdd];
+        let slopes = Slopes::around(at, &left_over(&middle), |q, qd, qdd| {
+            let (time, q, qd, qdd) = (state.time, *q, *qd, *qdd);
+            let there = balance(plant, &State { time, q, qd, qdd }, hand, memory);
+            (left_over(&there), there.force)
+        });
+        let inverse = inverse_of_free(&slopes.of_step(self.step), &held);
+        self.inverse.push(inverse);
         self.held.push(held);
         let resisted = plant.resisted(&middle.motion, memory, &way);
         self.resisted.push(resisted);
         self.ways.push(way);
-        self.damping.push(damping);
-        self.stiffness.push(stiffness);
-        self.force.push((by_angle, by_speed));
+        self.slopes.push(slopes);
         self.balances.push(middle);
     }
 
@@ -330,7 +295,7 @@ impl<'a, const N: usize> Linear<'a, N> {
     ) -> Vec<(Joints<f64, N>, Plane<f64>)> {
         let h = self.step;
         let memories = self.memories(plant);
-        let (mut q, mut qd, mut qdd) = (Joints::zeros(), Joints::zeros(), Joints::zeros());
+        let mut change = Change::default();
         let mut out = Vec::with_capacity(self.states.len());
         // A change of joint effects alone needs no more than their torque.
         let same_rig = plant.setup == self.setup && std::ptr::eq(hands, self.hands.as_slice());
@@ -345,24 +310,19 @@ impl<'a, const N: usize> Linear<'a, N> {
                 let friction = (own.friction - changed.friction).component_mul(&self.ways[i]);
                 (own.torque - changed.torque + friction, changed.force)
             };
+            let slopes = &self.slopes[i];
             if i == 0 {
-                q = moved + self.rest * (push + released - self.stiffness[i] * moved);
+                change.q = moved + self.rest * (push + released - slopes.stiffness * moved);
             } else {
                 for j in (0..N).filter(|&j| self.held[i][j]) {
-                    (qd[j], qdd[j]) = (0.0, 0.0);
+                    (change.qd[j], change.qdd[j]) = (0.0, 0.0);
                 }
-                let speed = qd + qdd * (h * (1.0 - THETA));
-                let angle = q + speed * (h * THETA) + qd * (h * (1.0 - THETA));
-                let next =
-                    self.inverse[i] * (push - self.damping[i] * speed - self.stiffness[i] * angle);
-                let faster = speed + next * (h * THETA);
-                q += faster * (h * THETA) + qd * (h * (1.0 - THETA));
-                (qd, qdd) = (faster, next);
+                change.advance(slopes, &self.inverse[i], &push, h);
             }
-            let (by_angle, by_speed) = &self.force[i];
-            let follow = by_angle * q + by_speed * qd;
+            let [by_angle, by_speed] = &slopes.force;
+            let follow = by_angle * change.q + by_speed * change.qd;
             let direct = [0, 1].map(|c| force[c] - own.force[c] + follow[c]);
-            out.push((q, direct));
+            out.push((change.q, direct));
         }
         out
     }
@@ -457,4 +417,31 @@ fn inverse_of_free<const N: usize>(
         inverse[(j, j)] = 0.0;
     }
     inverse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_solved_at_a_hundred_hertz_or_a_little_more() {
+        let of = |rate| {
+            let Grid { parts, stride } = Grid::of(rate);
+            (parts, stride, rate * parts as f64 / stride as f64)
+        };
+        assert_eq!(of(50.0), (2, 1, 100.0));
+        assert_eq!(of(30.0), (4, 1, 120.0));
+        assert_eq!(of(100.0), (1, 1, 100.0));
+        assert_eq!(of(250.0), (1, 2, 125.0));
+        assert_eq!(of(1000.0), (1, 10, 100.0));
+    }
+
+    #[test]
+    fn a_joint_that_is_held_answers_nothing() {
+        let slope = SMatrix::<f64, 2, 2>::new(2.0, 1.0, 1.0, 4.0);
+        let inverse = inverse_of_free(&slope, &[false, true]);
+        assert_eq!(inverse, SMatrix::<f64, 2, 2>::new(0.5, 0.0, 0.0, 0.0));
+        let free = inverse_of_free(&slope, &[false; 2]) * slope;
+        assert!((free - SMatrix::identity()).amax() < 1e-15);
+    }
 }

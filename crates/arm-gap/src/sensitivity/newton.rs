@@ -34,7 +34,15 @@ pub(super) fn newton<const N: usize>(
     const GOOD: f64 = 0.3;
     const ROUNDS: usize = 30;
     const HALVINGS: usize = 6;
-    let size = |r: &Joints<f64, N>| r.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    // What is not a number is larger than anything.
+    let larger = |most: f64, v: &f64| {
+        if v.is_nan() || v.abs() > most {
+            v.abs()
+        } else {
+            most
+        }
+    };
+    let size = |r: &Joints<f64, N>| r.iter().fold(0.0, larger);
     let (mut at, (mut left, mut there)) = (start, missing(&start));
     let (mut inverse, mut fallback) = (*first, (first != second).then_some(second));
     for _ in 0..ROUNDS {
@@ -166,4 +174,69 @@ pub(super) struct Slid<const N: usize> {
     pub there: Balance<N>,
     pub slope: SMatrix<f64, N, N>,
     pub exact: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Motion;
+
+    use super::*;
+
+    fn balance(friction: f64) -> Balance<1> {
+        Balance {
+            torque: Joints::zeros(),
+            friction: Joints::repeat(friction),
+            force: [0.0; 2],
+            motion: Motion::new(0.0, Joints::zeros(), Joints::zeros()),
+        }
+    }
+
+    /// Solves for the zero of a function of one number from 0, with an inverse slope of one.
+    fn solved(missing: impl Fn(f64) -> f64) -> Option<Solved<1>> {
+        let one = SMatrix::<f64, 1, 1>::identity();
+        let missing = |x: &Joints<f64, 1>| (Joints::repeat(missing(x[0])), balance(0.0));
+        newton(Joints::zeros(), [&one; 2], missing, 1e-7)
+    }
+
+    #[test]
+    fn what_is_smooth_is_solved_with_corrected_slopes_and_what_is_not_with_its_own() {
+        let root = |missing: fn(f64) -> f64| {
+            let solved = solved(missing).expect("numbers");
+            assert!(solved.exact && missing(solved.at[0]).abs() < 1e-7);
+            solved.at[0]
+        };
+        assert!((root(|x| 0.8 - x - 0.1 * x * x) - 0.744).abs() < 1e-3);
+        // A slope a hundred times as steep as the one given, and a contact that opens.
+        assert!((root(|x| 5.0 - 100.0 * x) - 0.05).abs() < 1e-9);
+        assert!((root(|x| 1.0 - 50.0 * f64::max(x - 0.3, 0.0) - 0.1 * x) - 0.3194).abs() < 1e-3);
+    }
+
+    #[test]
+    fn what_has_no_solution_is_not_exact_and_what_leaves_all_numbers_is_none() {
+        let stuck = solved(|x| 1.0 + x * x).expect("numbers");
+        assert!(!stuck.exact && (1.0 + stuck.at[0] * stuck.at[0]) < 2.0);
+        assert!(solved(|_| f64::NAN).is_none());
+    }
+
+    #[test]
+    fn a_joint_that_slides_sticks_where_friction_holds_what_pulls_it() {
+        // Unit inertia, friction up to 1 N m, steps of 0.01 s, speed 0 before.
+        let slid = |pull: f64| {
+            let missing = |next: &Joints<f64, 1>| Missing {
+                torque: Joints::repeat(pull - next[0]),
+                speed: next * 0.01,
+                there: balance(1.0),
+            };
+            let mut modes = [Mode::Sticks];
+            let slope = (SMatrix::identity(), 0.01);
+            let slid = slide(Joints::zeros(), slope, &mut modes, missing).expect("numbers");
+            assert!(slid.exact);
+            (slid.at[0], modes[0])
+        };
+        assert_eq!(slid(0.9), (0.0, Mode::Sticks));
+        let (faster, mode) = slid(1.5);
+        assert!((faster - 0.5).abs() < 1e-7 && mode == Mode::Slips(1));
+        let (faster, mode) = slid(-1.5);
+        assert!((faster + 0.5).abs() < 1e-7 && mode == Mode::Slips(-1));
+    }
 }

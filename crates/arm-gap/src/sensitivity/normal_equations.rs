@@ -260,4 +260,33 @@ mod tests {
         }
         assert!(bounded > 300);
     }
+
+    #[test]
+    fn columns_that_can_hardly_be_told_apart_are_not_solved_for() {
+        // The squared sine between both columns is just above and just below 1e-9.
+        let gram = |sine: f64| {
+            let cosine = (1.0 - sine * sine).sqrt();
+            DMatrix::from_row_slice(2, 2, &[4.0, 6.0 * cosine, 6.0 * cosine, 9.0])
+        };
+        assert!(factor(gram(4e-5)).is_some() && factor(gram(2.5e-5)).is_none());
+        assert!(factor(DMatrix::zeros(1, 1)).is_none());
+        let bounds = |_: usize| (f64::NEG_INFINITY, f64::INFINITY);
+        let none = solve(&gram(0.0), &DVector::zeros(2), &[0, 1], &bounds);
+        assert!(none.is_none());
+    }
+
+    #[test]
+    fn clusters_and_what_is_known_beforehand_add_up() {
+        let cluster = |value: f64| Cluster {
+            configuration: 0,
+            gram: Arc::new(DMatrix::repeat(1, 1, value)),
+            score: DVector::repeat(1, 2.0 * value),
+            square: value,
+            rows: 3,
+        };
+        // 0.5 from where it is expected, to 0.1: a weight of 100.
+        let sum = Normal::new(&[cluster(1.0), cluster(2.0)], &[Some((0.5, 0.1))]);
+        assert!((sum.gram[0] - 103.0).abs() < 1e-9 && (sum.score[0] - (6.0 - 50.0)).abs() < 1e-9);
+        assert!((sum.square - (3.0 + 25.0)).abs() < 1e-9 && sum.rows == 6);
+    }
 }

@@ -68,3 +68,62 @@ pub fn shapes_of(kind: Kind) -> [usize; 2] {
     };
     [position("frequency"), position("phase")]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rhythm(kind: Kind, frequency: f64, trial: Option<usize>) -> TrialSpecific {
+        let mut effect = Effect::new(kind, 0);
+        effect.parameters[shapes_of(kind)[0]] = frequency;
+        TrialSpecific {
+            effect,
+            sd: 0.0,
+            trial,
+            gain: 0.0,
+            rivals: Vec::new(),
+            locked: false,
+            columns: Vec::new(),
+            sizes: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn rhythms_are_one_where_they_are_nearer_than_a_third_of_a_hertz() {
+        let kinds = arm_core::effect::KINDS.iter().copied();
+        let mut swinging =
+            kinds.filter(|k| matches!(k.probe().nature, Nature::Rhythm | Nature::Periodic));
+        let (one, other) = (
+            swinging.next().expect("a kind"),
+            swinging.next().expect("another"),
+        );
+        let first = rhythm(one, 5.0, None);
+        assert!(
+            first.is_like(&rhythm(one, 5.29, None)) && !first.is_like(&rhythm(one, 5.31, None))
+        );
+        assert!(
+            !first.is_like(&rhythm(other, 5.0, None))
+                && first.swings_with(&rhythm(other, 5.0, None))
+        );
+        assert!(
+            !first.swings_with(&rhythm(one, 5.0, Some(2))),
+            "what happened once is no rhythm"
+        );
+    }
+
+    #[test]
+    fn a_burst_lasts_and_a_slip_stays() {
+        let kinds = arm_core::effect::KINDS.iter();
+        let burst = kinds
+            .copied()
+            .find(|k| k.probe().nature == Nature::Burst)
+            .expect("a burst");
+        let mut one = rhythm(burst, 0.0, Some(0));
+        one.effect = Effect::new(burst, 0).with(&[0.5, 2.0, 0.3]);
+        assert_eq!(one.span(), (2.0, 2.3));
+        let slip = Kind::named("angle_offset").expect("known");
+        one.effect = Effect::new(slip, 0);
+        one.effect.parameters[arm_core::effect::MAX_PARAMETERS - 1] = 1.5;
+        assert_eq!(one.span(), (1.5, f64::INFINITY));
+    }
+}

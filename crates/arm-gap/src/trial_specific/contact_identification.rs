@@ -279,3 +279,45 @@ fn sizes(trials: &[Channels]) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_swing_whose_size_changes_slowly_is_taken_out_and_ringing_is_left() {
+        let rate = 100.0;
+        let kept: Vec<usize> = (0..600).filter(|i| !(200..230).contains(i)).collect();
+        let at = |i: usize, frequency: f64| {
+            libm::sin(core::f64::consts::TAU * frequency * i as f64 / rate + 0.4)
+        };
+        let ringing = |i: usize| libm::exp(-((i % 150) as f64) / 15.0) * at(i, 17.0);
+        let grows = |i: usize| (1.0 + (i as f64 / 600.0)) * at(i, 9.0);
+        let channel =
+            |of: &dyn Fn(usize) -> f64| -> Channels { vec![kept.iter().map(|&i| of(i)).collect()] };
+        let size = |channels: &Channels| dot(&channels[0], &channels[0]);
+        let swings = Swings::of(&[9.0], &kept, rate);
+        let mut alone = channel(&grows);
+        let before = size(&alone);
+        swings.take_out(&mut alone);
+        assert!(size(&alone) < 1e-12 * before);
+        let mut both = channel(&|i| grows(i) + ringing(i));
+        swings.take_out(&mut both);
+        let kept_of_ringing = size(&both) / size(&channel(&ringing));
+        assert!((0.9..1.0).contains(&kept_of_ringing), "{kept_of_ringing}");
+        // Without a rhythm nothing is taken out.
+        let mut as_is = channel(&ringing);
+        Swings::of(&[], &kept, rate).take_out(&mut as_is);
+        assert_eq!(as_is, channel(&ringing));
+    }
+
+    #[test]
+    fn channels_count_in_their_own_size() {
+        let trials = [
+            vec![vec![3.0, -3.0], vec![0.0; 2]],
+            vec![vec![4.0, 4.0], vec![0.0; 2]],
+        ];
+        let found = sizes(&trials);
+        assert_eq!(found, [12.5_f64.sqrt(), f64::MIN_POSITIVE]);
+    }
+}

@@ -6,7 +6,7 @@ use crate::candidates::candidate::price;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
-use crate::measurement_model::prediction::Channels;
+use crate::measurement_model::prediction::{Channels, smooth};
 use crate::selection::lack_of_fit::{orthogonal, project_off};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
@@ -197,10 +197,13 @@ impl<const N: usize> PreparedSession<'_, N> {
                 // A slip within the trial; an offset from its start is how the sensor was put on.
                 for s in 10..starts.saturating_sub(10) {
                     let first = (EVERY * s as f64 * course.rate) as usize;
+                    let step = (0..count).map(|i| f64::from(u8::from(i >= first)));
+                    // In the band of what it is compared with.
+                    let Ok(slip) = smooth(&[step.collect()], course.band, course.rate) else {
+                        continue;
+                    };
                     let mut channels = vec![vec![0.0; count]; self.session.channels()];
-                    for value in channels[j].iter_mut().skip(first) {
-                        *value = 1.0;
-                    }
+                    channels.splice(j..=j, slip);
                     let mut effect = Effect::new(kind, j);
                     // The time of the slip travels in the last place, which the kind does not use.
                     effect.parameters[arm_core::effect::MAX_PARAMETERS - 1] = EVERY * s as f64;
@@ -360,5 +363,32 @@ mod tests {
         let always = vec![9.0; 95];
         let scatter = scatter_elsewhere(&asked[45], &asked, &[once, always]);
         assert!((scatter - 81.0 / 2.706).abs() < 1e-12, "{scatter}");
+    }
+
+    #[test]
+    fn a_deviation_stands_out_from_four_and_a_half_standard_deviations_on() {
+        // Twelve samples of two channels: 24 squares, whose sum has the standard deviation √48.
+        let limit = 24.0 + 4.5 * 48.0_f64.sqrt();
+        let of = |sum: f64| {
+            let mut all = vec![0.0; 80];
+            for channel in all.chunks_mut(40) {
+                channel[10..22].fill((sum / 24.0).sqrt());
+            }
+            all
+        };
+        assert!(stands_out(&of(1.001 * limit), 2, 1.0));
+        assert!(!stands_out(&of(0.999 * limit), 2, 1.0));
+        // Where the model is wrong otherwise, more is usual.
+        assert!(!stands_out(&of(1.9 * limit), 2, 2.0) && stands_out(&of(2.1 * limit), 2, 2.0));
+        assert!(!stands_out(&[9.0; 22], 2, 1.0), "shorter than a window");
+    }
+
+    #[test]
+    fn a_trial_differs_from_its_repeats_by_the_noise_of_one() {
+        assert_eq!(shrunk(0), 1.0);
+        assert!((shrunk(1) - 0.5_f64.sqrt()).abs() < 1e-15);
+        assert!((shrunk(3) - 0.75_f64.sqrt()).abs() < 1e-15);
+        let found = deviation(&[3.0], &[vec![1.0], vec![0.0], vec![-1.0]]);
+        assert!((found[0] - 3.0 * 0.75_f64.sqrt()).abs() < 1e-15);
     }
 }

@@ -70,3 +70,51 @@ impl SpectralLine {
         line / f64::max(all, 1e-300)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::TAU;
+
+    use super::*;
+
+    const LINE: SpectralLine = SpectralLine {
+        frequency: 4.0,
+        rate: 50.0,
+    };
+
+    /// Ten seconds of a swing of one frequency.
+    fn swing(size: f64, frequency: f64, phase: f64) -> Vec<f64> {
+        let at = |i: i32| size * libm::sin(TAU * frequency * f64::from(i) / 50.0 + phase);
+        (0..500).map(at).collect()
+    }
+
+    #[test]
+    fn a_line_has_the_share_of_its_square() {
+        let both = std::iter::zip(swing(3.0, 4.0, 0.2), swing(4.0, 7.0, 0.0));
+        let channel: Vec<f64> = both.map(|(a, b)| a + b + 5.0).collect();
+        // 3² of 3² + 4²; a constant is no variance.
+        assert!((LINE.share(&[vec![channel]], 0) - 0.36).abs() < 1e-3);
+        assert!(LINE.share(&[vec![vec![5.0; 500]]], 0) < 1e-3);
+    }
+
+    #[test]
+    fn noise_is_told_beside_the_line_and_not_on_it() {
+        let on = LINE.noise_beside(&[vec![swing(3.0, 4.0, 0.0)]], 0);
+        let beside = LINE.noise_beside(&[vec![swing(3.0, 4.6, 0.0)]], 0);
+        assert!(on < 1e-3 * beside, "{on} {beside}");
+        assert_eq!(LINE.noise_beside(&[], 0), 1e-30);
+    }
+
+    #[test]
+    fn a_swing_is_found_with_its_size_and_phase() {
+        let shown = vec![swing(2.0, 4.0, 0.0)];
+        // Three times as large, and a quarter of a period earlier.
+        let seen = vec![swing(6.0, 4.0, 0.25 * TAU)];
+        let (gram, score) = LINE.normal_equations(&seen, &[shown], &[1.0]);
+        let size = gram.cholesky().expect("two columns").solve(&score);
+        assert!(
+            size[0].abs() < 1e-6 && (size[1].abs() - 3.0).abs() < 1e-6,
+            "{size}"
+        );
+    }
+}

@@ -3,12 +3,11 @@
 //! A robot that leads the hand does not hold every joint: where the arm has more joints than the handle has directions, what it
 //! does between shoulder and handle depends on its own springs, friction and inertia. Torques computed along a simulated motion
 //! then follow an unknown twice, directly and through the motion. The second part comes from the equation of motion linearised
-//! along the run, `M q̈ + D q̇ + (K + Jᵀ S J) q = −Y`, which is solved implicitly, so that a stiff contact and dry friction need
-//! no short steps.
+//! along the run, `M q̈ + D q̇ + (K + Jᵀ S J) q = −Y`.
 
 use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{Joints, Plane, Pose, inertia, inverse_dynamics, jacobian, static_torque};
-use arm_sim::Recording;
+use arm_sim::{Change, Recording, Slopes};
 use nalgebra::SMatrix;
 
 use crate::regression::equation::Building;
@@ -21,11 +20,6 @@ use crate::regression::unknown::{Source, Unknown};
 pub(crate) const HELD: usize = 2;
 /// Samples a second that follow the arm's own vibrations between the samples of a trial \[Hz\].
 const FINE: f64 = 200.0;
-/// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
-const THETA: f64 = 0.55;
-/// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
-const NUDGE: (f64, f64) = (1e-6, 1e-5);
-
 /// The model from which a fit starts: what the robot does not hold is damped so far that its own vibrations die out as fast as the rows end.
 ///
 /// A joint of which nobody knows how it is damped rings in a simulation for as long as it likes and in no phase with the truth; a fit that is
@@ -153,7 +147,7 @@ impl<const N: usize> Course<N> {
             model,
             direct: Building::new((model, &unknowns[..count]), &self.fine, &self.motion),
             memory: InternalStates::new(model),
-            moved: vec![Moved::default(); count],
+            moved: vec![Change::default(); count],
             done: 0,
         }
     }
@@ -167,24 +161,9 @@ pub(crate) struct Answers<'a, const N: usize> {
     direct: Building<'a, N>,
     memory: InternalStates<N>,
     /// What one unit of each has changed of the motion.
-    moved: Vec<Moved<N>>,
+    moved: Vec<Change<N>>,
     /// Samples of the course that are behind.
     done: usize,
-}
-
-/// A change of the motion.
-#[derive(Clone, Copy, Debug)]
-struct Moved<const N: usize> {
-    q: Joints<f64, N>,
-    qd: Joints<f64, N>,
-    qdd: Joints<f64, N>,
-}
-
-impl<const N: usize> Default for Moved<N> {
-    fn default() -> Self {
-        let (q, qd, qdd) = (Joints::zeros(), Joints::zeros(), Joints::zeros());
-        Self { q, qd, qdd }
-    }
 }
 
 impl<const N: usize> Answers<'_, N> {
@@ -196,13 +175,16 @@ impl<const N: usize> Answers<'_, N> {
         let direct = self.direct.next(to - from);
         let mut out = vec![Vec::with_capacity(count * N); self.moved.len()];
         for i in from..to {
-            let slopes = self.slopes(i);
+            let (slopes, own_damping, inverse) = self.slopes(i);
             let push = (i - from) * N..(i - from + 1) * N;
             for ((moved, y), out) in self.moved.iter_mut().zip(&direct.columns).zip(&mut out) {
                 let push = -Joints::from_column_slice(&y[push.clone()]);
-                moved.advance(&slopes, &push, (i == 0, 1.0 / fine.rate));
+                match i {
+                    0 => moved.q = inverse * push,
+                    _ => moved.advance(&slopes, &inverse, &push, 1.0 / fine.rate),
+                }
                 if i % parts == 0 {
-                    let torque = slopes.mass * moved.qdd + slopes.own_damping * moved.qd;
+                    let torque = slopes.mass * moved.qdd + own_damping * moved.qd;
                     out.extend(torque.iter());
                 }
             }
@@ -211,41 +193,26 @@ impl<const N: usize> Answers<'_, N> {
         out
     }
 
-    /// The slopes at the next sample of the course.
-    fn slopes(&mut self, i: usize) -> Slopes<N> {
+    /// The slopes at the next sample of the course, the damping of the arm without the contact, whose force is measured, and the inverse of
+    /// what multiplies new accelerations.
+    fn slopes(&mut self, i: usize) -> (Slopes<N>, SMatrix<f64, N, N>, SMatrix<f64, N, N>) {
         let Course { fine, motion, .. } = self.course;
         let model = self.model;
-        let step = THETA / fine.rate;
         let force = fine.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
         let (q, qd, qdd) = (motion.q[i], motion.qd[i], motion.qdd[i]);
-        let moving = |q, qd| Motion::new(i as f64 / fine.rate, q, qd);
-        self.memory.advance(&moving(q, qd), 1.0 / fine.rate);
+        let moving = |q: &_, qd: &_| Motion::new(i as f64 / fine.rate, *q, *qd);
+        self.memory.advance(&moving(&q, &qd), 1.0 / fine.rate);
         let memory = &self.memory;
-        let left = |q, qd, qdd: &Joints<f64, N>| {
-            let (pose, motion) = (Pose::new(&q), moving(q, qd));
-            inverse_dynamics(&model.chain, &pose, &qd, qdd)
+        let left = |q: &_, qd: &_, qdd: &Joints<f64, N>| {
+            let (pose, motion) = (Pose::new(q), moving(q, qd));
+            inverse_dynamics(&model.chain, &pose, qd, qdd)
                 + resisting_torque(&model.fitted, &motion, &memory.fitted)
                 + resisting_torque(&model.held, &motion, &memory.held)
                 - static_torque(&model.chain, &pose, force, 0.0)
         };
-        let unit = |j, size| {
-            let mut change = Joints::<f64, N>::zeros();
-            change[j] = size;
-            change
-        };
-        let here = left(q, qd, &qdd);
-        let matrix = |column: &dyn Fn(usize) -> Joints<f64, N>| {
-            let columns: [Joints<f64, N>; N] = core::array::from_fn(column);
-            SMatrix::<f64, N, N>::from_columns(&columns)
-        };
-        let mass = matrix(&|j| left(q, qd, &(qdd + unit(j, 1.0))) - here);
-        let own_damping = matrix(&|j| {
-            let d = unit(j, NUDGE.1);
-            (left(q, qd + d, &qdd) - left(q, qd - d, &qdd)) / (2.0 * NUDGE.1)
-        });
-        let own_stiffness = matrix(&|j| {
-            let d = unit(j, NUDGE.0);
-            (left(q + d, qd, &qdd) - left(q - d, qd, &qdd)) / (2.0 * NUDGE.0)
+        let here = left(&q, &qd, &qdd);
+        let own = Slopes::around([q, qd, qdd], &here, |q, qd, qdd| {
+            (left(q, qd, qdd), [0.0; 2])
         });
         let jacobian = jacobian(&model.chain, &Pose::new(&q));
         let through = |gain: Plane<f64>| {
@@ -255,51 +222,17 @@ impl<const N: usize> Answers<'_, N> {
             }
             jacobian.transpose() * scaled
         };
-        let damping = own_damping + through(model.contact.damping);
-        let stiffness = own_stiffness + through(model.contact.stiffness);
+        let slopes = Slopes {
+            damping: own.damping + through(model.contact.damping),
+            stiffness: own.stiffness + through(model.contact.stiffness),
+            ..own
+        };
         // At rest, in the first instant, only angles give way.
-        let whole = if i == 0 {
-            stiffness
-        } else {
-            mass + damping * step + stiffness * (step * step)
+        let whole = match i {
+            0 => slopes.stiffness,
+            _ => slopes.of_step(1.0 / fine.rate),
         };
-        Slopes {
-            inverse: whole.try_inverse().unwrap_or_else(SMatrix::zeros),
-            mass,
-            own_damping,
-            damping,
-            stiffness,
-        }
+        let inverse = whole.try_inverse().unwrap_or_else(SMatrix::zeros);
+        (slopes, own.damping, inverse)
     }
-}
-
-impl<const N: usize> Moved<N> {
-    fn advance(&mut self, s: &Slopes<N>, push: &Joints<f64, N>, (first, h): (bool, f64)) {
-        if first {
-            self.q = s.inverse * push;
-            return;
-        }
-        let (early, late) = (h * (1.0 - THETA), h * THETA);
-        let Self { q, qd, qdd } = *self;
-        let speed: Joints<f64, N> = qd + qdd * early;
-        let angle = q + speed * late + qd * early;
-        let next = s.inverse * (push - s.damping * speed - s.stiffness * angle);
-        let faster = speed + next * late;
-        *self = Self {
-            q: q + (faster * late + qd * early),
-            qd: faster,
-            qdd: next,
-        };
-    }
-}
-
-/// How torques follow the motion at one instant.
-struct Slopes<const N: usize> {
-    mass: SMatrix<f64, N, N>,
-    /// Of the arm without the contact, whose force is measured.
-    own_damping: SMatrix<f64, N, N>,
-    damping: SMatrix<f64, N, N>,
-    stiffness: SMatrix<f64, N, N>,
-    /// Of what multiplies the new accelerations of a step.
-    inverse: SMatrix<f64, N, N>,
 }

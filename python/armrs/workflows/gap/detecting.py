@@ -13,8 +13,8 @@ from ...model import Model
 from ..movement import Movement
 from ..plan import Instruments
 from ..simulate import Channel, Sensors, simulate
+from .core_input import core_settings, core_trials
 from .found import Limit
-from .search import core_settings, core_trials
 from .stages import suspect
 
 _STEP = 0.5e-3

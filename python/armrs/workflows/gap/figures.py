@@ -41,13 +41,13 @@ def gap(result: GapFound) -> Figures:
     return figures | {_name_of(k, e): partial(_effect, result, k, e) for k, e in enumerate(result.effects)}
 
 
-def _steps(result: GapFound) -> list[str]:
+def steps_of(result: GapFound) -> list[str]:
     """Return the models that differ: where nothing was named, the last is the one before it."""
     together = [e for e in result.effects if e.trial is None]
     return ["given", "calibrated", "amended"] if together else ["given", "calibrated"]
 
 
-def _shown(name: str) -> tuple[str, float]:
+def channel_label(name: str) -> tuple[str, float]:
     """Return how a channel is shown, and its factor: angles in degrees."""
     quantity, unit = name.rsplit("_", 1)
     return (f"{quantity} [°]", 180.0 / np.pi) if unit == "rad" else (f"{quantity} [{'N m' if unit == 'Nm' else unit}]", 1.0)
@@ -63,13 +63,13 @@ def _before_and_after(result: GapFound) -> Drawn:
     figure = plotting.figure(10.4, 3.4 * rows)
     outer = figure.add_gridspec(rows, columns)
     for c, name in enumerate(names):
-        label, factor = _shown(name)
+        label, factor = channel_label(name)
         inner = outer[c // columns, c % columns].subgridspec(2, 1, height_ratios=(1.5, 1.0), hspace=0.04)
         above = figure.add_subplot(inner[0])
         below = figure.add_subplot(inner[1], sharex=above)
         measured = np.where(trial.valid, play["measured"][:, c], np.nan) * factor
         above.plot(t, measured, color=plotting.SILVER, lw=3.2)
-        for step in _steps(result):
+        for step in steps_of(result):
             if play[step] is None:
                 continue
             colour, _, width, dash = STEPS[step]
@@ -79,7 +79,7 @@ def _before_and_after(result: GapFound) -> Drawn:
         above.tick_params(labelbottom=False)
         above.set_title(label)
         below.set(ylabel="difference", xlabel="time [s]")
-    _time_legend(figure, _steps(result))
+    _time_legend(figure, steps_of(result))
     text = (
         f"The test trial with the largest gap, {trial.file}. Above, what was measured (broad, grey) and the closed-loop simulation of the "
         "models; below, simulated less measured."
@@ -98,7 +98,7 @@ def _time_legend(figure: Any, steps: Sequence[str]) -> None:
 def _missing_torques(result: GapFound) -> dict[str, list[maps.Discrepancy]]:
     """Return what torque is missing in the fit trials, by model; nothing where that cannot be computed."""
     led, plays = is_led(result.dataset), result.raw["trials"]
-    versions = [s for s in _steps(result) if s != "given"]
+    versions = [s for s in steps_of(result) if s != "given"]
     return {v: [d for d in maps.discrepancies(result.dataset, led, plays, v) if d.trial.role == "fit"] for v in versions}
 
 
@@ -188,7 +188,7 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
     for unit in dict.fromkeys(names[c].rsplit("_", 1)[1] for c in changed):
         ax = axes.pop(0)
         for k, c in enumerate(c for c in changed if names[c].endswith(f"_{unit}")):
-            label, factor = _shown(names[c])
+            label, factor = channel_label(names[c])
             ax.plot(seen.t, rows[:, c] * factor, color=plotting.CYCLE[k], ls=plotting.DASHES[k], label=label.split(" ")[0])
             ax.set_ylabel(f"change {label.split(' ', 1)[1]}")
         ax.axhline(0.0, color=plotting.INK, lw=0.8)

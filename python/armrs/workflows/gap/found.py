@@ -6,11 +6,12 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from ...io.dataset import Dataset
 from ...model import Model
 from ...tabular import Tabular, Tidy
+from ..identify import Estimate
 
 
 @dataclass(frozen=True)
@@ -357,12 +358,23 @@ class GapFound(Tabular):
     dataset: Dataset
     raw: Mapping[str, Any] = field(repr=False, default_factory=dict)
 
-    VIEW = ("workflows.gap.results", "GAP")
+    method: ClassVar[str] = "gap"
+    level: ClassVar[float] = 0.95
 
     def __repr__(self) -> str:
         named = ", ".join(f"{e.kind}{'' if e.joint is None else f' in joint {e.joint}'}" for e in self.effects) or "no effect named"
         shown = (f"{name} {g.before:.3g} → {g.after:.3g} (floor {g.floor:.3g})" for name, g in self.gap.items() if _complete(g))
         return f"GapFound({self.dataset.name!r}: {self.verdict}; {named}; gap on test trials: {', '.join(shown) or 'not measured'})"
+
+    def followed(self) -> tuple[Estimate, ...]:
+        """Return what a history keeps: the fitted parameters of the effects that are in all trials and were decided."""
+        lasting = [e for e in self.effects if e.decided and e.trial is None]
+        return tuple(
+            Estimate(f"{name} of {e.channel}" if e.channel else name, e.joint, e.kind, v.value, v.std, v.unit, v.interval, "data")
+            for e in lasting
+            for name, v in e.parameters.items()
+            if v.std is not None and v.interval is not None
+        )
 
     def tidy(self) -> Tidy:
         """Return the parameters of the named effects, one a row."""

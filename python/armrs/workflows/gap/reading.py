@@ -36,12 +36,10 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
     gap = gaps(dataset, led, raw)
     is_open = any(g.open is not None for g in gap.values())
-    if is_open or (after_z >= MISFIT and not (effects and share < _NEGLIGIBLE and after_ratio < _NEAR_NOISE)):
-        verdict = "unexplained"
+    verdict = verdict_of(named=bool(effects), is_open=is_open, z=after_z, ratio=after_ratio, share=share)
+    if verdict == "unexplained":
         # An interval rests on the structure, and that was rejected.
         effects = tuple(_without_intervals(effect) for effect in effects)
-    else:
-        verdict = "explained" if effects else "nothing_missing"
     return GapFound(
         verdict=verdict,
         effects=effects,
@@ -58,6 +56,26 @@ def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequenc
         dataset=dataset,
         raw=raw,
     )
+
+
+def verdict_of(*, named: bool, is_open: bool, z: float, ratio: float, share: float) -> str:
+    """Return the verdict of a search.
+
+    Parameters
+    ----------
+    named : bool
+        Whether an effect was named.
+    is_open : bool
+        Whether a channel of the test trials is open.
+    z, ratio : float
+        Lack of fit on the fit trials: in standard deviations, and of the residual to the scatter of repeats.
+    share : float
+        What of the calibrated model's lack of fit is left.
+    """
+    negligible = named and share < _NEGLIGIBLE and ratio < _NEAR_NOISE
+    if is_open or (z >= MISFIT and not negligible):
+        return "unexplained"
+    return "explained" if named else "nothing_missing"
 
 
 def _in_family(effect: Missing) -> Missing:

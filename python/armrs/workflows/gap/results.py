@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...catalogue import catalogue
 from ...io import files, tomlfile
-from ...io.dataset import FILE, Dataset
-from ...report.figures import draw
+from ...report.figures import draw, history
 from ...report.plain import data_of, origin
 from ...report.results import write_result
 from ...report.view import View
 from . import figures
 from .found import GapFound
+from .moving import moving
 
 
 def gap_data(result: GapFound, command: str | None = None) -> dict[str, Any]:
@@ -26,7 +25,7 @@ def gap_data(result: GapFound, command: str | None = None) -> dict[str, Any]:
         effect |= {"summary": kind.summary, "formula": kind.formula}
     for number, alternative in enumerate(_separated(data), start=1):
         alternative["separation"]["file"] = f"separating-{number}.toml"
-    data["made_by"] |= {"input_sha256": digest(result.dataset), "random_numbers": "none"}
+    data["made_by"] |= {"input_sha256": result.dataset.digest(), "random_numbers": "none"}
     return data
 
 
@@ -44,19 +43,6 @@ def _write_movement(separation: Mapping[str, Any], folder: Path) -> Path:
     return path
 
 
-def digest(dataset: Dataset) -> str | None:
-    """Return the SHA-256 of a data set's files one after the other: `dataset.toml`, the model, the trials in their order."""
-    if dataset.folder is None or dataset.model_path is None:
-        return None
-    whole = hashlib.sha256()
-    try:
-        for path in (dataset.folder / FILE, dataset.model_path, *(dataset.folder / t.file for t in dataset.trials)):
-            whole.update(path.read_bytes())
-    except OSError:
-        return None
-    return whole.hexdigest()
-
-
 def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write `amended.toml`, movements that separate alternatives, `gap.json`, figures and `report.html` below a folder.
 
@@ -66,14 +52,15 @@ def write_gap(result: GapFound, data: dict[str, Any], folder: Path) -> list[Path
     """
     name = "amended.toml"
     files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
-    drawn = draw(figures.gap(result))
+    drawn = draw(figures.gap(result)) + draw(history(data.get("history", ())))
+    shown = moving(result)
 
     def write(out: Path) -> list[Path]:
         result.model.write(out / name)
         movements = [_write_movement(a["separation"], out) for a in _separated(data)]
-        return [out / name, *movements, *write_result(out, "gap", data, drawn)]
+        return [out / name, *movements, *write_result(out, "gap", data, drawn, shown)]
 
     return files.write_whole(folder, write)
 
 
-GAP = View(gap_data, lambda result, _: figures.gap(result))
+GAP = View(gap_data, lambda result, _: figures.gap(result), moving)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from ... import _armrs, checks
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
-from ...io.dataset import Dataset, load_dataset, naming_trials, refuse_added
-from ..identify import core_columns
-from . import reading, suspicion
+from ...io.dataset import Dataset, load_dataset, naming_trials
+from . import reading, separating, suspicion
+from .core_input import core_settings, core_trials
 from .found import GapFound
 
 
@@ -56,8 +55,6 @@ def find_gap(
     Where the simulated arm does not follow the measured one at all, as a free wrist may, joint torques in measured motion are compared
     instead; the first of the warnings says so.
     """
-    from . import separating
-
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     checks.flag("separate", separate)
     if progress is not None:
@@ -93,21 +90,3 @@ def _torques_instead(error: SimulationError) -> str:
         f"The simulated arm does not follow the measured one ({error}): joint torques in measured motion are compared instead of angles "
         "and forces. Effects of the contact and of the robot cannot be asked that way."
     )
-
-
-def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
-    """Return the trials for the core."""
-    refuse_added(dataset)
-    configurations = sorted({t.configuration for t in dataset.trials})
-    return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
-
-
-def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> dict[str, Any]:
-    """Return what is known beforehand, for the core."""
-    return {
-        "segment_uncertainty": dataset.model.segment_uncertainty,
-        "tolerance": dataset.tolerance,
-        "led": led,
-        "own": list(own),
-        "threads": (os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),
-    }

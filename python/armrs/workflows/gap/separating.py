@@ -16,9 +16,9 @@ from ...model import Model
 from ..identify import core_columns
 from ..movement import Movement
 from ..simulate import Sensors, simulate
+from .core_input import core_settings, core_trials
 from .found import Alternative, GapFound, Missing, Separation
 from .reading import is_led, lasting
-from .search import core_settings, core_trials
 
 SPEEDS = (0.15, 1.2)
 """Largest joint speeds of the movements that are tried, as far as the limits allow [rad/s]."""

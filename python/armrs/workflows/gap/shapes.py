@@ -10,9 +10,9 @@ from ... import _armrs
 from ...catalogue import catalogue
 from ...model import Effect
 from . import maps
+from .core_input import core_settings, core_trials
 from .found import GapFound, Missing
 from .reading import channel_names, in_file, is_led
-from .search import core_settings, core_trials
 
 _BINS = 24
 _FEWEST = 8

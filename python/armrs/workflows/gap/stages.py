@@ -19,8 +19,8 @@ from ...model import Contact, Model, Robot
 from ...report.figures import shown
 from ...report.plain import data_of, origin
 from . import figures, maps, reading, suspicion
+from .core_input import core_settings, core_trials
 from .found import Absorbed, ChannelGap, GapFound, Place, Suspect, gap_to_dict
-from .search import core_settings, core_trials
 
 Source = Dataset | str | os.PathLike[str]
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset
-from ...io.plausibility import constant, refuse_implausible
-from ...io.trial import Trial
+from ...io.plausibility import refuse_implausible
+from ...io.trial import Trial, constant
 from ..setup import refuse_wrong_setup
+from .between_samples import unresolved
 
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
@@ -58,7 +59,14 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
                 raise BadInput(f"column {name}", found, "a torque that changes with the movement", file=trial.file, hint="a dead sensor?")
     _refuse_copies(dataset.trials)
     refuse_wrong_setup(dataset)
-    return lines + _still_joints(fit, led) + _moving_starts(dataset.trials, led) + _uneven_repeats(fit) + _saturated(dataset, led)
+    return (
+        lines
+        + _still_joints(fit, led)
+        + _moving_starts(dataset.trials, led)
+        + unresolved(dataset, led)
+        + _uneven_repeats(fit)
+        + _saturated(dataset, led)
+    )
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
@@ -205,23 +213,41 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
     if not led:
         return
     n = dataset.model.n_joints
-    pairs = zip(dataset.trials, plays, strict=True)
-    shown = [(trial.file, p["measured"][:, n:], p["given"][:, n:]) for trial, p in pairs if p["given"] is not None]
+    pairs = [(trial, p) for trial, p in zip(dataset.trials, plays, strict=True) if p["given"] is not None]
+    compared = [trial for trial, _ in pairs]
+    shown = [(trial.file, p["measured"][:, n:], p["given"][:, n:]) for trial, p in pairs]
     if not shown:
         return
-    _refuse_forces(dataset, np.concatenate([f for _, f, _ in shown]), np.concatenate([e for _, _, e in shown]))
-    # One trial alone may be labelled otherwise than the rest.
-    for file, forces, expected in shown:
-        _refuse_forces(dataset, forces, expected, f"{file}: ")
+    together = np.concatenate([f for _, f, _ in shown]), np.concatenate([e for _, _, e in shown])
+    _refuse_units(*together)
+    _refuse_directions(dataset, *together)
+    # One trial alone may be labelled otherwise than the rest; where its repeats show the same, the arm is another one than the model.
+    for trial, (file, forces, expected) in zip(compared, shown, strict=True):
+        _refuse_units(forces, expected, f"{file}: ")
+        others = (
+            f for other, (_, f, _) in zip(compared, shown, strict=True) if other is not trial and other.configuration == trial.configuration
+        )
+        if not any(_repeats(forces, other) for other in others):
+            _refuse_directions(dataset, forces, expected, f"{file}: ")
 
 
-def _refuse_forces(dataset: Dataset, forces: np.ndarray, expected: np.ndarray, at: str = "") -> None:
-    """Refuse forces, (n_samples, 2), that are those expected of the arm in another unit, order or direction."""
+def _repeats(forces: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two trials of a movement show forces, (n_samples, 2), of the same direction as far as both go."""
+    n = min(len(forces), len(other))
+    return _alike(forces[:n], other[:n]) > _ALIKE
+
+
+def _refuse_units(forces: np.ndarray, expected: np.ndarray, at: str = "") -> None:
+    """Refuse forces, (n_samples, 2), that are those expected of the arm in another unit."""
     size, usual = np.sqrt(np.mean(forces**2)), np.sqrt(np.mean(expected**2))
     for factor, unit in ((1000.0, "mN labelled as N"), (0.001, "kN labelled as N")):
         if usual > 0 and abs(np.log10(size / usual / factor)) < 0.5:
             found = f"{size:.3g} N on average where the model expects {usual:.3g} N"
             raise BadInput(f"{at}Fy_N, Fz_N", Text(found), f"forces in newtons ({unit}?)")
+
+
+def _refuse_directions(dataset: Dataset, forces: np.ndarray, expected: np.ndarray, at: str = "") -> None:
+    """Refuse forces, (n_samples, 2), that are those expected of the arm in another order or direction."""
     own = [_correlation(forces[:, c], expected[:, c]) for c in (0, 1)]
     cross = [_correlation(forces[:, c], expected[:, 1 - c]) for c in (0, 1)]
     if _alike(forces, expected) < -_ALIKE:

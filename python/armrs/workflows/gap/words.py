@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...report import words as common
-from ...report.tables import Table, number, spread, unit
+from ...report.tables import Table, number, smallest_effects, spread, unit
 from . import headline
 from .headline import effect_name, joined
 from .reading import MISFIT
@@ -128,7 +128,8 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     common.show("Where the calibrated model and the data disagree most", where(result))
     print("\n".join(left(result)) + "\n")
     if result["verdict"] == "nothing_missing":
-        common.show("The smallest effects that these data would have shown", limits(result))
+        common.show("The smallest effects that these data would have shown", smallest_effects(result["would_have_seen"]))
+    common.followed(result)
     common.files_written(written[-1:])
 
 
@@ -211,19 +212,6 @@ def where(data: Mapping[str, Any], most: int = 6) -> Table:
         for w in data["where"][:most]
     ]
     return Table(["trial", "where", "time [s]", "missing torque [N m]", "standard deviations"], rows, 2)
-
-
-def limits(data: Mapping[str, Any]) -> Table:
-    """Return the smallest effects that would have been seen, one row for each kind and its joints side by side."""
-    most = max([w["joint"] or 0 for w in data["would_have_seen"]], default=0)
-    rows: dict[tuple[str, str, str], list[object]] = {}
-    for w in data["would_have_seen"]:
-        key = (w["kind"], w["parameter"], w["unit"])
-        cells = rows.setdefault(key, [None] * (most + 2))
-        at = w["joint"] - 1 if w["joint"] else most + ({"Fy": 0, "Fz": 1}.get(w["channel"], 0) if w["channel"] else 0)
-        cells[at] = f"{w['at_least']:.2g}"
-    head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole or Fy", "Fz"]
-    return Table(head, [[kind, parameter, unit(held_in), *cells] for (kind, parameter, held_in), cells in rows.items()], 3)
 
 
 def nearest(data: Mapping[str, Any], most: int = 8) -> Table:

@@ -1,126 +1,10 @@
-//! The linearised responses are those of the simulation, and a hidden effect is found in simulated data.
+//! The linearised responses are those of the simulation.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Chain, Contact, Elbow, Joints, Limits, Robot, Segment, Setup, Shape};
 use arm_gap::data::prepared_session::PreparedSession;
-use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use arm_ident::regression::trial::{Role, Tolerance, Trial};
-use arm_sim::{
-    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start, simulate,
-};
 
-const RATE: f64 = 50.0;
-
-fn arm() -> Chain<f64, 2> {
-    let segment = |length, mass, com, inertia| Segment {
-        length,
-        mass,
-        com: [com, 0.0],
-        inertia,
-    };
-    Chain::new(
-        [
-            segment(0.32, 2.0, 0.15, 0.02),
-            segment(0.28, 1.3, 0.13, 0.012),
-        ],
-        [0.0, 0.0],
-        [0.0, -9.81],
-    )
-    .expect("a possible arm")
-}
-
-fn known() -> Vec<Effect<f64>> {
-    let viscous = Kind::named("viscous").expect("known");
-    (0..2)
-        .map(|j| Effect::new(viscous, j).with(&[0.1]))
-        .collect()
-}
-
-/// Two movements, each repeated: synthetic trials of an arm with `effects`, read by sensors with white noise.
-fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
-    let chain = arm();
-    let contact = Contact::new([1e4; 2], [25.0; 2]);
-    let robot = Robot::new([0.5, 0.45], [1.0, -0.1], Elbow::Up).expect("a possible robot");
-    let degrees = |list: &[[f64; 2]]| -> Vec<Joints<f64, 2>> {
-        list.iter()
-            .map(|w| Joints::from(w.map(f64::to_radians)))
-            .collect()
-    };
-    let movements = [
-        (
-            degrees(&[[-60.0, 50.0], [-30.0, 50.0], [-30.0, 85.0], [-60.0, 50.0]]),
-            0.4,
-        ),
-        (degrees(&[[-50.0, 80.0], [-20.0, 40.0], [-50.0, 80.0]]), 1.0),
-    ];
-    let mut trials = Vec::new();
-    for (configuration, (waypoints, speed)) in movements.into_iter().enumerate() {
-        let limits = Limits {
-            speed,
-            acceleration: 4.0 * speed,
-        };
-        let movement = Movement::within(Shape::Smooth, &waypoints, &[limits; 2], 0.3)
-            .expect("a possible movement");
-        let duration = (movement.duration() * RATE).ceil() / RATE;
-        let path = HandlePath::of_arm(chain, movement);
-        let drive = Drive::Handle {
-            path,
-            coupling: Coupling::Compliant,
-        };
-        let mut experiment = Experiment::new(Setup::new(&chain, contact), drive, duration);
-        experiment.effects = known().into_iter().chain(effects.iter().copied()).collect();
-        experiment.robot = Some(robot);
-        experiment.start = Start::Equilibrium { near: waypoints[0] };
-        experiment.output_interval = Some(0.5 / RATE);
-        let recording = simulate(&experiment).expect("a stable run");
-        for repeat in 0..4 {
-            let mut sensors = Sensors::<2>::ideal();
-            sensors.rate = RATE;
-            sensors.seed = 100 * configuration as u64 + repeat;
-            sensors.angle = [Channel::white(noise.0); 2];
-            sensors.force = [Channel::white(noise.1); 2];
-            let read = sensors.read(&experiment, &recording).expect("readings");
-            let count = read.time.len();
-            trials.push(Trial {
-                role: if repeat == 3 { Role::Test } else { Role::Fit },
-                configuration,
-                rate: RATE,
-                q: (0..count)
-                    .map(|i| Joints::from_column_slice(&read.q[2 * i..2 * i + 2]))
-                    .collect(),
-                speed: None,
-                force_on_arm: Some(
-                    (0..count)
-                        .map(|i| [read.force_on_arm[2 * i], read.force_on_arm[2 * i + 1]])
-                        .collect(),
-                ),
-                moment_on_arm: None,
-                torque: None,
-                handle: Some(
-                    (0..count)
-                        .map(|i| {
-                            robot.handle(&[read.robot_q[2 * i], read.robot_q[2 * i + 1]].into())
-                        })
-                        .collect(),
-                ),
-                valid: vec![true; count],
-            });
-        }
-    }
-    Session {
-        chain,
-        contact,
-        effects: known(),
-        segment_uncertainty: 0.02,
-        tolerance: Tolerance::default(),
-        trials,
-        comparison: ComparisonMode::Led,
-        own: Vec::new(),
-        base: Vec::new(),
-        start: [[0.0; 3]; 2],
-    }
-}
+use crate::sessions::session;
 
 /// Root mean square of channels.
 fn size(channels: &[Vec<f64>]) -> f64 {
@@ -300,30 +184,6 @@ fn a_joint_that_sticks_is_followed_as_it_is_simulated() {
 }
 
 #[test]
-fn a_hidden_spring_is_named_and_nothing_else() {
-    let elastic = Kind::named("elastic").expect("known");
-    let hidden = Effect::new(elastic, 1).with(&[1.5, 1.0]);
-    let session = session(&[hidden], (1e-3, 0.1));
-    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
-    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
-    let named = &finding.amended.hypothesis.named;
-    assert_eq!(named.len(), 1, "{named:?}");
-    assert_eq!((named[0].kind, named[0].index), (elastic, 1));
-    assert!((named[0].parameters[0] - 1.5).abs() < 0.15, "{named:?}");
-    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
-}
-
-#[test]
-fn nothing_is_named_where_nothing_is_hidden() {
-    let session = session(&[], (1e-3, 0.1));
-    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
-    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
-    assert!(finding.amended.hypothesis.named.is_empty());
-    assert!(finding.trial_specific.is_empty());
-    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
-}
-
-#[test]
 fn a_number_that_is_held_is_no_unknown_and_the_others_answer_as_before() {
     let session = session(&[], (1e-3, 0.1));
     let prepared = PreparedSession::new(&session, 1).expect("a sound session");
@@ -342,64 +202,5 @@ fn a_number_that_is_held_is_no_unknown_and_the_others_answer_as_before() {
                 assert_eq!(before.gram[(i, j)], after.gram[(a, b)]);
             }
         }
-    }
-}
-
-/// The session of an arm whose model has no joint law at all.
-fn little_known(effects: &[Effect<f64>]) -> Session<2> {
-    let mut session = session(effects, (1e-3, 0.1));
-    session.effects.clear();
-    session.with_base()
-}
-
-#[test]
-fn the_laws_of_a_passive_joint_are_named_with_what_could_stand_in_their_place() {
-    let session = little_known(&[]);
-    assert_eq!(session.base.len(), 6);
-    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
-    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
-    let named = &finding.amended.hypothesis.named;
-    let viscous = Kind::named("viscous").expect("known");
-    let places: Vec<_> = named.iter().map(|e| (e.kind, e.index)).collect();
-    assert!(
-        places.contains(&(viscous, 0)) && places.contains(&(viscous, 1)),
-        "{places:?}"
-    );
-    assert!(finding.amended.hypothesis.known.is_empty());
-    for one in &finding.named {
-        let effect = &named[one.slot];
-        assert_eq!(effect.kind, viscous, "{effect:?}");
-        assert!((effect.parameters[0] - 0.1).abs() < 0.03, "{effect:?}");
-        assert!(one.share > 0.0 && one.share <= 1.0);
-        for other in &one.alternatives {
-            assert_eq!(other.effect.index, effect.index);
-            assert!(!other.candidate.is_same_effect(effect));
-        }
-    }
-}
-
-#[test]
-fn whole_trials_tell_whether_friction_sticks_or_creeps() {
-    let of = |kind: &str, index, values: &[f64]| {
-        Effect::new(Kind::named(kind).expect("known"), index).with(values)
-    };
-    for smoothing in [0.0, 0.03] {
-        let hidden = [
-            of("elastic", 0, &[1.0, -1.0]),
-            of("elastic", 1, &[1.5, 1.0]),
-            of("coulomb", 1, &[0.3, smoothing]),
-        ];
-        let mut session = session(&hidden, (3e-4, 0.03));
-        session.effects = Vec::new();
-        let session = session.with_base();
-        let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
-        let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
-        let named = &finding.amended.hypothesis.named;
-        let friction = named
-            .iter()
-            .find(|e| e.kind == hidden[2].kind && e.index == 1);
-        let found = friction.expect("dry friction").parameters;
-        assert_eq!(found[1], smoothing, "{named:?}");
-        assert!((found[0] - 0.3).abs() < 0.02, "{found:?}");
     }
 }

@@ -1,0 +1,9 @@
+//! One module for each stage of the search; `sessions` are what they share.
+
+mod candidates;
+mod preparing;
+mod responses;
+mod search;
+mod sessions;
+mod swinging;
+mod trial_specific;

@@ -1,0 +1,107 @@
+//! A hidden effect is found in simulated data, and nothing else is.
+
+use arm_core::effect::{Effect, Kind};
+use arm_gap::data::prepared_session::PreparedSession;
+use arm_gap::data::session::Session;
+
+use crate::sessions::session;
+
+#[test]
+fn a_hidden_spring_is_named_and_nothing_else() {
+    let elastic = Kind::named("elastic").expect("known");
+    let hidden = Effect::new(elastic, 1).with(&[1.5, 1.0]);
+    let session = session(&[hidden], (1e-3, 0.1));
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    let named = &finding.amended.hypothesis.named;
+    assert_eq!(named.len(), 1, "{named:?}");
+    assert_eq!((named[0].kind, named[0].index), (elastic, 1));
+    assert!((named[0].parameters[0] - 1.5).abs() < 0.15, "{named:?}");
+    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
+}
+
+#[test]
+fn nothing_is_named_where_nothing_is_hidden() {
+    let session = session(&[], (1e-3, 0.1));
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    assert!(finding.amended.hypothesis.named.is_empty());
+    assert!(finding.trial_specific.is_empty());
+    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
+}
+
+/// The session of an arm whose model has no joint law at all.
+fn little_known(effects: &[Effect<f64>]) -> Session<2> {
+    let mut session = session(effects, (1e-3, 0.1));
+    session.effects.clear();
+    session.with_base()
+}
+
+#[test]
+fn the_laws_of_a_passive_joint_are_named_with_what_could_stand_in_their_place() {
+    let session = little_known(&[]);
+    assert_eq!(session.base.len(), 6);
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    let named = &finding.amended.hypothesis.named;
+    let viscous = Kind::named("viscous").expect("known");
+    let places: Vec<_> = named.iter().map(|e| (e.kind, e.index)).collect();
+    assert!(
+        places.contains(&(viscous, 0)) && places.contains(&(viscous, 1)),
+        "{places:?}"
+    );
+    assert!(finding.amended.hypothesis.known.is_empty());
+    for one in &finding.named {
+        let effect = &named[one.slot];
+        assert_eq!(effect.kind, viscous, "{effect:?}");
+        assert!((effect.parameters[0] - 0.1).abs() < 0.03, "{effect:?}");
+        assert!(one.share > 0.0 && one.share <= 1.0);
+        for other in &one.alternatives {
+            assert_eq!(other.effect.index, effect.index);
+            assert!(!other.candidate.is_same_effect(effect));
+        }
+    }
+}
+
+#[test]
+fn whole_trials_tell_whether_friction_sticks_or_creeps() {
+    let of = |kind: &str, index, values: &[f64]| {
+        Effect::new(Kind::named(kind).expect("known"), index).with(values)
+    };
+    for smoothing in [0.0, 0.03] {
+        let hidden = [
+            of("elastic", 0, &[1.0, -1.0]),
+            of("elastic", 1, &[1.5, 1.0]),
+            of("coulomb", 1, &[0.3, smoothing]),
+        ];
+        let mut session = session(&hidden, (3e-4, 0.03));
+        session.effects = Vec::new();
+        let session = session.with_base();
+        let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+        let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+        let named = &finding.amended.hypothesis.named;
+        let friction = named
+            .iter()
+            .find(|e| e.kind == hidden[2].kind && e.index == 1);
+        let found = friction.expect("dry friction").parameters;
+        assert_eq!(found[1], smoothing, "{named:?}");
+        assert!((found[0] - 0.3).abs() < 0.02, "{found:?}");
+    }
+}
+
+#[test]
+fn friction_that_the_model_lacks_sticks_where_the_joint_does() {
+    let coulomb = Kind::named("coulomb").expect("known");
+    let hidden = Effect::new(coulomb, 1).with(&[0.3, 0.0]);
+    let session = session(&[hidden], (3e-4, 0.03));
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    let named = &finding.amended.hypothesis.named;
+    assert_eq!(named.len(), 1, "{named:?}");
+    assert_eq!((named[0].kind, named[0].index), (coulomb, 1));
+    let [torque, smoothing, ..] = named[0].parameters;
+    assert_eq!(smoothing, 0.0, "{named:?}");
+    assert!((torque - 0.3).abs() < 0.02, "{named:?}");
+    // What is no unknown is not refined.
+    assert!(finding.amended.asked[0].refined.is_empty());
+}

@@ -1,0 +1,76 @@
+//! What is not the same in every trial: a sensor that slips, the robot's ripple.
+
+use arm_core::effect::{Kind, Nature};
+use arm_gap::data::prepared_session::PreparedSession;
+use arm_gap::data::session::Session;
+use arm_gap::trial_specific::component::TrialSpecific;
+use arm_gap::trial_specific::tremor_detection::Line;
+use core::f64::consts::TAU;
+
+use crate::sessions::{RATE, session};
+
+/// The clearest disturbance of a session against the model as given.
+fn disturbance(session: &Session<2>) -> Option<TrialSpecific> {
+    let prepared = PreparedSession::new(session, 2).expect("a sound session");
+    let point = prepared.linearize(&session.given()).expect("a run");
+    prepared.disturbance(&point, 1.0)
+}
+
+/// A session one of whose encoders slips by an angle \[rad\] after 3 s of one trial.
+fn slipped(by: f64) -> Session<2> {
+    let mut session = session(&[], (1e-3, 0.1));
+    let late = session.trials[1].q.iter_mut().skip((3.0 * RATE) as usize);
+    late.for_each(|q| q[1] += by);
+    session
+}
+
+#[test]
+fn an_encoder_that_slips_is_found_with_its_trial_its_time_and_its_size() {
+    let found = disturbance(&slipped(0.05)).expect("a slip");
+    let offset = Kind::named("angle_offset").expect("known");
+    assert_eq!(
+        (found.effect.kind, found.effect.index, found.trial),
+        (offset, 1, Some(1))
+    );
+    assert!(
+        (found.effect.parameters[0] - 0.05).abs() < 0.005,
+        "{found:?}"
+    );
+    assert!((found.span().0 - 3.0).abs() <= 0.2, "{found:?}");
+    assert!(found.sd < 0.005 && found.gain > 100.0, "{found:?}");
+}
+
+#[test]
+fn nothing_is_found_in_noise_nor_in_what_the_calibration_promises() {
+    assert!(disturbance(&slipped(0.0)).is_none());
+    // 0.3° is 0.0052 rad.
+    assert!(disturbance(&slipped(0.004)).is_none());
+}
+
+#[test]
+fn a_robot_that_shakes_is_told_by_handle_and_hand_that_come_apart() {
+    let ripple = |size: f64| {
+        let mut session = session(&[], (2e-4, 0.02));
+        for trial in &mut session.trials {
+            let handle = trial.handle.as_mut().expect("a robot");
+            for (i, point) in handle.iter_mut().enumerate() {
+                point[1] -= size * libm::sin(TAU * 4.3 * i as f64 / RATE);
+            }
+        }
+        let prepared = PreparedSession::new(&session, 2).expect("a sound session");
+        let point = prepared.linearize(&session.given()).expect("a run");
+        prepared
+            .rhythm(&point, Line::OfTheRobot)
+            .expect("an answer")
+    };
+    assert!(ripple(0.0).is_none());
+    let found = ripple(1e-3).expect("a ripple");
+    assert_eq!(found.effect.kind.probe().nature, Nature::Periodic);
+    assert!((found.wave()[0] - 4.3).abs() < 0.05, "{found:?}");
+    assert!(found.locked, "in the same phase in every trial");
+    let axes = &found.effect.parameters[..2];
+    assert!(
+        axes[0].abs() < 2e-4 && (axes[1].abs() - 1e-3).abs() < 2e-4,
+        "{axes:?}"
+    );
+}

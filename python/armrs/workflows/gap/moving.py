@@ -1,0 +1,74 @@
+"""What moves in the report of the gap workflow: the arm as measured and as simulated, and series with effects to switch off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadInput, SimulationError
+from ...io.trial import Trial
+from ...report import plotting
+from ...report.live import NOTHING, Live
+from ...report.moving import SERIES, compared
+from ...report.series import Line, Panel, series
+from ..simulate import Simulated, simulate
+from .figures import STEPS, channel_label, steps_of
+from .found import GapFound
+from .headline import place_of
+from .reading import channel_names, is_led
+from .shapes import telling_trial
+
+
+def moving(result: GapFound) -> Live:
+    """Return what moves in the page: the telling test trial, measured and simulated, and what it would be without each named effect."""
+    if not is_led(result.dataset):
+        return NOTHING
+    shown = telling_trial(result)
+    trial, play = result.dataset.trials[shown], result.raw["trials"][shown]
+    steps = [step for step in steps_of(result) if play[step] is not None]
+    if not steps:
+        return NOTHING
+    t, n = trial.t - trial.t[0], result.dataset.model.n_joints
+    without = _without(result, trial, play) if "amended" in steps else {}
+    panels = []
+    for c, name in enumerate(channel_names(result.dataset, True)):
+        label, factor = channel_label(name)
+        title, _, unit = label.rstrip("]").partition(" [")
+        lines = [Line("measured", plotting.SILVER, np.where(trial.valid, play["measured"][:, c], np.nan) * factor)]
+        lines += [Line(STEPS[step][1], STEPS[step][0], play[step][:, c] * factor, shown=step != "given") for step in steps]
+        lines += [
+            Line(f"without {words}", plotting.CYCLE[(k + 2) % len(plotting.CYCLE)], course[:, c] * factor, shown=False)
+            for k, (words, course) in enumerate(without.items())
+        ]
+        panels.append(Panel(title, unit, tuple(lines)))
+    text = f"The test trial with the largest gap, {trial.file}: measured, and simulated with each model. Switch single effects off."
+    arms = {"arm as simulated": play[steps[-1]][:, :n], "arm as measured": trial.q}
+    film = compared(result.dataset.model, t, arms, trial.robot_q)
+    return Live(film, series(SERIES, text, t, panels))
+
+
+def _without(result: GapFound, trial: Trial, play: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Return the channels of a trial without each named effect: what its absence changes in a simulation, from the amended course."""
+    named = [e for e in result.effects if e.trial is None and e.joint is not None]
+    joints = [joint.name for joint in result.dataset.model.joints]
+    model = result.model
+    found: dict[str, np.ndarray] = {}
+    try:
+        with_all = _channels(simulate(model, trial), trial)
+        for effect in named:
+            left = tuple(e for e in model.effects if (e.kind, e.joint) != (effect.kind, effect.joint))
+            if len(left) < len(model.effects):
+                changed = _channels(simulate(model.replace(effects=left), trial), trial) - with_all
+                found[place_of(effect.kind, effect.joint, None, joints)] = play["amended"] + changed
+    except (BadInput, SimulationError):
+        # An arm that cannot be followed without an effect has no course to show.
+        return found
+    return found
+
+
+def _channels(run: Simulated, trial: Trial) -> np.ndarray:
+    """Return angles and forces at the samples of a trial."""
+    columns = np.column_stack([run.q, run.force_on_arm]).T
+    return np.column_stack([np.interp(trial.t - trial.t[0], run.t, column) for column in columns])
