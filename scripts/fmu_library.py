@@ -4,11 +4,15 @@ It says which glibc the library needs: that of the system it is built on, roughl
 linked against glibc 2.17, so that FMUs run on older systems as well; this needs `pip install ziglang cargo-zigbuild`. With
 `--of-tests`, and the packages that cargo is to test after it, it is the one that the Rust tests are compiled with: of the same bits,
 slower, and there without compiling anything twice.
+
+`--target TRIPLE` builds for another machine instead (`scripts/foreign.sh` says which). `--into DIR` puts the library where
+`armrs fmu export --library DIR` takes it from, and not into the package.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import platform
 import re
 import shutil
@@ -17,27 +21,33 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-NAMES = {"win32": "arm_fmu.dll", "darwin": "libarm_fmu.dylib"}
 OLDEST = (2, 17)
+SYSTEMS = {"windows": "arm_fmu.dll", "darwin": "libarm_fmu.dylib", "linux": "libarm_fmu.so"}
+MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
 def main() -> None:
     """Build and copy what came out."""
-    portable = "--portable" in sys.argv
-    command = ["cargo", "build", "--release", "-p", "arm-fmu"]
-    if portable:
-        command[1:2] = ["zigbuild", "--target", f"{platform.machine()}-unknown-linux-gnu.{OLDEST[0]}.{OLDEST[1]}"]
-    elif sys.argv[1:2] == ["--of-tests"]:
-        command = ["cargo", "test", "--no-run", "--tests", *sys.argv[2:]]
-    name = NAMES.get(sys.platform, "libarm_fmu.so")
-    built = library(command, name)
+    portable, target, into = "--portable" in sys.argv, option("--target"), option("--into")
+    machine, system = of(target)
+    name = SYSTEMS[system]
+    if target and not portable:
+        built = foreign(target, name)
+    else:
+        command = ["cargo", "build", "--release", "-p", "arm-fmu"]
+        if portable:
+            command[1:2] = ["zigbuild", "--target", f"{machine}-unknown-linux-gnu.{OLDEST[0]}.{OLDEST[1]}"]
+        elif sys.argv[1:2] == ["--of-tests"]:
+            command = ["cargo", "test", "--no-run", "--tests", *sys.argv[2:]]
+        built = library(command, name)
     content = built.read_bytes()
     needed = glibc(content)
     if portable and needed > OLDEST:
         sys.exit(f"fmu_library: the library needs glibc {version(needed)}, allowed is {version(OLDEST)} at most")
-    place = ROOT / "python" / "armrs" / "fmu" / "lib"
-    place.mkdir(exist_ok=True)
-    (place / "license.txt").write_text(licences(), encoding="utf-8")
+    top = Path(into) if into else ROOT / "python" / "armrs" / "fmu" / "lib"
+    place = top / f"{machine}-{system}" if into else top
+    place.mkdir(parents=True, exist_ok=True)
+    (top / "license.txt").write_text(licences(), encoding="utf-8")
     # Renamed into its place: a process that has the old one loaded keeps it.
     part = place / f"{name}.part"
     part.write_bytes(content)
@@ -45,6 +55,28 @@ def main() -> None:
     part.replace(place / name)
     if any(needed):
         print(f"the library for FMUs needs glibc {version(needed)}")
+
+
+def option(name: str) -> str:
+    """Return the word after an option, or nothing."""
+    return sys.argv[sys.argv.index(name) + 1] if name in sys.argv[:-1] else ""
+
+
+def of(target: str) -> tuple[str, str]:
+    """Return processor and system of a target, or of this machine."""
+    if target:
+        return target.split("-")[0], next(system for system in SYSTEMS if system in target)
+    machine = platform.machine().lower()
+    return MACHINES.get(machine, machine), {"win32": "windows"}.get(sys.platform, sys.platform)
+
+
+def foreign(target: str, name: str) -> Path:
+    """Build for another machine."""
+    work = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "crosscheck"
+    done = subprocess.run([str(ROOT / "scripts" / "foreign.sh"), target, str(work), "-p", "arm-fmu"], check=False)
+    if done.returncode:
+        sys.exit(done.returncode)
+    return work / "foreign" / target / "release" / name
 
 
 def library(command: list[str], name: str) -> Path:

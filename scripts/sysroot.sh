@@ -30,10 +30,15 @@ case $target in
   mkdir "$work/src"
   printf '[package]\nname = "empty"\nversion = "0.0.0"\nedition = "2021"\n' >"$work/Cargo.toml"
   touch "$work/src/lib.rs"
-  (cd "$work" && PATH=/usr/bin:/bin CARGO_HOME=$work/home cargo build --quiet --release --offline \
+  (cd "$work" && PATH=/usr/bin:/bin CARGO_HOME=$work/home CARGO_TARGET_DIR=$work/target cargo build --quiet --release --offline \
     -Zbuild-std=std,panic_abort --target "$target" \
     --config 'source.crates-io.replace-with="vendored"' --config "source.vendored.directory=\"$source/vendor\"")
   cp "$work/target/$target/release/deps/"*.rlib "$out/"
+  case $target in
+  *-windows-gnu)
+    for part in rsbegin rsend; do $rustc --sysroot "$root" --target "$target" --emit obj -o "$out/$part.o" "$source/rtstartup/$part.rs"; done
+    ;;
+  esac
   ;;
 esac
 echo "$made_by" >"$stamp"

@@ -63,6 +63,9 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
 #ifdef EVENT_MODE_REFUSED
     if (events) return NULL;
 #endif
+#ifdef EVENT_MODE_ASKED
+    if (!events) return NULL;
+#endif
 #ifdef UPDATE_REFUSED
     if (update) return NULL;
 #endif
@@ -222,7 +225,7 @@ int fmi3DoStep(void *v, double t, double h, bool prior, bool *event, bool *end, 
     m->s += h * m->x + h;
 #ifdef RANDOM
     static int calls;
-    m->s += 1e-9 * ++calls;
+    m->s += 1e-3 * ++calls;
 #endif
     m->t = t + h;
     return 0;

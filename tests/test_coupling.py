@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from armrs.cosim import Partner, Slave
 from armrs.cosim.accuracy import run_checked
 from armrs.cosim.imported import ImportedSlave
 from armrs.cosim.master import Coupled, run_system
-from armrs.cosim.partner import StepResult
+from armrs.cosim.partner import StepResult, Variable
+from armrs.cosim.ready import Ready
 from armrs.cosim.system import couple, load_system
 from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
@@ -412,3 +414,45 @@ def test_an_fmu_that_refuses_is_one_line(folder: Path, capsys: pytest.CaptureFix
     assert err.count("\n") == 1
     assert err.startswith("armrs: fmu.toml: arm, [slave.start]")
     assert "body[1].m is -1, allowed is a finite number" in err
+
+
+# ---- arrays, and what a connection does to a value
+class Vector(Ready):
+    """Holds an array; gives it back turned round, as an array of two rows."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name, (), ())
+        row = {"unit": "m", "exponents": (0, 1, 0, 0)}
+        self.variables = {
+            "u": Variable("u", 0, "input", "continuous", dimensions=(4,), start=(0.0,), **row),
+            "Y": Variable("Y", 1, "output", "continuous", dimensions=(2, 2), **row),
+        }
+        self.inputs = {name: float(k) for k, name in enumerate(self.variables["u"].elements)}
+
+    def outputs(self) -> dict[str, float]:
+        return dict(zip(self.variables["Y"].elements, reversed(list(self.inputs.values())), strict=True))
+
+
+def test_arrays_are_connected_element_by_element() -> None:
+    one, two = Vector("one"), Vector("two")
+    system = couple([one, two], [{"from": "one.Y", "to": "two.u", "factor": 2.0, "offset": 1.0}], step=0.1, duration=0.2)
+    assert [c.label for c in system.connections][1:3] == ["one.Y[1,2] -> two.u[2]", "one.Y[2,1] -> two.u[3]"]
+    assert system.unconnected == ["one.u"]
+    run = run_system(system)
+    assert [run.columns[f"two.{name}"][-1] for name in two.variables["Y"].elements] == [1.0, 3.0, 5.0, 7.0]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ({"from": "one.Y", "to": "two.u[1]"}, r"unknown variable of two 'u\[1\]'"),
+        ({"from": "one.Y[1,2]", "to": "two.u"}, r"unknown variable of one 'Y\[1,2\]'"),
+        ({"from": "one.Y", "to": "three.u"}, "4 outputs and 3 inputs"),
+        ({"from": "one.Y", "to": "two.u", "factor": float("nan")}, "factor: found nan"),
+    ],
+)
+def test_arrays_are_connected_whole(line: dict[str, Any], words: str) -> None:
+    three = Vector("three")
+    three.variables["u"] = dataclasses.replace(three.variables["u"], dimensions=(3,))
+    with pytest.raises(BadInput, match=words):
+        couple([Vector("one"), Vector("two"), three], [line], step=0.1, duration=0.2)

@@ -89,7 +89,7 @@ def test_the_same_arm_has_the_same_bytes(folder: Path, tmp_path: Path) -> None:
 
 
 def test_every_function_of_the_standards_is_there_and_no_python() -> None:
-    from armrs.fmu.export import library
+    from armrs.fmu.libraries import library
 
     content = library().read_bytes()
     for version, count in ((2, 44), (3, 75)):
@@ -101,7 +101,7 @@ def test_every_function_of_the_standards_is_there_and_no_python() -> None:
 
 
 def test_the_library_needs_no_newer_glibc_than_the_documentation_says() -> None:
-    from armrs.fmu.export import library
+    from armrs.fmu.libraries import library
 
     found = re.findall(rb"\0GLIBC_(\d+)\.(\d+)", library().read_bytes())
     if not found:

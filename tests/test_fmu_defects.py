@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -60,10 +61,43 @@ def test_every_broken_promise_is_found_and_named(defect: str, tmp_path: Path) ->
 
 
 @NEEDS_COMPILER
+def test_an_fmu_that_wants_the_event_mode_is_no_defect(tmp_path: Path) -> None:
+    found = [str(f) for f in check_fmu(fmu_defects.small(tmp_path, "EVENT_MODE_ASKED"))]
+    assert any(
+        text.startswith("note: CoSimulation, hasEventMode: an instance that does not use the event mode is refused") for text in found
+    )
+    assert not any(text.startswith("error") for text in found), found
+
+
+@NEEDS_COMPILER
 def test_wrong_dependencies_are_found(tmp_path: Path) -> None:
     description = fmu_defects.SMALL.replace('"4" dependencies="1 2"', '"4" dependencies="2"')
     [found] = errors(fmu_defects.small(tmp_path, description=description))
     assert "InitialUnknown z: changes with x, which is not among its dependencies" in found
+
+
+ALIAS = """
+    <ScalarVariable name="alias" valueReference="{reference}" variability="{variability}" causality="local"><Real {unit}/></ScalarVariable>
+"""
+
+
+@pytest.mark.parametrize(
+    ("unit", "variability", "level", "words"),
+    [
+        ('unit="m/s2"', "fixed", "", ""),
+        ('unit="m"', "fixed", "error", "with different units: 'm', 'm/s2'"),
+        ('unit="m/s2"', "tunable", "note", "with different variabilities"),
+    ],
+)
+def test_aliases_of_fmi_2_have_one_unit(unit: str, variability: str, level: str, words: str, good: dict[int, Path], tmp_path: Path) -> None:
+    def add(text: str) -> str:
+        element = re.search(r'<ScalarVariable name="gravity" valueReference="(\d+)"', text)
+        assert element is not None
+        alias = ALIAS.format(reference=element[1], variability=variability, unit=unit)
+        return text.replace("</ModelVariables>", f"{alias}</ModelVariables>")
+
+    found = [str(f) for f in check_fmu(fmu_defects.edited(good[2], tmp_path / "edited.fmu", add), library=False) if "gravity" in f.place]
+    assert [f.startswith(level) and words in f for f in found] == ([True] if level else [])
 
 
 def test_there_are_more_than_120_of_them() -> None:

@@ -5,13 +5,22 @@ from __future__ import annotations
 import enum
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import BadInput
+from ..errors import BadInput, Text
 from ..report import console
 from .common import JsonFile, MaybeFolder, OutFile, SamplesFormat, command_line, present, samples_suffix, writable
+
+if TYPE_CHECKING:
+    from ..cosim.system import System
+
+Libraries = Annotated[
+    Path | None, typer.Option("--library", metavar="DIR", help="Libraries for several machines, such as DIR/x86_64-windows/arm_fmu.dll.")
+]
+Step = Annotated[float | None, typer.Option("--step", metavar="S", help="Communication step of an SSP system [s].")]
+Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Length of the run of an SSP system [s].")]
 
 app = typer.Typer(
     name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.", no_args_is_help=True
@@ -41,20 +50,25 @@ def fmu_export(
     start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; zero when absent.")] = "",
     rest: Annotated[bool, typer.Option("--rest", help="Start in equilibrium near these angles.")] = False,
     dt: Annotated[float, typer.Option(help="Inner step [s], above 0.")] = 0.25e-3,
+    library: Libraries = None,
     json: JsonFile = None,
 ) -> None:
-    """Export an arm as a functional mock-up unit for co-simulation: no compiler is needed.
+    """Export an arm as a functional mock-up unit for co-simulation and Model Exchange: no compiler is needed.
 
     The same model gives the same bytes. Personal values travel inside and are protected by the token of the description.
     """
     from ..cosim.slave import Slave
     from ..fmu.export import export_fmu
+    from ..fmu.libraries import collected
 
     writable(None, json)
     target = out if out is not None else Path(model.with_suffix(".fmu").name)
     start = _angles("--start-deg", start_deg)
     slave = Slave(model, port=port.value, start=start, rest=rest, step=dt, name=model.stem)
-    written = export_fmu(slave, target, fmi=int(version.value))
+    written = export_fmu(slave, target, fmi=int(version.value), libraries=library)
+    binaries, _, without = collected(int(version.value), library)
+    if without:
+        console.warn([f"left out: {', '.join(without)}, which FMI 2.0 has no folder for; export with --fmi 3"])
     if slave.left_out:
         console.warn([f"left out, since they are in the sensors or the contact and not behind this port: {', '.join(slave.left_out)}"])
     data = {
@@ -64,6 +78,7 @@ def fmu_export(
         "port": port.value,
         "token": slave.token,
         "left_out": slave.left_out,
+        "machines": [place for place, _ in binaries],
     }
     present(lambda: data, json, lambda: print(written))
 
@@ -114,8 +129,10 @@ def fmu_check(
 @app.command("run", short_help="Couple arms, units of any tool, and walls.")
 def fmu_run(
     context: typer.Context,
-    system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],
+    system: Annotated[Path, typer.Argument(metavar="SYSTEM", help="SYSTEM.toml, or .ssp or .ssd of SSP 1.0: slaves, connections, step.")],
     out: MaybeFolder = None,
+    step: Step = None,
+    duration: Duration = None,
     to: SamplesFormat = None,
     estimate: Annotated[bool, typer.Option(help="Run once more with half the step, and estimate the error.")] = True,
     json: JsonFile = None,
@@ -132,13 +149,12 @@ def fmu_run(
     from ..cosim.accuracy import run_checked
     from ..cosim.master import RESULTS, run_system
     from ..cosim.outcome import coupled_data, write_coupled
-    from ..cosim.system import load_system
     from ..errors import CoupledError
     from ..report import words
 
     suffix = samples_suffix(to, out)
     folder = writable(out, json)
-    loaded = load_system(system)
+    loaded = _loaded(system, step, duration)
     try:
         with console.progress("coupling", total=loaded.count) as advance:
             run = run_checked(loaded, progress=advance) if estimate else run_system(loaded, progress=advance)
@@ -157,6 +173,45 @@ def fmu_run(
         console.warn([run.why])
     present(lambda: plain, json, lambda: words.coupled(plain, written))
     return 0 if run.verdict == "good" or (run.verdict == "stable" and not estimate) else 1
+
+
+@app.command("ssp", short_help="Write a system as an archive of SSP 1.0.")
+def fmu_ssp(
+    system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],
+    out: OutFile = None,
+    version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard of exported arms.")] = Fmi.two,
+    library: Libraries = None,
+    json: JsonFile = None,
+) -> None:
+    """Write a system as an .ssp archive of SSP 1.0, for OMSimulator, libcosim, ecos, FMPy and others.
+
+    Arms are exported as FMUs, FMUs are taken along as they are; walls, signals and controllers have no place there and are refused.
+    """
+    from ..cosim.ssp_export import export_ssp
+
+    writable(None, json)
+    target = out if out is not None else Path(system.with_suffix(".ssp").name)
+    loaded = _loaded(system, None, None)
+    try:
+        written = export_ssp(loaded, target, fmi=int(version.value), libraries=library)
+    except BadInput as error:
+        raise error if error.file else error.within(file=system) from None
+    finally:
+        loaded.free()
+    data = {"verb": "fmu ssp", "file": written, "fmi": int(version.value), "slaves": list(loaded.slaves)}
+    present(lambda: data, json, lambda: print(written))
+
+
+def _loaded(path: Path, step: float | None, duration: float | None) -> System:
+    """Read a system from a TOML file, or from one of SSP."""
+    from ..cosim.ssp import load_ssp
+    from ..cosim.system import load_system
+
+    if path.suffix.lower() in (".ssp", ".ssd"):
+        return load_ssp(path, step=step, duration=duration)
+    if step is not None or duration is not None:
+        raise BadInput("--step, --duration", Text("with a TOML file"), "step_s and duration_s in it")
+    return load_system(path)
 
 
 def _angles(option: str, text: str) -> list[float] | None:

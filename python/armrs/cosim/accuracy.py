@@ -102,7 +102,7 @@ def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
         if name not in run.columns or name not in finer.columns:
             continue
         slave, _, variable = name.partition(".")
-        described = run.system.slaves[slave].variables[variable]
+        described = run.system.slaves[slave].variable(variable)
         coarse, fine = run.columns[name], np.interp(run.t, finer.t, finer.columns[name])
         change = max(float(np.max(np.abs(fine - fine[0]))), _LITTLE * abs(described.nominal))
         error = _SHARE * float(np.max(np.abs(coarse - fine)))

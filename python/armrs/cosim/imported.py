@@ -23,21 +23,29 @@ from .partner import Partner, Status, StepResult, Variable, listed
 
 
 class _Group:
-    """Variables of one type that are read or set in one call, with everything that the call needs made once."""
+    """Variables of one type that are read or set in one call, with everything that the call needs made once.
 
-    def __init__(self, slave: ImportedSlave, kind: str, variables: list[tuple[int, Variable]]) -> None:
+    Of an array single elements may be listed; the call is for the whole.
+    """
+
+    def __init__(self, slave: ImportedSlave, kind: str, members: list[tuple[int, Variable, int | None]]) -> None:
         self.kind = kind
-        self.slices: list[slice] = []
-        at = 0
-        for _, v in variables:
-            self.slices.append(slice(at, at + v.size))
+        variables = {v.name: v for _, v, _ in members}
+        begins, at = {}, 0
+        for v in variables.values():
+            begins[v.name] = at
             at += v.size
-        self.places = [place for place, _ in variables]
+        self.slices = [
+            slice(begins[v.name], begins[v.name] + v.size) if k is None else slice(begins[v.name] + k, begins[v.name] + k + 1)
+            for _, v, k in members
+        ]
+        self.places = [place for place, _, _ in members]
+        self.is_whole = sorted(k for s in self.slices for k in range(s.start, s.stop)) == list(range(at))
         ctype = c_int if slave.fmi == 2 and kind == "Boolean" else C_TYPES[kind]
         self.buffer = (ctype * at)()
         numeric = kind not in ("String", "Boolean")
         self.view: Any = np.ctypeslib.as_array(self.buffer) if numeric and at else None
-        references = (ctypes.c_uint32 * len(variables))(*(v.reference for _, v in variables))
+        references = (ctypes.c_uint32 * len(variables))(*(v.reference for v in variables.values()))
         name = NAMES_IN_2[kind] if slave.fmi == 2 else kind
         self.arguments = (references, c_size_t(len(variables)), self.buffer, *((c_size_t(at),) if slave.fmi == 3 else ()))
         self.names = (f"Get{name}", f"Set{name}")
@@ -48,20 +56,22 @@ class _Plan:
     """How a list of variables is read and set: one call for each of their types."""
 
     def __init__(self, slave: ImportedSlave, names: tuple[str, ...]) -> None:
-        by_type: dict[str, list[tuple[int, Variable]]] = {}
+        by_type: dict[str, list[tuple[int, Variable, int | None]]] = {}
         for place, name in enumerate(names):
-            variable = slave.variables.get(name)
-            if variable is None:
+            found = slave.element(name)
+            if found is None:
                 raise unknown_name(slave.name, name, slave.variables, what="variable")
+            variable, element = found
             kind = variable.type
             if kind not in C_TYPES or (slave.fmi == 2 and kind not in NAMES_IN_2):
                 raise BadInput(f"{slave.name}, {name}", Text(f"a variable of type {kind}"), "a number, truth value or text")
-            by_type.setdefault(kind, []).append((place, variable))
+            by_type.setdefault(kind, []).append((place, variable, element))
         self.groups = [_Group(slave, kind, variables) for kind, variables in by_type.items()]
         self.count = len(names)
         # The usual case: nothing but scalars of one numeric type.
         only = self.groups[0] if len(self.groups) == 1 else None
-        self.simple = only if only is not None and only.view is not None and len(only.view) == len(names) else None
+        in_order = only is not None and [(s.start, s.stop) for s in only.slices] == [(k, k + 1) for k in range(len(only.buffer))]
+        self.simple = only if only is not None and only.view is not None and in_order else None
 
 
 class ImportedSlave(Partner):
@@ -161,7 +171,7 @@ class ImportedSlave(Partner):
         self.call("ExitInitializationMode")
 
     def set(self, names: Sequence[str] | str, values: Any) -> None:
-        """Set variables by name; those of one type in one call. Arrays are given as sequences, row by row."""
+        """Set variables by name; those of one type in one call. Arrays are given as sequences, row by row, or all of their elements."""
         plan = self._plan(names)
         if plan.simple is not None and isinstance(values, np.ndarray) and values.dtype == plan.simple.view.dtype:
             plan.simple.view[:] = values
@@ -171,22 +181,24 @@ class ImportedSlave(Partner):
         if isinstance(names, str) and len(given) != 1:
             given = [given]
         for group in plan.groups:
+            if not group.is_whole:
+                raise BadInput(self.name, Text("some elements of an array"), "all of them")
             for place, part in zip(group.places, group.slices, strict=True):
                 group.buffer[part] = [_c_value(group.kind, v) for v in np.ravel(given[place]).tolist()]
             self._done(group.names[1], group.set(self._instance, *group.arguments))
 
     def get(self, names: Sequence[str] | str) -> np.ndarray:
-        """Return scalar variables by name as floating point numbers, shape (len(names),)."""
+        """Return scalar variables and elements of arrays by name as floating point numbers, shape (len(names),)."""
         plan = self._plan(names)
         if plan.simple is not None:
             self._done(plan.simple.names[0], plan.simple.get(self._instance, *plan.simple.arguments))
             return plan.simple.view.astype(float)  # a copy
         out = np.empty(plan.count)
         for group in plan.groups:
-            if len(group.buffer) != len(group.places):
+            if any(part.stop - part.start != 1 for part in group.slices):
                 raise BadInput(self.name, Text("an array"), "scalar variables; `values` reads arrays")
             self._done(group.names[0], group.get(self._instance, *group.arguments))
-            out[group.places] = list(group.buffer)
+            out[group.places] = [group.buffer[part.start] for part in group.slices]
         return out
 
     def values(self, name: str) -> list[Any]:
@@ -261,6 +273,12 @@ class ImportedSlave(Partner):
         extra = (c_size_t(n),) if self.fmi == 3 else ()
         self.call(word, self._references(listing), c_size_t(n), order, room, *extra)
         return np.array(room)
+
+    def set_input_derivatives(self, names: Sequence[str] | str, values: Sequence[float]) -> None:
+        """Set first time derivatives of inputs (FMI 2.0), which hold until they are set anew."""
+        listing = listed(names)
+        n = len(listing)
+        self.call("SetRealInputDerivatives", self._references(listing), c_size_t(n), (c_int * n)(*[1] * n), (c_double * n)(*values))
 
     def get_directional_derivative(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> np.ndarray:
         """Return the derivatives of variables in the direction of a change of others, shape (len(unknowns),)."""

@@ -151,7 +151,7 @@ class IsolatedSlave(Partner):
 
     def _known(self, names: Sequence[str] | str) -> None:
         for name in listed(names):
-            if name not in self.variables:
+            if self.element(name) is None:
                 raise unknown_name(self.name, name, self.variables, what="variable")
 
     def _call(self, call: str, *given: Any) -> Any:

@@ -147,7 +147,8 @@ class _Run:
         self.source = np.array([order[c.source[0]] for c in connections], dtype=int)
         self.target = np.array([order[c.target[0]] for c in connections], dtype=int)
         self.factor = np.array([c.factor for c in connections])
-        variables = [system.slaves[c.target[0]].variables[c.target[1]] for c in connections]
+        self.offset = np.array([c.offset for c in connections])
+        variables = [system.slaves[c.target[0]].variable(c.target[1]) for c in connections]
         self.nominal = np.array([abs(v.nominal) or 1.0 for v in variables])
         self.within = np.array([c.within for c in connections])
         self.into = [np.flatnonzero(self.target == i) for i in range(len(self.slaves))]
@@ -167,7 +168,10 @@ class _Run:
         self.outputs: list[np.ndarray] = []
         self.used: list[np.ndarray] = []
         self.stopped: tuple[str, str] | None = None
-        self.recorded = [[v.name for v in s.variables.values() if v.causality == "output" and v.is_signal] for s in self.slaves]
+        self.recorded = [
+            [name for v in s.variables.values() if v.causality == "output" and v.type == "Float64" for name in v.elements]
+            for s in self.slaves
+        ]
         self._check()
 
     def _check(self) -> None:
@@ -350,7 +354,7 @@ class _Run:
     def _take(self, i: int) -> None:
         if self.output_names[i]:
             places = self.out_of[i]
-            self.y[places] = self.factor[places] * self.slaves[i].get(self.output_names[i])
+            self.y[places] = self.factor[places] * self.slaves[i].get(self.output_names[i]) + self.offset[places]
 
     def _advance(self, i: int, time: float, step: float) -> None:
         self.evaluations += 1
@@ -465,7 +469,7 @@ class _Run:
         has_dual = connection.dual is not None
         return ConnectionReport(
             connection=connection,
-            unit=self.system.slaves[connection.target[0]].variables[connection.target[1]].unit or "",
+            unit=self.system.slaves[connection.target[0]].variable(connection.target[1]).unit or "",
             residual_max=float(np.max(np.abs(off))),
             residual_rms=float(np.sqrt(np.mean(off**2))),
             energy_exchanged=float(np.max(np.abs(exchanged[:, k]))) if has_dual else None,

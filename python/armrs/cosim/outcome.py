@@ -79,7 +79,7 @@ def samples(run: Coupled) -> dict[str, np.ndarray]:
     table = {"t_s": run.t}
     for name, values in run.columns.items():
         slave, _, variable = name.partition(".")
-        unit = run.system.slaves[slave].variables[variable].unit
+        unit = run.system.slaves[slave].variable(variable).unit
         table[f"{name}_{unit}" if unit else name] = values
     return table
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import abc
 import enum
+import itertools
 import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any
 
@@ -100,6 +102,14 @@ class Variable:
         """Whether it is one floating point number of 64 bit."""
         return self.type == "Float64" and not self.dimensions
 
+    @property
+    def elements(self) -> list[str]:
+        """Names of the elements of an array, row by row, such as `A[1,2]`; the name itself of a scalar."""
+        if not self.dimensions:
+            return [self.name]
+        indices = itertools.product(*(range(1, n + 1) for n in self.dimensions))
+        return [f"{self.name}[{','.join(map(str, index))}]" for index in indices]
+
 
 class Partner(abc.ABC):
     """A slave, wherever it runs.
@@ -123,6 +133,32 @@ class Partner(abc.ABC):
     can_rollback: bool
     internal_step: float | None = None
     can_vary_step: bool = True
+
+    def element(self, name: str) -> tuple[Variable, int | None] | None:
+        """Return the variable of a name, and the place in it for an element of an array; None for a name that is not known."""
+        if name in self.variables:
+            return self.variables[name], None
+        match = _ELEMENT.fullmatch(name)
+        array = self.variables.get(match[1]) if match else None
+        if match is None or array is None or not array.dimensions:
+            return None
+        index = [int(k) for k in match[2].split(",")]
+        if len(index) != len(array.dimensions) or not all(1 <= k <= n for k, n in zip(index, array.dimensions, strict=True)):
+            return None
+        place = 0
+        for k, n in zip(index, array.dimensions, strict=True):
+            place = place * n + k - 1
+        return array, place
+
+    def variable(self, name: str) -> Variable:
+        """Return a variable, or an element of an array as a scalar, by a name that is known."""
+        found = self.element(name)
+        assert found is not None, name
+        variable, place = found
+        if place is None:
+            return variable
+        start = variable.start if variable.start is None or len(variable.start) == 1 else variable.start[place : place + 1]
+        return replace(variable, name=name, dimensions=(), start=None if start is None else start[0])
 
     @abc.abstractmethod
     def enter_initialization_mode(self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None) -> None:
@@ -171,6 +207,9 @@ class Partner(abc.ABC):
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.free()
+
+
+_ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
 
 
 def listed(names: Sequence[str] | str) -> list[str]:

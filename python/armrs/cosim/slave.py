@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -182,5 +182,5 @@ def _joints(place: str, values: Any, n: int) -> list[float]:
     return given
 
 
-def _variable(row: dict[str, Any]) -> Variable:
+def _variable(row: Mapping[str, Any]) -> Variable:
     return Variable(**{**row, "exponents": tuple(row["exponents"])})

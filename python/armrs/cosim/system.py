@@ -46,8 +46,8 @@ class Connection:
         Variable of the target slave that makes a power with this input: a velocity for a force.
     sign : float
         +1 when input times dual is power into the target slave, −1 when it is power out of it.
-    factor : float
-        From the unit of the output to that of the input.
+    factor, offset : float
+        What the output is multiplied by, its unit turned into that of the input included, and what is added then.
     """
 
     source: tuple[str, str]
@@ -56,6 +56,7 @@ class Connection:
     dual: str | None = None
     sign: float = 1.0
     factor: float = 1.0
+    offset: float = 0.0
 
     @property
     def label(self) -> str:
@@ -105,7 +106,7 @@ class System:
             f"{name}.{v.name}"
             for name, slave in self.slaves.items()
             for v in slave.variables.values()
-            if v.causality == "input" and (name, v.name) not in driven
+            if v.causality == "input" and not any((name, element) in driven for element in v.elements)
         ]
 
     @property
@@ -285,7 +286,7 @@ def _slave(table: dict[str, Any], folder: Path) -> Partner:
 
 
 def _connections(table: dict[str, Any], slaves: dict[str, Partner], warnings: list[str]) -> list[Connection]:
-    checks.keys("", table, required=["from", "to"], optional=["within", "dual"])
+    checks.keys("", table, required=["from", "to"], optional=["within", "dual", "factor", "offset"])
     sources = _ends("from", table["from"], slaves)
     targets = _ends("to", table["to"], slaves)
     if len(sources) != len(targets):
@@ -298,15 +299,14 @@ def _connection(
     table: dict[str, Any], ends: tuple[tuple[str, str], tuple[str, str]], slaves: dict[str, Partner], warnings: list[str]
 ) -> Connection:
     source, target = ends
-    output, given = (slaves[name].variables[variable] for name, variable in ends)
+    output, given = (slaves[name].variable(variable) for name, variable in ends)
     if output.causality == "input":
         raise BadInput("from", Text(f"{'.'.join(source)}, an input"), "an output")
     if given.causality != "input":
         raise BadInput("to", Text(f"{'.'.join(target)}, {given.causality}"), "an input")
     for end, variable in zip(ends, (output, given), strict=True):
-        if variable.dimensions or _family(variable) is None:
-            kind = f"an array of {variable.type}" if variable.dimensions else variable.type
-            raise BadInput("from, to", Text(f"{'.'.join(end)}, {kind}"), "scalar numbers or truth values")
+        if _family(variable) is None:
+            raise BadInput("from, to", Text(f"{'.'.join(end)}, {variable.type}"), "numbers or truth values")
     if _family(output) != _family(given):
         raise BadInput("from, to", Text(f"{output.type} and {given.type}"), "the same sort of value at both ends")
     label = f"{'.'.join(source)} -> {'.'.join(target)}"
@@ -316,12 +316,15 @@ def _connection(
     elif (*output.exponents[:3], *output.exponents[4:]) != (*given.exponents[:3], *given.exponents[4:]):
         raise BadInput("from, to", Text(f"{label}, in {output.unit} and {given.unit}"), "the same dimension at both ends")
     dual, sign = _dual(table.get("dual"), target, slaves)
+    factor, offset = checks.number("factor", table.get("factor", 1.0)), checks.number("offset", table.get("offset", 0.0))
     within = table.get("within")
     if _family(given) != "Float":
+        if (factor, offset) != (1.0, 0.0):
+            raise BadInput("factor, offset", Text(f"with {output.type}"), "neither, but between floating point numbers")
         # Between whole numbers there is nothing to hold.
         return Connection(source, target, checks.choice("within", "start" if within is None else within, ("start", "end")))
     within = _within(target, given, slaves) if within is None else checks.choice("within", within, WITHIN)
-    return Connection(source, target, within, dual, sign, output.scale / given.scale)
+    return Connection(source, target, within, dual, sign, factor * output.scale / given.scale, offset)
 
 
 def _family(variable: Variable) -> str | None:
@@ -340,7 +343,7 @@ def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str
         raise unknown_name(key, name, slaves, what="slave")
     known = slaves[name].variables
     if variable in known:
-        return [(name, variable)]
+        return [(name, element) for element in known[variable].elements]
     indexed = [v for v in known if re.fullmatch(rf"{re.escape(variable)}\[\d+\]", v)]
     if not indexed:
         raise unknown_name(key, variable, known, what=f"variable of {name}")
@@ -364,7 +367,7 @@ def _dual(given: object, target: tuple[str, str], slaves: dict[str, Partner]) ->
         name = checks.text("dual", given)
         if name not in known:
             raise unknown_name("dual", name, known, what=f"variable of {target[0]}")
-        one, other = known[target[1]].exponents, known[name].exponents
+        one, other = slaves[target[0]].variable(target[1]).exponents, known[name].exponents
         if one is not None and other is not None and tuple(a + b for a, b in zip(one[:3], other[:3], strict=True)) != _POWER:
             raise BadInput("dual", name, f"a variable that makes a power with {target[1]}")
         return name, 1.0

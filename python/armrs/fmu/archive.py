@@ -64,6 +64,14 @@ def read_xml(files: zipfile.ZipFile, name: str, path: str | os.PathLike[str]) ->
     if info.file_size > MOST_XML:
         raise BadInput(name, Text(f"{info.file_size} bytes"), f"at most {MOST_XML} bytes", file=path)
     content = b"".join(_pieces(files, info, path))
+    refuse_xml(name, content, path)
+    return content
+
+
+def refuse_xml(name: str, content: bytes, path: str | os.PathLike[str]) -> None:
+    """Refuse an XML file that is not read: too large, in another encoding, or with a document type."""
+    if len(content) > MOST_XML:
+        raise BadInput(name, Text(f"{len(content)} bytes"), f"at most {MOST_XML} bytes", file=path)
     if content.count(b"<") > MOST_ELEMENTS:
         raise BadInput(name, Text(f"{content.count(b'<')} elements"), f"at most {MOST_ELEMENTS}", file=path)
     # In UTF-16 the words below would not be seen.
@@ -71,7 +79,6 @@ def read_xml(files: zipfile.ZipFile, name: str, path: str | os.PathLike[str]) ->
         raise BadInput(name, Text("UTF-16 or UTF-32"), "UTF-8", file=path)
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
         raise BadInput(name, Text("a document type"), "XML without one", file=path)
-    return content
 
 
 def unpack(path: str | os.PathLike[str], folder: Path) -> None:

@@ -105,7 +105,7 @@ class Description:
 
     def number(self, name: str) -> float | None:
         """Return a capability that is a finite number; None for any other text."""
-        return _number(self.flags.get(name))
+        return finite(self.flags.get(name))
 
 
 def read_description(path: str | os.PathLike[str]) -> Description:
@@ -168,7 +168,7 @@ def _units(root: ElementTree.Element) -> Iterator[Unit]:
         powers = tuple(_whole(f"unit {name}, {key}", base.get(key, "0")) for key in (*BASE_UNITS, *_OTHER_UNITS))
         # Powers of other base units are kept, so that they differ from what has none.
         exponents = powers[: len(BASE_UNITS)] if not any(powers[len(BASE_UNITS) :]) else powers
-        factor = _number(base.get("factor", "1"))
+        factor = finite(base.get("factor", "1"))
         if not factor:
             raise BadInput(f"unit {name}, factor", base.get("factor"), "a finite number other than 0")
         yield Unit(name, exponents, factor)
@@ -237,9 +237,9 @@ def _variable(
         exponents=None if known is None else known.exponents,
         scale=1.0 if known is None else known.factor,
         start=_start(kind, start, name) if not dimensions else _starts(kind, start, name),
-        min=_number(attribute("min")),
-        max=_number(attribute("max")),
-        nominal=_number(attribute("nominal")) or 1.0,
+        min=finite(attribute("min")),
+        max=finite(attribute("max")),
+        nominal=finite(attribute("nominal")) or 1.0,
         description=element.get("description", ""),
         dimensions=dimensions,
     )
@@ -301,7 +301,8 @@ def _whole(place: str, text: str, *, least: int = -(2**63), most: int = 2**64 - 
     raise BadInput(place, text or Text("nothing"), limits)
 
 
-def _number(text: str | None) -> float | None:
+def finite(text: str | None) -> float | None:
+    """Return a finite number, or None for any other text."""
     try:
         value = None if text is None else float(text)
     except ValueError:

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import html
 import os
-import platform
-import sys
 import zipfile
 from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
 from .. import _armrs, checks
-from ..cosim.library import platform_folder
 from ..cosim.partner import Variable
 from ..cosim.slave import Slave
-from ..errors import ArmrsError, BadInput
 from ..io import files
 from ..model import Model
+from .libraries import collected
 
 IDENTIFIER = "ArmRs"
 """Name of the library inside an FMU."""
@@ -36,6 +33,7 @@ def export_fmu(
     start: Iterable[float] | None = None,
     rest: bool = False,
     name: str | None = None,
+    libraries: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write an arm as a functional mock-up unit for co-simulation.
 
@@ -55,6 +53,8 @@ def export_fmu(
         Start in equilibrium near these angles.
     name : str, optional
         Name of the model in the description; that of the file when absent.
+    libraries : path, optional
+        Libraries for several machines, see `armrs.fmu.libraries`; that of this machine alone when absent.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def export_fmu(
     Raises
     ------
     BadInput
-        For an arm or a name that cannot be used; nothing is written.
+        For an arm, a name or a library that cannot be used; nothing is written.
     """
     target = checks.path("path", path)
     checks.text("path", target.stem)
@@ -71,7 +71,7 @@ def export_fmu(
     fmi = checks.whole("fmi", fmi, least=2, most=3)
     if not isinstance(model, Slave):
         model = Slave(model, port=port, start=start, rest=rest, name=target.stem if name is None else name)
-    content = contents(model, fmi)
+    content = contents(model, fmi, libraries)
     with files.replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as packed:
         for inside, data in content.items():
             info = zipfile.ZipInfo(inside, _MOMENT)
@@ -82,20 +82,16 @@ def export_fmu(
     return target
 
 
-def contents(slave: Slave, fmi: int) -> dict[str, bytes]:
+def contents(slave: Slave, fmi: int, libraries: str | os.PathLike[str] | None = None) -> dict[str, bytes]:
     """Return the files of an FMU, its description first."""
-    machine = platform.machine().lower()
-    if fmi == 2 and machine not in ("x86_64", "amd64", "i386", "i686"):
-        raise BadInput("fmi", fmi, f"3: FMI 2.0 has no folder for libraries of {machine}")
+    # The licence is that of armrs and of everything that is compiled into the library.
+    binaries, licence, _ = collected(fmi, libraries)
     description, terminals = slave.compiled.description(fmi)
-    place, suffix = platform_folder(fmi)
     icon = resources.files("armrs.fmu").joinpath("icon.png").read_bytes()
     page = documentation(slave)
-    # Of armrs and of everything that is compiled into the library; made together with it.
-    licence = library().with_name("license.txt").read_bytes()
     listed = {
         "modelDescription.xml": description.encode(),
-        f"binaries/{place}/{IDENTIFIER}{suffix}": library().read_bytes(),
+        **{f"binaries/{place}/{IDENTIFIER}{suffix}": content for (place, suffix), content in binaries.items()},
         "resources/arm.json": slave.compiled.json.encode(),
     }
     if terminals is None:
@@ -113,19 +109,6 @@ def contents(slave: Slave, fmi: int) -> dict[str, bytes]:
             "terminalsAndIcons/icon.png": icon,
         }
     return listed
-
-
-def library() -> Path:
-    """Return the shared library that travels in FMUs, with its licence beside it; both come with the wheel."""
-    suffix = platform_folder(3)[1]
-    stem = "arm_fmu" if sys.platform == "win32" else "libarm_fmu"
-    found = Path(str(resources.files("armrs.fmu").joinpath("lib", f"{stem}{suffix}")))
-    if not (found.is_file() and found.with_name("license.txt").is_file()):
-        machine = f"{platform.machine()} {sys.platform}"
-        raise ArmrsError(
-            f"the library for FMUs, or its licence, is missing ({found}; this is {machine}): build it with make, or install the wheel"
-        )
-    return found
 
 
 def rows(variables: Iterable[Variable]) -> list[tuple[str, ...]]:

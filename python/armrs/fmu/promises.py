@@ -5,19 +5,18 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from ctypes import byref, c_bool, c_double, c_int, c_size_t, c_void_p
-from typing import TYPE_CHECKING
 
 from ..cosim.imported import ImportedSlave
 from ..cosim.library import UPDATE_3, Library, library_path
 from ..cosim.partner import Variable
 from ..errors import ArmrsError, SlaveError
-
-if TYPE_CHECKING:
-    from .probe import Trial
+from .trial import Trial
 
 _MOST_TRIED = 200
 """Most changes of one variable after which another is read."""
 _MOST_EVENTS = 100
+_NOISE = 1e-6
+"""Relative change of a value that solving equations by iteration may cause."""
 _DIFFERENCE = 1e-6
 _DERIVATIVE_OFF = 1e-3
 """Relative difference from a finite difference that a directional derivative may have: it is to find wrong formulas, not rounding."""
@@ -42,7 +41,7 @@ def dependencies(trial: Trial, slave: ImportedSlave) -> None:
         after = slave.get(free)
         slave.set(known.name, known.start)
         for name, a, b in zip(free, before, after, strict=True):
-            if a != b and a == a:
+            if abs(a - b) > _NOISE * max(abs(a), abs(b)):
                 text = f"changes with {known.name}, which is not among its dependencies in the initialization"
                 trial.find(f"ModelStructure, InitialUnknown {name}", text, sort="dependencies")
 
@@ -104,7 +103,7 @@ def _discrete(trial: Trial, slave: ImportedSlave) -> None:
 
 def intermediate_update(trial: Trial) -> None:
     """Make an instance with a callback for intermediate updates where they are promised, and a step with it."""
-    if trial.fmi == 2 or not trial.flag("providesIntermediateUpdate"):
+    if trial.fmi == 2 or trial.wants_events or not trial.flag("providesIntermediateUpdate"):
         return
     trial.step("making an instance with an intermediate update")
     calls = []

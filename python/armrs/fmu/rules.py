@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from ..cosim.partner import Variable
 from ..errors import nearest
 from . import names, structure
-from .description import Description, Unit
+from .description import Description, Unit, finite
 
 Broken = tuple[str, str]
 """Place and text of what is wrong."""
@@ -94,7 +94,7 @@ def _experiment(experiment: dict[str, str]) -> Iterator[Broken]:
     for key in ("stepSize", "tolerance"):
         if key in experiment and not _positive(experiment[key]):
             yield f"DefaultExperiment, {key}", f"{experiment[key]}, allowed is a positive number"
-    times = {key: _finite(experiment[key]) for key in ("startTime", "stopTime") if key in experiment}
+    times = {key: finite(experiment[key]) for key in ("startTime", "stopTime") if key in experiment}
     for key, value in times.items():
         if value is None:
             yield f"DefaultExperiment, {key}", f"{experiment[key]}, allowed is a finite number of seconds"
@@ -178,6 +178,13 @@ def worth_knowing(description: Description) -> Iterator[Broken]:
     for key in description.flags:
         if key not in known and ":" not in key and not key.startswith("{") and nearest(key, known) is None:
             yield "CoSimulation", f"unknown attribute {key}, which importers ignore"
+    # Forbidden since FMI 2.0.1 alone, and tools from before that are in use.
+    aliases: dict[tuple[str, int], list[Variable]] = {}
+    for variable in description.variables if description.fmi == 2 else ():
+        aliases.setdefault((variable.type, variable.reference), []).append(variable)
+    for group in aliases.values():
+        if len({v.variability for v in group}) > 1:
+            yield f"variables {', '.join(v.name for v in group)}", "share a value reference with different variabilities"
 
 
 def _units(description: Description) -> Iterator[Broken]:
@@ -223,10 +230,16 @@ def _uniqueness(description: Description) -> Iterator[Broken]:
         if len(group) < 2:
             continue
         listing = ", ".join(v.name for v in group)
-        # In FMI 2.0 these are aliases of one value: at most one may be set, and what they say of it must agree.
-        settable = [v for v in group if v.causality in ("input", "parameter") or v.start is not None]
-        if description.fmi == 3 or len(settable) > 1 or len({v.unit for v in group}) > 1 or len({v.variability for v in group}) > 1:
-            yield f"variables {listing}", f"share the value reference {reference}"
+        # In FMI 2.0 these are aliases of one value: at most one may be set, and they have one unit or none (section 2.2.7).
+        settable = [v.name for v in group if v.causality in ("input", "parameter") or v.start is not None]
+        units = {v.unit for v in group}
+        if description.fmi == 3:
+            yield f"variables {listing}", f"share the value reference {reference}, allowed is one variable for each"
+        elif len(settable) > 1:
+            yield f"variables {listing}", f"share the value reference {reference}, and {len(settable)} of them have a start or can be set"
+        elif len(units) > 1:
+            shown = ", ".join(sorted(repr(u) if u else "none" for u in units))
+            yield f"variables {listing}", f"share the value reference {reference} with different units: {shown}"
 
 
 def _variable(v: Variable, description: Description) -> Iterator[str]:
@@ -285,14 +298,6 @@ def _limits(v: Variable) -> Iterator[str]:
             yield f"start is {v.start}, a number of the type {v.type} is {least} to {least + 2**bits - 1}"
 
 
-def _finite(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
-
-
 def _positive(text: str) -> bool:
-    value = _finite(text)
+    value = finite(text)
     return value is not None and value > 0
