@@ -30,7 +30,8 @@ def estimate(kind: str, name: str, joint: int, value: float, half: float, decide
 
 def result(**changes: Any) -> dict[str, Any]:
     """Return an identification as its JSON has it."""
-    change = {"kind": "elastic", "name": "stiffness", "joint": 1, "dates": ["2026-01-02", "2026-02-02"]}
+    change = {"kind": "elastic", "name": "stiffness", "joint": 1, "unit": "N m/rad", "dates": ["2026-01-02", "2026-02-02"]}
+    change |= {"values": [0.9, 1.8], "stds": [0.1, 0.1], "changed": True, "since_last_std": 0.14, "changed_since_last": True}
     return {
         "verb": "identify",
         "data": {
@@ -43,7 +44,7 @@ def result(**changes: Any) -> dict[str, Any]:
             estimate("coulomb", "torque", 1, 0.0, 0.03, "bound"),
             estimate("viscous", "viscosity", 2, 0.1, 0.05, "prior"),
         ],
-        "history": [{**change, "change": 0.9, "changed": True}],
+        "history": [{**change, "since_last": 0.9}],
         "warnings": [],
         "made_by": {"armrs": "0"},
     } | changes  # fmt: skip
@@ -60,7 +61,7 @@ def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic.Norm, ...]) 
     assert stiffness.value == pytest.approx(1.8 * math.radians(10.0))
     assert rest.value == pytest.approx(math.degrees(-1.0))
     assert clinic.words_of(stiffness) == [
-        "shoulder", "Stiffness [N m per 10°]", "0.314", "0.283 to 0.346", "0.087 to 0.244, above it", "higher by 0.157",
+        "shoulder", "Stiffness [N m per 10°]", "0.314", "0.283 to 0.346", "0.087 to 0.244, above it", "higher by 0.157 ± 0.048",
     ]  # fmt: skip
     assert clinic.words_of(friction)[2:4] == ["none seen", "at most 0.030"]
     assert speed.value is None and clinic.words_of(speed)[2:4] == ["not measured", ""]
@@ -70,7 +71,7 @@ def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> Non
     said = clinic.unusual(clinic.lines_of(result(), norms))
     assert said == [
         "shoulder: stiffness is above the usual range.",
-        "shoulder: stiffness is higher by 0.157 N m per 10° than in the sessions before.",
+        "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° than in the session before.",
     ]
     assert clinic.unusual(clinic.lines_of(result(history=[]))) == []
     assert len(clinic.notes([result(warnings=list("abcdef"))])) == clinic.MOST_NOTES + 1
@@ -94,15 +95,18 @@ def test_the_verb_writes_one_page(norms: object, tmp_path: Path, capsys: pytest.
         "Usual values: a table",
         "no diagnosis",
         "change since 2026-01-02",
+        "elbow: nothing was measured of this joint",
+        "before acting on a change",
     ):
         assert words in page
-    assert page.count('src="data:image/png') == 1
+    # What was found, and its course over the sessions.
+    assert page.count('src="data:image/png') == 2
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"verb": "gap"}, "verb: found 'gap', allowed a result of armrs identify or passive"),
+        ({"verb": "plan"}, "verb: found 'plan', allowed a result of armrs identify or passive or gap or spasticity"),
         ({"data": {}}, "found not what a result holds"),
     ],
 )

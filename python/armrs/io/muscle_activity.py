@@ -22,6 +22,10 @@ BEFORE, AFTER = 0.05, 0.3
 """By how much marks are widened [s]: torque follows activity by 30 to 100 ms (Cavanagh and Komi 1979) and decays in about as long again."""
 MOST = 0.5
 """Share of a session beyond which activity is no exception: the median is then no resting level."""
+ONSET_SMOOTHED, ONSET_HELD, LEAST_REST = 0.01, 0.025, 0.05
+"""Time over which the rectified signal is averaged for an onset, for which it must last, and of rest before it [s]."""
+ONSET_DEVIATIONS = 3.0
+"""Of rest that an onset must exceed."""
 _TO_SIGMA = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
@@ -107,3 +111,25 @@ def _widened(mark: np.ndarray, dt: float) -> np.ndarray:
     for k in np.flatnonzero(mark):
         wide[max(0, k - before) : k + after + 1] = True
     return wide
+
+
+def onset(trial: Trial, name: str, start: float, end: float) -> float | None:
+    """Return when a channel becomes active in a stretch [s]: above rest by three deviations for 25 ms (Hodges and Bui 1996).
+
+    Rest is what the channel does before `start`; None where there is less than 50 ms of that, no such channel or no activity up to `end`.
+    """
+    signal = trial.emg.get(name)
+    if signal is None or not np.isfinite(signal).all():
+        return None
+    rectified = np.abs(signal - np.median(signal)) if signal.min() < 0.0 else signal
+    width = max(1, round(ONSET_SMOOTHED / trial.dt))
+    # The mean of the samples up to each: an onset is not seen before it is.
+    envelope = np.convolve(rectified, np.full(width, 1.0 / width))[: len(rectified)]
+    rest = envelope[(trial.t < start) & (np.arange(len(envelope)) >= width)]
+    if len(rest) * trial.dt < LEAST_REST:
+        return None
+    above = envelope > rest.mean() + ONSET_DEVIATIONS * max(float(rest.std()), 1e-12)
+    held = max(1, round(ONSET_HELD / trial.dt))
+    lasting = np.convolve(above, np.ones(held), mode="valid") > held - 0.5
+    there = np.flatnonzero(lasting & (trial.t[: len(lasting)] >= start) & (trial.t[: len(lasting)] <= end))
+    return float(trial.t[there[0]]) if there.size else None

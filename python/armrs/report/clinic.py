@@ -13,7 +13,7 @@ from typing import Any
 from .. import checks
 from ..errors import BadInput, Text
 from ..io import tomlfile
-from . import html, pages, plotting
+from . import figures, html, pages, plotting
 from .words import is_synthetic, name
 
 
@@ -41,6 +41,17 @@ QUANTITIES = (
     Quantity("elastic", "rest", "Resting angle", "where the joint goes by itself, without weight", "°", 180.0 / math.pi),
     Quantity("viscous", "viscosity", "Resistance to speed", "what is added when the joint turns by 90° in a second", "N m", math.pi / 2.0),
     Quantity("coulomb", "torque", "Friction", "resistance to any movement, however slow", "N m", 1.0),
+    Quantity(
+        "stretch_reflex",
+        "gain",
+        "Reflex strength",
+        "what is added for every 90° per second of stretch beyond its onset",
+        "N m",
+        math.pi / 2.0,
+    ),
+    Quantity("stretch_reflex", "threshold", "Reflex onset", "speed of stretch from which on the muscle resists", "°/s", 180.0 / math.pi),
+    Quantity("stretch_reflex", "tonic", "Reflex angle", "angle beyond which the onset is lowest", "°", 180.0 / math.pi),
+    Quantity("stretch_reflex", "latency", "Reflex delay", "time from stretch to resistance", "ms", 1000.0),
 )
 HALF_WIDTH = Quantity(
     "passive",
@@ -50,9 +61,27 @@ HALF_WIDTH = Quantity(
     "N m",
     1.0,
 )
+SLOW = (
+    HALF_WIDTH,
+    Quantity(
+        "passive",
+        "stiffness",
+        "Stiffness, slow movement",
+        "how much more the joint pulls back for every 10° further",
+        "N m per 10°",
+        math.pi / 18.0,
+    ),
+    Quantity("passive", "range", "Range moved through", "how far the joint was moved, no test of how far it can go", "°", 180.0 / math.pi),
+)
+"""What slow movements say of a joint."""
+Key = tuple[str, str, int]
+"""Kind, parameter and joint of a quantity."""
+NO_CHANGE = "no clear change"
+MOST_TRENDS = 9
+"""Plots over the sessions that find room on a page."""
 MOST_NOTES = 3
 """Notes that find room on one page."""
-ANALYSED = ("identify", "passive")
+ANALYSED = ("identify", "passive", "gap", "spasticity")
 """Results of which a summary is made."""
 
 
@@ -106,7 +135,7 @@ def _norms(document: Mapping[str, Any], _: Path) -> tuple[Norm, ...]:
     for k, table in enumerate(checks.tables("norm", document["norm"]), start=1):
         place = f"[[norm]] {k}"
         checks.keys(place, table, required=["kind", "name", "joint", "low", "high", "source"])
-        known = [(q.kind, q.parameter) for q in (*QUANTITIES, HALF_WIDTH)]
+        known = [(q.kind, q.parameter) for q in (*QUANTITIES, *SLOW)]
         if (table["kind"], table["name"]) not in known:
             allowed = " or ".join(f"{kind} {parameter}" for kind, parameter in known)
             raise BadInput(place, Text(f"{table['kind']} {table['name']}"), allowed)
@@ -130,7 +159,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
     Parameters
     ----------
     sources : sequence of path
-        JSON of `identify`, of `passive`, or of both.
+        JSON of `identify`, `passive`, `gap`, `spasticity`, or several of them.
     path : path
         The HTML file.
     norms : sequence of Norm
@@ -156,7 +185,10 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "words": [words_of(line) for line in lines],
             "unusual": unusual(lines),
             "notes": notes(results),
-            "since": min((c["dates"][0] for r in results for c in r.get("history", ())), default=None),
+            "since": max((c["dates"][-2] for r in results for c in r.get("history", ()) if len(c["dates"]) > 1), default=None),
+            "not_measured": not_measured(results, lines),
+            "next": next_steps(results, lines),
+            "trends": _trends(results),
             "sources": list(dict.fromkeys(line.norm.source for line in lines if line.norm is not None)),
             "picture": _picture(lines),
             "made_by": results[0].get("made_by", {}),
@@ -174,18 +206,12 @@ def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = ()) -> list[Line
     """Return the lines of a result, joint by joint."""
     joints = result["data"]["joints"]
     usual = {(n.kind, n.name, n.joint): n for n in norms}
-    if result["verb"] == "passive":
-        lines = []
-        for j, joint in enumerate(joints, start=1):
-            own = [c for c in result["curves"] if c["joint"] == j and c.get("half_width_mean_Nm") is not None]
-            if own:  # the movement with most repeats is known best
-                curve = max(own, key=lambda c: c["repeats"])
-                low, high = curve.get("half_width_interval_Nm") or (None, None)
-                interval = None if low is None or high is None else (low, high)
-                lines.append(Line(joint, HALF_WIDTH, curve["half_width_mean_Nm"], interval, usual.get(("passive", "half_width", j)), None))
-        return lines
-    lines = []
     courses = {(c["kind"], c["name"], c["joint"]): c for c in result.get("history", ())}
+    if result["verb"] == "passive":
+        return _slow_lines(result, usual, courses)
+    if result["verb"] in ("gap", "spasticity"):
+        return _effect_lines(result, usual, courses)
+    lines = []
     for j, joint in enumerate(joints, start=1):
         for quantity in QUANTITIES:
             key = (quantity.kind, quantity.parameter, j)
@@ -200,14 +226,107 @@ def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = ()) -> list[Line
     return lines
 
 
+def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]]) -> list[Line]:
+    """Return what slow movements say of each joint, of the movement with most repeats, which is known best."""
+    lines = []
+    for j, joint in enumerate(result["data"]["joints"], start=1):
+        own = [c for c in result["curves"] if c["joint"] == j and c.get("half_width_mean_Nm") is not None]
+        if not own:
+            continue
+        curve = max(own, key=lambda c: c["repeats"])
+        for quantity in SLOW:
+            course = courses.get((quantity.kind, f"{quantity.parameter} in {curve['configuration']}", j))
+            if quantity is HALF_WIDTH:
+                value, (low, high) = curve["half_width_mean_Nm"], curve.get("half_width_interval_Nm") or (None, None)
+            else:
+                found = next(
+                    (
+                        e
+                        for e in result.get("repeated", ())
+                        if e["joint"] == j and e["name"] == f"{quantity.parameter} in {curve['configuration']}"
+                    ),
+                    None,
+                )
+                if found is None or found["value"] is None:
+                    continue
+                value, (low, high) = quantity.factor * found["value"], (quantity.factor * x for x in found["interval"])
+            interval = None if low is None or high is None else (low, high)
+            lines.append(
+                Line(joint, quantity, value, interval, usual.get((quantity.kind, quantity.parameter, j)), _trend(course, quantity))
+            )
+    return lines
+
+
+def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]]) -> list[Line]:
+    """Return the effects of joints that were found, in all trials and without an alternative."""
+    lines = []
+    for effect in result["effects"]:
+        if effect["joint"] is None or not effect.get("decided", True) or effect.get("trial"):
+            continue
+        for quantity in QUANTITIES:
+            found = effect["parameters"].get(quantity.parameter) if effect["kind"] == quantity.kind else None
+            if found is None or found.get("interval") is None:
+                continue
+            key = (quantity.kind, quantity.parameter, effect["joint"])
+            low, high = (quantity.factor * x for x in found["interval"])
+            joint = result["data"]["joints"][effect["joint"] - 1]
+            lines.append(
+                Line(joint, quantity, quantity.factor * found["value"], (low, high), usual.get(key), _trend(courses.get(key), quantity))
+            )
+    return lines
+
+
 def _trend(course: Mapping[str, Any] | None, quantity: Quantity) -> str | None:
-    """Say how the last session differs from those before."""
-    if course is None or len(course["dates"]) < 2 or course["change"] is None or not math.isfinite(course["change"]):
+    """Say how the last session differs from the one before it, and how sure that is."""
+    if course is None or len(course["dates"]) < 2 or course.get("since_last") is None or not math.isfinite(course["since_last"]):
         return None
-    change = quantity.factor * course["change"]
-    if not course["changed"]:
-        return "no clear change"
-    return f"{'higher' if change > 0.0 else 'lower'} by {_number(abs(change))}"
+    change, either_way = quantity.factor * course["since_last"], quantity.factor * 1.96 * course["since_last_std"]
+    if not course["changed_since_last"]:
+        return f"{NO_CHANGE}: {_signed(change)} ± {_number(either_way)}"
+    return f"{'higher' if change > 0.0 else 'lower'} by {_number(abs(change))} ± {_number(either_way)}"
+
+
+def _signed(value: float) -> str:
+    return ("+" if value > 0.0 else "") + _number(value)
+
+
+def not_measured(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
+    """Return what these movements say nothing of."""
+    seen = {line.joint for line in lines if line.value is not None}
+    said = [f"{joint}: nothing was measured of this joint." for joint in results[0]["data"]["joints"] if joint not in seen]
+    if not any(line.quantity.kind == "stretch_reflex" for line in lines):
+        said.append("Reflexes: they need stretches at several speeds (armrs spasticity).")
+    return [*said, "Strength, voluntary movement, pain, and how far the joints can go."]
+
+
+def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
+    """Return what would answer what is open."""
+    said = []
+    unclear = [line for line in lines if line.trend is not None and line.trend.startswith(NO_CHANGE)]
+    if unclear:
+        said.append(
+            "Where no clear change is stated, a change smaller than the number behind ± could not have been seen. More repeats of each "
+            "movement make that number smaller: four times the repeats halve it."
+        )
+    if any(line.trend is not None and line.trend.startswith(("higher", "lower")) for line in lines):
+        said.append("Repeat the session within days before acting on a change: strapping and posture differ from day to day.")
+    if lines and all(line.trend is None for line in lines):
+        said.append("Keep the sessions of this person in one file (--history FILE): the next page then says what changed.")
+    return said
+
+
+def _trends(results: Sequence[Mapping[str, Any]]) -> html.Picture | None:
+    """Draw what is followed over the sessions, where there are several."""
+    courses = [c for result in results for c in result.get("history", ()) if len(c["dates"]) > 1]
+    shown = {(q.kind, q.parameter) for q in (*QUANTITIES, *SLOW)}
+    known = [c for c in courses if (c["kind"], str(c["name"]).partition(" in ")[0]) in shown][:MOST_TRENDS]
+    if not known:
+        return None
+    with plotting.style():
+        drawn = figures.history(known)["history"]()
+        image = io.BytesIO()
+        plotting.write_png(drawn.figure, image)
+    return html.Picture("trends.png", drawn.title, drawn.text, html.data_uri(image.getvalue()))
 
 
 def measured(results: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -249,7 +368,7 @@ def unusual(lines: Sequence[Line]) -> list[str]:
         if line.beside_norm in ("below", "above"):
             said.append(f"{title} is {line.beside_norm} the usual range.")
         if line.trend is not None and line.trend.startswith(("higher", "lower")):
-            said.append(f"{title} is {line.trend} {line.quantity.unit} than in the sessions before.")
+            said.append(f"{title} is {line.trend} {line.quantity.unit} than in the session before.")
     return said
 
 
@@ -271,7 +390,7 @@ def _number(value: float, line: Line | None = None) -> str:
 
 def _picture(lines: Sequence[Line]) -> html.Picture | None:
     """Draw every quantity with its interval, one panel each, the usual range behind."""
-    shown = [q for q in (*QUANTITIES, HALF_WIDTH) if any(line.quantity is q and line.value is not None for line in lines)]
+    shown = [q for q in (*QUANTITIES, *SLOW) if any(line.quantity is q and line.value is not None for line in lines)]
     if not shown:
         return None
     with plotting.style():

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -19,10 +19,12 @@ from ..errors import BadInput, Text, show
 from ..io import files
 from ..io.dataset import Dataset
 from ..tabular import Tabular, Tidy
-from .identify import Estimate, Identified
+from .identify import Estimate
 
 APPLICATION = 0x61726D73
 """Mark of our files: "arms" in ASCII."""
+_TOGETHER = ("joint", "cascade")
+"""Methods that estimate all parameters of a joint together."""
 LEVEL = 0.95
 """One minus the probability of calling any parameter changed when none is."""
 LONGEST_WAIT = 60.0
@@ -62,6 +64,25 @@ _AROUND = " _-.,;:/|()[]"
 """What may stand between a subject and a date in the name of a data set."""
 
 
+class Followed(Protocol):
+    """A result of a session that a history keeps: of `identify`, `find_gap`, `passive_moments` or `spasticity`."""
+
+    @property
+    def dataset(self) -> Dataset:
+        """Its data."""
+
+    @property
+    def method(self) -> str:
+        """What it was found with: sessions compare with those of the same method."""
+
+    @property
+    def level(self) -> float:
+        """Probability of the intervals."""
+
+    def followed(self) -> Sequence[Estimate]:
+        """Return what is kept, each name once a joint."""
+
+
 @dataclass(frozen=True, eq=False)
 class Course:
     """One parameter over sessions that measured it.
@@ -81,6 +102,8 @@ class Course:
         when the data decided the same parameters of that joint: where another one sat at a bound, a deviation means less.
     p_value : float
         Of so large a change by chance, over all parameters followed (Holm 1979); NaN for a single session.
+    since_last, since_last_std, since_last_p_value : float
+        The last value less that of the session before it, its deviation, and the probability over all parameters; NaN as above.
     """
 
     name: str
@@ -93,6 +116,14 @@ class Course:
     change: float
     change_std: float
     p_value: float
+    since_last: float
+    since_last_std: float
+    since_last_p_value: float
+
+    @property
+    def changed_since_last(self) -> bool:
+        """Whether the last session differs from the one before it."""
+        return self.since_last_p_value < 1.0 - LEVEL
 
     @property
     def changed(self) -> bool:
@@ -118,6 +149,10 @@ class Course:
             "change_std": self.change_std,
             "p_value": self.p_value,
             "changed": self.changed,
+            "since_last": self.since_last,
+            "since_last_std": self.since_last_std,
+            "since_last_p_value": self.since_last_p_value,
+            "changed_since_last": self.changed_since_last,
         }
 
 
@@ -134,8 +169,6 @@ class History(Tabular):
 
     subject: str | None
     courses: tuple[Course, ...]
-
-    VIEW = ("report.results", "HISTORY")
 
     def __repr__(self) -> str:
         changed = [c.label for c in self.courses if c.changed]
@@ -183,14 +216,15 @@ def subject_of(dataset: Dataset) -> str:
     BadInput
         When neither says anything.
     """
-    name = dataset.subject.name or _without_date(dataset.name)
+    name = dataset.subject.name or without_date(dataset.name)
     if not name:
         found = Text(f"a data set {show(dataset.name)} that names no subject")
         raise BadInput("history", found, "[subject] name in dataset.toml, or a name of the data set besides its date")
     return name
 
 
-def _without_date(name: str) -> str:
+def without_date(name: str) -> str:
+    """Return the name of a data set without its date."""
     return _DATE.sub("", name).strip(_AROUND)
 
 
@@ -208,22 +242,23 @@ def check(path: str | os.PathLike[str], joints: int, subject: str) -> None:
             _same_arm(connection, joints, subject, file)
 
 
-def add(path: str | os.PathLike[str], result: Identified, date: str) -> History:
+def add(path: str | os.PathLike[str], result: Followed, date: str) -> History:
     """Add a result to the history of its subject, as `adding` does, and return the history."""
     with adding(path, result, date) as history:
         return history
 
 
 @contextmanager
-def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Iterator[History]:
+def adding(path: str | os.PathLike[str], result: Followed, date: str) -> Iterator[History]:
     """Add a result to the history of its subject and give that history; what is added stays only if the block ends well.
 
     Parameters
     ----------
     path : path
         File of SQLite, made when it does not exist; one subject a file.
-    result : Identified
-        The same session (name of the data set, date, method) takes the place of its former result.
+    result : Followed
+        Of `identify`, `find_gap`, `passive_moments` or `spasticity`. The same session (name of the data set, date, method) takes the
+        place of its former result.
     date : str
         ISO date of the session.
 
@@ -244,7 +279,7 @@ def adding(path: str | os.PathLike[str], result: Identified, date: str) -> Itera
         raise BadInput("history", Text(str(error)), "a history that can be written", file=file) from None
 
 
-def _foreseen(file: Path, result: Identified, subject: str, date: str) -> History:
+def _foreseen(file: Path, result: Followed, subject: str, date: str) -> History:
     """Return the history as it will be with a result, without writing it."""
     with closing(sqlite3.connect(":memory:")) as memory:
         memory.execute("PRAGMA foreign_keys = ON")
@@ -255,7 +290,7 @@ def _foreseen(file: Path, result: Identified, subject: str, date: str) -> Histor
         return _courses(memory, result.method)
 
 
-def _write(connection: sqlite3.Connection, result: Identified, subject: str, date: str) -> None:
+def _write(connection: sqlite3.Connection, result: Followed, subject: str, date: str) -> None:
     """Add a result in one transaction, the tables included: a process that is killed leaves the history as it was."""
     # A script begins its own transaction; statements that follow it belong to the same one.
     connection.executescript(f"BEGIN IMMEDIATE; PRAGMA application_id = {APPLICATION}; {_SCHEMA} {_WHOSE}")
@@ -264,14 +299,11 @@ def _write(connection: sqlite3.Connection, result: Identified, subject: str, dat
     connection.commit()
 
 
-def _insert(connection: sqlite3.Connection, result: Identified, date: str) -> None:
+def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> None:
     key = (result.dataset.name, date, result.method)
     connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
     made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints))
-    # A combination of one parameter alone is that parameter.
-    alone = {(e.name, e.joint) for e in result.parameters}
-    combinations = [e for e in result.combinations if (e.name, e.joint) not in alone]
-    estimates = {(e.name, e.kind, e.joint or 0): e for e in (*result.parameters, *combinations)}
+    estimates = {(e.name, e.kind, e.joint or 0): e for e in result.followed()}
     rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)]
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
 
@@ -305,8 +337,12 @@ def _courses(connection: sqlite3.Connection, method: str) -> History:
         beside.setdefault((session, joint), set()).add((name, kind))
     last = rows[-1][7] if rows else 0
     followed = {key: points for key, points in by_parameter.items() if points[-1][3] == last}
-    tests = [_change([p for p in points if beside[p[3], key[2]] == beside[last, key[2]]]) for key, points in followed.items()]
-    adjusted = _holm([p for *_, p in tests])
+    # Where another parameter of the joint sat at a bound, a deviation of `identify` means less; the others estimate each by itself.
+    alike = [
+        [p for p in points if method not in _TOGETHER or beside[p[3], key[2]] == beside[last, key[2]]] for key, points in followed.items()
+    ]
+    tests, lasts = [_change(points) for points in alike], [_change(points[-2:]) for points in alike]
+    adjusted, adjusted_last = (holm([p for *_, p in all_tests]) for all_tests in (tests, lasts))
     courses = tuple(
         Course(
             name=name,
@@ -319,8 +355,13 @@ def _courses(connection: sqlite3.Connection, method: str) -> History:
             change=change,
             change_std=std,
             p_value=p_value,
+            since_last=since[0],
+            since_last_std=since[1],
+            since_last_p_value=p_last,
         )
-        for ((name, kind, joint, unit), points), (change, std, _), p_value in zip(followed.items(), tests, adjusted, strict=True)
+        for ((name, kind, joint, unit), points), (change, std, _), p_value, since, p_last in zip(
+            followed.items(), tests, adjusted, lasts, adjusted_last, strict=True
+        )
     )
     return History(_whose(connection), courses)
 
@@ -397,7 +438,7 @@ def _whose(connection: sqlite3.Connection) -> str | None:
         if stored is not None:
             return str(stored[0])
     first = connection.execute("SELECT name FROM session ORDER BY id LIMIT 1").fetchone()
-    return None if first is None else _without_date(str(first[0])) or None
+    return None if first is None else without_date(str(first[0])) or None
 
 
 def _deviation(estimate: Estimate, level: float) -> float:
@@ -429,7 +470,7 @@ def _change(points: Sequence[_Point]) -> tuple[float, float, float]:
     return change, std, float(2.0 * norm.sf(abs(change) / std))
 
 
-def _holm(p_values: Sequence[float]) -> list[float]:
+def holm(p_values: Sequence[float]) -> list[float]:
     """Return probabilities over all tests together (Holm 1979); NaN stays."""
     order = [int(k) for k in np.argsort(p_values) if np.isfinite(p_values[k])]
     adjusted, largest = [float("nan")] * len(p_values), 0.0

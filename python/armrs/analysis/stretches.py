@@ -1,0 +1,283 @@
+"""The stretch reflex in fast and slow stretches of one joint: separated from elastic, viscous and dry resistance.
+
+`R = offset + k1 x + … + k5 x⁵ + b q̇ + c sign(q̇) + ΔI q̈ + s·gain·max(0, s q̇(t−L) − threshold − slope·max(0, s (tonic − q(t−L))))`,
+x the angle from its mean, s = ±1 the direction of the stretch, with an offset of its own in every trial, as tone drifts. The law is that of
+the effect `stretch_reflex` (Lance 1980; Levin and Feldman 1994). For given threshold, latency, tonic angle and slope the rest is linear:
+variable projection (Golub and Pereyra 1973). Intervals are from leaving out one trial at a time (jackknife, Efron 1982), linearised at the
+optimum, so that neither the colour of the noise nor what differs from trial to trial has to be modelled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+LONGEST = 0.2
+"""Longest latency that is asked for [s]."""
+FEWEST = 4
+"""Trials without which nothing is said of the scatter between them."""
+LEVEL = 0.95
+"""Probability of the intervals."""
+NEEDED = 12.0
+"""Twice the log-likelihood, beyond its price, that an angle threshold must gain: as an effect must in `armrs gap`."""
+CREEP = 0.03
+"""Speed below which dry friction is taken as proportional to it [rad/s]: it is the sign of a measured speed, with its noise."""
+ELASTIC = 5
+"""Degree of the polynomial that stands for the springs of a joint."""
+SHAPES = ("threshold", "latency", "tonic", "slope")
+UNITS = {"gain": "N m s/rad", "threshold": "rad/s", "latency": "s", "tonic": "rad", "slope": "1/s"}
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One trial of one joint, evenly sampled.
+
+    Attributes
+    ----------
+    t, q, qd, qdd : ndarray, shape (n,)
+        [s, rad, rad/s, rad/s²]
+    moment : ndarray, shape (n,)
+        Torque with which the joint resists [N m].
+    fine_q, fine_qd : ndarray, shape (n,)
+        Angle and speed with less of a low-pass, of which thresholds are asked [rad, rad/s].
+    smooth : callable
+        The low-pass that angle and moment went through: what reflex and friction should show went through it too.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    moment: np.ndarray
+    fine_q: np.ndarray
+    fine_qd: np.ndarray
+    smooth: Callable[[np.ndarray], np.ndarray] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A number with its interval."""
+
+    value: float
+    std: float
+    interval: tuple[float, float]
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Reflex:
+    """What the stretches of one joint say.
+
+    Attributes
+    ----------
+    direction : int
+        1 where motion with growing angle is resisted.
+    parameters : dict of Estimated
+        `gain`, `threshold`, `latency`, and `tonic` and `slope` where an angle threshold is needed.
+    viscosity, dry : Estimated
+        Besides the reflex [N m s/rad, N m].
+    found : bool
+        Whether there is a reflex: its gain is above zero in the interval.
+    elastic, resisting, reflex : tuple of ndarray
+        Elastic, viscous and dry, and reflex moment of every trial [N m].
+    residual_rms : float
+        [N m]
+    """
+
+    direction: int
+    parameters: dict[str, Estimated]
+    viscosity: Estimated
+    dry: Estimated
+    found: bool
+    elastic: tuple[np.ndarray, ...] = field(repr=False)
+    resisting: tuple[np.ndarray, ...] = field(repr=False)
+    reflex: tuple[np.ndarray, ...] = field(repr=False)
+    residual_rms: float
+
+
+def drive(stretch: Stretch, direction: int, shape: np.ndarray) -> np.ndarray:
+    """Return what a reflex of gain 1 resists with, after the low-pass [N m]; `shape` holds threshold, latency, tonic angle and slope."""
+    threshold, latency, tonic, slope = shape
+    ago = stretch.t - latency
+    q, qd = (direction * np.interp(ago, stretch.t, values) for values in (stretch.fine_q, stretch.fine_qd))
+    excess = qd - threshold - slope * np.maximum(0.0, direction * tonic - q)
+    return stretch.smooth(direction * np.maximum(0.0, excess))
+
+
+def fit(stretches: Sequence[Stretch]) -> Reflex | None:
+    """Fit the reflex of one joint to its stretches; None where there are too few."""
+    if len(stretches) < FEWEST:
+        return None
+    problem = _Problem(stretches)
+    direction, shape = min((problem.start(direction) for direction in (1, -1)), key=lambda s: problem.cost(*s))
+    shape = problem.refined(direction, shape, 2)
+    return problem.result(direction, *problem.with_angle(direction, shape))
+
+
+def spread(stretches: Sequence[Stretch], direction: int, shape: np.ndarray, gain: float) -> np.ndarray:
+    """Return the deviations of gain, threshold and latency that white noise of 1 N m in each sample leaves, by the linearised law."""
+    jacobian = _Problem(stretches).jacobian(direction, shape, gain, 2)
+    scale = np.linalg.norm(jacobian, axis=0) + 1e-300
+    inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), hermitian=True)
+    return np.asarray((np.sqrt(np.diag(inverse)) / scale)[:3])
+
+
+class _Problem:
+    """Moments and linear columns of all trials, less their means in each trial and so without the offsets."""
+
+    def __init__(self, stretches: Sequence[Stretch]) -> None:
+        self.stretches = list(stretches)
+        self.middle = float(np.mean(np.concatenate([s.q for s in stretches])))
+        self.ends = np.cumsum([len(s.q) for s in stretches])[:-1]
+        self.linear = np.concatenate([_less_mean(_columns(s, self.middle)) for s in stretches])
+        self.moment = np.concatenate([_less_mean(s.moment) for s in stretches])
+        self.basis = np.linalg.qr(self.linear)[0]
+        self.rest = self.moment - self.basis @ (self.basis.T @ self.moment)
+        self.total = float(self.rest @ self.rest)
+        self.fastest = max(float(np.percentile(np.abs(s.qd), 98.0)) for s in stretches)
+
+    def column(self, direction: int, shape: np.ndarray) -> np.ndarray:
+        """Return what a reflex of gain 1 shows in all trials."""
+        return np.concatenate([_less_mean(drive(s, direction, shape)) for s in self.stretches])
+
+    def gain(self, direction: int, shape: np.ndarray) -> tuple[float, float]:
+        """Return the best gain, not below zero, and the sum of squares that it leaves."""
+        own = self.column(direction, shape)
+        inside = self.basis.T @ own
+        size, along = float(own @ own - inside @ inside), max(0.0, float(own @ self.rest))
+        return (0.0, self.total) if size < 1e-12 * len(own) else (along / size, self.total - along**2 / size)
+
+    def cost(self, direction: int, shape: np.ndarray) -> float:
+        """Return the sum of squares that is left."""
+        return self.gain(direction, shape)[1]
+
+    def start(self, direction: int) -> tuple[int, np.ndarray]:
+        """Return the best of a grid of thresholds and latencies."""
+        grid = [
+            np.array([share * self.fastest, latency, self.middle, 0.0])
+            for share in np.linspace(0.05, 0.85, 7)
+            for latency in (0.0, 0.025, 0.05, 0.08, 0.12)
+        ]
+        return direction, min(grid, key=lambda shape: self.cost(direction, shape))
+
+    def refined(self, direction: int, shape: np.ndarray, free: int) -> np.ndarray:
+        """Return the shape with its first `free` numbers at the minimum nearby (Nelder and Mead 1965: the law has kinks)."""
+        from scipy.optimize import minimize
+
+        scale = np.array([self.fastest, 0.1, 1.0, 10.0])[:free]
+        limits = np.array([(0.0, 1.0), (0.0, LONGEST / 0.1), (-7.0, 7.0), (0.0, 10.0)])[:free]
+        begin = shape[:free] / scale
+
+        def of(values: np.ndarray) -> float:
+            return self.cost(direction, np.concatenate([values * scale, shape[free:]]))
+
+        simplex = np.clip(np.vstack([begin, begin + 0.15 * np.eye(free)]), *limits.T)
+        options = {"initial_simplex": simplex, "xatol": 3e-4, "fatol": 1e-7 * self.total, "maxfev": 80 * free}
+        found = minimize(of, begin, method="Nelder-Mead", bounds=limits, options=options)
+        return np.concatenate([found.x * scale, shape[free:]])
+
+    def with_angle(self, direction: int, shape: np.ndarray) -> tuple[np.ndarray, int]:
+        """Return the shape with an angle threshold where the data need it, and how many numbers of it are free."""
+        angles = np.percentile(np.concatenate([s.q for s in self.stretches]), (25.0, 60.0, 95.0))
+        starts = [
+            np.array([share * shape[0], shape[1], angle, slope])
+            for share in (0.3, 1.0)
+            for angle in angles
+            for slope in (0.3 * self.fastest, self.fastest)
+        ]
+        best = min(starts, key=lambda s: self.cost(direction, s))
+        wider = self.refined(direction, best, 4)
+        n = self._independent(self.residual(direction, wider))
+        gained = n * np.log(self.cost(direction, shape) / max(self.cost(direction, wider), 1e-300))
+        return (wider, 4) if gained > NEEDED + 2.0 * np.log(n) else (shape, 2)
+
+    def residual(self, direction: int, shape: np.ndarray) -> np.ndarray:
+        """Return what is left of the moments."""
+        left = self.moment - self.gain(direction, shape)[0] * self.column(direction, shape)
+        return left - self.basis @ (self.basis.T @ left)
+
+    def _independent(self, left: np.ndarray) -> float:
+        """Return the number of independent samples, by the correlation of what is left with itself up to half a second."""
+        parts = [(s, p) for s, p in zip(self.stretches, np.split(left, self.ends), strict=True)]
+        count = 0.0
+        for stretch, part in parts:
+            lags = min(len(part) - 1, round(0.5 / (stretch.t[1] - stretch.t[0])))
+            size = max(float(part @ part), 1e-300)
+            correlation = np.array([float(part[k:] @ part[:-k]) / size for k in range(1, lags)])
+            # Up to the first that is none: beyond it is noise.
+            correlation = correlation[: int(np.argmax(correlation < 0.0))] if np.any(correlation < 0.0) else correlation
+            count += len(part) / (1.0 + 2.0 * float(correlation.sum()))
+        return max(count, 8.0)
+
+    def jacobian(self, direction: int, shape: np.ndarray, gain: float, free: int) -> np.ndarray:
+        """Return the derivatives of the moments to gain, the first `free` numbers of the shape, and the linear coefficients."""
+        steps = np.array([0.01 * self.fastest, 2e-3, 0.02, 0.02 * self.fastest])
+        slopes = []
+        for k in range(free):
+            up, down = shape.copy(), shape.copy()
+            up[k] += steps[k]
+            down[k] = max(down[k] - steps[k], 0.0) if k != 2 else down[k] - steps[k]
+            slopes.append(gain * (self.column(direction, up) - self.column(direction, down)) / (up[k] - down[k]))
+        return np.column_stack([self.column(direction, shape), *slopes, self.linear])
+
+    def _deviations(self, direction: int, shape: np.ndarray, free: int) -> np.ndarray:
+        """Return standard deviations of gain, shape, viscosity and dry friction: the jackknife over trials, linearised at the optimum."""
+        jacobian = self.jacobian(direction, shape, self.gain(direction, shape)[0], free)
+        scale = np.linalg.norm(jacobian, axis=0) + 1e-300
+        jacobian = jacobian / scale
+        left = np.split(self.residual(direction, shape), self.ends)
+        parts = np.split(jacobian, self.ends)
+        whole = jacobian.T @ jacobian
+        away = np.array([-np.linalg.pinv(whole - j.T @ j, hermitian=True) @ (j.T @ r) for j, r in zip(parts, left, strict=True)])
+        n = len(parts)
+        std = np.sqrt((n - 1) / n * np.sum((away - away.mean(axis=0)) ** 2, axis=0)) / scale
+        return np.concatenate([std[: 1 + free], np.zeros(4 - free), std[1 + free + ELASTIC : 3 + free + ELASTIC]])
+
+    def result(self, direction: int, shape: np.ndarray, free: int) -> Reflex:
+        """Return what was found."""
+        from scipy.stats import t as student
+
+        gain = self.gain(direction, shape)[0]
+        column = self.column(direction, shape)
+        linear = np.linalg.lstsq(self.linear, self.moment - gain * column, rcond=None)[0]
+        values = np.array([gain, *shape, *linear[ELASTIC : ELASTIC + 2]])
+        std = self._deviations(direction, shape, free)
+        half = student.ppf(0.5 + 0.5 * LEVEL, len(self.stretches) - 1) * std
+        least = np.array([0.0, 0.0, 0.0, -np.inf, 0.0, -np.inf, -np.inf])
+        names, units = ("gain", *SHAPES), (*UNITS.values(), "N m s/rad", "N m")
+        numbers = [
+            Estimated(float(v), float(s), (float(max(v - h, low)), float(v + h)), unit)
+            for v, s, h, low, unit in zip(values, std, half, least, units, strict=True)
+        ]
+        split = slice(ELASTIC), slice(ELASTIC, ELASTIC + 2)
+        parts = (*(self.linear[:, own] @ linear[own] for own in split), gain * column)
+        elastic, resisting, reflex = (tuple(_from_start(p) for p in np.split(part, self.ends)) for part in parts)
+        return Reflex(
+            direction=direction,
+            parameters=dict(zip(names[: 1 + free], numbers[: 1 + free], strict=True)),
+            viscosity=numbers[5],
+            dry=numbers[6],
+            found=bool(values[0] - half[0] > 0.0),
+            elastic=elastic,
+            resisting=resisting,
+            reflex=reflex,
+            residual_rms=float(np.sqrt(np.mean(self.residual(direction, shape) ** 2))),
+        )
+
+
+def _less_mean(values: np.ndarray) -> np.ndarray:
+    return values - values.mean(axis=0)
+
+
+def _from_start(values: np.ndarray) -> np.ndarray:
+    """Return a part of the moment from its value at the beginning of the trial on."""
+    return values - values[0]
+
+
+def _columns(stretch: Stretch, middle: float) -> np.ndarray:
+    """Return what the moment is linear in, besides offset and reflex."""
+    x = stretch.q - middle
+    sign = stretch.smooth(np.tanh(stretch.fine_qd / CREEP))
+    return np.column_stack([*(x**k for k in range(1, ELASTIC + 1)), stretch.qd, sign, stretch.qdd])

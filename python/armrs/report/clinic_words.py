@@ -1,0 +1,132 @@
+"""Sentences and tables of results that a clinic reads: reflexes by speed, and cohorts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import tables, words
+from .tables import Table
+
+LAW = (
+    "A reflex resists the stretch as gain times the speed beyond its threshold, after its latency. Short of the tonic angle, where one is "
+    "stated, the threshold is higher by the slope for each radian. Springs, viscosity, friction and what is wrong with the inertia of the "
+    "model are fitted beside it, with an offset in every trial."
+)
+
+
+def verdict(result: Mapping[str, Any]) -> str:
+    """Return a result in a sentence or two."""
+    return _cohort(result) if result["verb"] == "cohort" else _spasticity(result)
+
+
+def _spasticity(result: Mapping[str, Any]) -> str:
+    joints, said = result["data"]["joints"], []
+    for effect in result["effects"]:
+        name, p = joints[effect["joint"] - 1], effect["parameters"]
+        if not effect["decided"]:
+            said.append(f"{name}: no stretch reflex was found.")
+            continue
+        parts = [f"{tables.number(p[k]['value'] * f, p[k]['std'] * f)} ± {tables.spread(p[k]['std'] * f)} {u}" for k, f, u in _SHOWN]
+        way = "growing" if p["direction"]["value"] > 0 else "falling"
+        said.append(f"{name}: a reflex resists stretch with {way} angle from {parts[0]}, with {parts[1]} beyond, {parts[2]} late.")
+    return " ".join(said)
+
+
+_SHOWN = (("threshold", 180.0 / math.pi, "°/s"), ("gain", 1.0, "N m s/rad"), ("latency", 1000.0, "ms"))
+
+
+def reflexes(result: Mapping[str, Any]) -> Table:
+    """Return gain, threshold and latency of each reflex, viscosity and friction besides it."""
+    joints, rows = result["data"]["joints"], []
+    for effect, besides in zip(result["effects"], result["besides"], strict=True):
+        own = {k: v for k, v in effect["parameters"].items() if k != "direction"} if effect["decided"] else {}
+        own |= {"viscosity besides": besides["viscosity"], "dry friction besides": besides["dry"]}
+        for name, value in own.items():
+            shown = [tables.number(x, value["std"]) for x in (value["value"], *value["interval"])]
+            rows.append(
+                [joints[effect["joint"] - 1], name, shown[0], tables.spread(value["std"]), f"{shown[1]} … {shown[2]}", value["unit"]]
+            )
+    return Table(["joint", "quantity", "estimate", "± std", "95 % interval", "unit"], rows, left=2)
+
+
+def stretches(result: Mapping[str, Any]) -> Table:
+    """Return the stretches, each movement's means over its repeats, the slowest first."""
+    joints, rows = result["data"]["joints"], []
+    for joint, configuration in dict.fromkeys((s["joint"], s["configuration"]) for s in result["stretches"]):
+        own = [s for s in result["stretches"] if (s["joint"], s["configuration"]) == (joint, configuration)]
+
+        def mean(name: str, factor: float = 1.0, own: Sequence[Mapping[str, Any]] = own) -> str:
+            values = [factor * s[name] for s in own if s[name] is not None and math.isfinite(s[name])]
+            return f"{np.mean(values):.3g}" if values else "–"
+
+        degrees = 180.0 / math.pi
+        cells = [mean("speed", degrees), mean("peak_moment"), mean("work"), mean("elastic"), mean("resisting"), mean("reflex")]
+        cells += [mean("catch_angle", degrees), mean("catch_speed", degrees), mean("emg_latency", 1000.0)]
+        rows.append([joints[joint - 1], configuration, len(own), *cells])
+    head = ["joint", "movement", "repeats", "speed [°/s]", "peak [N m]", "work [J]", "of it elastic [N m]", "viscous and dry [N m]"]
+    head += ["reflex [N m]", "catch at [°]", "at [°/s]", "EMG after [ms]"]
+    used = [k for k in range(len(head)) if k != len(head) - 1 or any(row[k] != "–" for row in rows)]
+    return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2)
+
+
+def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print the reflexes of a data set."""
+    words.head(result, verdict(result))
+    words.show("Reflex, and what resists besides it", reflexes(result))
+    words.show("Stretches, means over repeats", stretches(result))
+    words.followed(result)
+    words.files_written(written)
+
+
+def _cohort(result: Mapping[str, Any]) -> str:
+    differ = [c for c in result["contrasts"] if c["p_value"] is not None and c["p_value"] < 0.05]
+    named = "; ".join(f"{c['name']} differs between {c['between'][0]} and {c['between'][1]}" for c in differ)
+    named = named[:1].upper() + named[1:] or "No difference between groups or sides is called one"
+    count = len({q["name"] for q in result["quantities"]})
+    return (
+        f"{result['subjects']} subjects, {result['sessions']} sessions, {count} {'quantity' if count == 1 else 'quantities'}. "
+        f"{named}, at a level of 5 % over all of them together."
+    )
+
+
+def quantities(result: Mapping[str, Any]) -> Table:
+    """Return mean, scatter between and within subjects, and the norm band of each quantity."""
+    rows = []
+    for q in result["quantities"]:
+        mean = f"{tables.number(q['mean'], q['mean_std'])} ± {tables.spread(q['mean_std'])}"
+        between, within = (tables.number(q[name], 0.1 * q[name] if q[name] else None) for name in ("between_std", "within_std"))
+        low, high = (tables.number(x, q["mean_std"]) for x in q["norm"])
+        ends = [" … ".join(tables.number(x, q["mean_std"]) for x in q[name]) for name in ("norm_low_interval", "norm_high_interval")]
+        rows.append([q["name"], q["group"], q["unit"], q["subjects"], mean, between, within, f"{low} … {high}", *ends])
+    head = ["quantity", "group", "unit", "subjects", "mean", "between", "within", "norm band", "its lower end", "its upper end"]
+    return Table(head, rows, left=3)
+
+
+def contrasts(result: Mapping[str, Any]) -> Table:
+    """Return the differences between groups and between sides."""
+    rows = [
+        [
+            c["name"],
+            f"{c['between'][1]} less {c['between'][0]}",
+            c["unit"],
+            f"{tables.number(c['difference'], c['std'])} ± {tables.spread(c['std'])}",
+            " … ".join(tables.number(x, c["std"]) for x in c["interval"]),
+            f"{c['p_value']:.2g}",
+        ]
+        for c in result["contrasts"]
+    ]
+    return Table(["quantity", "difference", "unit", "estimate", "95 % interval", "p (Holm)"], rows, left=3)
+
+
+def show_cohort(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
+    """Print a cohort."""
+    words.head(result, verdict(result))
+    words.show("Between and within subjects", quantities(result))
+    if result["contrasts"]:
+        words.show("Differences", contrasts(result))
+    words.files_written(written)

@@ -1,0 +1,382 @@
+"""Many subjects: mean, scatter between and within subjects, groups and sides compared, norm bands with their uncertainty."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import checks
+from ..analysis import mixed_model
+from ..analysis.mixed_model import MixedModel
+from ..errors import ArmrsError, BadInput, Text
+from ..io import files
+from ..io.tomlfile import read_text
+from ..report.plain import passive_data
+from ..tabular import Tabular, Tidy
+from .history import holm, session_date, without_date
+from .passive import passive_moments
+
+LEVEL = 0.95
+"""Share of sessions that a norm band holds, and probability of the intervals."""
+FEWEST = 3
+"""Subjects of a group without whom nothing is said of it."""
+NEEDED = ("subject", "quantity", "value")
+MAY = ("unit", "std", "group", "side", "date")
+COLUMNS = (*NEEDED, *MAY)
+
+
+@dataclass(frozen=True)
+class Value:
+    """One value of one session.
+
+    Attributes
+    ----------
+    subject, quantity, unit, group, side, date : str
+        Empty where nothing is known.
+    value : float
+    std : float or None
+        What the measurement knows of its own uncertainty.
+    """
+
+    subject: str
+    quantity: str
+    value: float
+    unit: str = ""
+    std: float | None = None
+    group: str = ""
+    side: str = ""
+    date: str = ""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of one group.
+
+    Attributes
+    ----------
+    name, group, unit : str
+    subjects, sessions : int
+    mean, mean_std : float
+    between_std, within_std : float
+        Between subjects, and between sessions and sides of one, of all groups together.
+    norm : (float, float)
+        Holds 95 of 100 sessions of other subjects of the group.
+    norm_low_interval, norm_high_interval : (float, float)
+        95 % intervals of the ends of the band that holds the middle 95 % of the group.
+    """
+
+    name: str
+    group: str
+    unit: str
+    subjects: int
+    sessions: int
+    mean: float
+    mean_std: float
+    between_std: float
+    within_std: float
+    norm: tuple[float, float]
+    norm_low_interval: tuple[float, float]
+    norm_high_interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """What differs between two groups, or two sides: the second less the first.
+
+    Attributes
+    ----------
+    name, unit : str
+    between : (str, str)
+    difference, std : float
+    interval : (float, float)
+    p_value : float
+        Over all contrasts together (Holm 1979).
+    """
+
+    name: str
+    unit: str
+    between: tuple[str, str]
+    difference: float
+    std: float
+    interval: tuple[float, float]
+    p_value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Cohort(Tabular):
+    """A summary of many subjects.
+
+    Attributes
+    ----------
+    name : str
+    values : tuple of Value
+    quantities : tuple of Quantity
+    contrasts : tuple of Contrast
+    warnings : tuple of str
+    """
+
+    name: str
+    values: tuple[Value, ...]
+    quantities: tuple[Quantity, ...]
+    contrasts: tuple[Contrast, ...]
+    warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        count = len({q.name for q in self.quantities})
+        return (
+            f"Cohort({self.name!r}: {len({v.subject for v in self.values})} subjects, {count} {'quantity' if count == 1 else 'quantities'})"
+        )
+
+    def values_of(self, quantity: Quantity) -> list[float]:
+        """Return the values behind a quantity of one group."""
+        return [v.value for v in self.values if (v.quantity, v.group or ALL) == (quantity.name, quantity.group)]
+
+    def tidy(self) -> Tidy:
+        """Return the values, one a row."""
+        return Tidy({name: [getattr(v, name) for v in self.values] for name in COLUMNS}, {})
+
+    def write_table(self, path: Path) -> None:
+        """Write the values as a tidy table, which `cohort` reads."""
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(COLUMNS)
+        table.writerows([getattr(v, name) for name in COLUMNS] for v in self.values)
+        files.write_text(path, text.getvalue(), kind=".csv")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {
+            "subjects": len({v.subject for v in self.values}),
+            "sessions": len({(v.subject, v.date, v.side) for v in self.values}),
+            "quantities": [asdict(q) for q in self.quantities],
+            "contrasts": [asdict(c) for c in self.contrasts],
+            "level": LEVEL,
+            "warnings": list(self.warnings),
+        }
+
+
+ALL = "all"
+"""The group of those of whom none is stated."""
+
+
+def cohort(source: str | os.PathLike[str], *, groups: str | os.PathLike[str] | None = None) -> Cohort:
+    """Summarise a table of values, or a folder of results or data sets.
+
+    Parameters
+    ----------
+    source : path
+        A CSV with a value a row: subject, quantity, value, and optionally unit, std, group, side, date. Or a folder, searched at all
+        depths: JSON results of `identify`, `passive`, `gap` and `spasticity`; where there are none, data sets, whose passive moments
+        are computed.
+    groups : path, optional
+        For a folder: a CSV with columns subject, group and side; subject is the subject's or the data set's name.
+
+    Raises
+    ------
+    BadInput
+        For a table without these columns or with a value that is none, and a folder in which there is nothing.
+
+    Examples
+    --------
+    >>> armrs.cohort("values.csv").quantities[0].norm  # doctest: +SKIP
+    (0.31, 0.74)
+    """
+    path = checks.path("source", source)
+    if path.is_dir():
+        values, warnings = _of_folder(path, _groups(groups))
+    elif groups is not None:
+        raise BadInput("groups", Text("a table beside a table"), "a folder: a table has its own columns group and side")
+    else:
+        values, warnings = _of_table(path), []
+    quantities, contrasts = [], []
+    for name in dict.fromkeys(v.quantity for v in values):
+        own = [v for v in values if v.quantity == name]
+        units = {v.unit for v in own}
+        if len(units) > 1:
+            raise BadInput(f"unit of {name}", Text(" and ".join(sorted(map(repr, units)))), "one unit a quantity", file=path)
+        found, differ, doubts = _summary(own)
+        quantities += found
+        contrasts += differ
+        warnings += doubts
+    adjusted = holm([c.p_value for c in contrasts])
+    compared = tuple(Contrast(**{**asdict(c), "p_value": p}) for c, p in zip(contrasts, adjusted, strict=True))
+    return Cohort(path.stem, tuple(values), tuple(quantities), compared, tuple(warnings))
+
+
+def _summary(values: Sequence[Value]) -> tuple[list[Quantity], list[Contrast], list[str]]:
+    """Return what one quantity is in each group, and what differs."""
+    name, unit = values[0].quantity, values[0].unit
+    counts = {g: len({v.subject for v in values if (v.group or ALL) == g}) for g in dict.fromkeys(v.group or ALL for v in values)}
+    few = [g for g, count in counts.items() if count < FEWEST]
+    warnings = [f"{name}: {counts[g]} subject{'s' * (counts[g] > 1)} in group {g!r}, needed are {FEWEST}: left out" for g in few]
+    kept = [v for v in values if (v.group or ALL) not in few]
+    groups = [g for g in counts if g not in few]
+    if not groups:
+        return [], [], warnings
+    sides = sorted({v.side for v in kept})
+    both = len(sides) == 2 and "" not in sides
+    design = np.array(
+        [[float((v.group or ALL) == g) for g in groups] + ([0.5 if v.side == sides[1] else -0.5] if both else []) for v in kept]
+    )
+    if np.linalg.matrix_rank(design) < design.shape[1]:
+        both, design = False, design[:, : len(groups)]
+        warnings.append(f"{name}: sides are not compared, as each group has one")
+    fitted = mixed_model.fit(np.array([v.value for v in kept]), design, [v.subject for v in kept])
+    quantities = [_quantity(fitted, k, (name, g, unit), [v for v in kept if (v.group or ALL) == g]) for k, g in enumerate(groups)]
+    contrasts = []
+    for k, group in enumerate(groups[1:], start=1):
+        vector = np.zeros(design.shape[1])
+        vector[0], vector[k] = -1.0, 1.0
+        contrasts.append(_contrast(fitted, vector, (name, unit), (groups[0], group), fitted.between_freedom))
+    if both:
+        freedom = max(fitted.within_freedom - 1.0, 1.0)
+        contrasts.append(_contrast(fitted, np.eye(design.shape[1])[-1], (name, unit), (sides[0], sides[1]), freedom))
+    return quantities, contrasts, warnings
+
+
+def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str], own: Sequence[Value]) -> Quantity:
+    from scipy.stats import norm
+    from scipy.stats import t as student
+
+    mean, variance = float(fitted.coefficients[place]), float(fitted.covariance[place, place])
+    freedom, z = fitted.total_freedom, float(norm.ppf(0.5 + 0.5 * LEVEL))
+    half = float(student.ppf(0.5 + 0.5 * LEVEL, freedom) * np.hypot(fitted.total, np.sqrt(variance)))
+    end_std = float(np.sqrt(variance + z**2 * fitted.total**2 / (2.0 * freedom)))
+    ends = [mean - z * fitted.total, mean + z * fitted.total]
+    return Quantity(
+        *named,
+        subjects=len({v.subject for v in own}),
+        sessions=len(own),
+        mean=mean,
+        mean_std=float(np.sqrt(variance)),
+        between_std=fitted.between,
+        within_std=fitted.within,
+        norm=(mean - half, mean + half),
+        norm_low_interval=(ends[0] - z * end_std, ends[0] + z * end_std),
+        norm_high_interval=(ends[1] - z * end_std, ends[1] + z * end_std),
+    )
+
+
+def _contrast(fitted: MixedModel, vector: np.ndarray, named: tuple[str, str], between: tuple[str, str], freedom: float) -> Contrast:
+    from scipy.stats import t as student
+
+    difference = float(vector @ fitted.coefficients)
+    std = max(float(np.sqrt(vector @ fitted.covariance @ vector)), 1e-300)
+    half = float(student.ppf(0.5 + 0.5 * LEVEL, freedom)) * std
+    p_value = float(2.0 * student.sf(abs(difference) / std, freedom))
+    return Contrast(*named, between, difference, std, (difference - half, difference + half), p_value)
+
+
+def _rows(path: Path, needed: Sequence[str], may: Sequence[str]) -> list[tuple[int, Mapping[str, str]]]:
+    """Return the rows of a CSV with their numbers in the file."""
+    table = csv.DictReader(read_text(path, "a table in CSV").splitlines())
+    head = [name.strip() for name in table.fieldnames or ()]
+    missing = [name for name in needed if name not in head]
+    unknown = [name for name in head if name not in (*needed, *may)]
+    if missing or unknown:
+        raise BadInput(
+            "columns", Text(", ".join(head) or "none"), f"{', '.join(needed)}, and may be {', '.join(may) or 'no more'}", file=path
+        )
+    table.fieldnames = head
+    rows: list[tuple[int, Mapping[str, str]]] = [
+        (number, {k: (v or "").strip() for k, v in row.items() if k is not None}) for number, row in enumerate(table, start=2)
+    ]
+    if not rows:
+        raise BadInput("rows", Text("none"), "a value a row", file=path)
+    return rows
+
+
+def _of_table(path: Path) -> list[Value]:
+    values = []
+    for number, row in _rows(path, NEEDED, MAY):
+        value = _number(row, "value", number, path)
+        std = _number(row, "std", number, path) if row.get("std") else None
+        for name in ("subject", "quantity"):
+            if not row[name]:
+                raise BadInput(f"row {number}, {name}", Text("nothing"), "a name", file=path)
+        words = {name: row.get(name, "") for name in COLUMNS if name not in ("value", "std")}
+        values.append(Value(value=value, std=std, **words))
+    return values
+
+
+def _number(row: Mapping[str, str], name: str, number: int, path: Path) -> float:
+    try:
+        found = float(row[name])
+    except ValueError:
+        found = np.nan
+    if not np.isfinite(found):
+        raise BadInput(f"row {number}, {name}", row[name], "a finite number", file=path)
+    return found
+
+
+def _groups(path: str | os.PathLike[str] | None) -> Mapping[str, tuple[str, str]]:
+    """Return group and side by the name of a subject or of a data set."""
+    if path is None:
+        return {}
+    file = checks.path("groups", path)
+    return {row["subject"]: (row.get("group", ""), row.get("side", "")) for _, row in _rows(file, ["subject"], ["group", "side"])}
+
+
+def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]]) -> tuple[list[Value], list[str]]:
+    """Return the values of all results in a folder, or of its data sets where there are none."""
+    results: list[dict[str, Any]] = []
+    warnings: list[str] = []
+    for file in sorted(folder.rglob("*.json")):
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        if isinstance(data, dict) and data.get("verb") in ("identify", "passive", "gap", "spasticity"):
+            results.append(data)
+    if not results:
+        results, warnings = _computed(folder)
+    if not results:
+        raise BadInput(
+            "source", Text("a folder without results and data sets"), "JSON of armrs identify, passive, gap or spasticity", file=folder
+        )
+    values = [v for data in results for v in _of_result(data, groups)]
+    return values, warnings
+
+
+def _computed(folder: Path) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return the passive moments of every data set in a folder, and which could not be had."""
+    found = [_passive(file.parent) for file in sorted(folder.rglob("dataset.toml"))]
+    return [f for f in found if isinstance(f, dict)], [f for f in found if isinstance(f, str)]
+
+
+def _passive(dataset: Path) -> dict[str, Any] | str:
+    """Return the passive moments of a data set as in their file, or why there are none."""
+    try:
+        plain: dict[str, Any] = json.loads(files.json_text(passive_data(passive_moments(dataset))))
+    except ArmrsError as error:
+        return f"{dataset}: left out: {error}"
+    return plain
+
+
+def _of_result(data: Mapping[str, Any], groups: Mapping[str, tuple[str, str]]) -> list[Value]:
+    """Return what one result says of its subject."""
+    name = str(data["data"]["name"])
+    subject = str(data["data"].get("subject") or without_date(name) or name)
+    group, side = groups.get(name, groups.get(subject, ("", "")))
+    if data["verb"] == "identify":
+        found = [(e["kind"], e["name"], e["joint"], e) for e in data["parameters"] if e["decided_by"] == "data"]
+    elif data["verb"] == "passive":
+        found = [(e["kind"], e["name"], e["joint"], e) for e in data["repeated"]]
+    else:
+        found = [
+            (e["kind"], n, e["joint"], p) for e in data["effects"] if e.get("decided") for n, p in e["parameters"].items() if p.get("std")
+        ]
+    values = []
+    for kind, what, joint, entry in found:
+        if entry["value"] is not None and np.isfinite(entry["value"]):
+            label = f"{kind} {what}" + ("" if joint is None else f" of joint {joint}")
+            values.append(Value(subject, label, float(entry["value"]), entry["unit"], entry.get("std"), group, side, session_date(name)))
+    return values

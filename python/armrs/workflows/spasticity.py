@@ -1,0 +1,277 @@
+"""Spasticity by speed: stretches of one joint, slow to fast, and the reflex that resists the fast ones."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .. import _armrs, checks
+from ..analysis import stretches
+from ..analysis.stretches import Reflex, Stretch
+from ..errors import BadInput, Text
+from ..io.dataset import Dataset, load_dataset
+from ..io.muscle_activity import onset
+from ..io.plausibility import refuse_implausible
+from ..tabular import Tabular, Tidy
+from .identify import Estimate
+from .passive import LEAST_RANGE, TrialMoments, trial_moments
+
+DEFAULT_CUTOFF = 4.0
+"""Cutoff of the low-pass [Hz]: above it, inertia times the noise of angles would be taken for latency (0.05° gave 6 ms at 8 Hz)."""
+FINER = 3.0
+"""How much higher the cutoff of the motion is that the reflex is told: a low-pass before its threshold would not be undone by one after."""
+FINEST = 12.0
+"""Samples that are looked at in each period of the cutoff."""
+LEAST_SPEEDS = 1.5
+"""The fastest stretch must be faster than the slowest by this factor before a reflex can be told from viscosity."""
+FELT = 0.1
+"""Share of its largest moment in a stretch from which on the reflex counts as felt: the catch."""
+
+
+@dataclass(frozen=True)
+class StretchSeen:
+    """One stretch: the motion of a trial in the direction that is resisted.
+
+    Attributes
+    ----------
+    file, configuration : str
+    speed : float
+        Largest speed [rad/s].
+    peak_moment, work : float
+        Largest moment of the stretch less that at its beginning [N m], and the work done on the joint [J].
+    elastic, resisting, reflex : float
+        Their largest shares of the moment: springs; viscosity and friction; reflex [N m].
+    catch_angle, catch_speed : float
+        Where the reflex began to be felt [rad, rad/s]; NaN where it was not.
+    emg_onset : float
+        Time from the start of the stretch to the first activity of a muscle [s]; NaN without one.
+    emg_latency : float
+        Time from the speed's passing the threshold to that activity [s]; NaN as above.
+    """
+
+    file: str
+    configuration: str
+    speed: float
+    peak_moment: float
+    work: float
+    elastic: float
+    resisting: float
+    reflex: float
+    catch_angle: float
+    catch_speed: float
+    emg_onset: float
+    emg_latency: float
+
+
+@dataclass(frozen=True, eq=False)
+class JointReflex:
+    """The reflex of one joint.
+
+    Attributes
+    ----------
+    joint : int
+        From 1.
+    reflex : Reflex
+    stretches : tuple of StretchSeen
+        By speed.
+    """
+
+    joint: int
+    reflex: Reflex
+    stretches: tuple[StretchSeen, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Spasticity(Tabular):
+    """What stretches at several speeds say of the reflexes of an arm.
+
+    Attributes
+    ----------
+    joints : tuple of JointReflex
+    cutoff : float
+        Of the low-pass [Hz].
+    warnings : tuple of str
+    dataset : Dataset
+    """
+
+    joints: tuple[JointReflex, ...]
+    cutoff: float
+    warnings: tuple[str, ...]
+    dataset: Dataset = field(repr=False)
+
+    method: ClassVar[str] = "spasticity"
+    level: ClassVar[float] = stretches.LEVEL
+
+    def __repr__(self) -> str:
+        parts = []
+        for j in self.joints:
+            shown = ", ".join(f"{name} {p.value:.3g} ± {p.std:.2g} {p.unit}" for name, p in j.reflex.parameters.items())
+            parts.append(f"joint {j.joint}: {shown if j.reflex.found else 'no reflex'}")
+        return f"Spasticity({self.dataset.name!r}; {'; '.join(parts) or 'no joint was stretched'})"
+
+    def followed(self) -> tuple[Estimate, ...]:
+        """Return what a history keeps: gain, threshold and latency of the reflexes, viscosity and friction besides them."""
+        found = []
+        for j in self.joints:
+            of = {("stretch_reflex", name): p for name, p in j.reflex.parameters.items()} if j.reflex.found else {}
+            of |= {("viscous", "viscosity"): j.reflex.viscosity, ("coulomb", "torque"): j.reflex.dry}
+            found += [Estimate(name, j.joint, kind, p.value, p.std, p.unit, p.interval, "data") for (kind, name), p in of.items()]
+        return tuple(found)
+
+    def tidy(self) -> Tidy:
+        """Return the stretches, one a row."""
+        rows = [(j.joint, s) for j in self.joints for s in j.stretches]
+        names = list(StretchSeen.__dataclass_fields__)
+        columns: dict[str, list[Any]] = {"joint": [joint for joint, _ in rows]}
+        units = dict.fromkeys(("peak_moment", "elastic", "resisting", "reflex"), "N m")
+        units |= {"speed": "rad/s", "work": "J", "catch_angle": "rad", "catch_speed": "rad/s", "emg_onset": "s", "emg_latency": "s"}
+        return Tidy(columns | {name: [getattr(s, name) for _, s in rows] for name in names}, units)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data; `effects` as `armrs gap` writes them."""
+        effects = [
+            {
+                "kind": "stretch_reflex",
+                "joint": j.joint,
+                "decided": j.reflex.found,
+                "parameters": {name: dict(vars(p)) for name, p in j.reflex.parameters.items()}
+                | {"direction": {"value": j.reflex.direction}},
+            }
+            for j in self.joints
+        ]
+        besides = [
+            {
+                "joint": j.joint,
+                "viscosity": dict(vars(j.reflex.viscosity)),
+                "dry": dict(vars(j.reflex.dry)),
+                "residual_rms_Nm": j.reflex.residual_rms,
+            }
+            for j in self.joints
+        ]
+        stretched = [{"joint": j.joint, **vars(s)} for j in self.joints for s in j.stretches]
+        return {"effects": effects, "besides": besides, "stretches": stretched, "cutoff_Hz": self.cutoff, "warnings": list(self.warnings)}
+
+
+def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEFAULT_CUTOFF) -> Spasticity:
+    """Find the stretch reflex of every joint that was stretched at several speeds: threshold, gain and latency with intervals.
+
+    See `armrs.analysis.stretches` for the law. The resisting moment is that of `passive_moments`, without its slow low-pass: torque of the
+    contact force, less gravity and inertia by the model.
+
+    Parameters
+    ----------
+    dataset : Dataset or path
+        Trials in which joints are stretched, slow to fast; three repeats of three to five speeds in all at least four trials.
+    cutoff : float
+        Of the zero-phase low-pass of angles and forces, -3 dB of both passes [Hz]; at most 0.4 of the sample rate.
+
+    Raises
+    ------
+    BadInput
+        For settings out of range, and a data set in which no joint is stretched in four trials at speeds that differ.
+
+    Examples
+    --------
+    >>> armrs.spasticity("patient")  # doctest: +SKIP
+    Spasticity('patient'; joint 1: gain 0.8 ± 0.02 N m s/rad, threshold 0.6 ± 0.01 rad/s, latency 0.04 ± 0.001 s)
+    """
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    slowest = min(trial.rate for trial in dataset.trials)
+    cutoff = checks.number("cutoff", cutoff, above=0.0, unit="Hz")
+    # A slow recording is not refused for a default: it is asked with what it holds.
+    cutoff = min(cutoff, 0.4 * slowest)
+    refuse_implausible(dataset, robot_matters=False)
+    # Activity of the muscles is what is looked for here: samples with it count.
+    whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
+    moments = [trial_moments(dataset, trial, cutoff) for trial in whole]
+    found, warnings = [], []
+    for joint in range(dataset.model.n_joints):
+        own = [(m, s) for m in moments if (s := _stretch(m, joint, cutoff)) is not None]
+        speeds = [float(np.abs(s.qd).max()) for _, s in own]
+        if len(own) < stretches.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):
+            continue
+        fitted = stretches.fit([s for _, s in own])
+        if fitted is None:
+            continue
+        seen = [_seen(m, s, fitted, k) for k, (m, s) in enumerate(own)]
+        found.append(JointReflex(joint + 1, fitted, tuple(sorted(seen, key=lambda s: s.speed))))
+        warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
+    if not found:
+        need = f"{stretches.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
+        raise BadInput("trials", Text("no joint that is stretched at several speeds"), need)
+    return Spasticity(tuple(found), cutoff, tuple(warnings), dataset)
+
+
+def _stretch(moments: TrialMoments, joint: int, cutoff: float) -> Stretch | None:
+    """Return one joint of a trial from its first to its last sample that was measured; None where it is held, or interrupted."""
+    there = np.flatnonzero(np.isfinite(moments.moment[:, joint]))
+    if there.size < 3 or there[-1] - there[0] + 1 != there.size:
+        return None
+    t, q, qd = moments.trial.t[there], moments.q[there, joint], moments.qd[there, joint]
+    if np.ptp(q) < LEAST_RANGE:
+        return None
+    rate = moments.trial.rate
+    qdd = np.gradient(qd, 1.0 / rate)
+    fine = _armrs.smooth(np.ascontiguousarray(moments.trial.q[there, joint, None]), rate, min(FINER * cutoff, 0.4 * rate))
+    every = max(1, int(rate / (FINEST * cutoff)))
+    moment, fine_q, fine_qd = moments.moment[there, joint], fine[0][:, 0], fine[1][:, 0]
+    t, q, qd, qdd, moment, fine_q, fine_qd = (values[::every] for values in (t, q, qd, qdd, moment, fine_q, fine_qd))
+    return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, low_pass(rate / every, cutoff))
+
+
+def low_pass(rate: float, cutoff: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the zero-phase low-pass of angles and forces at a rate and a cutoff [Hz]."""
+    return lambda values: _armrs.smooth(np.ascontiguousarray(values[:, None]), rate, cutoff)[0][:, 0]
+
+
+def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int) -> StretchSeen:
+    """Return what one stretch shows: from where the joint begins to move in the direction that is resisted, to its turn."""
+    along = fitted.direction * stretch.qd
+    peak = int(np.argmax(along))
+    low = 0.02 * along[peak]
+    first = peak - int(np.argmax(along[peak::-1] < low)) if np.any(along[: peak + 1] < low) else 0
+    last = peak + int(np.argmax(along[peak:] < low)) if np.any(along[peak:] < low) else len(along) - 1
+    span = slice(first, last + 1)
+    parts = [fitted.direction * part[number][span] for part in (fitted.elastic, fitted.resisting, fitted.reflex)]
+    moment = fitted.direction * (stretch.moment[span] - stretch.moment[first])
+    felt = parts[2] > FELT * parts[2].max(initial=0.0)
+    shape = fitted.parameters
+    begun = first + int(np.argmax(felt)) if fitted.found and felt.any() else None
+    emg = min(
+        (t for name in moments.trial.emg if (t := onset(moments.trial, name, stretch.t[first], stretch.t[last])) is not None),
+        default=np.nan,
+    )
+    over = along[span] > shape["threshold"].value
+    passed = float(stretch.t[first + int(np.argmax(over))]) if over.any() else np.nan
+    return StretchSeen(
+        file=moments.trial.file,
+        configuration=moments.trial.configuration,
+        speed=float(along[peak]),
+        peak_moment=float(moment.max()),
+        work=float(np.sum(0.5 * (moment[1:] + moment[:-1]) * fitted.direction * np.diff(stretch.q[span]))),
+        elastic=float(np.ptp(parts[0])),
+        resisting=float(parts[1].max()),
+        reflex=float(parts[2].max(initial=0.0)),
+        catch_angle=np.nan if begun is None else float(stretch.q[begun]),
+        catch_speed=np.nan if begun is None else float(along[begun]),
+        emg_onset=float(emg - stretch.t[first]),
+        emg_latency=float(emg - passed),
+    )
+
+
+def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
+    """Return what speaks against a reflex that was found."""
+    threshold, latency = (fitted.parameters[key] for key in ("threshold", "latency"))
+    said = []
+    if not fitted.found:
+        return [f"{name}: no reflex was found up to {fastest:.2g} rad/s"]
+    if threshold.value < 0.02 * fastest:
+        said.append(f"{name}: the reflex acts at any speed, which is as well a viscosity in one direction")
+    if latency.interval[1] > 0.95 * stretches.LONGEST:
+        said.append(f"{name}: the latency is not told, up to {stretches.LONGEST:g} s")
+    return said

@@ -1,0 +1,109 @@
+"""Virtual patients whose laws are written here anew: an elbow that a dynamometer stretches, with a reflex that acts late.
+
+Nothing of the catalogue or of the simulation is used but the rigid arm. The motion is given in closed form, so that its past is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import armrs
+from armrs import _armrs
+from armrs.io.dataset import Dataset
+from armrs.io.trial import Trial
+from armrs.model import Joint, Model, Segment
+
+SPEEDS = np.radians([15.0, 60.0, 110.0, 170.0, 230.0])
+"""Largest speeds of the stretches [rad/s]."""
+LOW, HIGH = np.radians([25.0, 115.0])
+
+
+@dataclass(frozen=True)
+class Patient:
+    """What is true of a patient, in SI units."""
+
+    gain: float = 1.2
+    threshold: float = 1.0
+    latency: float = 0.04
+    tonic: float = 0.0
+    slope: float = 0.0
+    viscosity: float = 0.15
+    dry: float = 0.2
+    stiffness: float = 0.8
+    tone: float = 0.15
+    wrong_inertia: float = 0.03
+
+    @staticmethod
+    def drawn(draw: np.random.Generator) -> Patient:
+        """Return one of a population."""
+        return Patient(
+            gain=draw.uniform(0.5, 2.5),
+            threshold=draw.uniform(0.5, 1.8),
+            latency=draw.uniform(0.025, 0.06),
+            viscosity=draw.uniform(0.05, 0.3),
+            dry=draw.uniform(0.05, 0.3),
+            stiffness=draw.uniform(0.3, 1.5),
+        )
+
+
+def arm() -> Model:
+    """Return a forearm with hand."""
+    return Model((Segment("forearm", 0.3, 1.5, 0.15, 0.012),), (Joint("elbow"),))
+
+
+def motion(t: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return angle, speed and acceleration of a stretch and a slow return: minimum jerk, after 0.4 s of rest."""
+    there, back = 1.875 * (HIGH - LOW) / speed, 1.875 * (HIGH - LOW) / min(speed, SPEEDS[1])
+    q, qd, qdd = np.full(len(t), LOW), np.zeros(len(t)), np.zeros(len(t))
+    for begin, lasts, way in ((0.4, there, 1.0), (0.9 + there, back, -1.0)):
+        s = np.clip((t - begin) / lasts, 0.0, 1.0)
+        q += way * (HIGH - LOW) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        qd += way * (HIGH - LOW) / lasts * 30.0 * s**2 * (1.0 - s) ** 2
+        qdd += way * (HIGH - LOW) / lasts**2 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    return q, qd, qdd
+
+
+def felt(patient: Patient, t: np.ndarray, speed: float) -> np.ndarray:
+    """Return how far the speed is beyond the threshold a latency ago [rad/s]."""
+    q, qd, _ = motion(t - patient.latency, speed)
+    return np.maximum(0.0, qd - patient.threshold - patient.slope * np.maximum(0.0, patient.tonic - q))
+
+
+def resistance(patient: Patient, t: np.ndarray, speed: float) -> np.ndarray:
+    """Return the torque with which the elbow resists [N m]."""
+    q, qd, qdd = motion(t, speed)
+    middle = 0.5 * (LOW + HIGH)
+    spring = patient.stiffness * (q - middle) + 0.15 * (np.exp(3.0 * (q - HIGH)) - np.exp(-3.0 * (q - LOW)))
+    friction = patient.viscosity * qd + patient.dry * np.tanh(qd / 0.03) + patient.wrong_inertia * qdd
+    return spring + friction + patient.gain * felt(patient, t, speed)
+
+
+def session(patient: Patient, seed: int, *, repeats: int = 3, rate: float = 200.0, emg: bool = False) -> Dataset:
+    """Return a session: every speed some times, with noise of 0.05 N m and 0.05°, and tone that drifts from trial to trial."""
+    draw = np.random.default_rng(seed)
+    model, trials = arm(), []
+    chain = _armrs.Arm.from_model(model)
+    for number, speed in enumerate(SPEEDS):
+        for repeat in range(1, repeats + 1):
+            lasts = 1.4 + 1.875 * (HIGH - LOW) * (1.0 / speed + 1.0 / min(speed, SPEEDS[1]))
+            t = np.arange(0.0, lasts, 1.0 / rate)
+            q, qd, qdd = (np.ascontiguousarray(x[:, None]) for x in motion(t, speed))
+            torque = chain.inverse_dynamics(q, qd, qdd)[:, 0] + resistance(patient, t, speed) + patient.tone * draw.standard_normal()
+            tau = torque + 0.05 * draw.standard_normal(len(t))
+            q = q + np.radians(0.05) * draw.standard_normal(q.shape)
+            channels = {}
+            if emg:
+                # Nerve before torque: activity 15 ms ahead of it, a random signal of which the size follows what is felt.
+                drive = felt(patient, t + 0.015, speed)
+                channels["emg_biceps_uV"] = (3.0 + 60.0 * drive) * draw.standard_normal(len(t))
+            trials.append(Trial(f"v{number}_{repeat}.csv", f"speed {number}", repeat, "fit", t, q, tau=tau[:, None], emg=channels))
+    return Dataset("patient", model, tuple(trials))
+
+
+def written(data: Dataset, folder: Path) -> Path:
+    """Write a session as a data set."""
+    armrs.write_dataset(data, folder)
+    return folder

@@ -1,0 +1,122 @@
+"""Cohorts: the mixed model against closed forms, norm bands that hold, tables that are refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import BadInput
+from armrs.analysis import mixed_model
+from armrs.cli import main
+from armrs.io import files
+
+SEED = 7101
+
+
+def table(path: Path, rows: list[tuple[str, str, str, float]]) -> Path:
+    lines = ["subject,group,date,quantity,value,unit", *(f"{s},{g},{d},stiffness,{v!r},N m/rad" for s, g, d, v in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def population(draw: np.random.Generator, subjects: int, sessions: int, mean: float, group: str) -> list[tuple[str, str, str, float]]:
+    own = mean + 0.3 * draw.standard_normal(subjects)
+    return [
+        (f"{group}{k}", group, f"2026-01-{i + 1:02}", float(own[k] + 0.1 * draw.standard_normal()))
+        for k in range(subjects)
+        for i in range(sessions)
+    ]
+
+
+def test_balanced_sessions_have_the_variances_of_their_mean_squares() -> None:
+    """In balanced data restricted maximum likelihood is the analysis of variance (Searle, Casella, McCulloch 1992, section 4.7)."""
+    draw = np.random.default_rng(SEED)
+    values = (draw.standard_normal(12)[:, None] + 0.4 * draw.standard_normal((12, 3))).ravel()
+    found = mixed_model.fit(values, np.ones((36, 1)), np.repeat(np.arange(12), 3).tolist())
+    means = values.reshape(12, 3).mean(axis=1)
+    within = np.sum((values.reshape(12, 3) - means[:, None]) ** 2) / 24
+    between = 3.0 * means.var(ddof=1)
+    assert found.within**2 == pytest.approx(within, rel=1e-5)
+    assert found.between**2 == pytest.approx((between - within) / 3.0, rel=1e-4)
+    assert found.covariance[0, 0] == pytest.approx(between / 36.0, rel=1e-4)
+
+
+def test_norm_bands_hold_and_no_difference_is_called_one(tmp_path: Path) -> None:
+    """Forty subjects with two sessions; their band holds 90 to 98 % of sessions of others, and equal groups differ in one of twenty."""
+    draw = np.random.default_rng(SEED)
+    held, called, ends = [], 0, []
+    for number in range(60):
+        rows = population(draw, 20, 2, 1.0, "a") + population(draw, 20, 2, 1.0, "b")
+        found = armrs.cohort(table(tmp_path / f"{number}.csv", rows))
+        band = next(q for q in found.quantities if q.group == "a")
+        held += [band.norm[0] <= v <= band.norm[1] for *_, v in population(draw, 50, 1, 1.0, "a")]
+        called += found.contrasts[0].p_value < 0.05
+        true_low = 1.0 - 1.96 * np.hypot(0.3, 0.1)
+        ends.append(band.norm_low_interval[0] <= true_low <= band.norm_low_interval[1])
+    assert 0.93 <= np.mean(held) <= 0.97
+    assert called <= 8  # of 60 at a level of 5 %: more has a probability of 0.4 %
+    assert np.mean(ends) >= 0.85
+
+
+def test_groups_and_sides_that_differ_are_told(tmp_path: Path) -> None:
+    draw = np.random.default_rng(SEED)
+    lines = ["subject,group,side,quantity,value"]
+    for group, mean in (("control", 1.0), ("patient", 1.6)):
+        for k in range(15):
+            own = mean + 0.2 * draw.standard_normal()
+            lines += [
+                f"{group}{k},{group},{side},half width,{own + more + 0.05 * draw.standard_normal()}"
+                for side, more in (("l", 0.0), ("r", 0.2))
+            ]
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    found = armrs.cohort(tmp_path / "t.csv")
+    differ = {c.between: c for c in found.contrasts}
+    assert differ["control", "patient"].p_value < 1e-4 and differ["control", "patient"].difference == pytest.approx(0.6, abs=0.2)
+    # Within subjects the sides are told far better than their scatter between subjects would.
+    assert differ["l", "r"].difference == pytest.approx(0.2, abs=0.04) and differ["l", "r"].std < 0.02
+
+
+def test_the_verb_and_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    draw = np.random.default_rng(SEED)
+    source = table(tmp_path / "in.csv", population(draw, 40, 2, 1.0, "a"))
+    assert main(["cohort", str(source), "-o", str(tmp_path / "out")]) == 0
+    assert "40 subjects, 80 sessions, 1 quantity." in capsys.readouterr().out
+    again = armrs.cohort(tmp_path / "out" / "cohort.csv")
+    assert again.values == armrs.cohort(source).values
+    assert "norm band" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_folder_of_results_is_read_with_its_groups(slow_arm: Path, tmp_path: Path) -> None:
+    first = tmp_path / "first.json"
+    main(["passive", str(slow_arm), "--json", str(first)])
+    result = json.loads(first.read_text())
+    folder = tmp_path / "results"
+    for k in range(6):
+        named = result | {"data": result["data"] | {"name": f"subject {k} 2026-02-0{k + 1}", "subject": None}}
+        files.write_json(folder / f"{k}" / "passive.json", named)
+    (tmp_path / "groups.csv").write_text("subject,group\n" + "".join(f"subject {k},{'ab'[k % 2]}\n" for k in range(6)))
+    found = armrs.cohort(folder, groups=tmp_path / "groups.csv")
+    assert {q.group for q in found.quantities} == {"a", "b"} and found.to_dict()["subjects"] == 6
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(BadInput, match="folder without results"):
+        armrs.cohort(tmp_path / "empty")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("subject,value\na,1\n", "quantity"),
+        ("subject,quantity,value\na,k,x\n", "row 2, value"),
+        ("subject,quantity,value\n,k,1\n", "row 2, subject"),
+        ("subject,quantity,value\n", "a value a row"),
+        ("subject,quantity,value,unit\na,k,1,N m\nb,k,1,kN m\n", "one unit a quantity"),
+    ],
+)
+def test_refused_tables(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(BadInput, match=message):
+        armrs.cohort(tmp_path / "t.csv")

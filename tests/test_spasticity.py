@@ -1,0 +1,99 @@
+"""Reflexes by the speed of stretch, in patients whose laws the tests write themselves (tests/patients.py)."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+import patients
+from armrs import BadInput
+from armrs.cli import main
+from armrs.io.muscle_activity import onset
+from armrs.model import Effect, Model
+from armrs.workflows.plan import Instruments, Limits
+from armrs.workflows.plan_stretches import plan_stretches
+from patients import Patient
+
+SEED = 7001
+
+
+def test_threshold_gain_and_latency_are_recovered() -> None:
+    for number in range(4):
+        patient = Patient.drawn(np.random.default_rng(SEED + number))
+        found = armrs.spasticity(patients.session(patient, SEED + number)).joints[0].reflex
+        assert found.found and found.direction == 1
+        value = {name: p.value for name, p in found.parameters.items()}
+        assert value["gain"] == pytest.approx(patient.gain, rel=0.1)
+        assert value["threshold"] == pytest.approx(patient.threshold, rel=0.1)
+        assert value["latency"] == pytest.approx(patient.latency, abs=5e-3)
+
+
+def test_without_a_reflex_none_is_found() -> None:
+    found = armrs.spasticity(patients.session(dataclasses.replace(Patient(), gain=0.0), SEED))
+    assert not found.joints[0].reflex.found and "no reflex" in found.warnings[0]
+    assert not any(e.kind == "stretch_reflex" for e in found.followed())
+
+
+def test_an_angle_threshold_is_told() -> None:
+    patient = dataclasses.replace(Patient(), threshold=0.3, tonic=np.radians(90.0), slope=2.0)
+    found = armrs.spasticity(patients.session(patient, SEED)).joints[0].reflex
+    assert found.parameters["tonic"].value == pytest.approx(patient.tonic, abs=0.15)
+    assert found.parameters["slope"].value == pytest.approx(patient.slope, rel=0.2)
+    assert "tonic" not in armrs.spasticity(patients.session(Patient(), SEED)).joints[0].reflex.parameters
+
+
+def test_muscle_activity_precedes_the_torque() -> None:
+    patient = Patient()
+    data = patients.session(patient, SEED, emg=True)
+    fast = [s for s in armrs.spasticity(data).joints[0].stretches if s.speed > 2.5]
+    # Torque 40 ms after the threshold is passed, activity 15 ms before the torque; an onset is seen when it rises above rest.
+    assert np.mean([s.emg_latency for s in fast]) == pytest.approx(0.025, abs=0.012)
+    slow = next(t for t in data.trials if t.configuration == "speed 0")
+    assert onset(slow, "emg_biceps_uV", 0.4, 5.0) is None
+
+
+def test_the_verb_writes_a_page_and_keeps_a_history(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number, gain in enumerate((1.2, 1.8)):
+        folder = patients.written(patients.session(dataclasses.replace(Patient(), gain=gain), SEED + number), tmp_path / f"s{number}")
+        history = ["--history", str(tmp_path / "h.sqlite"), "--date", f"2026-0{number + 1}-03"]
+        out = ["-o", str(tmp_path / f"o{number}"), "--json", str(tmp_path / f"{number}.json")]
+        assert main(["spasticity", str(folder), *history, *out]) == 0
+    said = capsys.readouterr().out
+    assert "a reflex resists stretch" in said and "since the session before" in said
+    courses = json.loads((tmp_path / "1.json").read_text())["history"]
+    changed = {c["name"] for c in courses if c["changed_since_last"]}
+    assert "gain" in changed and "latency" not in changed
+    page = (tmp_path / "o1" / "report.html").read_text()
+    assert "Stretches of elbow" in page and "catch at" in page
+    assert main(["report", str(tmp_path / "1.json"), "--summary", "-o", str(tmp_path / "page")]) == 0
+    summary = (tmp_path / "page" / "summary.html").read_text()
+    assert "Reflex strength" in summary and "higher by" in summary and "What was not measured" in summary
+
+
+def test_one_speed_is_refused() -> None:
+    data = patients.session(Patient(), SEED)
+    one = dataclasses.replace(data, trials=tuple(t for t in data.trials if t.configuration == "speed 2"))
+    with pytest.raises(BadInput, match="no joint that is stretched at several speeds"):
+        armrs.spasticity(one)
+
+
+def test_a_plan_of_stretches_expects_what_patients_scatter_by() -> None:
+    limits = Limits(((patients.LOW, patients.HIGH),), speed=4.0, acceleration=40.0)
+    patient = Patient()
+    reflex = Effect("stretch_reflex", joint=1, parameters={"gain": patient.gain, "threshold": patient.threshold})
+    arm = patients.arm()
+    model = Model(arm.segments, arm.joints, effects=(reflex,))
+    # A force of 0.05 / 0.3 N at the hand is the patients' 0.05 N m.
+    planned = plan_stretches(model, limits, 1, instruments=Instruments(rate=200.0, force=0.05 / 0.3))
+    speeds = [m.speed for m in planned.movements]
+    assert speeds[0] == pytest.approx(np.radians(15.0)) and speeds[-1] == pytest.approx(4.0) and planned.repeats == 3
+    found = [armrs.spasticity(patients.session(patient, SEED + k)).joints[0].reflex.parameters["gain"].value for k in range(12)]
+    # Angles are noisy in the patients and not in the plan.
+    assert 0.3 < planned.predictions[0].std / np.std(found, ddof=1) < 2.0
+    with pytest.raises(BadInput, match="fastest stretch"):
+        plan_stretches(model, dataclasses.replace(limits, speed=0.5), 1)
