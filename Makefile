@@ -17,7 +17,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: help demo test bench bench-kernels hidden crosscheck wheel sdist docs lint-workflows clean build format rust python
+.PHONY: help demo test bench bench-kernels hidden fuzz crosscheck wheel sdist docs guide mutants lint-workflows clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -130,18 +130,39 @@ hidden: build ## the gap workflow against hidden effects: some hours
 	$(GENERATE_MUJOCO) --family little_known --seed 1200000 --count $(or $(HIDDEN_LITTLE),75)
 	$(BIN)/python bench/hidden/score.py $(HIDDEN) $(HIDDEN)/mujoco
 
+# Minutes of each part; the nightly job takes hours.
+FUZZ_MINUTES ?= 1
+FUZZED := toml samples text motion urdf mjcf result fmu
+
+fuzz: $(STAMPS)/dev ## changed files, fuzzed readers and kills, a minute each (FUZZ_MINUTES)
+	$(BIN)/python bench/fuzz/harness.py --minutes $(FUZZ_MINUTES)
+	$(BIN)/python bench/fuzz/kills.py --minutes $(FUZZ_MINUTES)
+	$(BIN)/python -m pip install "atheris>=3,<4"
+	for reader in $(FUZZED); do \
+	  mkdir -p out/fuzz/$$reader && $(BIN)/python bench/fuzz/readers.py $$reader -artifact_prefix=out/fuzz/ -max_total_time=$$((60 * $(FUZZ_MINUTES))) out/fuzz/$$reader || exit 1; \
+	done
+
 sdist: $(STAMPS)/venv ## the source archive, in out/wheels, and a wheel built from it
 	$(BIN)/maturin sdist --out out/wheels
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir out/from-sdist out/wheels/armrs-*.tar.gz
 
-# The site: pages of docs/, links checked, in out/site. What it is made with goes into an environment of its own.
+# The site is made of the pages of docs/. What it is made with goes into an environment of its own.
 $(STAMPS)/docs: docs/requirements.txt | $(STAMPS)/venv
 	$(PYTHON) -m venv $(VENV)/docs
 	$(VENV)/docs/bin/python -m pip install -r docs/requirements.txt
 	@touch $@
 
-docs: $(STAMPS)/docs ## the documentation site, in out/site
+docs: $(STAMPS)/docs ## the documentation site, in out/site: no warning, no broken link, looked at in Chromium
 	NO_MKDOCS_2_WARNING=1 $(VENV)/docs/bin/mkdocs build --strict --quiet --site-dir out/site
+	$(VENV)/docs/bin/python scripts/check_site.py
+
+guide: ## add the effect of the developer guide to a copy, as it says, and test it
+	$(PYTHON) scripts/developer_guide.py
+
+# The kernels and the verdict; what survives is answered in docs/developer.md.
+MUTATED := crates/arm-core/src/dynamics.rs crates/arm-core/src/gravity.rs crates/arm-core/src/inertia.rs crates/arm-core/src/coriolis.rs
+mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels and verdict: hours. Needs cargo-mutants
+	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants --cargo-arg=--test --cargo-arg=suite
 
 lint-workflows: $(STAMPS)/venv ## lint .github/workflows
 	$(BIN)/python -m pip install check-jsonschema zizmor

@@ -124,15 +124,39 @@ def test_rapier_with_set_valued_friction_is_compared_with_half_the_step(tmp_path
 
 @pytest.mark.parametrize("name", STRONG)
 def test_smooth_friction_too_steep_for_the_step_ends_with_status_1(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
-    """The force was off by up to twice its size, with status 0."""
+    """With a step that is asked for: the force was off by up to twice its size, with status 0."""
     path = written(tmp_path, "".join(effect(kind, joint, **values) for kind, joint, values in STRONG[name]))
     movement = tmp_path / "movement.toml"
     movement.write_text("[movement]\nwaypoints_deg = [[-60, 60], [-48, 60], [-60, 72]]\nspeed_rad_s = 1.0\nacceleration_rad_s2 = 4.0\n")
-    status = main(["simulate", str(path), "--movement", str(movement), "--json", "-"])
+    status = main(["simulate", str(path), "--movement", str(movement), "--dt", "0.00025", "--json", "-"])
     printed = capsys.readouterr()
     assert json.loads(printed.out)["half_step"]["force_share"] > 0.01
     assert status == 1
     assert "smoothing = 0" in printed.err
+
+
+def judged(run: armrs.Simulated, fine: armrs.Simulated) -> tuple[float, float]:
+    """Return the largest difference of angles [deg] and of the force as a share of the largest."""
+    angle = np.degrees(np.abs(run.q - fine.q).max())
+    return float(angle), float(np.hypot(*(run.force_on_arm - fine.force_on_arm).T).max() / np.hypot(*fine.force_on_arm.T).max())
+
+
+@pytest.mark.parametrize("name", STRONG)
+def test_without_a_step_one_is_taken_that_follows_the_friction(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    """`armrs simulate` printed 1126 N for 336 N."""
+    path = written(tmp_path, "".join(effect(kind, joint, **values) for kind, joint, values in STRONG[name]))
+    way = np.radians([[-60, 60], [-48, 60], [-60, 72]])
+    usual = armrs.simulate(path, armrs.Movement(way, speed=1.0, acceleration=4.0))
+    fine = armrs.simulate(path, armrs.Movement(way, speed=1.0, acceleration=4.0), dt=usual.settings["dt_s"] / 4)
+    angle, force = judged(usual, fine)
+    assert usual.settings["dt_s"] < 0.25e-3
+    assert angle < 0.01
+    assert force < 0.01
+    movement = tmp_path / "movement.toml"
+    movement.write_text("[movement]\nwaypoints_deg = [[-60, 60], [-48, 60], [-60, 72]]\nspeed_rad_s = 1.0\nacceleration_rad_s2 = 4.0\n")
+    assert main(["simulate", str(path), "--movement", str(movement), "--json", "-"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["digest"] == usual.digest
 
 
 def random_arm(rng: np.random.Generator, joints: int) -> tuple[str, armrs.Movement]:
@@ -166,8 +190,8 @@ def random_arm(rng: np.random.Generator, joints: int) -> tuple[str, armrs.Moveme
 
 
 def test_no_run_with_smooth_friction_is_wrong_in_silence(tmp_path: Path) -> None:
-    """Random arms at the default step against a twentieth of it; arms = 200 gives the figures of docs/conventions.md."""
-    arms = 24
+    """Random arms without a step against a twentieth of 0.25 ms, or a quarter of what is taken; arms = 200: docs/conventions.md."""
+    arms = 12
     counts = {"refused": 0, "wrong, warned": 0, "wrong, silent": 0, "right, warned": 0, "right, silent": 0}
     rng = np.random.default_rng(11)
     path = tmp_path / "model.toml"
@@ -175,18 +199,17 @@ def test_no_run_with_smooth_friction_is_wrong_in_silence(tmp_path: Path) -> None
         text, movement = random_arm(rng, 2 + k % 2)
         path.write_text(text)
         try:
-            usual, fine = (armrs.simulate(path, movement, dt=dt) for dt in (0.25e-3, 0.25e-3 / 20))
+            usual = armrs.simulate(path, movement)
+            fine = armrs.simulate(path, movement, dt=min(0.25e-3 / 20, usual.settings["dt_s"] / 4))
         except armrs.SimulationError:
             counts["refused"] += 1
             continue
-        angle = np.degrees(np.abs(usual.q - fine.q).max())
-        force = np.hypot(*(usual.force_on_arm - fine.force_on_arm).T).max() / np.hypot(*fine.force_on_arm.T).max()
+        angle, force = judged(usual, fine)
         wrong = "wrong" if angle > 0.01 or force > 0.01 else "right"
         counts[f"{wrong}, {'warned' if usual.warnings else 'silent'}"] += 1
     print(counts)
     assert counts["wrong, silent"] == 0
-    assert min(counts["wrong, warned"], counts["right, silent"]) >= 5
-    assert counts["right, warned"] <= 0.1 * arms
+    assert counts["right, silent"] >= 0.7 * arms
 
 
 def test_a_run_that_loses_energy_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

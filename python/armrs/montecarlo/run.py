@@ -45,8 +45,6 @@ class Swept(Tabular):
     files: tuple[Path, ...]
     run: dict[str, Any]
 
-    VIEW = ("montecarlo.results", "SWEPT")
-
     def __repr__(self) -> str:
         return f"Swept({self.sweep.name!r}: {self.sweep.cases} cases, {self.failed} failed, {len(self.data['quantities'])} quantities)"
 

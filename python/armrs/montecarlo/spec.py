@@ -189,9 +189,7 @@ def _resampled(table: dict[str, Any], path: Path, draft: Sweep) -> Sweep:
     if sum(t.role == "fit" for t in dataset.trials) < 2:
         raise BadInput("dataset", Text("one trial to fit"), "at least two, to draw from")
     _check_question(draft.question, dataset.model)
-    from ..workflows.gap.results import digest
-
-    return dataclasses.replace(draft, dataset=dataset, digest=_digest(table, {"files": digest(dataset)}))
+    return dataclasses.replace(draft, dataset=dataset, digest=_digest(table, {"files": dataset.digest()}))
 
 
 def _question(table: object) -> Question:

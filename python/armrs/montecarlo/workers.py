@@ -12,6 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
+from .. import _armrs
 from ..errors import ArmrsError, BadInput, Text
 from .case import Row, compute
 from .spec import Sweep
@@ -132,8 +133,6 @@ def cluster(sweep: Sweep, parts: Sequence[Part], address: str) -> Done:
 
 def _check_versions(client: Any, address: str) -> None:
     """Refuse workers that have another armrs, or none: their bits could differ."""
-    from .. import _armrs
-
     try:
         found = set(client.run(_version).values())
     except Exception as error:
@@ -143,6 +142,4 @@ def _check_versions(client: Any, address: str) -> None:
 
 
 def _version() -> str:
-    from .. import _armrs
-
     return _armrs.__version__

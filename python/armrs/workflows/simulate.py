@@ -8,13 +8,13 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from .. import _armrs, checks
 from ..catalogue import catalogue
-from ..errors import BadInput, Text
+from ..errors import BadInput, SimulationError, Text
 from ..io.trial import Trial
 from ..model import Model, load_model
 from ..tabular import Labelled, Series, Tidy
@@ -22,12 +22,14 @@ from .accuracy import energy_balance
 from .movement import Movement
 
 if TYPE_CHECKING:
-    from .streamed import Run
+    from .._armrs import _Recorded
 
 DEFAULT_DT = 0.25e-3
 """Step of the simulation [s]."""
 CHATTER = 1e-5
 """Share of the energy exchanged that smooth friction loses when the step does not resolve it."""
+FINER = (1, 4, 16, 64)
+"""Steps within `DEFAULT_DT` that are tried in turn, until one resolves the dry friction."""
 DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
 RUNAWAY = 30.0
@@ -96,6 +98,29 @@ class Sensors:
         )
 
 
+class Run(Protocol):
+    """A recorded run, whole or streamed: what it takes to say what came out, and to draw and write it."""
+
+    @property
+    def model(self) -> Model:
+        """As of `Simulated`."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """As of `Simulated`."""
+
+    @property
+    def samples(self) -> int:
+        """How many were recorded."""
+
+    @property
+    def digest(self) -> str:
+        """As of `Simulated`."""
+
+    def pieces(self) -> Iterator[Simulated]:
+        """Give the samples in order, as runs of at most `PIECE` of them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Simulated(Series):
     """A recorded run; rows are samples.
@@ -122,11 +147,9 @@ class Simulated(Series):
     qdd: np.ndarray
     force_on_arm: np.ndarray
     columns: dict[str, Any] = field(repr=False)
-    readings: tuple[dict[str, Any], ...] = field(repr=False)
+    readings: tuple[Mapping[str, Any], ...] = field(repr=False)
     model: Model = field(repr=False)
     settings: dict[str, Any] = field(repr=False)
-
-    VIEW = ("report.results", "SIMULATED")
 
     def __repr__(self) -> str:
         most = np.max(np.hypot(*self.force_on_arm.T))
@@ -220,13 +243,30 @@ def is_doubtful(run: Run) -> str | None:
     Rapier does not locate where set-valued friction sticks and slips. Smooth friction whose slope at rest is too steep for the step
     chatters, and loses energy while it does: at 1e-5 of what is exchanged the force is off by up to 0.2 %.
     """
-    speeds = [effect.parameters[p.name] for effect in run.model.effects for p in catalogue()[effect.kind].parameters if p.or_zero]
-    speeds += [np.inf for joint in run.model.joints if joint.coulomb > 0.0]
+    speeds = _smoothings(run.model)
     if run.settings["engine"] == "rapier" and 0.0 in speeds:
         return "rapier does not locate where set-valued friction sticks and slips"
     if any(speed > 0.0 for speed in speeds) and energy_balance(run.pieces()).share > CHATTER:
         return "the dry friction may be too steep for the step"
     return None
+
+
+def steps_to_try(model: Model, *, engine: str, integrator: str | None, dt: float | None) -> tuple[float, ...]:
+    """Return the steps that a run is made with in turn, until one resolves its dry friction [s].
+
+    A step that is asked for is taken. Smooth dry friction is so steep at rest that an explicit step has to follow it: with the
+    fourth-order method, whose energy says whether it does, shorter steps are tried. Set-valued friction is solved at any step.
+    """
+    if dt is not None:
+        return (dt,)
+    explicit = engine == "native" and integrator in (None, "rk4")
+    return tuple(DEFAULT_DT / n for n in (FINER if explicit and any(speed > 0.0 for speed in _smoothings(model)) else FINER[:1]))
+
+
+def _smoothings(model: Model) -> list[float]:
+    """Return the speeds over which dry friction changes its sign [rad/s]; infinite for what joints state."""
+    speeds = [effect.parameters[p.name] for effect in model.effects for p in catalogue()[effect.kind].parameters if p.or_zero]
+    return speeds + [np.inf for joint in model.joints if joint.coulomb > 0.0]
 
 
 def warnings(run: Run) -> tuple[str, ...]:
@@ -257,7 +297,7 @@ def simulate(
     *,
     engine: str = "native",
     integrator: str | None = None,
-    dt: float = DEFAULT_DT,
+    dt: float | None = None,
     rate: float | None = None,
     duration: float | None = None,
     coupling: str = "compliant",
@@ -277,8 +317,9 @@ def simulate(
         Minimal coordinates, or rigid bodies and joints in maximal coordinates.
     integrator : {"rk4", "euler"}, optional
         Of the native engine: fourth order, taken when absent, or semi-implicit first order.
-    dt : float
-        Step [s].
+    dt : float, optional
+        Step [s]. When absent 0.25 ms, or a 4th, 16th or 64th of it where smooth dry friction is too steep for it: the longest with which
+        less than 1e-5 of the exchanged energy is unaccounted for.
     rate : float, optional
         Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps. Sensors read this recording at a rate of their own,
         `sensors.rate`, which may not be larger: what is in between is not recorded. When absent, 50 Hz, or that of faster sensors.
@@ -301,21 +342,31 @@ def simulate(
     checks.instance("sensors", sensors, Sensors, type(None))
     if rate is None:
         rate = DEFAULT_RATE if sensors is None else max(DEFAULT_RATE, sensors.rate)
-    asked = _asked(
-        model,
-        drive,
-        engine=engine,
-        integrator=integrator,
-        dt=dt,
-        rate=rate,
-        duration=duration,
-        coupling=coupling,
-        start=(start, start_speed),
-    )
-    sensing = _sensing(sensors, seeds, rate)
-    with asked.about_drive():
-        raw = _armrs.simulate(_armrs.Rig(asked.model), asked.led, asked.core, sensing)
-    return asked.recorded(raw)
+    model = checks.loaded("model", model, Model, load_model)
+
+    def run(step: float) -> Simulated:
+        asked = _asked(
+            model,
+            drive,
+            engine=engine,
+            integrator=integrator,
+            dt=step,
+            rate=rate,
+            duration=duration,
+            coupling=coupling,
+            start=(start, start_speed),
+        )
+        sensing = _sensing(sensors, seeds, rate)
+        with asked.about_drive():
+            return asked.recorded(_armrs.simulate(_armrs.Rig(asked.model), asked.led, asked.core, sensing))
+
+    *shorter, last = steps_to_try(model, engine=engine, integrator=integrator, dt=dt)
+    for step in shorter:
+        with contextlib.suppress(SimulationError):  # a step that is too long may end the run
+            made = run(step)
+            if is_doubtful(made) is None:
+                return made
+    return run(last)
 
 
 def simulate_in_pieces(
@@ -363,7 +414,7 @@ class _Asked:
         except BadInput as error:
             raise about(self.drive, error, f"; a step is {self.core['dt']:g} s") from None
 
-    def recorded(self, raw: dict[str, Any]) -> Simulated:
+    def recorded(self, raw: _Recorded) -> Simulated:
         """Return what the core has recorded."""
         return Simulated(
             t=raw["time"],

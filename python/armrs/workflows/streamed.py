@@ -6,39 +6,17 @@ import contextlib
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 import numpy as np
 
 from .. import _armrs
+from ..errors import SimulationError
 from ..io import files
 from ..io.trial import Trial
 from ..model import Model
 from .movement import Movement
-from .simulate import PIECE, Simulated, digested, simulate_in_pieces, warnings
-
-
-class Run(Protocol):
-    """A recorded run, whole or streamed: what it takes to say what came out, and to draw and write it."""
-
-    @property
-    def model(self) -> Model:
-        """As of `Simulated`."""
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """As of `Simulated`."""
-
-    @property
-    def samples(self) -> int:
-        """How many were recorded."""
-
-    @property
-    def digest(self) -> str:
-        """As of `Simulated`."""
-
-    def pieces(self) -> Iterator[Simulated]:
-        """Give the samples in order, as runs of at most `PIECE` of them."""
+from .simulate import PIECE, Simulated, digested, is_doubtful, simulate_in_pieces, steps_to_try, warnings
 
 
 class Streamed:
@@ -141,7 +119,16 @@ def stream(model: Model, drive: Movement | Trial | None, near: Path | None = Non
     near : path, optional
         On whose disk samples may be kept for that time: this folder, or where it is to be.
     """
-    with contextlib.ExitStack() as stack:
-        run = Streamed(model, near, stack)
-        simulate_in_pieces(model, drive, run._add, samples=PIECE, **options)
-        yield run
+    tried = steps_to_try(model, engine=options.get("engine", "native"), integrator=options.get("integrator"), dt=options.pop("dt", None))
+    for step in tried:
+        with contextlib.ExitStack() as stack:
+            run = Streamed(model, near, stack)
+            try:
+                simulate_in_pieces(model, drive, run._add, samples=PIECE, dt=step, **options)
+            except SimulationError:
+                if step == tried[-1]:
+                    raise
+                continue  # a step that is too long may end the run
+            if step == tried[-1] or is_doubtful(run) is None:
+                yield run
+                return

@@ -1,0 +1,231 @@
+"""Run armrs on changed files and judge what it does: `python bench/fuzz/harness.py --cases 20000`.
+
+Asked of every case: a status of 0, 1, 2, 130 or 143 and no traceback; at most 10 s of processor time and the stated memory; nothing left
+behind after a refusal, neither the output folder nor temporary files. The seed gives the same cases again; each that fails is kept below
+`--keep` with the command and what it printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import resource
+import select
+import shutil
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from mutations import mutate
+from seeds import Seed, plant
+
+from armrs import cli
+
+STATUSES = (0, 1, 2, 130, 143)
+SECONDS = 10.0
+"""Of processor time."""
+WAIT = 120.0
+"""On the clock, after which a process is taken to wait for something that never comes."""
+MEMORY = 4 << 30
+"""Address space beyond that of a process that has read nothing [bytes]."""
+AT_ONCE = 100
+"""Cases in one process."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One changed file and one command that reads it."""
+
+    number: int
+    seed: Seed
+    command: tuple[str, ...]
+    content: bytes
+
+
+def case_of(number: int, start: int, seeds: tuple[Seed, ...], folder: Path) -> Case:
+    """Return the case of a number: formats take turns."""
+    random = Random(f"{start} {number}")
+    seed = seeds[number % len(seeds)]
+    content = mutate(random, Path(seed.file).suffix, (folder / seed.file).read_bytes())
+    return Case(number, seed, random.choice(seed.commands), content)
+
+
+@contextlib.contextmanager
+def printing(path: Path) -> Iterator[None]:
+    """Let everything that is printed go to a file."""
+    with (
+        path.open("w", encoding="utf-8", errors="replace") as printed,
+        contextlib.redirect_stdout(printed),
+        contextlib.redirect_stderr(printed),
+    ):
+        yield
+
+
+def run(case: Case, folder: Path, home: Path) -> list[str]:
+    """Run a case in this process; return what is wrong with it."""
+    place = home / "work"
+    shutil.copytree(folder, place)
+    (place / case.seed.file).write_bytes(case.content)
+    scratch = home / "tmp"
+    scratch.mkdir()
+    os.chdir(place)
+    os.environ["TMPDIR"] = tempfile.tempdir = str(scratch)
+    before = sorted(str(p.relative_to(place)) for p in place.rglob("*"))
+    begun = time.process_time()
+    wrong = []
+    with printing(home / "printed"):
+        try:
+            status: object = cli.main(case.command)
+        except BaseException:
+            status = "a traceback"
+            traceback.print_exc()
+    said = (home / "printed").read_text(encoding="utf-8", errors="replace")
+    took = time.process_time() - begun
+    after = sorted(str(p.relative_to(place)) for p in place.rglob("*"))
+    if status not in STATUSES:
+        wrong.append(f"status {status}")
+    elif "Traceback (most recent" in said:
+        wrong.append("a traceback is printed")
+    if status == 2 and after != before:
+        wrong.append(f"left behind {sorted(set(after) ^ set(before))[:5]}")
+    if status == 2 and not said.strip():
+        wrong.append("refused without a word")
+    if any(scratch.iterdir()):
+        wrong.append(f"left in the temporary folder {[p.name for p in scratch.iterdir()][:5]}")
+    if took > SECONDS:
+        wrong.append(f"{took:.1f} s of processor time")
+    return wrong
+
+
+def child(pipe: int, numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, home: Path) -> None:
+    """Run some cases and tell about each on the pipe."""
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() if Path("/proc/self/statm").exists() else 0
+    if used:
+        resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    for number in numbers:
+        case = case_of(number, start, seeds, folder)
+        os.write(pipe, f"{number} begins\n".encode())
+        os.chdir("/")
+        shutil.rmtree(home, ignore_errors=True)
+        home.mkdir(parents=True)
+        wrong = "; ".join(run(case, folder, home)).replace("\n", " ")
+        os.write(pipe, f"{number} ends {wrong[:3000]}\n".encode())
+        if wrong:
+            break  # what it printed is still to be kept
+    os._exit(0)
+
+
+def batch(numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, home: Path) -> tuple[int, str | None]:
+    """Run cases in a process of their own; return how many ended, and what is wrong with the last one."""
+    reading, writing = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        os.close(reading)
+        try:
+            child(writing, numbers, start, seeds, folder, home)
+        finally:
+            os._exit(70)
+    os.close(writing)
+    done, text, why = 0, b"", None
+    with os.fdopen(reading, "rb", buffering=0) as source:
+        while True:
+            ready, _, _ = select.select([source], [], [], WAIT)
+            piece = source.read(1 << 16) if ready else None
+            if not piece:
+                why = None if ready else f"waits for more than {WAIT:g} s"
+                break
+            text += piece
+            *lines, text = text.split(b"\n")
+            for line in lines:
+                _, what, rest = (*line.decode().split(" ", 2), "")[:3]
+                if what == "ends":
+                    done += 1
+                    if rest:
+                        why = rest
+                        break
+            if why:
+                break
+    if why:
+        os.kill(pid, 9)
+    _, status = os.waitpid(pid, 0)
+    if why is None and done < len(numbers):
+        why = f"the process ended with {os.waitstatus_to_exitcode(status)}"
+        return done + 1, why
+    if why and why.startswith("waits"):
+        return done + 1, why
+    return done, why
+
+
+def keep(case: Case, why: str, home: Path, place: Path) -> None:
+    """Keep what is needed to look at a case."""
+    place = place / str(case.number)
+    place.mkdir(parents=True, exist_ok=True)
+    (place / Path(case.seed.file).name).write_bytes(case.content)
+    printed = home / "printed"
+    said = printed.read_text(encoding="utf-8", errors="replace")[-4000:] if printed.exists() else ""
+    (place / "why.txt").write_text(f"armrs {' '.join(case.command)}\nchanged: {case.seed.file}\n{why}\n{said}\n")
+
+
+def main() -> int:
+    """Run the cases and print what came of them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=0, help="how many; as many as the time allows when absent")
+    parser.add_argument("--minutes", type=float, default=1.0, help="of the clock, when --cases is absent")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--only", default="", help="formats whose file holds this text")
+    parser.add_argument("--keep", type=Path, default=Path("out/fuzz/mutations"))
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
+        folder, home = Path(name) / "seeds", Path(name) / "home"
+        seeds = tuple(s for s in plant(folder) if asked.only in s.file)
+        accepted_at_first(seeds, folder, Path(name) / "home")
+        begun, wrong = time.monotonic(), Counter[str]()
+        next_case, end = asked.first, asked.first + asked.cases if asked.cases else sys.maxsize
+        while next_case < end and (asked.cases or time.monotonic() - begun < 60.0 * asked.minutes):
+            numbers = range(next_case, min(end, next_case + AT_ONCE))
+            done, why = batch(numbers, asked.seed, seeds, folder, home)
+            next_case += done
+            if why:
+                case = case_of(next_case - 1, asked.seed, seeds, folder)
+                keep(case, why, home, asked.keep)
+                wrong[f"{case.seed.file}: {why[:100]}"] += 1
+                print(f"{next_case - 1}: armrs {' '.join(case.command)}, {case.seed.file}: {why[:300]}", flush=True)
+        count = next_case - asked.first
+        print(f"{count} changed files of {len(seeds)} formats in {time.monotonic() - begun:.0f} s: {sum(wrong.values())} wrong")
+        for line, number in wrong.most_common():
+            print(f"  {number} x {line}")
+    return 1 if wrong else 0
+
+
+def accepted_at_first(seeds: tuple[Seed, ...], folder: Path, home: Path) -> None:
+    """Say which commands are refused on files that were not changed: their mutations would show little."""
+    for seed in seeds:
+        for command in seed.commands:
+            shutil.rmtree(home, ignore_errors=True)
+            home.mkdir(parents=True)
+            pid = os.fork()
+            if pid == 0:
+                shutil.copytree(folder, home / "work")
+                os.chdir(home / "work")
+                with printing(home / "printed"):
+                    status = cli.main(command)
+                os._exit(status)
+            _, status = os.waitpid(pid, 0)
+            if os.waitstatus_to_exitcode(status) not in (0, 1):
+                said = (home / "printed").read_text().strip().splitlines()[-1:]
+                print(f"armrs {' '.join(command)} is refused as it is: {' '.join(said)}", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
