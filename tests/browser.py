@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -24,6 +25,14 @@ class Opened:
     page: Any
     errors: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
+
+    def until(self, predicate: str, argument: Any = None, *, seconds: float = 30.0) -> None:
+        """Wait for a condition in the page, asked from outside: `wait_for_function` asks again from within, which the policy of a page
+        forbids."""
+        end = time.monotonic() + seconds
+        while not self.page.evaluate(predicate, argument):
+            assert time.monotonic() < end, f"not within {seconds:g} s: {predicate}"
+            self.page.wait_for_timeout(20)
 
 
 @contextmanager

@@ -23,6 +23,7 @@ LITERAL = re.compile(
 )
 FUNCTION = re.compile(r"\bfn\s+(\w+)")
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\([^)]*\))?\s+)?mod\s+\w+\s*(?=\{)")
+LOADERS = {"importlib", "pkgutil", "runpy"}
 USE = re.compile(r"\b(pub(?:\([^)]*\))?\s+)?use\s+([^;]+);")
 DEFINED = re.compile(r"(?<![*&])\b(?:fn|struct|enum|trait|type|const|static|union)\s+(\w+)")
 
@@ -100,34 +101,51 @@ def python_modules(package: Path) -> dict[str, PythonModule]:
     return found
 
 
-def python_imports(package: Path, at_start: bool = False) -> dict[str, set[str]]:
-    """Return the modules that each module of a package imports, those in functions as well.
+def python_imports(package: Path) -> dict[str, set[str]]:
+    """Return the modules that each module of a package imports, those in functions and those for type checkers as well.
 
-    The root, which loads lazily, is left out. With `at_start`, only what is imported when the module is: not what stands in
-    functions or is there for type checkers.
+    The root, which loads lazily, is left out.
     """
+    graph = _imports(package)
+    return {name: used - {package.name} for name, used in graph.items() if name != package.name}
+
+
+def late_imports(package: Path) -> dict[str, set[str]]:
+    """Return the modules that functions of each module of a package import; the modules without any are left out."""
+    return {name: used for name, used in _imports(package, late_alone=True).items() if used}
+
+
+def _imports(package: Path, late_alone: bool = False) -> dict[str, set[str]]:
     modules = python_modules(package)
 
-    def inside(node: ast.AST) -> Iterator[ast.ImportFrom]:
+    def inside(node: ast.AST, late: bool = False) -> Iterator[ast.ImportFrom]:
         for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.ImportFrom) and child.level:
+            if isinstance(child, ast.ImportFrom) and child.level and (late or not late_alone):
                 yield child
-            late = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-            types = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)
-            if not (at_start and (late or types)):
-                yield from inside(child)
+            yield from inside(child, late or isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda))
 
     graph = {}
     for name, module in modules.items():
-        if name == package.name:
-            continue
         used = set()
         for node in inside(module.syntax):
             base = module.package.split(".")
             origin = ".".join([*base[: len(base) - node.level + 1], *([node.module] if node.module else [])])
             used |= {whole if (whole := f"{origin}.{alias.name}") in modules else origin for alias in node.names}
-        graph[name] = {other for other in used if other in modules and other not in (name, package.name)}
+        graph[name] = {other for other in used if other in modules and other != name}
     return graph
+
+
+def loads_by_name(path: Path) -> bool:
+    """Whether a file loads modules by a name that may be anything."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = {alias.name for alias in node.names}
+            by_name = names & LOADERS if isinstance(node, ast.Import) else node.module in LOADERS and not names <= {"util", "resources"}
+        else:
+            by_name = isinstance(node, ast.Call) and ast.unparse(node.func) == "__import__"
+        if by_name:
+            return True
+    return False
 
 
 # ---- Rust
@@ -183,6 +201,12 @@ def leaves(tree: str) -> Iterator[tuple[list[str], str]]:
     for left, right in pairwise([*cuts, len(inner)]):
         for parts, name in leaves(inner[left + 1 : right]):
             yield ([*before, *parts], name) if parts != ["self"] else (before, before[-1] if name == "self" else name)
+
+
+def variants(path: Path, enum: str) -> set[str]:
+    """Return the variants of an enum that a Rust file names outside its tests."""
+    code = without_tests(blanked(path.read_text(encoding="utf-8")))
+    return set(re.findall(rf"\b{enum}::([A-Z]\w*)", code))
 
 
 @dataclass

@@ -254,6 +254,7 @@ HOPELESS: dict[str, tuple[Writer, str]] = {
     "words": (lambda r, folder: _written(folder / "slow_1.csv", b"hello\nworld\n"), "no block of rows"),
     "a picture": (lambda r, folder: _written(folder / "slow_1.csv", b"\x89PNG\r\n\x1a\n\0\0\0" * 20), "binary data"),
     "no workbook": (lambda r, folder: _written(folder / "slow_1.xlsx", b"PK\x03\x04 broken"), "no readable workbook"),
+    "damaged HDF5": (lambda r, folder: _damaged(matlab_7_3(r, folder)), "no readable MATLAB file"),
     "no MATLAB file": (lambda r, folder: _written(folder / "slow_1.mat", b"MATLAB 5.0 " + b"x" * 600), "MATLAB"),
     "forces of noise": (
         lambda r, folder: write_text(
@@ -262,6 +263,17 @@ HOPELESS: dict[str, tuple[Writer, str]] = {
         "unexplained",
     ),
 }
+
+
+def _damaged(path: Path) -> Path:
+    """Change the version of an object's header: the file opens, and h5py raised RuntimeError later, which ended in a traceback."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "r") as file:
+        header = file.userblock_size + h5py.h5o.get_info(file["q"].id).addr
+    content = bytearray(path.read_bytes())
+    content[header] = 0xFF
+    path.write_bytes(content)
+    return path
 
 
 def _written(path: Path, content: bytes) -> Path:
@@ -289,3 +301,11 @@ def test_all_problems_are_said_at_once(recording: Recording, tmp_path: Path, cap
     assert cli.main(["import", str(path), "--model", str(tmp_path / "model.toml"), "-o", str(tmp_path / "session")]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) >= 3 and all(line.startswith("armrs: ") for line in lines)
+
+
+def test_repeats_that_are_counted_from_zero(recording: Recording, tmp_path: Path) -> None:
+    """`slow_0` and `slow_1` were both written as the first repeat, and the data set refused."""
+    names, values = table(recording, names=SI)
+    sources = [write_text(tmp_path / f"slow_{k}.csv", names, values + 1e-7 * k) for k in range(3)]
+    made = armrs.import_recordings(sources, tmp_path / "set", model=KNOWN)
+    assert [(t.repeat, t.role) for t in armrs.load_dataset(made.folder).trials] == [(1, "fit"), (2, "fit"), (3, "test")]

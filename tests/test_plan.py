@@ -164,7 +164,7 @@ def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture
     data = json.loads((tmp_path / "out/plan.json").read_text())
     assert len(data["predictions"]) == len(data["compared"]["predictions"]) == 8
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
-    assert page.count('src="data:image/png') == 1 and "What will be known" in page
+    assert page.count('src="data:image/png') == 2 and "What will be known" in page
     movement = armrs.load_movement(tmp_path / "out/movement-2.toml", 2)
     assert movement.waypoints.shape == (7, 2)
     experiment = f'model = "../model.toml"\n{(tmp_path / "out/plan.toml").read_text()}'

@@ -198,7 +198,7 @@ def test_links_jump_to_what_they_name(made: Path) -> None:
         page.click("nav button[data-part=humans]")
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
         page.mouse.wheel(0, 3000)
-        page.wait_for_function("scrollY > 500")
+        seen.until("scrollY > 500")
         assert page.locator("nav").bounding_box()["y"] < -100  # on a small screen the buttons do not stay in the way
 
 
@@ -231,7 +231,7 @@ def test_the_animation_moves_stops_and_is_dragged(made: Path) -> None:
             return str(film.locator(".stick").last.get_attribute("points"))
 
         first = pose()
-        page.wait_for_function("before => document.querySelector('.film .stick:last-of-type').getAttribute('points') !== before", arg=first)
+        seen.until("before => document.querySelector('.film .stick:last-of-type').getAttribute('points') !== before", first)
         film.locator("button").click()
         assert film.locator("button").inner_text() == "Play"
         still = pose()

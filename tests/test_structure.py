@@ -40,9 +40,30 @@ def test_no_circle_in_a_crate() -> None:
 
 
 def test_no_circle_of_imports_in_the_package() -> None:
-    """At the start of a module none; with those in functions, where one of two modules may need the other late, none of three."""
-    assert structure.circles(structure.python_imports(PACKAGE, at_start=True)) == []
-    assert [circle for circle in structure.circles(structure.python_imports(PACKAGE)) if len(circle) > 2] == []
+    """With those in functions and those for type checkers."""
+    assert structure.circles(structure.python_imports(PACKAGE)) == []
+
+
+LATE = {
+    "armrs.__main__": {"armrs.cli"},
+    "armrs.catalogue": {"armrs"},
+    "armrs.cosim.worker": {"armrs.fmu.probe", "armrs.cosim.imported"},
+    "armrs.report.words": {"armrs.workflows.plan"},
+}
+"""Modules beside the commands that import in functions: a command that is interrupted while it loads ends with one line, effects are listed
+where nothing is compiled, a worker loads what its task needs before limits hold, and an old result is shown without what computed it."""
+
+
+def test_imports_stand_in_functions_where_starting_asks_for_it_alone() -> None:
+    """What the commands load is stated by `test_startup`."""
+    late = {name: used for name, used in structure.late_imports(PACKAGE).items() if not name.startswith("armrs.cli")}
+    assert late == LATE
+
+
+def test_modules_are_loaded_by_name_in_two_places() -> None:
+    """By the package itself, and by `armrs.views`, the door from results to what draws them: such imports are in no graph."""
+    by_name = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.rglob("*.py") if structure.loads_by_name(p)}
+    assert by_name == {"__init__.py", "views.py"}
 
 
 def test_folders_do_not_know_what_is_above_them() -> None:
@@ -52,7 +73,7 @@ def test_folders_do_not_know_what_is_above_them() -> None:
         "cli": {"__main__"},
         "montecarlo": {"cli"},
     }
-    below = {"io": {"io", "model", "checks", "errors", "catalogue", "rig", "custom_effects"}}
+    below = {"io": {"io", "model", "checks", "errors", "catalogue", "custom_effects", "views"}}
     for name, used in structure.python_imports(PACKAGE).items():
         room = name.split(".")[1]
         for other in used:
@@ -61,6 +82,26 @@ def test_folders_do_not_know_what_is_above_them() -> None:
                 assert room in allowed[known], f"{name} imports {other}"
             if room in below:
                 assert known in below[room], f"{name} imports {other}"
+
+
+NAMED = {
+    "crates/arm-capi/src/arm.rs": "an effect that is off",
+    "crates/arm-cosim/src/spec.rs": "a sample",
+    "crates/arm-gap/src/measurement_model/start.rs": "the torque that holds a joint is a constant moment",
+    "crates/arm-model/src/joint.rs": "the keys of a joint are short for effects",
+    "crates/arm-sim/src/models.rs": "samples",
+}
+"""Files that name a kind of effect, and why."""
+
+
+def test_a_kind_of_effect_is_named_in_its_own_file() -> None:
+    """Other code asks a kind for its properties, so that a new one needs no more than its file and a line of the catalogue."""
+    own = ROOT / "crates" / "arm-core" / "src" / "effect"
+    kinds = {path.stem.title().replace("_", "") for path in own.glob("*.rs")} - {"Own", "OwnAbsent"}
+    assert {"Coulomb", "StretchReflex"} <= kinds
+    crates = [path for path in RUST if not is_test(path) and own not in path.parents and "examples" not in path.parts]
+    named = {path.relative_to(ROOT).as_posix() for path in crates if structure.variants(path, "Kind") & kinds}
+    assert {name for name in named if name.startswith("crates/")} - {"crates/crosscheck/src/main.rs"} == set(NAMED)
 
 
 # ---- that each rule finds what it is for
@@ -138,8 +179,19 @@ def test_what_only_looks_like_a_circle_is_none(tmp_path: Path) -> None:
 def test_a_circle_of_python_modules_is_found(tmp_path: Path) -> None:
     files = {"p/__init__.py": "from . import a", "p/a.py": "from . import b", "p/b.py": "from .c.d import x", "p/c/__init__.py": ""}
     package = tree(tmp_path, {**files, "p/c/d.py": "from ..a import y"}) / "p"
-    for at_start in (True, False):
-        assert structure.circles(structure.python_imports(package, at_start)) == [["p.a", "p.b", "p.c.d"]]
-    tree(tmp_path, {"p/c/d.py": "if TYPE_CHECKING:\n    from ..a import y\ndef f():\n    from ..a import y\n"})
-    assert structure.circles(structure.python_imports(package, at_start=True)) == []
     assert structure.circles(structure.python_imports(package)) == [["p.a", "p.b", "p.c.d"]]
+    assert structure.late_imports(package) == {}
+    tree(tmp_path, {"p/c/d.py": "if TYPE_CHECKING:\n    from ..a import y\ndef f():\n    from ..a import y\n    import sys\n"})
+    assert structure.circles(structure.python_imports(package)) == [["p.a", "p.b", "p.c.d"]]
+    assert structure.late_imports(package) == {"p.c.d": {"p.a"}}
+
+
+def test_variants_are_found_outside_tests_alone(tmp_path: Path) -> None:
+    source = "fn f() { Kind::Coulomb; } // Kind::Viscous\n#[cfg(test)]\nmod tests { use Kind::Elastic; }"
+    assert structure.variants(tree(tmp_path, {"a.rs": source}) / "a.rs", "Kind") == {"Coulomb"}
+
+
+def test_what_is_loaded_by_name_is_found(tmp_path: Path) -> None:
+    sources = {"a": "import importlib.util", "b": "import importlib", "c": "from pkgutil import resolve_name", "d": "__import__('p')"}
+    root = tree(tmp_path, {f"{name}.py": source for name, source in sources.items()})
+    assert [p.stem for p in sorted(root.glob("*.py")) if structure.loads_by_name(p)] == ["b", "c", "d"]

@@ -94,6 +94,7 @@ ROUGH: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
     "Worn": (armrs.Worn, {"segment": 1, "mass": 0.1, "at": 0.1}),
     "export_model": (armrs.export_model, {"model": MODEL, "path": "arm.urdf"}),
     "import_model": (armrs.import_model, {"path": "arm.urdf"}),
+    "cohort": (armrs.cohort, {"source": "values.csv", "groups": None}),
     "check_fmu": (armrs.check_fmu, {"path": "a.fmu"}),
     "Trial": (armrs.Trial, {"file": "a", "configuration": "a", "repeat": 1, "role": "fit", "t": TIME, "q": np.zeros((20, 2)), "force_on_arm": np.zeros((20, 2)), "moment_on_arm": np.zeros(20), "robot_q": np.zeros((20, 2)), "tau": np.zeros((20, 2)), "dq": np.zeros((20, 2))}),
     "Dataset": (armrs.Dataset, {"name": "a", "model": MODEL, "trials": (), "force_on": "arm", "sample_rate": 50.0, "subject": armrs.Subject(), "tolerance": armrs.Tolerance(), "synthetic": False, "added": ()}),
@@ -101,6 +102,7 @@ ROUGH: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
 OF_A_DATA_SET: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
     "identify": (armrs.identify, {"method": "joint", "with_effects": (), "cutoff": None, "motion": "auto", "level": 0.95}),
     "passive_moments": (armrs.passive_moments, {"cutoff": 1.0, "bins": 24}),
+    "spasticity": (armrs.spasticity, {"cutoff": 4.0}),
     "find_gap": (armrs.find_gap, {"effects": (), "separate": False, "threads": 1, "progress": None}),
     "write_dataset": (armrs.write_dataset, {"folder": "out", "suffix": None}),
 }
@@ -170,6 +172,7 @@ def test_every_public_function_is_asked() -> None:
         "SimulationFit",
     }
     made_by_functions |= {"Plan", "Simulated", "GapFound", "Demonstration", "FirmwareSource"}
+    made_by_functions |= {"Cohort", "Spasticity"}
     made_by_functions |= {"Checked", "Expected", "ExportedModel", "Imported"}
     errors = {name for name in armrs.__all__ if name.endswith("Error") or name == "BadInput"}
     texts = {"__version__", "build_profile"}

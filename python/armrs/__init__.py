@@ -57,6 +57,8 @@ if TYPE_CHECKING:
     from .workflows import gap as gap
     from .workflows.checking import Checked as Checked
     from .workflows.checking import check_dataset as check_dataset
+    from .workflows.cohort import Cohort as Cohort
+    from .workflows.cohort import cohort as cohort
     from .workflows.demo import Demonstration as Demonstration
     from .workflows.demo import run_demo as run_demo
     from .workflows.firmware import FirmwareSource as FirmwareSource
@@ -88,6 +90,8 @@ if TYPE_CHECKING:
     from .workflows.simulate import Sensors as Sensors
     from .workflows.simulate import Simulated as Simulated
     from .workflows.simulate import simulate as simulate
+    from .workflows.spasticity import Spasticity as Spasticity
+    from .workflows.spasticity import spasticity as spasticity
 
 # No module or package directly below `armrs` is named like a public function: importing it would put it in the place of the function.
 _HOMES = {
@@ -99,6 +103,8 @@ _HOMES = {
     "workflows.checking": ("Checked", "check_dataset"),
     "workflows.importing": ("Imported", "import_recordings"),
     "workflows.initialise": ("Expected", "Worn", "initialise", "segment_expectations"),
+    "workflows.cohort": ("Cohort", "cohort"),
+    "workflows.spasticity": ("Spasticity", "spasticity"),
     "workflows.demo": ("Demonstration", "run_demo"),
     "workflows.firmware": ("FirmwareSource", "export_c"),
     "workflows.gap": ("GapFound", "find_gap"),

@@ -2,7 +2,7 @@
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, ClassVar, final
+from typing import ClassVar, NotRequired, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +51,269 @@ __all__ = [
 
 __version__: str
 build_profile: str
+
+# ---- what the functions return: these names are there for type checkers alone
+_Array: TypeAlias = NDArray[np.float64]
+_Entry: TypeAlias = tuple[str, int, list[float]]  # kind, place from 0, parameters
+_Asked: TypeAlias = tuple[_Entry, list[int]]  # an effect, and which of its parameters are free
+_Lack: TypeAlias = tuple[float, float, float]  # ratio, z, excess
+_Unknown: TypeAlias = tuple[str, int, int, float, float, float]  # what, place, part, value, standard deviation before and after
+
+@type_check_only
+class _Estimate(TypedDict):
+    name: str
+    joint: int | None
+    kind: str
+    value: float
+    std: float
+    unit: str
+    interval: list[float]
+    decided_by: str
+
+@type_check_only
+class _Explained(TypedDict):
+    samples: NDArray[np.uint64]
+    measured: _Array
+    fitted: _Array
+
+@type_check_only
+class _Identified(TypedDict):
+    status: str
+    rank: int
+    unknowns: int
+    scale_free: bool
+    cutoff: float
+    clusters: int
+    neglected_inertia: list[float]
+    speed_noise: list[float]
+    speed_noise_allowed: float
+    trades: list[str]
+    parameters: list[_Estimate]
+    combinations: list[_Estimate]
+    calibration: list[_Estimate]
+    explained: list[_Explained]
+    segments: list[tuple[float, float, float, float, float]]
+    effects: list[_Entry]
+
+@type_check_only
+class _Predicted(TypedDict):
+    name: str
+    unit: str
+    effect: int | None
+    value: float
+    std: float
+    std_of_data: float
+    relative: float
+
+@type_check_only
+class _Forecast(TypedDict):
+    predicted: list[_Predicted]
+    worst: float
+    force: float
+    speed: float
+    robot_speed: float
+    robot_acceleration: float
+    duration: float
+    durations: list[float]
+
+@type_check_only
+class _Excess(TypedDict):
+    limit: str
+    what: str
+    found: float
+    allowed: float
+    unit: str
+
+@type_check_only
+class _Task(TypedDict):
+    waypoints: _Array
+    speed: float
+    acceleration: float
+    pace: float
+    slowed_for: _Excess | None
+
+@type_check_only
+class _Design(_Forecast):
+    tasks: list[_Task]
+
+@type_check_only
+class _Fit(TypedDict):
+    values: list[float]
+    sd: list[float]
+    active: list[int]
+    squares: float
+    residuals: int
+    rounds: int
+    settled: bool
+
+@type_check_only
+class _Free(TypedDict, total=False):
+    given: _Array | None
+    calibrated: _Array | None
+    amended: _Array | None
+
+@type_check_only
+class _Played(_Free):
+    measured: _Array
+    counted: NDArray[np.bool_]
+    free: _Free
+
+@type_check_only
+class _Fitted(TypedDict):
+    cost: float
+    segments: list[list[float]]
+    contact: list[list[float]]
+    shift: list[float]
+    known: list[_Entry]
+    calibration: list[_Entry]
+    named: list[_Entry]
+
+@type_check_only
+class _Named(TypedDict):
+    effect: _Entry
+    sd: list[tuple[int, float]]
+    p_value: float
+    share: float
+    alternatives: list[tuple[_Asked, float, float]]
+
+@type_check_only
+class _Screened(TypedDict):
+    groups: list[int]
+    calibrated: _Fitted
+    lack: _Lack
+    unknowns: list[_Unknown]
+    suspects: list[tuple[_Entry, list[int], float, float, float]]
+    trials: list[_Played]
+
+@type_check_only
+class _Found(TypedDict):
+    repeated: bool
+    groups: list[int]
+    scale: float
+    calibrated: _Fitted
+    amended: _Fitted
+    rhythms: list[_Entry]
+    locked: list[_Entry]
+    lack: tuple[_Lack, _Lack]
+    unknowns: list[_Unknown]
+    named: list[_Named]
+    apart: list[tuple[_Entry, float, int | None, tuple[float, float], float, list[tuple[_Entry, float]]]]
+    ruled: list[tuple[_Asked, float, float, float]]
+    ladder: list[tuple[list[tuple[list[_Asked], float]], float, float]]
+    trials: list[_Played]
+
+@type_check_only
+class _Controlled(TypedDict):
+    time: _Array
+    robot_q: _Array
+    tracking_error: float
+    periods_to_stop: int | None
+    force_after_fault: float | None
+    way_after_stop: float | None
+    stop: tuple[str, int, float, float, float] | None
+
+_Recorded = TypedDict(
+    "_Recorded",
+    {
+        "time": _Array,
+        "q": _Array,
+        "qd": _Array,
+        "qdd": _Array,
+        "tip": _Array,
+        "handle": _Array | None,
+        "robot_q": _Array | None,
+        "robot_qd": _Array | None,
+        "robot_qdd": _Array | None,
+        "force_on_arm": _Array,
+        "moment_on_arm": _Array,
+        "torque.inertial": _Array,
+        "torque.centrifugal": _Array,
+        "torque.coriolis": _Array,
+        "torque.gravity": _Array,
+        "torque.frame": _Array,
+        "torque.resisting": _Array,
+        "torque.drive": _Array,
+        "torque.contact": _Array,
+        "resisting": _Array | None,
+        "memory": _Array | None,
+        "energy.kinetic": _Array,
+        "energy.potential": _Array,
+        "energy.contact": _Array,
+        "work.handle": _Array,
+        "work.drive": _Array,
+        "work.resisted": _Array,
+        "work.damped": _Array,
+        "effects": list[tuple[str, int]],
+        "energy_error": _Array,
+        "readings": NotRequired[list[_Readings]],
+    },
+)
+
+@type_check_only
+class _Readings(TypedDict):
+    time: _Array
+    q: _Array
+    force_on_arm: _Array | None
+    moment_on_arm: _Array | None
+    robot_q: _Array | None
+    tau: _Array | None
+
+@type_check_only
+class _Parameter(TypedDict):
+    name: str
+    unit: str
+    min: float
+    max: float
+    default: float
+    linear: bool
+    or_zero: bool
+
+@type_check_only
+class _Kind(TypedDict):
+    kind: str
+    where: str
+    summary: str
+    formula: str
+    reference: str
+    parameters: list[_Parameter]
+    first_joint: int
+    family: str
+    address: str
+    own: bool
+
+@type_check_only
+class _Firmware(TypedDict):
+    values: list[float]
+    sd: list[float]
+    torques: list[list[float]]
+    angle_offset: list[float]
+    force: list[list[float]]
+    force_offset: list[float]
+    force_delay: float
+    acts_on: list[str]
+
+@type_check_only
+class _Literature(TypedDict):
+    name: str
+    length: float
+    mass: tuple[float, float]
+    com: tuple[float, float]
+    inertia: tuple[float, float]
+
+@type_check_only
+class _Variable(TypedDict):
+    name: str
+    reference: int
+    causality: str
+    variability: str
+    initial: str | None
+    unit: str | None
+    exponents: list[int] | None
+    start: float | None
+    min: float | None
+    max: float | None
+    nominal: float | None
+    description: str
 
 @final
 class Segment:
@@ -473,7 +736,7 @@ class Digest:
 
 @final
 class ArmSlave:
-    def __new__(cls, rig: Rig, coupling: Mapping[str, Any]) -> ArmSlave: ...
+    def __new__(cls, rig: Rig, coupling: Mapping[str, object]) -> ArmSlave: ...
     @property
     def token(self) -> str: ...
     @property
@@ -482,7 +745,7 @@ class ArmSlave:
     def mode(self) -> str: ...
     @property
     def time(self) -> float: ...
-    def variables(self) -> list[dict[str, Any]]: ...
+    def variables(self) -> list[_Variable]: ...
     def description(self, fmi: int) -> tuple[str, str | None]: ...
     def enter_initialization_mode(self, start: float, stop: float | None = None) -> None: ...
     def exit_initialization_mode(self) -> None: ...
@@ -501,10 +764,10 @@ class ArmSlave:
 
 def control(
     rig: Rig,
-    drive: Mapping[str, Any],
-    settings: Mapping[str, Any],
-    watch: Mapping[str, Any],
-) -> dict[str, Any]: ...
+    drive: Mapping[str, object],
+    settings: Mapping[str, object],
+    watch: Mapping[str, object],
+) -> _Controlled: ...
 def declare(
     name: str,
     summary: str,
@@ -513,52 +776,54 @@ def declare(
     grid: tuple[float, float, float, float, int, int],
     tabulate: Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
 ) -> None: ...
-def design(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]: ...
+def design(rig: Rig, settings: Mapping[str, object], sensing: Mapping[str, object], bounds: Mapping[str, object]) -> _Design: ...
 def distances(
     rig: Rig,
-    trials: Sequence[Mapping[str, Any]],
-    settings: Mapping[str, Any],
-    planned: Sequence[Mapping[str, Any]],
+    trials: Sequence[Mapping[str, object]],
+    settings: Mapping[str, object],
+    planned: Sequence[Mapping[str, object]],
     rivals: Sequence[tuple[str, int, Sequence[float], Sequence[int]]],
 ) -> list[list[float] | None]: ...
-def effects() -> list[dict[str, Any]]: ...
-def firmware(rig: Rig, uncertainty: float, samples: Sequence[Sequence[float]]) -> dict[str, Any]: ...
+def effects() -> list[_Kind]: ...
+def firmware(rig: Rig, uncertainty: float, samples: Sequence[Sequence[float]]) -> _Firmware: ...
 def held_out(
     trials: Sequence[tuple[int, bool, float, list[list[float]] | None, list[bool]]],
 ) -> list[tuple[float | None, float | None, float | None, tuple[int, float, float, float] | None]]: ...
 def find_gap(
     rig: Rig,
-    trials: Sequence[Mapping[str, Any]],
-    settings: Mapping[str, Any],
+    trials: Sequence[Mapping[str, object]],
+    settings: Mapping[str, object],
     progress: Callable[[str, float], None] | None = None,
-) -> dict[str, Any]: ...
+) -> _Found: ...
 def fit_by_simulation(
     rig: Rig,
-    drive: Mapping[str, Any],
-    settings: Mapping[str, Any],
-    recorded: Mapping[str, Any],
+    drive: Mapping[str, object],
+    settings: Mapping[str, object],
+    recorded: Mapping[str, object],
     free: Sequence[tuple[int, int, float, float]],
-) -> dict[str, Any]: ...
-def forecast(rig: Rig, settings: Mapping[str, Any], sensing: Mapping[str, Any], tasks: Sequence[Mapping[str, Any]]) -> dict[str, Any]: ...
-def identify(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]: ...
-def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[dict[str, Any]]: ...
-def play(rig: Rig, trials: Sequence[Mapping[str, Any]], settings: Mapping[str, Any], own: bool = False) -> list[dict[str, Any]]: ...
+) -> _Fit: ...
+def forecast(
+    rig: Rig, settings: Mapping[str, object], sensing: Mapping[str, object], tasks: Sequence[Mapping[str, object]]
+) -> _Forecast: ...
+def identify(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object]) -> _Identified: ...
+def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[_Literature]: ...
+def play(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object], own: bool = False) -> list[_Played]: ...
 def simulate(
     rig: Rig,
-    drive: Mapping[str, Any],
-    settings: Mapping[str, Any],
-    sensing: Mapping[str, Any] | None = None,
-) -> dict[str, Any]: ...
+    drive: Mapping[str, object],
+    settings: Mapping[str, object],
+    sensing: Mapping[str, object] | None = None,
+) -> _Recorded: ...
 def simulate_in_pieces(
-    rig: Rig, drive: Mapping[str, Any], settings: Mapping[str, Any], samples: int, take: Callable[[dict[str, Any]], None]
+    rig: Rig, drive: Mapping[str, object], settings: Mapping[str, object], samples: int, take: Callable[[_Recorded], None]
 ) -> None: ...
 def smooth(
     values: NDArray[np.float64], rate: float, cutoff: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def look(
     rig: Rig,
-    trials: Sequence[Mapping[str, Any]],
-    settings: Mapping[str, Any],
+    trials: Sequence[Mapping[str, object]],
+    settings: Mapping[str, object],
     progress: Callable[[str, float], None] | None = None,
-) -> dict[str, Any]: ...
+) -> _Screened: ...
 def low_pass_both_ways(values: NDArray[np.float64], rate: float, cutoff: float, order: int) -> NDArray[np.float64]: ...

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import html
-import importlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
+from . import views
 from .errors import ArmrsError
 from .io import files
 
@@ -44,12 +44,7 @@ class Tidy:
 
 
 class Tabular:
-    """A result that is also a table. Subclasses say which by `tidy`; those with `to_dict` are also JSON.
-
-    `VIEW` names the module below `armrs` that draws the result, and the `View` in it: it is loaded when something is drawn.
-    """
-
-    VIEW: ClassVar[tuple[str, str]]
+    """A result that is also a table. Subclasses say which by `tidy`; those with `to_dict` are also JSON. `views` names what draws them."""
 
     def tidy(self) -> Tidy:
         """Return the result as a tidy table."""
@@ -96,7 +91,7 @@ class Tabular:
         BadInput
             For a name that is unknown, and a result without anything to draw.
         """
-        axes: np.ndarray = self._view().plot(self, name)
+        axes: np.ndarray = views.of(self).plot(self, name)
         return axes
 
     def report(self, path: str | os.PathLike[str]) -> Path:
@@ -107,12 +102,8 @@ class Tabular:
         BadInput
             When the name does not end with `.html`, or cannot be written.
         """
-        written: Path = self._view().report(self, path)
+        written: Path = views.of(self).report(self, path)
         return written
-
-    def _view(self) -> Any:
-        module, name = self.VIEW
-        return getattr(importlib.import_module(f"{__package__}.{module}"), name)
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return the result as JSON text, and write it to `path` where one is given."""

@@ -23,6 +23,7 @@ from ..io import files
 from . import fmu
 from .analysis import gap, identify, passive
 from .built_in import demo, reproduce
+from .clinic import cohort, spasticity
 from .data import convert, effects, report
 from .experiments import plan, record, simulate, sweep
 from .firmware import export_c
@@ -39,6 +40,8 @@ _VERBS: dict[Callable[..., Any], str] = {
     gap: "Find and name what a model misses.",
     simulate: "Simulate a robot that leads the arm.",
     passive: "Compute passive joint moments.",
+    spasticity: "Find stretch reflexes, by the speed of stretch.",
+    cohort: "Summarise many subjects, with norm bands.",
     plan: "Propose movements, and forecast what they show.",
     record: "Run an experiment in the virtual laboratory.",
     sweep: "Simulate and identify many cases.",

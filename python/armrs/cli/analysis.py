@@ -4,14 +4,52 @@ from __future__ import annotations
 
 import contextlib
 import enum
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import BadInput, Text
 from ..report import console
 from .common import JsonFile, MaybeFolder, Source, command_line, present, writable
+
+if TYPE_CHECKING:
+    from ..io.dataset import Dataset
+    from ..workflows.history import Followed
+
+
+HistoryFile = Annotated[
+    Path | None,
+    typer.Option("--history", metavar="FILE", help="Add the result to the history of this subject, a file of SQLite, and show it."),
+]
+SessionDate = Annotated[
+    str | None,
+    typer.Option("--date", metavar="YYYY-MM-DD", help="Date of the session; that in the data set's name, or today, when absent."),
+]
+
+
+def day_of(data: Dataset, history: Path | None, date: str | None) -> str:
+    """Return the date of a session; a history that cannot be added to is refused before any work is done."""
+    from ..workflows import history as sessions
+
+    if history is None and date is not None:
+        raise BadInput("--date", Text("no --history"), "--date beside --history FILE: the date is kept only there")
+    day = sessions.session_date(data.name, date)
+    if history is not None:
+        sessions.check(history, data.model.n_joints, sessions.subject_of(data))
+    return day
+
+
+@contextlib.contextmanager
+def kept(history: Path | None, result: Followed, day: str, plain: dict[str, Any]) -> Iterator[None]:
+    """Add a result to a history, and the history to the result; both stay only if all that is written in the block could be."""
+    with contextlib.ExitStack() as stack:
+        if history is not None:
+            from ..workflows import history as sessions
+
+            plain["history"] = stack.enter_context(sessions.adding(history, result, day)).to_dict()["courses"]
+        yield
 
 
 class Method(str, enum.Enum):
@@ -48,12 +86,8 @@ def identify(
     ] = None,
     motion: Annotated[Motion, typer.Option(help="Where speeds and accelerations come from.")] = Motion.auto,
     level: Annotated[float, typer.Option(help="Probability of the intervals, from 0.5 to 0.999999.")] = 0.95,
-    history: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Add the result to the history of this subject, a file of SQLite, and show it.")
-    ] = None,
-    date: Annotated[
-        str | None, typer.Option(metavar="YYYY-MM-DD", help="Date of the session; that in the data set's name, or today, when absent.")
-    ] = None,
+    history: HistoryFile = None,
+    date: SessionDate = None,
     json: JsonFile = None,
 ) -> int:
     """Identify body segment and joint parameters, each with an interval and what decided it.
@@ -65,16 +99,11 @@ def identify(
     from ..io.dataset import load_dataset
     from ..report import words
     from ..report.plain import identified_data
-    from ..workflows import history as sessions
     from ..workflows.identify import identify as run_identification
 
     folder = writable(out, json)
     data = load_dataset(dataset)
-    if history is None and date is not None:
-        raise BadInput("--date", Text("no --history"), "--date beside --history FILE: the date is kept only there")
-    day = sessions.session_date(data.name, date)
-    if history is not None:
-        sessions.check(history, data.model.n_joints, sessions.subject_of(data))
+    day = day_of(data, history, date)
     with console.progress("identifying"):
         result = run_identification(
             data,
@@ -85,10 +114,7 @@ def identify(
             level=level,
         )
     plain = identified_data(result, command_line(context))
-    with contextlib.ExitStack() as kept:
-        # What is added to the history stays only if everything else could be written.
-        if history is not None and result.is_sound:
-            plain["history"] = kept.enter_context(sessions.adding(history, result, day)).to_dict()["courses"]
+    with kept(history if result.is_sound else None, result, day, plain):
         written = []
         if folder:
             from ..report.results import write_identified
@@ -110,6 +136,8 @@ def gap(
         typer.Option("--quick", help="A first answer only: calibrate, and list what may be missing; nothing is named or written below -o."),
     ] = False,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores when absent. The result does not depend on it.")] = None,
+    history: HistoryFile = None,
+    date: SessionDate = None,
     json: JsonFile = None,
 ) -> int:
     """Find where model and data disagree, name the effect that is missing, and show the gap before and after.
@@ -122,8 +150,11 @@ def gap(
 
     if quick and out is not None:
         raise BadInput("--quick", Text("-o beside it"), "--json, or nothing: a first answer has no report")
+    if quick and history is not None:
+        raise BadInput("--quick", Text("--history beside it"), "one of them: a first answer names nothing that could be followed")
     folder = writable(out, json)
     data = load_dataset(dataset)
+    day = day_of(data, history, date)
     if quick:
         with console.stages("a first look") as tell:
             first = calibrate(data, threads=threads, progress=tell)
@@ -135,9 +166,10 @@ def gap(
     from ..workflows.gap.results import gap_data, write_gap
 
     plain = gap_data(result, command_line(context))
-    written = write_gap(result, plain, folder) if folder else []
-    console.warn([*data.warnings, *result.warnings])
-    present(lambda: plain, json, lambda: words.show(plain, written))
+    with kept(history, result, day, plain):
+        written = write_gap(result, plain, folder) if folder else []
+        console.warn([*data.warnings, *result.warnings])
+        present(lambda: plain, json, lambda: words.show(plain, written))
     return 1 if result.verdict == "unexplained" else 0
 
 
@@ -149,6 +181,8 @@ def passive(
         float, typer.Option(help="Cutoff of the low-pass of angles and forces [Hz], from 0.001 to below half the sample rate.")
     ] = 1.0,
     bins: Annotated[int, typer.Option(help="Angle bins over the range of a joint, 2 to 1000.")] = 24,
+    history: HistoryFile = None,
+    date: SessionDate = None,
     json: JsonFile = None,
 ) -> int:
     """Compute passive joint moments of slow movements: elastic mean and hysteresis against the angle.
@@ -164,14 +198,16 @@ def passive(
 
     folder = writable(out, json)
     data = load_dataset(dataset)
+    day = day_of(data, history, date)
     with console.progress("passive moments"):
         result = passive_moments(data, cutoff=cutoff_hz, bins=bins)
     plain = passive_data(result, command_line(context))
-    written = []
-    if folder:
-        from ..report.results import write_passive
+    with kept(history, result, day, plain):
+        written = []
+        if folder:
+            from ..report.results import write_passive
 
-        written = write_passive(result, plain, folder)
-    console.warn([*data.warnings, *result.warnings])
-    present(lambda: plain, json, lambda: words.passive(plain, written))
+            written = write_passive(result, plain, folder)
+        console.warn([*data.warnings, *result.warnings])
+        present(lambda: plain, json, lambda: words.passive(plain, written))
     return 0 if result.curves else 1

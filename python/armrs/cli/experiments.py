@@ -40,19 +40,25 @@ class Coupling(str, enum.Enum):
     rigid = "rigid"
 
 
+Step = Annotated[
+    float | None, typer.Option(help="Step [s], above 0; when absent 0.00025, or as much shorter as steep dry friction asks for.")
+]
+DrivingTrial = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
+]
+
+
 def simulate(
     context: typer.Context,
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
     movement: Annotated[
         Path | None, typer.Option(metavar="FILE", help="TOML file with a table [movement]: waypoints_deg, speed_rad_s, …")
     ] = None,
-    trial: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
-    ] = None,
+    trial: DrivingTrial = None,
     out: MaybeFolder = None,
     engine: Annotated[Engine, typer.Option(help="Minimal coordinates, or rigid bodies and joints.")] = Engine.native,
-    dt: Annotated[float, typer.Option(help="Step [s], above 0.")] = 0.25e-3,
+    dt: Step = None,
     rate_hz: Annotated[
         float, typer.Option(help="Samples a second that are recorded [Hz], above 0; a whole number of steps from one to the next.")
     ] = 50.0,
@@ -73,7 +79,8 @@ def simulate(
     """Simulate the closed-chain experiment: a robot leads the arm.
 
     A warning when 0.1 % of the energy exchanged is not accounted for, or half the step changes angles or forces by 0.1 %; exit status 1
-    from 1 % on. A run whose dry friction may be too steep for the step is compared with half the step without being asked.
+    from 1 % on. Where smooth dry friction is too steep for the step, and no step was asked for, a shorter one is taken; what is still in
+    doubt is compared with half the step without being asked.
     """
     from ..model import load_model
     from ..report import words
@@ -104,7 +111,10 @@ def simulate(
             result = stack.enter_context(stream(arm, drive, folder, dt=dt, **options))
         halved = None
         if check_step or is_doubtful(result) is not None:
-            with console.progress("simulating with half the step"), stream(arm, drive, folder, dt=0.5 * dt, **options) as half:
+            with (
+                console.progress("simulating with half the step"),
+                stream(arm, drive, folder, dt=0.5 * result.settings["dt_s"], **options) as half,
+            ):
                 halved = step_error(result.pieces(), half.pieces())
         plain = simulated_data(result, f"{model.name} along {(movement or trial or model).name}", command_line(context))
         if halved is not None:
@@ -142,9 +152,16 @@ def plan(
     compare: Annotated[Path | None, typer.Option(metavar="FILE", help="Movement file to compare the plan with.")] = None,
     evaluations: Annotated[int, typer.Option(help="Movements to try.")] = 300,
     seed: Annotated[int, typer.Option(help="Seed of the search.")] = 1,
+    spasticity: Annotated[
+        int | None,
+        typer.Option(metavar="JOINT", min=1, help="Propose stretches of this joint, from 1, at five speeds for armrs spasticity instead."),
+    ] = None,
     json: JsonFile = None,
 ) -> int:
     """Propose movements that make the parameters identifiable, and say before the experiment how well each will be known.
+
+    With --spasticity: stretches of one joint from 15 °/s to as fast as the limits allow, and how well they will show threshold, gain and
+    latency of its reflex; the other joints are held in the middle of their ranges.
 
     A movement that would exceed the speed or the acceleration of the robot, or the force on the arm, is slowed along its own path, to the
     longest trial allowed or a tenth of its pace at the most.
@@ -156,6 +173,7 @@ def plan(
     from ..workflows import plan as planning
     from ..workflows.gap import detectable
     from ..workflows.movement import load_movement
+    from ..workflows.plan_stretches import plan_stretches
 
     folder = writable(out, json)
     arm = load_model(model)
@@ -170,11 +188,17 @@ def plan(
     )
     other = None if compare is None else load_movement(compare, arm.n_joints)
     kinds = listed(with_)
+    if spasticity is not None and (other is not None or kinds):
+        raise BadInput("--spasticity", Text("--compare or --with beside it"), "one of them: stretches are planned for the reflex alone")
     with console.progress("planning"):
-        found = planning.plan(arm, limits, repeats=repeats, with_effects=kinds, evaluations=evaluations, seed=seed)
+        found = (
+            planning.plan(arm, limits, repeats=repeats, with_effects=kinds, evaluations=evaluations, seed=seed)
+            if spasticity is None
+            else plan_stretches(arm, limits, spasticity, repeats=repeats)
+        )
         beside = None if other is None else planning.forecast(arm, [other], repeats=repeats, with_effects=kinds)
     smallest: tuple[Any, ...] = ()
-    if arm.robot is not None and repeats > 1:
+    if arm.robot is not None and repeats > 1 and spasticity is None:
         with console.progress("looking for the smallest effects that they would show"):
             smallest = detectable(arm, found.movements, repeats=repeats)
     plain = planning.plan_data(found, beside, smallest, name=f"a plan for {model.name}", command=command_line(context))
@@ -186,6 +210,7 @@ def plan(
 
 
 def record(
+    context: typer.Context,
     experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="EXPERIMENT.toml: subject, robot, sensors, movements.")],
     out: OutFolder,
     json: JsonFile = None,
@@ -195,6 +220,8 @@ def record(
     Exit status 1 when the safety supervisor stopped a trial; that trial is not in the data set.
     """
     from ..report import words
+    from ..report.plain import origin
+    from ..report.results import write_recorded
     from ..workflows.experiment import load_experiment
     from ..workflows.record import record as run_record
 
@@ -202,7 +229,9 @@ def record(
     planned = load_experiment(experiment)
     with console.progress("recording", sum(run.repeats + run.tests for run in planned.runs)) as step:
         result = run_record(planned, out, step=step)
-    present(result.to_dict, json, lambda: words.recorded(result.to_dict()))
+    plain = result.to_dict() | {"made_by": origin(command_line(context))}
+    report = write_recorded(result, plain, out)[-1]
+    present(lambda: plain, json, lambda: words.recorded(plain, report))
     return 1 if result.stopped else 0
 
 
@@ -254,14 +283,15 @@ def sweep(
 
 
 def _single_trial(path: Path, n_joints: int) -> Reading:
-    """Read a trial that stands alone. Its forces are not used, so that they may be absent, and it does not matter what they act on."""
+    """Read a trial that stands alone. Its forces drive nothing; they are shown where the data set around it says what they act on."""
     from ..io.trial import read_trial
 
+    force_on = _force_on(path)
     try:
         reading = read_trial(
             path,
             n_joints=n_joints,
-            force_on="arm",
+            force_on=force_on or "arm",
             sample_rate=None,
             file=path.name,
             configuration=path.stem,
@@ -273,4 +303,18 @@ def _single_trial(path: Path, n_joints: int) -> Reading:
         raise error.within(file=path) from None
     if reading is None:
         raise BadInput("file", Text("no samples below the header"), "samples", file=path)
+    if force_on is None:
+        return dataclasses.replace(reading, trial=dataclasses.replace(reading.trial, force_on_arm=None))
     return reading
+
+
+def _force_on(path: Path) -> str | None:
+    """Return what the forces of a trial act on, from the data set in its folder or the one above; nothing where there is none."""
+    from ..io import tomlfile
+
+    for folder in (path.parent, path.parent.parent):
+        description = folder / "dataset.toml"
+        if description.is_file():
+            said = tomlfile.read(description).get("force_on")
+            return said if said in ("robot", "arm") else None
+    return None

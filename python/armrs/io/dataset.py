@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -17,9 +18,8 @@ from ..errors import ArmrsError, BadInput, Text
 from ..model import AddedMass, Description, Model, Subject, Tolerance, TrialEntry, load_model
 from . import files
 from .muscle_activity import comparable, mark_activity
-from .plausibility import still_angles
 from .samples import SUFFIXES, write_samples
-from .trial import FEWEST_SAMPLES, Reading, Trial, read_trial
+from .trial import FEWEST_SAMPLES, Reading, Trial, read_trial, still_angles
 
 FILE = "dataset.toml"
 
@@ -107,6 +107,18 @@ class Dataset:
             if configuration in item.configurations:
                 model = model.with_mass(item.segment, item.mass, item.at)
         return model
+
+    def digest(self) -> str | None:
+        """Return the SHA-256 of the files one after the other: `dataset.toml`, the model, the trials; None where they are not on disk."""
+        if self.folder is None or self.model_path is None:
+            return None
+        whole = hashlib.sha256()
+        try:
+            for path in (self.folder / FILE, self.model_path, *(self.folder / t.file for t in self.trials)):
+                whole.update(path.read_bytes())
+        except OSError:
+            return None
+        return whole.hexdigest()
 
     def replace(self, **changes: Any) -> Dataset:
         """Return a data set with some attributes changed."""

@@ -5,21 +5,15 @@ It is asked before any physics, so that a wrong column is named as such and not 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..errors import BadInput, Text
+from ..model import Model, Robot
 from . import readings
+from .dataset import Dataset
+from .readings import Reading
+from .trial import Trial, constant
 
-if TYPE_CHECKING:
-    from ..model import Model, Robot
-    from .dataset import Dataset
-    from .readings import Reading
-    from .trial import Trial
-
-STILL = 1e-9
-"""A channel that varies by no more than this says nothing: noise alone is more."""
 _FAR = 0.3
 """Distance of hand and handle, relative to the arm, beyond which angles of arm and robot contradict each other."""
 _SUSPECT = 0.05
@@ -59,22 +53,6 @@ def refuse_implausible(dataset: Dataset, *, robot_matters: bool = True) -> None:
                 _refuse_apart(dataset.model, dataset.model.robot, trial, robot_matters)
 
 
-def constant(values: np.ndarray) -> float | None:
-    """Return the value that a channel has throughout, or None for one that varies."""
-    there = values[np.isfinite(values)]
-    return float(there[0]) if len(there) and np.ptp(there) <= STILL else None
-
-
-def still_angles(trials: tuple[Trial, ...]) -> list[str]:
-    """Return the joints whose angle is the same in every sample of every trial, a line each: held, or not measured."""
-    lines = []
-    for j in range(trials[0].q.shape[1] if trials else 0):
-        levels = [constant(trial.q[:, j]) for trial in trials]
-        if all(level is not None and level == levels[0] for level in levels):
-            lines.append(f"q{j + 1} is {levels[0]:g} rad in every sample of every trial: a joint that is held, or a dead sensor?")
-    return lines
-
-
 def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool) -> None:
     """Compare where the measured angles put the hand with where the robot's put its handle."""
     assert trial.robot_q is not None
@@ -83,7 +61,7 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
         return
     q, robot_q = trial.q[good], trial.robot_q[good]
     reach = sum(s.length for s in model.segments)
-    handle = _handle(robot, robot_q)
+    handle = handle_path(robot, robot_q)
     gap = _tip(model, q) - handle
     own = _rms(gap)
     if own > _SUSPECT * reach:
@@ -109,12 +87,12 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
 
 def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray) -> tuple[float, Reading | None]:
     """Return what the angles of arm or robot may be instead, and how far apart hand and handle are then [m]."""
-    handle = _handle(robot, robot_q)
+    handle = handle_path(robot, robot_q)
     found: list[tuple[float, Reading | None]] = [
         (_rms(_tip(model, reading.angles(q)) - handle), reading) for reading in readings.of_angles(q.shape[1])
     ]
     tip = _tip(model, q)
-    found += [(_rms(tip - _handle(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
+    found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
     return min(found, key=lambda item: item[0])
 
 
@@ -148,13 +126,14 @@ def hand_meets_handle(dataset: Dataset) -> bool:
             return False
         good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
         if good.any():
-            gap = _tip(model, trial.q[good]) - _handle(robot, trial.robot_q[good])
+            gap = _tip(model, trial.q[good]) - handle_path(robot, trial.robot_q[good])
             if _rms(gap) > _SUSPECT * sum(s.length for s in model.segments):
                 return False
     return True
 
 
-def _handle(robot: Robot, q: np.ndarray) -> np.ndarray:
+def handle_path(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Return where a robot with angles q, (n, 2) [rad], the second relative to the first, has its handle, (n, 2) [m]."""
     first, second = q[:, 0], q[:, 0] + q[:, 1]
     near, far = robot.lengths
     return np.column_stack(

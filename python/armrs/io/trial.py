@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import checks
+from .. import checks, views
 from ..errors import BadInput, Text
 from . import columns, resample
 from .samples import Samples, read_samples
@@ -28,6 +27,8 @@ SLOWEST = 0.5
 """Samples that are as far apart [s] show no movement of an arm; a recording in milliseconds at 1 kHz has 1."""
 SHORTEST, FASTEST = 0.5, 2e-4
 """A recording shorter than this [s] whose samples are nearer than this [s] is in another unit; one in seconds at 25 Hz has 4e-5 s."""
+STILL = 1e-9
+"""A channel that varies by no more than this says nothing: noise alone is more."""
 _TURN = 2.0 * np.pi
 
 
@@ -160,7 +161,7 @@ class Trial:
         """
         if model is not None and model.n_joints != self.q.shape[1]:
             raise BadInput("model", Text(f"{model.n_joints} joints"), f"{self.q.shape[1]}, as the trial has")
-        axes: np.ndarray = importlib.import_module("armrs.report.recording").plot(self, model)
+        axes: np.ndarray = views.of(self).plot(self, model)
         return axes
 
     def pieces(self) -> list[slice]:
@@ -373,3 +374,19 @@ def _lines(said: Mapping[str, str]) -> list[str]:
     for name, text in said.items():
         names.setdefault(text, []).append(name)
     return [f"column{'s' * (len(own) > 1)} {', '.join(own)}: {text}" for text, own in names.items()]
+
+
+def constant(values: np.ndarray) -> float | None:
+    """Return the value that a channel has throughout, or None for one that varies."""
+    there = values[np.isfinite(values)]
+    return float(there[0]) if len(there) and np.ptp(there) <= STILL else None
+
+
+def still_angles(trials: tuple[Trial, ...]) -> list[str]:
+    """Return the joints whose angle is the same in every sample of every trial, a line each: held, or not measured."""
+    lines = []
+    for j in range(trials[0].q.shape[1] if trials else 0):
+        levels = [constant(trial.q[:, j]) for trial in trials]
+        if all(level is not None and level == levels[0] for level in levels):
+            lines.append(f"q{j + 1} is {levels[0]:g} rad in every sample of every trial: a joint that is held, or a dead sensor?")
+    return lines

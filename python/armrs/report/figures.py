@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,16 +13,17 @@ import numpy as np
 
 from ..analysis.joint_coupling import LEAST_HELD, Dependence
 from ..io.trial import Trial
+from ..model import Model
 from ..workflows.identify import Explained, Identified
 from ..workflows.passive import PassiveMoments
 from ..workflows.plan import MOST_UNCERTAIN
-from ..workflows.simulate import Simulated
+from ..workflows.simulate import Run, Simulated
 from . import plotting, tables
+from .animation import points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..workflows.streamed import Run
 
 MOST_CONFIGURATIONS = 8
 """So many movements are drawn; with more, a report would be too long to read."""
@@ -122,9 +124,39 @@ def _history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
     return Drawn("history", "Over the sessions", text, figure)
 
 
-def planned(data: Mapping[str, Any]) -> Figures:
-    """Return the figure of a plan: how well each parameter will be known."""
-    return {"predictions": partial(_planned, data["predictions"], data["data"]["joints"], data.get("compared"))}
+def planned(data: Mapping[str, Any], model: Model) -> Figures:
+    """Return the figures of a plan: how well each parameter will be known, and the movements."""
+    return {
+        "predictions": partial(_planned, data["predictions"], data["data"]["joints"], data.get("compared")),
+        "movements": partial(_movements, data["movements"], model),
+    }
+
+
+def _movements(movements: Sequence[Mapping[str, Any]], model: Model) -> Drawn:
+    """Draw the arm at the waypoints of every movement, and the path of the hand."""
+    columns = min(3, len(movements))
+    rows = -(-len(movements) // columns)
+    figure = plotting.figure(3.7 * columns, 4.4 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+    for number, (ax, movement) in enumerate(zip(axes, movements, strict=False), start=1):
+        waypoints = np.radians(np.asarray(movement["waypoints_deg"], dtype=float))
+        legs = [np.linspace(a, b, 25) for a, b in itertools.pairwise(waypoints)]
+        hand = points(model, np.concatenate(legs))[:, -1]
+        for k, pose in enumerate(points(model, waypoints)):
+            shade = plotting.shade(k / max(1, len(waypoints) - 1))
+            ax.plot(*pose.T, color=shade, lw=2.2, marker="o", ms=4, solid_capstyle="round")
+            ax.annotate(str(k + 1), pose[-1], xytext=(5, 3), textcoords="offset points", fontsize=9)
+        ax.plot(*hand.T, color=plotting.GREY, lw=1.0, ls="--")
+        ax.set(title=f"movement {number}", xlabel="forward, y [m]", ylabel="up, z [m]" if (number - 1) % columns == 0 else "")
+        ax.set_aspect("equal", adjustable="box", anchor="C")
+        ax.margins(0.1)
+    for ax in axes[len(movements) :]:
+        ax.remove()
+    text = (
+        "The arm at the waypoints of each movement, numbered in their order, from dark to bright; the dashed line is the way of the hand. "
+        "Joints move together between two waypoints."
+    )
+    return Drawn("movements", "The movements", text, figure)
 
 
 def _planned(predictions: Sequence[Mapping[str, Any]], joints: Sequence[str], compared: Mapping[str, Any] | None) -> Drawn:
@@ -194,7 +226,7 @@ def _elapsed(explained: Explained) -> np.ndarray:
     return explained.t - explained.trial.t[0]
 
 
-_TORQUES = {
+TORQUES = {
     "inertial": "inertia",
     "centrifugal": "centrifugal",
     "coriolis": "Coriolis",
@@ -251,10 +283,13 @@ def _simulated(result: Simulated, trial: Trial | None) -> Drawn:
     top = [figure.add_subplot(grid[0, k * columns : (k + 1) * columns]) for k in range(2)]
     measured = None if trial is None else np.column_stack([np.interp(result.t, trial.t - trial.t[0], q) for q in trial.q.T])
     plotting.angles(result.t, result.q, names, top[0], measured=measured)
-    plotting.force(result.t, result.force_on_arm, top[1])
-    largest = {key: np.abs(result.columns[f"torque.{key}"]).max(axis=0) for key in _TORQUES}
+    beside = None
+    if trial is not None and trial.force_on_arm is not None:
+        beside = np.column_stack([np.interp(result.t, trial.t - trial.t[0], f) for f in trial.force_on_arm.T])
+    plotting.force(result.t, result.force_on_arm, top[1], measured=beside)
+    largest = {key: np.abs(result.columns[f"torque.{key}"]).max(axis=0) for key in TORQUES}
     limit = _VISIBLE * np.max(list(largest.values()), axis=0)
-    visible = {key: label for key, label in _TORQUES.items() if (largest[key] > limit).any()}
+    visible = {key: label for key, label in TORQUES.items() if (largest[key] > limit).any()}
     for j, name in enumerate(names):
         share = 2 * columns // n
         ax = figure.add_subplot(grid[1, j * share : (j + 1) * share])
@@ -265,7 +300,7 @@ def _simulated(result: Simulated, trial: Trial | None) -> Drawn:
         "contact on the right. Torques that would be a line on the axis are left out."
     )
     if trial is not None:
-        text += f" The broad lines are the angles measured in {trial.file}."
+        text += f" The broad lines are what was measured in {trial.file}."
     return Drawn("simulated", "Angles, force and torques", text, figure)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +17,23 @@ from ..errors import BadInput, Text
 from ..io import files
 
 TEMPLATES = Path(__file__).with_name("templates")
+CONTENTS = Markup("<!-- contents -->")
+"""Where a part of a page has its table of contents."""
+_HEADING = re.compile(r"<h2>(.*?)</h2>", flags=re.S)
 
-__all__ = ["Environment", "Picture", "TemplateError", "data_uri", "environment", "picture", "render", "source", "write_page"]
+__all__ = [
+    "CONTENTS",
+    "Environment",
+    "Picture",
+    "TemplateError",
+    "data_uri",
+    "environment",
+    "picture",
+    "render",
+    "source",
+    "with_contents",
+    "write_page",
+]
 
 
 @dataclass(frozen=True)
@@ -44,6 +60,21 @@ def environment(*folders: Path) -> Environment:
 def render(engine: Environment, template: str, values: Mapping[str, Any]) -> Markup:
     """Return what a template makes of values, as HTML that is not escaped again."""
     return Markup(engine.get_template(template).render(values))
+
+
+def with_contents(part: Markup, number: int) -> Markup:
+    """Return a part of a page whose headings can be linked to, with the list of them at `CONTENTS`."""
+    places: list[str] = []
+
+    def marked(found: re.Match[str]) -> str:
+        place = f"part-{number}-{len(places) + 1}"
+        places.append(f'<li><a href="#{place}">{found[1]}</a></li>')
+        return f'<h2 id="{place}">{found[1]}</h2>'
+
+    # What a file says is escaped, so that no heading is in it.
+    text = _HEADING.sub(marked, str(part))
+    listed = f'<nav class="contents" aria-label="Contents, part {number}"><ul>{"".join(places)}</ul></nav>' if len(places) > 2 else ""
+    return Markup(text.replace(str(CONTENTS), listed))
 
 
 def source(engine: Environment, name: str) -> Markup:

@@ -6,7 +6,6 @@ It arranges what a result says as plain data (its JSON) and the figures beside i
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 from collections import defaultdict
@@ -17,11 +16,11 @@ from typing import Any
 
 from markupsafe import Markup
 
-from .. import checks
+from .. import checks, views
 from ..errors import BadInput, Text
 from ..io import files
 from ..io.tomlfile import read_text
-from . import html, tables, words
+from . import html, live, tables, words
 
 INPUT = "SHA-256 of dataset.toml, the model and the trials, one after the other in their order:"
 
@@ -35,16 +34,12 @@ class Kind:
     title : str
     template : str
         In `templates/`.
-    words : str
-        The module with its sentences and tables, loaded when a result of this kind is shown. Its function `verdict` says the result
-        in a sentence or two.
     digest_of : str
         What the digest of its input is made of.
     """
 
     title: str
     template: str
-    words: str = f"{__package__}.words"
     digest_of: str = INPUT
 
 
@@ -52,15 +47,17 @@ KINDS = {
     "identify": Kind("Identification", "identify.html.j2"),
     "simulate": Kind("Simulation", "simulate.html.j2"),
     "passive": Kind("Passive joint moments", "passive.html.j2"),
+    "spasticity": Kind("Stretch reflexes", "spasticity.html.j2"),
+    "cohort": Kind("Cohort", "cohort.html.j2", "SHA-256 of the table:"),
     "demo": Kind("Demonstration", "demo.html.j2"),
     "plan": Kind("Plan of an experiment", "plan.html.j2"),
     "history": Kind("Over the sessions", "history.html.j2"),
-    "gap": Kind("Gap between model and measurement", "gap.html.j2", "armrs.workflows.gap.words"),
+    "gap": Kind("Gap between model and measurement", "gap.html.j2"),
+    "record": Kind("Virtual laboratory", "record.html.j2"),
     "fmu run": Kind("Co-simulation", "fmu_run.html.j2"),
     "sweep": Kind(
         "Sweep",
         "sweep.html.j2",
-        "armrs.montecarlo.words",
         "SHA-256 of what SWEEP.toml and the files that it names say, and of the version of armrs:",
     ),
 }
@@ -106,35 +103,44 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
     if isinstance(sources, (str, bytes)) or not isinstance(sources, Iterable):
         raise BadInput("sources", sources, "a sequence of paths")
     engine = html.environment()
-    parts = [_part(engine, checks.path(f"sources[{k}]", source)) for k, source in enumerate(sources)]
-    html.write_page(engine, target, parts, title="armrs report")
+    parts = [_part(engine, checks.path(f"sources[{k}]", source), k + 1) for k, source in enumerate(sources)]
+    _write(engine, target, parts)
     return target
 
 
-def write_page_of(data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], path: Path) -> Path:
+def write_page_of(data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], path: Path, moving: live.Live = live.NOTHING) -> Path:
     """Write one page about a result that is in memory; `figures` are its pictures by the section that they belong to."""
     engine = html.environment()
     # What a file would hold: NaN is absent there, and arrays are lists.
     plain = json.loads(files.json_text(data))
-    html.write_page(engine, path, [_result(engine, plain, defaultdict(list, figures))], title="armrs report")
+    _write(engine, path, [_result(engine, plain, defaultdict(list, figures), moving, 1)])
     return path
 
 
-def _part(engine: html.Environment, source: Path) -> Markup:
+def _write(engine: html.Environment, path: Path, parts: Sequence[Markup]) -> None:
+    """Write a page with the scripts that something in it needs."""
+    whole = "".join(parts)
+    scripts = [f"{name}.js" for name in ("film", "series") if f'class="{name}"' in whole]
+    html.write_page(engine, path, parts, title="armrs report", scripts=scripts)
+
+
+def _part(engine: html.Environment, source: Path, number: int) -> Markup:
     """Return one result as it stands in a page."""
     data = read_result(source)
     try:
         figures: defaultdict[str, list[html.Picture]] = defaultdict(list)
         for entry in data.get("figures", []):
             figures[entry.get("section", "")].append(html.picture(entry, source.parent))
-        return _result(engine, data, figures)
+        return _result(engine, data, figures, live.read(data.get("live"), source.parent), number)
     except BadInput:
         raise
     except (KeyError, TypeError, AttributeError, ValueError, IndexError, html.TemplateError) as error:
         raise BadInput("content", Text(f"not what a result holds ({error})"), "a whole result", file=source) from None
 
 
-def _result(engine: html.Environment, data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]]) -> Markup:
+def _result(
+    engine: html.Environment, data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], moving: live.Live, number: int
+) -> Markup:
     kind = KINDS[data["verb"]]
     values = {
         "kind": kind.title,
@@ -142,8 +148,11 @@ def _result(engine: html.Environment, data: Mapping[str, Any], figures: Mapping[
         "data": data,
         "figures": figures,
         "made_by": defaultdict(lambda: None, data.get("made_by", {})),
-        "said": importlib.import_module(kind.words),
+        "said": views.words_of(data["verb"]),
         "tables": tables,
         "words": words,
+        "contents": html.CONTENTS,
+        "number": number,
+        **moving.shown(),
     }
-    return html.render(engine, kind.template, values)
+    return html.with_contents(html.render(engine, kind.template, values), number)

@@ -15,8 +15,7 @@ from ..model import Contact
 from ..workflows.accuracy import energy_balance
 from ..workflows.identify import Estimate, Identified
 from ..workflows.passive import LEVEL, PassiveMoments
-from ..workflows.simulate import Simulated
-from ..workflows.streamed import Run
+from ..workflows.simulate import Run, Simulated
 
 
 def origin(command: str | None) -> dict[str, Any]:
@@ -42,6 +41,7 @@ def data_of(dataset: Dataset) -> dict[str, Any]:
 
     return {
         "name": dataset.name,
+        "subject": dataset.subject.name,
         "synthetic": dataset.synthetic,
         "joints": [joint.name for joint in dataset.model.joints],
         "range_deg": ranges(dataset),
@@ -144,6 +144,7 @@ def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str
             d.to_dict() | {"joint_name": joints[d.joint - 1], "adjacent_name": joints[d.adjacent - 1]} for d in result.dependence
         ],
         "couplings": [c.to_dict() | {"joint_names": [joints[j - 1] for j in c.joints]} for c in result.couplings],
+        "repeated": [dataclasses.asdict(e) for e in result.followed()],
         "checks": [{"name": c.name, "passed": c.passed, "text": c.text} for c in result.checks],
         "level": LEVEL,
         "warnings": list(result.warnings),

@@ -227,10 +227,12 @@ def angles(t: np.ndarray, q: np.ndarray, names: Sequence[str], ax: Axes | None =
     return ax
 
 
-def force(t: np.ndarray, force_on_arm: np.ndarray, ax: Axes | None = None) -> Axes:
-    """Plot the contact force on the arm, shape (n, 2) [N]."""
+def force(t: np.ndarray, force_on_arm: np.ndarray, ax: Axes | None = None, *, measured: np.ndarray | None = None) -> Axes:
+    """Plot the contact force on the arm, shape (n, 2) [N], simulated and where it is given measured."""
     ax = _axes(ax)
     for k, name in enumerate(("forward (y)", "up (z)")):
+        if measured is not None:
+            ax.plot(*_broken(t, measured[:, k]), color=SILVER, lw=3.2, label="measured" if k == 0 else None)
         ax.plot(t, force_on_arm[:, k], color=CYCLE[k], ls=DASHES[k], label=name)
     ax.set(title="Force on the arm", ylabel="force [N]", xlabel="time [s]")
     _legend(ax)
@@ -320,6 +322,8 @@ def by_direction(
     return ax
 
 
+_BESIDE_TITLE = 50
+"""Letters of title and legend that stand beside each other above a panel."""
 DASHES = ("-", "--", "-.", ":")
 
 
@@ -331,7 +335,8 @@ def _legend(ax: Axes) -> None:
         return
     # A point needs no room for a line.
     look = {"columnspacing": 1.2, "handlelength": 1.6 if any(handle.get_linestyle() != "None" for handle in shown) else 0.7}
-    if count <= 3:
+    words = len(ax.get_title(loc="left")) + sum(len(str(handle.get_label())) + 4 for handle in shown)
+    if count <= 3 and words <= _BESIDE_TITLE:
         legend = ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=count, **look)
     else:
         legend = ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=4, **look)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +15,10 @@ from ..io.trial import Trial
 from ..workflows.identify import Identified
 from ..workflows.passive import PassiveMoments
 from ..workflows.plan import Plan, plan_data, write_movements
-from ..workflows.simulate import Simulated
-from ..workflows.streamed import Run
-from . import figures, pages, plain, plotting
+from ..workflows.record import Recorded
+from ..workflows.simulate import Run, Simulated
+from . import figures, live, moving, pages, plain, plotting
+from .recording import recording
 from .view import View
 
 if TYPE_CHECKING:
@@ -30,9 +32,13 @@ def history_data(result: History) -> dict[str, Any]:
 
 
 IDENTIFIED = View(plain.identified_data, figures.identified)
-SIMULATED = View(lambda run: plain.simulated_data(run, "a simulated run"), lambda run, _: figures.simulated(figures.outline(run)))
+SIMULATED = View(
+    lambda run: plain.simulated_data(run, "a simulated run"), lambda run, _: figures.simulated(figures.outline(run)), moving.simulated
+)
+MOST_RECORDINGS = 6
+"""So many movements of a session are drawn, one trial of each."""
 PASSIVE = View(plain.passive_data, lambda result, _: figures.passive(result))
-PLANNED = View(plan_data, lambda _, data: figures.planned(data))
+PLANNED = View(plan_data, lambda plan, data: figures.planned(data, plan.model))
 HISTORY = View(history_data, lambda _, data: figures.history(data["courses"]))
 
 
@@ -43,9 +49,7 @@ def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> 
     """
     name = "identified.toml"
     files.not_an_input([folder / name], [result.dataset.model_path] if result.dataset.model_path else [])
-    drawn = figures.draw(figures.identified(result, data))
-    if "history" in data:
-        drawn += figures.draw(figures.history(data["history"]))
+    drawn = figures.draw(figures.identified(result, data)) + figures.draw(figures.history(data.get("history", ())))
 
     def write(out: Path) -> list[Path]:
         result.model.write(out / name)
@@ -54,8 +58,8 @@ def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> 
     return files.write_whole(folder, write)
 
 
-def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figures.Drawn]) -> list[Path]:
-    """Write figures, then the JSON that names them, then the report of both; return the files, the report last."""
+def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figures.Drawn], shown: live.Live = live.NOTHING) -> list[Path]:
+    """Write figures and what moves, then the JSON that names them, then the report of all; return the files, the report last."""
     pictures = []
     for item in drawn:
         path = folder / "figures" / f"{item.name}.png"
@@ -66,6 +70,9 @@ def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figu
     data["figures"] = [
         {"file": f"figures/{d.name}.png", "title": d.title, "text": d.text} | ({"section": d.section} if d.section else {}) for d in drawn
     ]
+    if shown:
+        data["live"] = live.write(shown, folder)
+        pictures.append(folder / live.FILE)
     document, page = folder / f"{stem}.json", folder / "report.html"
     files.write_json(document, data)
     pages.write_report([document], page)
@@ -110,22 +117,32 @@ def write_simulated(result: Run, data: dict[str, Any], folder: Path, *, suffix: 
     """Write all samples, `simulated.json`, a figure and `report.html` below a folder; return the files, the report last."""
     name = f"simulated{suffix}"
     drawn = figures.draw(figures.simulated(figures.outline(result), trial))
+    shown = moving.simulated(result, trial)
     data["file"] = name
 
     def write(out: Path) -> list[Path]:
         write_pieces(out / name, (simulated_columns(piece) for piece in result.pieces()))
-        return [out / name, *write_result(out, "simulated", data, drawn)]
+        return [out / name, *write_result(out, "simulated", data, drawn, shown)]
 
     return files.write_whole(folder, write)
 
 
+def write_recorded(result: Recorded, data: dict[str, Any], folder: Path) -> list[Path]:
+    """Write `record.json`, figures and `report.html` beside a session of the virtual laboratory; return the files, the report last."""
+    dataset = result.dataset
+    by_movement = {trial.configuration: trial for trial in reversed(dataset.trials)}
+    shown = list(reversed(by_movement.values()))[:MOST_RECORDINGS]
+    drawn = figures.draw({str(k): partial(recording, trial, dataset.model) for k, trial in enumerate(shown)})
+    return write_result(folder, "record", data, drawn, moving.recorded(shown[0], dataset.model))
+
+
 def write_passive(result: PassiveMoments, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write `passive.json`, figures and `report.html` below a folder; return the files, the report last."""
-    drawn = figures.draw(figures.passive(result))
+    drawn = figures.draw(figures.passive(result)) + figures.draw(figures.history(data.get("history", ())))
     return files.write_whole(folder, lambda out: write_result(out, "passive", data, drawn))
 
 
 def write_planned(result: Plan, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write movement files, `plan.toml`, `plan.json`, a figure and `report.html` below a folder; return the files, the report last."""
-    drawn = figures.draw(figures.planned(data))
+    drawn = figures.draw(figures.planned(data, result.model))
     return files.write_whole(folder, lambda out: [*write_movements(result, data, out), *write_result(out, "plan", data, drawn)])

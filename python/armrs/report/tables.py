@@ -266,6 +266,16 @@ def _known(value: float | None) -> str:
     return "unknown" if value is None or not math.isfinite(value) else f"{value:.4g}"
 
 
+def recorded(data: Mapping[str, Any]) -> Table:
+    """Return the trials of the virtual laboratory: how well the robot followed, and how each ended."""
+    rows = []
+    for trial in data["trials"]:
+        stop = trial["stop"]
+        end = "complete" if stop is None else f"stopped at {stop['at_s']:.4f} s: {stop['what']} {stop['reason']}"
+        rows.append([trial["configuration"], str(trial["repeat"]), f"{1e3 * trial['tracking_error_rad']:.3g}", end])
+    return Table(["configuration", "repeat", "robot off by [mrad]", "end"], rows)
+
+
 def movements(data: Mapping[str, Any]) -> Table:
     """Return planned movements: repeats and speeds."""
     rows = [
@@ -281,22 +291,18 @@ def movements(data: Mapping[str, Any]) -> Table:
 
 
 def history(courses: Sequence[Mapping[str, Any]]) -> Table:
-    """Return every parameter over sessions: the last value, and how it differs from those before."""
+    """Return every parameter over sessions: the last value, and how it differs from the session before and from all before."""
     rows = []
     for c in courses:
         several = c["change"] is not None and math.isfinite(c["change"])
-        rows.append(
-            [
-                course_label(c),
-                c["unit"],
-                len(c["dates"]),
-                f"{c['values'][-1]:.4g} ± {c['stds'][-1]:.2g}",
-                f"{c['change']:+.2g} ± {c['change_std']:.2g}" if several else "–",
-                f"{c['p_value']:.2g}" if several else "–",
-                ("yes" if c["changed"] else "no") if several else "–",
-            ]
-        )
-    return Table(["parameter", "unit", "sessions", "last", "change", "p (Holm)", "changed"], rows, left=2)
+        cells = [
+            [f"{c[name]:+.2g} ± {c[f'{name}_std']:.2g}", f"{c[p]:.2g}", "yes" if c[changed] else "no"] if several else ["–"] * 3
+            for name, p, changed in (("since_last", "since_last_p_value", "changed_since_last"), ("change", "p_value", "changed"))
+        ]
+        last = f"{c['values'][-1]:.4g} ± {c['stds'][-1]:.2g}"
+        rows.append([course_label(c), c["unit"], len(c["dates"]), last, *cells[0], *cells[1]])
+    columns = ["since the session before", "p (Holm)", "changed", "since all before", "p (Holm)", "changed"]
+    return Table(["parameter", "unit", "sessions", "last", *columns], rows, left=2)
 
 
 def comparison(data: Mapping[str, Any]) -> Table:
@@ -315,3 +321,16 @@ def comparison(data: Mapping[str, Any]) -> Table:
         for c in data["comparison"]
     ]
     return Table(["quantity", "unit", "known", "identified", "± std", "error [%]", "error in the thesis [%]", "decided by"], rows, left=2)
+
+
+def smallest_effects(would_show: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the smallest effects that `armrs gap` would name, one row for each kind and its joints side by side."""
+    most = max([w["joint"] or 0 for w in would_show], default=0)
+    rows: dict[tuple[str, str, str], list[object]] = {}
+    for w in would_show:
+        key = (w["kind"], w["parameter"], w["unit"])
+        cells = rows.setdefault(key, [None] * (most + 2))
+        at = w["joint"] - 1 if w["joint"] else most + ({"Fy": 0, "Fz": 1}.get(w["channel"], 0) if w["channel"] else 0)
+        cells[at] = f"{w['at_least']:.2g}"
+    head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole or Fy", "Fz"]
+    return Table(head, [[kind, parameter, unit(held_in), *cells] for (kind, parameter, held_in), cells in rows.items()], 3)

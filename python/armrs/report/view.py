@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
-from . import html, pages, plotting
+from . import html, live, pages, plotting
 from .figures import Drawn, Figures, draw, shown
 
 
@@ -28,10 +28,13 @@ class View:
         Makes plain data of a result, as it is written to JSON.
     figures : callable
         Makes figures of a result and its plain data.
+    moving : callable
+        Makes what moves in the page of a result.
     """
 
     data: Callable[[Any], dict[str, Any]]
     figures: Callable[[Any, Mapping[str, Any]], Figures]
+    moving: Callable[[Any], live.Live] = lambda result: live.NOTHING
 
     def plot(self, result: object, name: str | None) -> np.ndarray:
         """Draw one figure where pyplot shows it, and return its Axes."""
@@ -51,7 +54,7 @@ class View:
         pictures = defaultdict(list)
         for drawn in draw(self.figures(result, data)):
             pictures[drawn.section].append(_picture(drawn))
-        return pages.write_page_of(data, pictures, target)
+        return pages.write_page_of(data, pictures, target, self.moving(result))
 
 
 def _picture(drawn: Drawn) -> html.Picture:

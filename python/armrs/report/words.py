@@ -11,6 +11,11 @@ from . import console, tables
 if TYPE_CHECKING:
     from ..io.markers import PlanarMotion
 
+HISTORY_MEANING = (
+    "What was measured in each session. A change is set against the uncertainty of both sessions, which is the scatter of their own "
+    "repeats, and called one at a level of 5 % over all parameters together. What differs between days without being a change of the "
+    "joint, such as where the arm was strapped, is not in that scatter."
+)
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "
     "The mean of both directions is its elastic part, half their difference its dissipative part. The mean also holds what is wrong with "
@@ -47,6 +52,7 @@ def verdict(result: Mapping[str, Any]) -> str:
         "passive": _passive,
         "plan": _planned,
         "history": _followed,
+        "record": _recorded,
         "demo": _demo,
         "fmu run": _coupled,
     }
@@ -72,6 +78,12 @@ def _simulated(result: Mapping[str, Any]) -> str:
         f"{result['duration_s']:.4g} s simulated; the force on the arm reaches {result['largest_force_N']:.4g} N. "
         f"Energy is accounted for to {result['energy']['error_J']:.2g} J."
     )
+
+
+def _recorded(result: Mapping[str, Any]) -> str:
+    movements = len({trial["configuration"] for trial in result["trials"]})
+    ending = f"; the supervisor stopped {result['stopped']}, which are not in the data set" if result["stopped"] else ""
+    return f"{len(result['trials'])} trials of {movements} movements were simulated as a laboratory measures them{ending}."
 
 
 def _coupled(result: Mapping[str, Any]) -> str:
@@ -168,9 +180,14 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         print("\n".join(f"  {line}" for line in lines))
     if not data["test"]["trials"]:
         print("No test trials: nothing was checked on data that the fit has not seen.")
+    followed(result)
+    files_written(written)
+
+
+def followed(result: Mapping[str, Any]) -> None:
+    """Print the history that a result was added to."""
     if "history" in result:
         show("Over the sessions, what the data decided in the last one", tables.history(result["history"]))
-    files_written(written)
 
 
 def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
@@ -221,6 +238,7 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     for check in result["checks"]:
         print(check["text"])
     print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
+    followed(result)
     files_written(written)
 
 
@@ -276,15 +294,10 @@ def planar(motion: PlanarMotion, points: Sequence[str], file: Path) -> None:
     print(file)
 
 
-def recorded(result: Mapping[str, Any]) -> None:
+def recorded(result: Mapping[str, Any], report: Path) -> None:
     """Print what the virtual laboratory did."""
-    rows = []
-    for trial in result["trials"]:
-        stop = trial["stop"]
-        end = "complete" if stop is None else f"stopped at {stop['at_s']:.4f} s: {stop['what']} {stop['reason']}"
-        rows.append((trial["configuration"], trial["repeat"], f"{1e3 * trial['tracking_error_rad']:.3g}", end))
-    console.table(["configuration", "repeat", "robot off by [mrad]", "end"], rows)
-    print("\n" + "\n".join(result["files"][:3]))
+    show("", tables.recorded(result))
+    print("\n" + "\n".join([*result["files"][:3], str(report)]))
 
 
 def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
@@ -305,10 +318,8 @@ def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     for line in slowed(result):
         print(line)
     if result.get("would_show"):
-        from ..workflows.gap.words import limits
-
         print()
-        show("The smallest effects that `armrs gap` would name on such a session", limits({"would_have_seen": result["would_show"]}))
+        show("The smallest effects that `armrs gap` would name on such a session", tables.smallest_effects(result["would_show"]))
     print("\n".join(str(path) for path in written))
 
 

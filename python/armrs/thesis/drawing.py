@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model import Model
 from ..report import plotting, tables
-from .people import points
+from ..report.animation import points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,14 @@ from .. import _armrs
 from ..analysis.passivity_checks import muscles_silent
 from ..io.trial import Trial
 from ..report import plotting
+from ..report.animation import points
 from ..report.figures import Drawn
 from ..report.tables import Table
 from ..workflows.record import muscle_activity
 from ..workflows.simulate import Simulated
 from . import drawing
 from .item import Found, Group, Sheet
-from .people import HANDLE, ORTHOSIS, SUBJECT_ONE, TABLE_4_10, arm, mechanical, points
+from .people import HANDLE, ORTHOSIS, SUBJECT_ONE, TABLE_4_10, arm, mechanical
 from .sessions import ELBOW_HELD, SEED, SHOULDER_HELD, holding, subject_one
 from .simulation import HUMAN_PATH, MECHANICAL_PATH
 

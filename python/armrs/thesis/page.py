@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..report import html, tables
-from .animation import drawn
+from ..report.animation import drawn
 
 TEMPLATES = Path(__file__).with_name("templates")
 _NEGATIVE = re.compile(r"-\d")
@@ -19,7 +19,7 @@ def write(path: Path, data: Mapping[str, Any], folder: Path) -> None:
     engine = html.environment(TEMPLATES)
     values = {"data": data, "signed": _signed, "drawn": drawn, "picture": lambda entry: html.picture(entry, folder)}
     part = html.render(engine, "thesis.html.j2", values)
-    html.write_page(engine, path, [part], title="The thesis, computed again", styles=["thesis.css"], scripts=["thesis.js"])
+    html.write_page(engine, path, [part], title="The thesis, computed again", styles=["thesis.css"], scripts=["film.js", "thesis.js"])
 
 
 def _signed(sheet: Mapping[str, Any]) -> tables.Table:

@@ -96,14 +96,6 @@ def trials(made: Simulated, configuration: str, first: int = 1, role: str = "fit
     ]
 
 
-def points(model: Model, q: np.ndarray) -> np.ndarray:
-    """Return the joints and the handle of an arm, shape (n, n_joints + 1, 2) [m]."""
-    absolute = np.cumsum(np.atleast_2d(q), axis=1)
-    steps = np.stack([np.cos(absolute), np.sin(absolute)], axis=2) * np.array([s.length for s in model.segments])[:, None]
-    start = np.broadcast_to(np.array(model.base), (len(absolute), 1, 2))
-    return np.concatenate([start, start + np.cumsum(steps, axis=1)], axis=1)
-
-
 def static_torque(model: Model, trial: Trial) -> np.ndarray:
     """Return Jᵀ F of the force on the arm, shape (n, n_joints): τ_j of equations 3.23 to 3.25, weight and passive moments [N m]."""
     assert trial.force_on_arm is not None

@@ -11,6 +11,7 @@ import numpy as np
 from ..io.dataset import Dataset
 from ..model import Effect, Joint, Model, Subject, Tolerance
 from ..report import plotting
+from ..report.animation import film, points, robot_points
 from ..report.figures import Drawn
 from ..report.tables import Table, minus
 from ..workflows.experiment import THESIS_ROBOT, Controller, Devices, Experiment, Run, Safety
@@ -18,9 +19,8 @@ from ..workflows.movement import Movement
 from ..workflows.record import record
 from ..workflows.simulate import Simulated, simulate
 from . import drawing
-from .animation import film
 from .item import Found, Group, Sheet
-from .people import RATE, TABLE_4_10, arm, mechanical, points
+from .people import RATE, TABLE_4_10, arm, mechanical
 
 GROUP = Group("simulation", "Simulation (4.3)")
 
@@ -121,17 +121,12 @@ def of_human_arm() -> Comparison:
 def _film(comparison: Comparison, title: str) -> dict[str, object]:
     run = comparison.simulated
     model = run.model
-    assert model.robot is not None
-    robot = np.array(run.columns["robot_q"])
-    base, lengths = np.array(model.robot.base), model.robot.lengths
-    first = base + lengths[0] * np.column_stack([np.cos(robot[:, 0]), np.sin(robot[:, 0])])
-    chain = np.stack([np.broadcast_to(base, first.shape), first, run.columns["handle"]], axis=1)
     arm_colour, robot_colour = plotting.RED, plotting.BLUE
     return film(
         title,
         "The robot (blue) and the arm (orange) of figure 3.14. Drag the slider, or stop and play; thin lines are poses on the way.",
         run.t,
-        {"robot": (robot_colour, chain), "arm": (arm_colour, points(model, run.q))},
+        {"robot": (robot_colour, robot_points(model, run.columns["robot_q"])), "arm": (arm_colour, points(model, run.q))},
     )
 
 

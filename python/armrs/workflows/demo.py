@@ -290,7 +290,7 @@ def _write(out: Path, made: Demonstration, command: str | None) -> list[Path]:
     identified = results.write_identified(found, plain.identified_data(found, command), out / "identified")
     moments = results.write_passive(passive, plain.passive_data(passive, command), out / "passive")
     own = results.write_result(out, "demo", data, drawn)
-    documents = [path for path in (*own, *gap, *identified, *moments) if path.suffix == ".json"]
+    documents = [path for path in (*own, *gap, *identified, *moments) if path.suffix == ".json" and path.parent.name != "figures"]
     page = pages.write_report(documents, out / "report.html")
     return [*(path for path in (*gap, *identified, *moments, *own) if path != page), page]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -205,7 +205,7 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     return tomlfile.load(path, experiment_of)
 
 
-def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple[Segment, ...], list[dict[str, Any]]]:
+def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple[Segment, ...], Sequence[Mapping[str, Any]]]:
     """Return the segments of a person by de Leva's tables, and the tables' values with their deviations.
 
     With two lengths the hand belongs to the forearm, which then reaches from elbow to handle.
@@ -218,7 +218,7 @@ def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple
     return tuple(_segments(parts, lengths)), parts
 
 
-def _segments(parts: list[dict[str, Any]], lengths: list[float | None]) -> list[Segment]:
+def _segments(parts: Sequence[Mapping[str, Any]], lengths: list[float | None]) -> list[Segment]:
     single = [Segment(p["name"], p["length"], p["mass"][0], p["com"][0], p["inertia"][0]) for p in parts]
     if len(lengths) == 3:
         return single
@@ -342,10 +342,12 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
     believed, parts = literature_arm(subject, lengths)
     draw = np.random.default_rng([seed, 0]).standard_normal((3, 3)) * spread
     true_parts = [
-        part
-        | {
-            key: (min(max(part[key][0] + d * part[key][1], 0.3 * part[key][0]), most), 0.0)
-            for key, d, most in zip(("mass", "com", "inertia"), row, (np.inf, part["length"], np.inf), strict=True)
+        {
+            **part,
+            **{
+                key: (min(max(part[key][0] + d * part[key][1], 0.3 * part[key][0]), most), 0.0)
+                for key, d, most in zip(("mass", "com", "inertia"), row, (np.inf, part["length"], np.inf), strict=True)
+            },
         }
         for part, row in zip(parts, draw, strict=True)
     ]

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ..io.trial import Trial
 from ..model import Effect, Model, Segment, Tolerance
 from ..tabular import Tabular, Tidy
 from .setup import refuse_wrong_setup
+
+if TYPE_CHECKING:
+    from .._armrs import _Identified
 
 
 @dataclass(frozen=True)
@@ -139,11 +142,14 @@ class Identified(Tabular):
     model: Model
     dataset: Dataset
 
-    VIEW = ("report.results", "IDENTIFIED")
-
     def __repr__(self) -> str:
         known = f"{self.rank} of {self.unknowns} unknowns determined"
         return f"Identified({self.dataset.name!r}, {self.method} method, {self.status}: {known}; {'; '.join(map(str, self.combinations))})"
+
+    def followed(self) -> tuple[Estimate, ...]:
+        """Return what a history keeps: parameters, and combinations of more than one."""
+        alone = {(e.name, e.joint) for e in self.parameters}
+        return (*self.parameters, *(e for e in self.combinations if (e.name, e.joint) not in alone))
 
     def tidy(self) -> Tidy:
         """Return the estimates, one a row: parameters, combinations, calibration."""
@@ -256,9 +262,7 @@ def _checked(
     return tuple(kinds)
 
 
-def _result(
-    dataset: Dataset, raw: dict[str, Any], effects: list[Effect], settings: Mapping[str, Any], follows: Sequence[str]
-) -> Identified:
+def _result(dataset: Dataset, raw: _Identified, effects: list[Effect], settings: Mapping[str, Any], follows: Sequence[str]) -> Identified:
     """Return what the core found, with what is to be said of it."""
     model, method = dataset.model, settings["method"]
     explained = tuple(
@@ -307,7 +311,7 @@ def _result(
 
 def _identified(
     built: _armrs.Rig, columns: list[dict[str, Any]], settings: dict[str, Any], dataset: Dataset
-) -> tuple[dict[str, Any], tuple[str, ...]]:
+) -> tuple[_Identified, tuple[str, ...]]:
     """Return what the core identified, and a line where the measured motion had to take the place of the simulated one."""
     try:
         return _armrs.identify(built, columns, settings), ()
@@ -528,7 +532,7 @@ def core_columns(trial: Trial) -> dict[str, Any]:
     }
 
 
-def _estimates(items: list[dict[str, Any]], caveat: str | None) -> tuple[Estimate, ...]:
+def _estimates(items: Sequence[Mapping[str, Any]], caveat: str | None) -> tuple[Estimate, ...]:
     """Return estimates; a caveat is one against the data, and so against what they decided alone."""
     return tuple(
         Estimate(**{**item, "interval": tuple(item["interval"])}, caveat=caveat if item["decided_by"] == "data" else None) for item in items
@@ -554,7 +558,7 @@ def _residuals_by_configuration(explained: Sequence[Explained]) -> dict[str, dic
     return result
 
 
-def _identified_model(model: Model, raw: dict[str, Any], effects: list[Effect]) -> Model:
+def _identified_model(model: Model, raw: _Identified, effects: list[Effect]) -> Model:
     """Return the model with estimates; effects that its joints state stay there, the others become effects."""
     segments = tuple(
         Segment(old.name, length, mass, min(max(com, 0.0), length), _not_rounding(inertia, mass * length**2), com_normal=normal)

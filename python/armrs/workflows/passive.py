@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..tabular import Tabular, Tidy
+from .identify import Estimate
 from .setup import find_wrong_setup
 
 DEFAULT_CUTOFF = 1.0
@@ -130,15 +131,23 @@ class PassiveCurve:
 
         Student's t over the repeats, on angles that all of them cover. Errors that are the same in all repeats are not in it.
         """
-        from scipy.stats import t as student
+        return _interval(self._means(part))
 
+    def stiffness(self) -> np.ndarray:
+        """Return the slope of the straight line through the elastic mean of every repeat [N m/rad], on angles that all of them cover."""
+        angle, values = self._shared("elastic")
+        return np.polyfit(angle, values.T, 1)[0] if len(angle) > 1 else np.full(len(values), np.nan)
+
+    def _means(self, part: str) -> np.ndarray:
+        """Return the mean of every repeat over the angles that all of them cover, none where there is no such angle."""
+        _, values = self._shared(part)
+        return np.asarray(values.mean(axis=1)) if values.size else np.empty(0)
+
+    def _shared(self, part: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the angles that all repeats cover, (k,), and the values there, (repeats, k)."""
         repeats = getattr(self, f"{part}_repeats")
         there = np.isfinite(repeats).all(axis=0)
-        if len(repeats) < 2 or not there.any():
-            return (float("nan"), float("nan"))
-        means = repeats[:, there].mean(axis=1)
-        half = float(student.ppf(0.5 + 0.5 * LEVEL, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)))
-        return (float(means.mean()) - half, float(means.mean()) + half)
+        return self.angle[there], repeats[:, there]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with units in the names."""
@@ -189,11 +198,37 @@ class PassiveMoments(Tabular):
     dependence: tuple[joint_coupling.Dependence, ...] = ()
     checks: tuple[passivity_checks.Check, ...] = ()
 
-    VIEW = ("report.results", "PASSIVE")
+    method: ClassVar[str] = "passive"
+    level: ClassVar[float] = LEVEL
 
     def __repr__(self) -> str:
         parts = [f"joint {c.joint} in {c.configuration!r}: ±{np.nanmean(c.half_width):.3g} N m" for c in self.curves]
         return f"PassiveMoments({self.dataset.name!r}; {'; '.join(parts) or 'no joint moved in both directions'})"
+
+    def followed(self) -> tuple[Estimate, ...]:
+        """Return what a history keeps, with intervals from the scatter of the repeats.
+
+        For each configuration and joint the mean half width of the hysteresis [N m], the stiffness [N m/rad] and the range that was moved
+        through [rad]; for each pair of joints their coupling [N m/rad].
+        """
+        found = []
+        for curve in self.curves:
+            own = [
+                m.q[np.isfinite(m.q[:, curve.joint - 1]), curve.joint - 1]
+                for m in self.trials
+                if m.trial.configuration == curve.configuration
+            ]
+            quantities = {
+                "half_width": (curve._means("half_width"), "N m"),
+                "stiffness": (curve.stiffness(), "N m/rad"),
+                "range": (np.array([np.ptp(angles) for angles in own if angles.size]), "rad"),
+            }
+            found += [
+                _estimate(f"{name} in {curve.configuration}", curve.joint, _interval(values), unit)
+                for name, (values, unit) in quantities.items()
+            ]
+        found += [_estimate(f"coupling {c.joints[0]}-{c.joints[1]}", None, c.interval, "N m/rad") for c in self.couplings]
+        return tuple(found)
 
     def tidy(self) -> Tidy:
         """Return the curves, one angle a row."""
@@ -208,6 +243,22 @@ class PassiveMoments(Tabular):
     def to_dict(self) -> dict[str, Any]:
         """Return the curves as plain data."""
         return {"curves": [c.to_dict() for c in self.curves], "warnings": list(self.warnings)}
+
+
+def _interval(values: np.ndarray) -> tuple[float, float]:
+    """Return the interval of the mean of repeats by Student's t; NaN for fewer than two."""
+    from scipy.stats import t as student
+
+    if len(values) < 2:
+        return (float("nan"), float("nan"))
+    mean, half = float(values.mean()), float(student.ppf(0.5 + 0.5 * LEVEL, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values)))
+    return (mean - half, mean + half)
+
+
+def _estimate(name: str, joint: int | None, interval: tuple[float, float], unit: str) -> Estimate:
+    """Return a quantity in the middle of its interval; `std` is that of a normal distribution with this interval."""
+    half = 0.5 * (interval[1] - interval[0])
+    return Estimate(name, joint, "passive", 0.5 * (interval[0] + interval[1]), half / 1.96, unit, interval, "data")
 
 
 def passive_moments(
@@ -240,7 +291,7 @@ def passive_moments(
     bins = checks.whole("bins", bins, least=2, most=1000)
     cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
     refuse_implausible(dataset, robot_matters=False)
-    trials = tuple(_of_trial(dataset, trial, cutoff) for trial in dataset.trials)
+    trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
     wrong = find_wrong_setup(dataset)
     curves, warnings = [], [] if wrong is None else [str(wrong)]
     for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
@@ -272,7 +323,14 @@ def passive_moments(
     return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, both, fitted, assumptions)
 
 
-def _of_trial(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
+def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
+    """Return the moments with which the joints resist in one trial, low-passed at a cutoff [Hz].
+
+    Raises
+    ------
+    BadInput
+        For a trial with neither forces nor joint torques.
+    """
     if trial.force_on_arm is None and trial.tau is None:
         raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
     chain, n = _armrs.Arm.from_model(dataset.model_of(trial.configuration)), dataset.model.n_joints

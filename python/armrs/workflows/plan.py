@@ -207,8 +207,6 @@ class Plan(Tabular):
     model: Model = field(repr=False)
     slowed: tuple[Slowed, ...] = field(default=(), repr=False)
 
-    VIEW = ("report.results", "PLANNED")
-
     def __repr__(self) -> str:
         return f"Plan({len(self.movements)} movements, {self.duration:.4g} s; {'; '.join(map(str, self.predictions))})"
 
@@ -415,7 +413,7 @@ class _Question:
         self.settings = core_settings(model, fitted, instruments.tolerance)
         self.sensing = {name: getattr(instruments, name) for name in ("rate", "cutoff", "force", "angle")}
 
-    def plan(self, movements: tuple[Movement, ...], raw: dict[str, Any]) -> Plan:
+    def plan(self, movements: tuple[Movement, ...], raw: Mapping[str, Any]) -> Plan:
         """Return what the core found."""
         fitted = [e for e, fit in zip(self.effects, self.settings["fitted"], strict=True) if fit]
         predictions = []

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,11 +15,15 @@ from ..errors import ArmrsError, BadInput, Text
 from ..io import files
 from ..io.dataset import Dataset, write_dataset
 from ..io.markers import Markers, planar_motion
+from ..io.opensim import write_trc
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Effect, Model
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .movement import Movement
 from .simulate import DEFAULT_DT, Channel, Sensors, Simulated, driven, simulate
+
+if TYPE_CHECKING:
+    from .._armrs import _Controlled
 
 RECORDING_RATE = 500.0
 """Samples a second of the simulation, from which the devices take theirs [Hz]."""
@@ -216,7 +220,7 @@ class _Session:
         true = simulate(model, path, rate=rate, start=run.movement.waypoints[0], sensors=_sensors(devices), seeds=[seed])
         return self._read(run, repeat, true, (draw, story))
 
-    def _lead(self, model: Model, movement: Movement, fault: Fault | None, seed: int) -> dict[str, Any]:
+    def _lead(self, model: Model, movement: Movement, fault: Fault | None, seed: int) -> _Controlled:
         """Let the robot's controller follow the movement; it is programmed with the true lengths."""
         c, s = self.experiment.controller, self.experiment.safety
         settings = {"engine": "native", "integrator": "rk4", "dt": DEFAULT_DT, "duration": None, "output_interval": 1.0 / RECORDING_RATE}
@@ -340,7 +344,7 @@ def _injected(fault: Fault) -> tuple[float, str, int, tuple[float, float]]:
     return fault.at_s, fault.kind, fault.joint - 1, size
 
 
-def _stop(led: dict[str, Any]) -> dict[str, Any] | None:
+def _stop(led: _Controlled) -> dict[str, Any] | None:
     if led["stop"] is None:
         return None
     reason, channel, value, limit, at = led["stop"]
@@ -382,8 +386,6 @@ def _added(runs: tuple[Run, ...], kept: set[str]) -> tuple[AddedMass, ...]:
 
 
 def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path, ...]:
-    from ..io.opensim import write_trc
-
     head = "# SYNTHETIC: what was simulated. No verb reads it.\n"
     truth = out / "truth" / "truth.toml"
     files.write_text(truth, head + experiment.truth.to_toml(), kind=".toml")

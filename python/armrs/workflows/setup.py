@@ -10,9 +10,9 @@ from ..analysis.balance import SAMPLES, Motion, motion_of, unexplained
 from ..errors import BadInput, Text
 from ..io import readings
 from ..io.dataset import Dataset
-from ..io.plausibility import OTHER_ZERO, constant, hand_meets_handle
+from ..io.plausibility import OTHER_ZERO, hand_meets_handle
 from ..io.readings import Reading
-from ..io.trial import Trial
+from ..io.trial import Trial, constant
 from ..model import Model
 
 _UNEXPLAINED = 0.04

@@ -14,6 +14,7 @@ from ... import checks
 from ...errors import BadInput, Text
 from ...model import Model, load_model
 from .. import files
+from ..tomlfile import read_text
 from . import mjcf, osim, urdf
 from .joints import Exported
 
@@ -95,8 +96,6 @@ def import_model(path: str | os.PathLike[str]) -> Model:
     read = _READERS.get(source.suffix.lower())
     if read is None:
         raise BadInput("path", Text(f"suffix {source.suffix!r}"), f"one of {', '.join(_READERS)} (MJCF is .xml)", file=path)
-    from ..tomlfile import read_text
-
     try:
         return read(read_text(source, "an XML file", most=_LARGEST))
     except BadInput as error:

@@ -15,6 +15,8 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _FEWEST = 3
 _DEEPEST = 4
 """Structs within structs that are looked into."""
+_MOST = 100_000_000
+"""Values of one array of a version 7.3 file, whose size is stated by the file whatever it holds."""
 
 
 def read_matlab(path: Path) -> RawTable:
@@ -92,6 +94,8 @@ def _version_7_3(path: Path) -> dict[str, np.ndarray]:
             and item.attrs.get("MATLAB_class", b"") != b"char"
             and item.ndim <= 2
         ):
+            if item.size > _MOST:
+                raise ValueError(f"{name} has {item.size} values, at most {_MOST} are read")
             value = np.asarray(item[()])
             if np.issubdtype(value.dtype, np.number):
                 _keep(name.rsplit("/", 1)[-1], value.T, found)
@@ -99,6 +103,6 @@ def _version_7_3(path: Path) -> dict[str, np.ndarray]:
     try:
         with h5py.File(path, "r") as file:
             file.visititems(visit)
-    except OSError as error:
+    except Exception as error:  # h5py raises OSError, RuntimeError, KeyError and others for damaged files
         raise BadInput("file", Text(f"no readable MATLAB file ({error})"), "a MATLAB file of version 5 or 7.3") from None
     return found

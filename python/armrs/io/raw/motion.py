@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import c3d
 from ..opensim import read_motion
+from ..samples import parquet_table
 from .table import RawTable, column
 
 PARQUET_SUFFIXES = (".parquet",)
@@ -21,8 +22,6 @@ _NO_ANGLE = re.compile(r"force|moment|torque|emg|_[vp][xyz]$|_t[xyz]$|_f[xyz]$",
 def read_parquet(path: Path) -> RawTable:
     """Read the numeric columns of a Parquet file."""
     import pyarrow as pa
-
-    from ..samples import parquet_table
 
     table = parquet_table(path)
     columns, dropped = [], []

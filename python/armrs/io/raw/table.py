@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .units import UNITS
+
 _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>]\s*$")
 _AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
 _AFTER_LAST = re.compile(r"^(?P<name>.*[^_\s/])[_\s/](?P<unit>[^_\s]+)$")
@@ -63,8 +65,6 @@ class RawTable:
 
 def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
     """Return a column; without `unit`, the unit is split off its name where one is recognised."""
-    from .units import UNITS
-
     text = " ".join(name.split())
     if unit:
         return RawColumn(name, text, unit, values)

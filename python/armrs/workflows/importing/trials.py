@@ -36,15 +36,18 @@ def arrange(tables: Sequence[RawTable]) -> tuple[list[Named], list[RawTable], st
     placed: list[tuple[RawTable, str, int, bool]] = []
     counts: dict[str, int] = {}
     used: set[tuple[str, int]] = set()
-    for table in with_angles:
-        name, number = _split(table.title)
+    split = [_split(table.title) for table in with_angles]
+    from_zero = {name for name, number in split if number == 0}
+    for table, (name, number) in zip(with_angles, split, strict=True):
+        if number is not None and name in from_zero:
+            number += 1
         is_test = bool(_TEST & set(words(table.title)))
         repeat = number if number is not None and (name, number) not in used else counts.get(name, 0) + 1
         while (name, repeat) in used:
             repeat += 1
         counts[name] = max(counts.get(name, 0), repeat)
         used.add((name, repeat))
-        placed.append((table, name, max(repeat, 1), is_test))
+        placed.append((table, name, repeat, is_test))
     stated = any(is_test for *_, is_test in placed)
     last = {name: max(r for _, n, r, _ in placed if n == name) for name in counts}
     many = {name for name in counts if sum(n == name for _, n, _, _ in placed) >= _FEWEST}

@@ -3,15 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..model import Model
 
 FRAMES = 25.0
 """Pictures a second."""
 GHOSTS = 7
 """Poses that are shown all the time, over the whole movement."""
+MOST_FRAMES = 400
+"""Pictures of a film; a longer movement has fewer a second."""
 _MARGIN = 0.06
+
+
+def points(model: Model, q: np.ndarray) -> np.ndarray:
+    """Return the joints of an arm and its end, shape (n, n_joints + 1, 2) [m], of angles (n, n_joints)."""
+    directions = np.cumsum(q, axis=1)
+    lengths = np.array([s.length for s in model.segments])
+    steps = lengths[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=-1)
+    base = np.broadcast_to(np.asarray(model.base, dtype=float), (len(q), 1, 2))
+    return np.concatenate([base, base + np.cumsum(steps, axis=1)], axis=1)
+
+
+def robot_points(model: Model, robot_q: np.ndarray) -> np.ndarray:
+    """Return base, elbow and handle of the robot, shape (n, 3, 2) [m], of its angles (n, 2), the second relative to the first."""
+    assert model.robot is not None
+    directions = np.cumsum(robot_q, axis=1)
+    steps = np.array(model.robot.lengths)[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=-1)
+    base = np.broadcast_to(np.array(model.robot.base), (len(robot_q), 1, 2))
+    return np.concatenate([base, base + np.cumsum(steps, axis=1)], axis=1)
 
 
 def film(title: str, text: str, t: np.ndarray, chains: Mapping[str, tuple[str, np.ndarray]]) -> dict[str, Any]:
@@ -25,7 +48,7 @@ def film(title: str, text: str, t: np.ndarray, chains: Mapping[str, tuple[str, n
     chains : mapping
         Name -> colour and points, shape (n, k, 2) [m].
     """
-    every = max(1, round(1.0 / (FRAMES * float(t[1] - t[0]))))
+    every = max(1, round(1.0 / (FRAMES * float(t[1] - t[0]))), -(-len(t) // MOST_FRAMES))
     return {
         "title": title,
         "text": text,

@@ -1,0 +1,210 @@
+"""Pages as readers use them, in Chromium: accessible by axe-core, light and dark, on a phone and on paper; what moves, moves."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.report import series
+from armrs.workflows import demo
+from browser import opened
+from test_docs import DOCS, blocks
+
+A4 = {"width": 718, "height": 1047}
+"""Within margins of 1 cm, in CSS pixels."""
+
+
+@pytest.fixture(scope="module")
+def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of every verb, in a folder of its name."""
+    out = tmp_path_factory.mktemp("pages")
+    truth, trial = str(slow_arm / "truth.toml"), str(next((slow_arm / "trials").glob("*.csv")))
+    experiment = next(content for _, name, content in blocks(DOCS / "files.md") if name == "EXPERIMENT.toml")
+    (out / "EXPERIMENT.toml").write_text(experiment, encoding="utf-8")
+    for verb, *arguments in (
+        ["simulate", truth, "--trial", trial],
+        ["identify", str(slow_arm), "--with", "coulomb"],
+        ["passive", str(slow_arm)],
+        ["record", str(out / "EXPERIMENT.toml")],
+        ["plan", truth, "--angles-deg=-80:-20,30:90", "--evaluations", "20"],
+    ):
+        assert cli.main([verb, *arguments, "-o", str(out / verb)]) in (0, 1)
+    result = armrs.find_gap(demo.measure_two_speeds(demo.true_model()), separate=False)
+    (out / "gap").mkdir()
+    result.report(out / "gap" / "report.html")
+    cli.main(["report", str(out / "identify" / "identified.json"), "--summary", "-o", str(out / "summary")])
+    (out / "summary" / "summary.html").rename(out / "summary" / "report.html")
+    both = [str(out / "simulate" / "simulated.json"), str(out / "record" / "record.json")]
+    cli.main(["report", *both, "-o", str(out / "both")])
+    return out
+
+
+EVERY = ["simulate", "identify", "passive", "record", "plan", "gap", "summary", "both"]
+
+
+def violations(page: Any) -> list[str]:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    return [f"{v['id']}: {[n['target'] for n in v['nodes']]}" for v in axe.run(page).response["violations"]]
+
+
+@pytest.mark.parametrize("verb", EVERY)
+def test_axe_core_finds_nothing_and_nothing_is_wider_than_the_window(pages: Path, verb: str) -> None:
+    with opened(pages / verb / "report.html", width=1400) as seen:
+        assert violations(seen.page) == []
+        seen.page.emulate_media(color_scheme="dark")
+        assert violations(seen.page) == []
+        seen.page.set_viewport_size({"width": 390, "height": 800})
+        assert violations(seen.page) == []
+        assert seen.page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+@pytest.mark.parametrize("verb", EVERY)
+def test_nothing_is_cut_on_a4(pages: Path, verb: str) -> None:
+    with opened(pages / verb / "report.html") as seen:
+        seen.page.emulate_media(media="print")
+        seen.page.set_viewport_size(A4)
+        assert seen.page.evaluate("document.documentElement.scrollWidth") <= A4["width"]
+        parts = "[...document.querySelectorAll('figure, tr, .panels svg')]"
+        assert seen.page.evaluate(f"{parts}.every(e => getComputedStyle(e.closest('figure, table, svg')).breakInside === 'avoid')")
+        assert seen.page.evaluate(f"Math.max(0, ...{parts}.map(e => e.getBoundingClientRect().height))") <= A4["height"]
+
+
+@pytest.mark.parametrize("verb", EVERY)
+def test_pictures_say_what_is_seen_and_headings_are_listed(pages: Path, verb: str) -> None:
+    with opened(pages / verb / "report.html") as seen:
+        texts = seen.page.evaluate("[...document.querySelectorAll('img')].map(i => i.alt)")
+        assert all(len(text) > 60 for text in texts)
+        if verb != "summary":
+            listed = seen.page.evaluate("[...document.querySelectorAll('.contents a')].map(a => document.querySelector(a.hash).innerText)")
+            assert listed == seen.page.evaluate("[...document.querySelectorAll('h2[id]')].map(h => h.innerText)")
+            assert len(listed) > 2
+
+
+@pytest.mark.parametrize("verb", ["simulate", "gap", "record"])
+def test_arm_and_robot_move(pages: Path, verb: str) -> None:
+    with opened(pages / verb / "report.html") as seen:
+        film = seen.page.locator(".film")
+        before = film.locator(".stick").last.get_attribute("points")
+        seen.until("before => [...document.querySelectorAll('.film .stick')].pop().getAttribute('points') !== before", before)
+        film.locator("button").click()
+        assert film.locator("button").inner_text() == "Play"
+        assert film.locator(".key").inner_text().split()[:2] == ["robot", "arm"]
+
+
+def test_series_are_zoomed_read_and_switched(pages: Path) -> None:
+    with opened(pages / "simulate" / "report.html", width=1400) as seen:
+        section = seen.page.locator(".series")
+        panel = section.locator(".panels svg").first
+        ticks = panel.locator(".tick.middle").all_text_contents()
+        lines = section.locator("path.line").count()
+        section.get_by_label("simulated").uncheck()
+        assert section.locator("path.line").count() == lines - 4  # two angles and two forces
+        section.get_by_role("button", name="Zoom in").click()
+        zoomed = panel.locator(".tick.middle").all_text_contents()
+        assert zoomed != ticks
+        panel.scroll_into_view_if_needed()
+        box = panel.bounding_box()
+        seen.page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 60)
+        assert re.match(r"\d+\.\d+ s\. shoulder, angle: measured −?\d", section.locator("output").inner_text())
+        seen.page.mouse.down()
+        seen.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
+        seen.page.mouse.up()
+        assert panel.locator(".tick.middle").all_text_contents() not in (ticks, zoomed)
+        panel.dblclick()
+        assert panel.locator(".tick.middle").all_text_contents() == ticks
+
+
+def test_effects_are_switched_on_and_off(pages: Path) -> None:
+    """Of a run its effects by themselves; of a gap the simulation without each named effect."""
+    with opened(pages / "simulate" / "report.html") as seen:
+        before = seen.page.locator("path.line").count()
+        seen.page.get_by_label("effect: coulomb").check()
+        assert seen.page.locator("path.line").count() > before
+    with opened(pages / "gap" / "report.html") as seen:
+        names = seen.page.evaluate("[...document.querySelectorAll('.series input')].map(i => i.value)")
+        assert {"measured", "with the named effects"} < set(names)
+        assert any(name.startswith("without coulomb in joint 2") for name in names)
+        data = json.loads(seen.page.locator(".series script").text_content())
+        force = next(panel for panel in data["panels"] if panel["title"] == "Fy")
+        measured, full, without = (
+            np.array(next(line["values"] for line in force["lines"] if line["name"].startswith(start)), dtype=float)
+            for start in ("measured", "with the named", "without coulomb in joint 2")
+        )
+        known = np.isfinite(measured)
+        assert np.std((full - measured)[known]) < 0.5 * np.std((without - measured)[known])
+
+
+def test_simulated_and_measured_forces_have_one_sign(pages: Path) -> None:
+    """The files hold the force on the robot; the data set around a trial says so."""
+    data = json.loads((pages / "simulate" / "figures" / "live.json").read_text(encoding="utf-8"))["series"]
+    for panel in data["panels"]:
+        if panel["unit"] == "N":
+            measured, simulated = (np.array(line["values"], dtype=float) for line in panel["lines"])
+            assert np.abs(measured - simulated).mean() < 0.1 * np.abs(simulated).mean()
+
+
+def test_a_page_with_scripts_runs_none_but_its_own(pages: Path, tmp_path: Path) -> None:
+    text = (pages / "simulate" / "report.html").read_text(encoding="utf-8")
+    (tmp_path / "added.html").write_text(text.replace("</main>", "<script>document.title = 'ran'</script></main>"), encoding="utf-8")
+    titles: list[str] = []
+    with pytest.raises(AssertionError), opened(tmp_path / "added.html") as seen:
+        titles.append(seen.page.title())
+    assert titles == ["armrs report"]
+
+
+def test_names_in_what_moves_are_text(pages: Path, tmp_path: Path) -> None:
+    """A name that tries to be markup, in the file of what moves and in the JSON beside it."""
+    result = json.loads((pages / "simulate" / "simulated.json").read_text(encoding="utf-8"))
+    live = json.loads((pages / "simulate" / "figures" / "live.json").read_text(encoding="utf-8"))
+    evil = "</script><img src=x onerror=\"document.title='ran'\">"
+    for place in (live["animation"], live["series"], live["animation"]["chains"][0]):
+        place["title" if "title" in place else "name"] = evil
+    for panel in live["series"]["panels"]:
+        panel["title"] += evil
+        panel["lines"][0]["name"] = panel["lines"][0]["colour"] = evil
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "live.json").write_text(json.dumps(live), encoding="utf-8")
+    (tmp_path / "r.json").write_text(json.dumps(result | {"figures": []}), encoding="utf-8")
+    armrs.write_report([tmp_path / "r.json"], tmp_path / "page.html")
+    with opened(tmp_path / "page.html") as seen:
+        assert seen.page.title() == "armrs report"
+        assert seen.page.locator("img").count() == 0
+        assert evil in seen.page.locator(".series h2").inner_text()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda live: live["series"]["panels"][0]["lines"][0]["values"].pop(), "content: found not what a result holds"),
+        (lambda live: live.pop("animation"), "live: found no animation and series"),
+        (lambda live: live["animation"]["chains"][0].pop("points_m"), "content: found not what a result holds"),
+    ],
+)
+def test_what_moves_is_refused_when_it_is_not_whole(pages: Path, tmp_path: Path, change: Any, message: str) -> None:
+    result = json.loads((pages / "simulate" / "simulated.json").read_text(encoding="utf-8"))
+    live = json.loads((pages / "simulate" / "figures" / "live.json").read_text(encoding="utf-8"))
+    change(live)
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "live.json").write_text(json.dumps(live), encoding="utf-8")
+    (tmp_path / "r.json").write_text(json.dumps(result | {"figures": []}), encoding="utf-8")
+    with pytest.raises(armrs.BadInput, match=message):
+        armrs.write_report([tmp_path / "r.json"], tmp_path / "page.html")
+    (tmp_path / "r.json").write_text(json.dumps(result | {"figures": [], "live": "../live.json"}), encoding="utf-8")
+    with pytest.raises(armrs.BadInput, match="outside the folder of the result"):
+        armrs.write_report([tmp_path / "r.json"], tmp_path / "page.html")
+
+
+def test_a_long_line_keeps_its_peaks() -> None:
+    t = np.linspace(0.0, 100.0, 50_001)
+    values = np.where(np.arange(len(t)) == 31_234, 7.0, np.sin(t))
+    thinned = series.series("", "", t, [series.Panel("", "", (series.Line("a", "#000", values),))])
+    line = thinned["panels"][0]["lines"][0]["values"]
+    assert len(line) == len(thinned["t_s"]) <= series.MOST_SAMPLES
+    assert (max(line), min(line)) == (7.0, pytest.approx(-1.0, abs=1e-4))
