@@ -73,6 +73,26 @@ def test_help_loads_the_command_line_alone() -> None:
     assert modules.isdisjoint(HEAVY)
 
 
+def test_only_the_options_of_the_verb_that_runs_are_read(capsys: pytest.CaptureFixture[str]) -> None:
+    """They are a third of what a start costs; the list of verbs and what is said of a name that is none stay those of all."""
+    from typer.main import get_command
+
+    from armrs import cli
+
+    def options(of: str | None) -> dict[str, int]:
+        group = get_command(cli._with_options_of(of))
+        return {name: len(getattr(command, "commands", command.params)) for name, command in group.commands.items()}  # type: ignore[attr-defined]
+
+    whole = get_command(cli.app)
+    names = list(whole.commands)  # type: ignore[attr-defined]
+    assert options(None) == dict.fromkeys(names, 0)
+    for verb in ("identify", "fmu"):
+        assert {name for name, count in options(verb).items() if count} == {verb}
+    assert cli.main(["--help"]) == 0
+    with whole.make_context("armrs", [], resilient_parsing=True) as context:
+        assert capsys.readouterr().out.split() == whole.get_help(context).split()
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "model.toml").write_text(MODEL, encoding="utf-8")

@@ -9,6 +9,7 @@ nothing otherwise.
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import sys
@@ -80,14 +81,32 @@ def _root(
 
 for _verb, _line in _VERBS.items():
     app.command(_verb.__name__.rstrip("_").replace("_", "-"), short_help=_line)(_verb)
-app.add_typer(fmu.app, short_help="Export the arm for other tools; look at a unit, check it.")
+app.add_typer(fmu.app, name="fmu", short_help="Export the arm for other tools; look at a unit, check it.")
+
+
+def _listed_only() -> None:
+    """Stand for a verb that is listed and not run."""
+
+
+def _with_options_of(verb: str | None) -> typer.Typer:
+    """Return the command line with the options of one verb: to read those of all takes a third of the start."""
+    light = copy.copy(app)
+    light.registered_commands = [copy.copy(info) for info in app.registered_commands]
+    for info in light.registered_commands:
+        if info.name != verb:
+            info.callback = _listed_only
+    light.registered_groups = [copy.copy(info) for info in app.registered_groups]
+    for group in light.registered_groups:
+        if group.name != verb:
+            group.typer_instance = typer.Typer()
+    return light
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        command = typer.main.get_command(app)
+        command = typer.main.get_command(_with_options_of(next((word for word in given if not word.startswith("-")), None)))
         # Not `command.main`, which turns some errors into exits of its own.
         with command.make_context("armrs", given or ["--help"], obj=tuple(given)) as context:
             result = command.invoke(context)
