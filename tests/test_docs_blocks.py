@@ -16,6 +16,7 @@ import armrs
 from armrs import cli
 from armrs.io import tomlfile
 from armrs.io.dataset import write_dataset
+from armrs.io.samples import write_samples
 from armrs.workflows import demo
 from test_docs import DOCS, ROOT, blocks
 
@@ -23,7 +24,7 @@ SHELL = ("sh", "text")
 RUN_ELSEWHERE = {
     "tutorial.md": "test_docs.py, in order",
     "files.md": "test_docs.py reads every file that is shown",
-    "firmware.md": "scripts/walkthrough.py, by make crosscheck; test_export_c.py its first commands",
+    "firmware.md": "scripts/walkthrough.py, by make crosscheck; test_export_c.py its first commands; its Python below",
     "index.md": "make demo, which builds",
 }
 """Pages by what runs their blocks; those of all others run here."""
@@ -85,6 +86,23 @@ def test_python_prints_what_its_comments_say(page: str, folder: Path, capsys: py
                 assert told in printed
             ran += 1
     assert ran
+
+
+def test_python_of_the_firmware_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """On two seconds of a log of the demo's arm."""
+    truth = demo.true_model()
+    demo.handed_over(truth).write("identified.toml")
+    moved = armrs.simulate(truth, armrs.Movement(np.radians([[-60, 60], [-30, 20], [-60, 60]]), speed=1.0, acceleration=4.0), rate=1000.0)
+    columns = [moved.t, *moved.q.T, *moved.force_on_arm.T]
+    write_samples(Path("log.csv"), ["t_s", "q1_rad", "q2_rad", "Fy_N", "Fz_N"], columns)
+    shown = [(name, content) for language, name, content in blocks(DOCS / "firmware.md") if language == "python"]
+    assert len(shown) == 2
+    for _, content in shown:
+        exec(compile(content, "firmware.md", "exec"), {})
+        printed = capsys.readouterr().out
+        for said in re.findall(r"^print\(.*\)  # (.*)$", content, flags=re.M):
+            assert said in printed
+    assert "beyond the limit" in printed and Path("replay.html").is_file()
 
 
 def test_python_of_the_gap_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

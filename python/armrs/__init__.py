@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import cosim as cosim
+    from . import online as online
     from ._armrs import Arm as Arm
     from ._armrs import __version__ as __version__
     from .analysis.fitting import SimulationFit as SimulationFit
@@ -128,7 +129,7 @@ _HOMES = {
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
-_MODULES = {"cosim": "cosim", "demo": "workflows.demo", "gap": "workflows.gap", "plotting": "report.plotting"}
+_MODULES = {"cosim": "cosim", "demo": "workflows.demo", "gap": "workflows.gap", "online": "online", "plotting": "report.plotting"}
 """Modules that are of use by themselves; `armrs.demo` loads the module."""
 
 __all__ = sorted(_HOME_OF)

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "DECISIONS",
+    "SAMPLE_STATUSES",
     "AddedMass",
     "Arm",
     "ArmSlave",
@@ -18,6 +20,9 @@ __all__ = [
     "Effect",
     "Joint",
     "Model",
+    "OnlineCompensation",
+    "OnlineEstimator",
+    "OnlineMonitor",
     "ParameterId",
     "ParameterInfo",
     "Rig",
@@ -43,6 +48,7 @@ __all__ = [
     "load_model",
     "look",
     "low_pass_both_ways",
+    "online_settings",
     "play",
     "simulate",
     "simulate_in_pieces",
@@ -51,6 +57,8 @@ __all__ = [
 
 __version__: str
 build_profile: str
+DECISIONS: tuple[str, str, str]
+SAMPLE_STATUSES: list[str]
 
 # ---- what the functions return: these names are there for type checkers alone
 _Array: TypeAlias = NDArray[np.float64]
@@ -291,6 +299,36 @@ class _Firmware(TypedDict):
     force_offset: list[float]
     force_delay: float
     acts_on: list[str]
+
+@type_check_only
+class _OnlineSettings(TypedDict):
+    period: float
+    cutoff: float
+    window: float
+    noise: list[float]
+    dead_band: float
+    range: list[list[float]]
+    fastest: float
+    steepest: float
+    largest_force: float
+    largest_torque: float
+    gate: float
+    frozen_after: float
+    envelope: list[float]
+    forgetting: float
+
+@type_check_only
+class _Replayed(TypedDict):
+    status: NDArray[np.uint8]
+    value: NDArray[np.float64]
+    sd: NDArray[np.float64]
+    decided: NDArray[np.uint8]
+    torque: NDArray[np.float64]
+    torque_sd: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    excess: NDArray[np.float64]
+    age: NDArray[np.float64]
+    restarts: NDArray[np.uint32]
 
 @type_check_only
 class _Literature(TypedDict):
@@ -735,6 +773,39 @@ class Digest:
     def value(self) -> str: ...
 
 @final
+class OnlineEstimator:
+    def __new__(cls, rig: Rig, uncertainty: float, settings: Mapping[str, object]) -> OnlineEstimator: ...
+    def run(
+        self,
+        log: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]],
+        lead: NDArray[np.float64] | None,
+        every: int,
+    ) -> _Replayed: ...
+    def carry(
+        self, time: NDArray[np.float64], q: NDArray[np.float64], qd: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def estimates(self) -> list[tuple[float, float, str]]: ...
+    def health(self) -> tuple[list[float], float, float, int]: ...
+
+@final
+class OnlineCompensation:
+    def __new__(cls, rig: Rig, sd: Sequence[float]) -> OnlineCompensation: ...
+    def carry(
+        self, time: NDArray[np.float64], q: NDArray[np.float64], qd: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+@final
+class OnlineMonitor:
+    def __new__(cls, channels: Sequence[Mapping[str, object]], oldest: int, period: int) -> OnlineMonitor: ...
+    def run(
+        self,
+        times: tuple[NDArray[np.uint64], NDArray[np.uint64]],
+        values: NDArray[np.float64],
+        moving: NDArray[np.bool_],
+    ) -> tuple[int, str, int | None, float, float, int] | None: ...
+    def reset(self) -> None: ...
+
+@final
 class ArmSlave:
     def __new__(cls, rig: Rig, coupling: Mapping[str, object]) -> ArmSlave: ...
     @property
@@ -785,6 +856,7 @@ def distances(
     rivals: Sequence[tuple[str, int, Sequence[float], Sequence[int]]],
 ) -> list[list[float] | None]: ...
 def effects() -> list[_Kind]: ...
+def online_settings(rig: Rig, period: float) -> _OnlineSettings: ...
 def firmware(rig: Rig, uncertainty: float, samples: Sequence[Sequence[float]]) -> _Firmware: ...
 def held_out(
     trials: Sequence[tuple[int, bool, float, list[list[float]] | None, list[bool]]],

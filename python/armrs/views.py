@@ -15,6 +15,7 @@ DRAWN_BY = {
     "Identified": "report.results:IDENTIFIED",
     "PassiveMoments": "report.results:PASSIVE",
     "Plan": "report.results:PLANNED",
+    "Replay": "report.online:REPLAYED",
     "Spasticity": "report.clinic_results:SPASTICITY",
     "Simulated": "report.results:SIMULATED",
     "Swept": "montecarlo.results:SWEPT",

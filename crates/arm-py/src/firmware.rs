@@ -13,8 +13,10 @@ use crate::kernel::joints;
 use crate::rig::Rig;
 
 /// Most effects and unknowns of the C interface.
-const EFFECTS: usize = 12;
-const UNKNOWNS: usize = 18;
+pub const EFFECTS: usize = 12;
+pub const UNKNOWNS: usize = 18;
+/// The equation of motion as the C interface holds it.
+pub type DeviceEquation<const N: usize> = Equation<f64, N, UNKNOWNS, EFFECTS>;
 
 /// What a device is told of a model.
 ///
@@ -42,12 +44,17 @@ pub fn firmware<'py>(
     match &rig.arm.chain {
         AnyChain::Two(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
         AnyChain::Three(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
-        _ => Err(bad_input(
-            "[[arm.segment]]",
-            rig.arm.n_joints(),
-            "2 or 3 segments for firmware",
-        )),
+        _ => Err(too_long(rig)),
     }
+}
+
+/// The refusal of an arm that no device can hold.
+pub fn too_long(rig: &Rig) -> PyErr {
+    bad_input(
+        "[[arm.segment]]",
+        rig.arm.n_joints(),
+        "2 or 3 segments for firmware",
+    )
 }
 
 fn told<'py, const N: usize>(
@@ -57,6 +64,32 @@ fn told<'py, const N: usize>(
     uncertainty: f64,
     samples: &[Vec<f64>],
 ) -> PyResult<Bound<'py, PyDict>> {
+    let (equation, calibration) = device(chain, effects)?;
+    let priors = equation.priors(uncertainty);
+    let used = priors.iter().take(equation.used());
+    let result = PyDict::new(py);
+    result.set_item("values", used.clone().map(|p| p.mean).collect::<Vec<_>>())?;
+    result.set_item("sd", used.map(|p| p.sd).collect::<Vec<_>>())?;
+    let torques = samples.iter().map(|s| torque(&equation, s));
+    result.set_item("torques", torques.collect::<Vec<_>>())?;
+    result.set_item("angle_offset", calibration.angle_offset.to_vec())?;
+    result.set_item("force", calibration.force.map(|row| row.to_vec()).to_vec())?;
+    result.set_item("force_offset", calibration.force_offset.to_vec())?;
+    result.set_item("force_delay", calibration.force_delay)?;
+    let acts = effects.iter().map(|e| match e.kind.acts_on() {
+        ActsOn::Joints => "joints",
+        ActsOn::Arm => "arm",
+        _ => "sensors",
+    });
+    result.set_item("acts_on", acts.collect::<Vec<_>>())?;
+    Ok(result)
+}
+
+/// The equation of motion that a device makes of an arm, with the places of the C interface, and the calibration of the sensors.
+pub fn device<const N: usize>(
+    chain: &Chain<f64, N>,
+    effects: &[Effect<f64>],
+) -> PyResult<(DeviceEquation<N>, Calibration<f64, N>)> {
     if let Some(own) = effects.iter().find(|e| matches!(e.kind, Kind::Own(_))) {
         return Err(refused((
             0,
@@ -81,25 +114,8 @@ fn told<'py, const N: usize>(
         *place = *effect;
         place.on = effect.kind.acts_on() == ActsOn::Joints;
     }
-    let equation = Equation::<f64, N, UNKNOWNS, EFFECTS>::new(arm, kept).map_err(invalid)?;
-    let priors = equation.priors(uncertainty);
-    let used = priors.iter().take(equation.used());
-    let result = PyDict::new(py);
-    result.set_item("values", used.clone().map(|p| p.mean).collect::<Vec<_>>())?;
-    result.set_item("sd", used.map(|p| p.sd).collect::<Vec<_>>())?;
-    let torques = samples.iter().map(|s| torque(&equation, s));
-    result.set_item("torques", torques.collect::<Vec<_>>())?;
-    result.set_item("angle_offset", calibration.angle_offset.to_vec())?;
-    result.set_item("force", calibration.force.map(|row| row.to_vec()).to_vec())?;
-    result.set_item("force_offset", calibration.force_offset.to_vec())?;
-    result.set_item("force_delay", calibration.force_delay)?;
-    let acts = effects.iter().map(|e| match e.kind.acts_on() {
-        ActsOn::Joints => "joints",
-        ActsOn::Arm => "arm",
-        _ => "sensors",
-    });
-    result.set_item("acts_on", acts.collect::<Vec<_>>())?;
-    Ok(result)
+    let equation = Equation::new(arm, kept).map_err(invalid)?;
+    Ok((equation, calibration))
 }
 
 fn off() -> Effect<f64> {
@@ -110,10 +126,7 @@ fn off() -> Effect<f64> {
 }
 
 /// Inverse dynamics in the order of operations of `armrs_inverse_dynamics`.
-fn torque<const N: usize>(
-    equation: &Equation<f64, N, UNKNOWNS, EFFECTS>,
-    sample: &[f64],
-) -> Vec<f64> {
+fn torque<const N: usize>(equation: &DeviceEquation<N>, sample: &[f64]) -> Vec<f64> {
     let at = |k: usize| joints::<f64, N>(&sample[k * N..(k + 1) * N]);
     let (q, qd, qdd) = (at(0), at(1), at(2));
     let [y, z, moment] = [0, 1, 2].map(|k| sample[3 * N + k]);

@@ -12,6 +12,7 @@ mod ident;
 mod kernel;
 mod lab;
 mod model;
+mod online;
 mod own;
 mod plan;
 mod rig;
@@ -48,5 +49,11 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(signal::low_pass_both_ways, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
     m.add_function(wrap_pyfunction!(firmware::firmware, m)?)?;
+    m.add_function(wrap_pyfunction!(online::online_settings, m)?)?;
+    m.add_class::<online::OnlineEstimator>()?;
+    m.add_class::<online::OnlineCompensation>()?;
+    m.add_class::<online::OnlineMonitor>()?;
+    m.add("SAMPLE_STATUSES", online::statuses())?;
+    m.add("DECISIONS", online::DECISIONS)?;
     Ok(())
 }

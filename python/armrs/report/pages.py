@@ -53,6 +53,7 @@ KINDS = {
     "plan": Kind("Plan of an experiment", "plan.html.j2"),
     "history": Kind("Over the sessions", "history.html.j2"),
     "gap": Kind("Gap between model and measurement", "gap.html.j2"),
+    "online replay": Kind("Replay of a device log", "replay.html.j2"),
     "record": Kind("Virtual laboratory", "record.html.j2"),
     "fmu run": Kind("Co-simulation", "fmu_run.html.j2"),
     "sweep": Kind(

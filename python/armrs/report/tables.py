@@ -178,6 +178,22 @@ def coupling_errors(data: Mapping[str, Any]) -> Table:
     return Table(["variable", "estimated error", "allowed", "unit"], rows, left=1)
 
 
+def online(data: Mapping[str, Any]) -> Table:
+    """Return what an online estimator knows of every unknown."""
+    joints = data["data"]["joints"]
+    rows = [
+        [symbol(e["name"]), where(e, joints), number(e["value"], e["std"]), spread(e["std"]), unit(e["unit"]), e["decided_by"]]
+        for e in data["estimates"]
+    ]
+    return Table(["unknown", "joint", "value", "± std", "unit", "decided by"], rows, left=2)
+
+
+def statuses(data: Mapping[str, Any]) -> Table:
+    """Return how many samples became what."""
+    rows = [[name, count, f"{100 * count / data['periods']:.3g}"] for name, count in data["statuses"].items()]
+    return Table(["sample", "control periods", "[%]"], rows)
+
+
 def passive(data: Mapping[str, Any]) -> Table:
     """Return the passive moment of every configuration and joint, averaged over the bins."""
     rows = [

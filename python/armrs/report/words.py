@@ -52,6 +52,7 @@ def verdict(result: Mapping[str, Any]) -> str:
         "passive": _passive,
         "plan": _planned,
         "history": _followed,
+        "online replay": _replayed,
         "record": _recorded,
         "demo": _demo,
         "fmu run": _coupled,
@@ -77,6 +78,16 @@ def _simulated(result: Mapping[str, Any]) -> str:
     return (
         f"{result['duration_s']:.4g} s simulated; the force on the arm reaches {result['largest_force_N']:.4g} N. "
         f"Energy is accounted for to {result['energy']['error_J']:.2g} J."
+    )
+
+
+def _replayed(result: Mapping[str, Any]) -> str:
+    by = [e["decided_by"] for e in result["estimates"]]
+    share = result["untrusted_share"]
+    ending = f" In {100 * share:.3g} % of the recorded states the device would give no carrying torque." if share else ""
+    return (
+        f"Of {result['periods']} control periods {result['refused']} had no sample or one that was refused; "
+        f"{by.count('data')} of {len(by)} unknowns are decided by the data.{ending}"
     )
 
 

@@ -92,9 +92,8 @@ def export_c(
     digest = hashlib.sha256(loaded.to_toml().encode()).hexdigest()
     vectors = _vectors(loaded.n_joints)
     told = _armrs.firmware(_armrs.Rig(loaded), loaded.segment_uncertainty, vectors.tolist())
-    placed = list(zip(loaded.all_effects, told["acts_on"], strict=True))
-    effects = [e for e, acts_on in placed if acts_on != "sensors"]
-    sd = _deviations(loaded, told["sd"], [e for e, acts_on in placed if acts_on == "joints"], identified)
+    effects = [e for e, acts_on in zip(loaded.all_effects, told["acts_on"], strict=True) if acts_on != "sensors"]
+    sd = _deviations(loaded, told, identified)
     parts = _Parts(loaded, precision, digest, told, effects, sd, vectors)
     return FirmwareSource(parts.header(), parts.source(), vectors, np.array(told["torques"]), digest)
 
@@ -110,12 +109,34 @@ def _vectors(joints: int) -> np.ndarray:
     return vectors.astype(np.float32).astype(np.float64)
 
 
-def _deviations(model: Model, prior: list[float], effects: list[Effect], path: str | os.PathLike[str] | None) -> list[float]:
+def standard_deviations(model: Model, identified: str | os.PathLike[str] | None = None) -> list[float]:
+    """Return the standard deviations that `export_c` writes, one an unknown."""
+    return _deviations(model, _told(model), identified)
+
+
+def unknowns_of(model: Model) -> list[tuple[str, int, str]]:
+    """Return name, joint and unit of the unknowns of a device in their order: first and second moments, then parameters of effects."""
+    joints = range(1, model.n_joints + 1)
+    base = [(f"X{j}", j, "kg m") for j in joints] + [(f"J{j}", j, "kg m^2") for j in joints]
+    return base + [(f"{e.kind} {p.name}", e.joint or 1, p.unit) for e, p in _linear(model, _told(model))]
+
+
+def _told(model: Model) -> _Firmware:
+    return _armrs.firmware(_armrs.Rig(model), model.segment_uncertainty, [])
+
+
+def _linear(model: Model, told: _Firmware) -> list[tuple[Effect, Any]]:
+    """Return the effects that stay in the joints with each of their linear parameters."""
+    acting = [e for e, acts_on in zip(model.all_effects, told["acts_on"], strict=True) if acts_on == "joints"]
+    return [(e, p) for e in acting for p in catalogue()[e.kind].parameters if p.linear]
+
+
+def _deviations(model: Model, told: _Firmware, path: str | os.PathLike[str] | None) -> list[float]:
     """Return the standard deviation of each unknown: of the base parameters, then of the linear parameters of the effects."""
     base = 2 * model.n_joints
-    linear = [(e, p) for e in effects for p in catalogue()[e.kind].parameters if p.linear]
+    linear = _linear(model, told)
     if path is None:
-        return [*prior[:base], *(0.0 for _ in linear)]
+        return [*told["sd"][:base], *(0.0 for _ in linear)]
     result = _result(checks.path("identified", path))
     found = [e["std"] for e in result["combinations"]]
     if len(found) != base:

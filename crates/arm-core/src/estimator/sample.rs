@@ -30,6 +30,38 @@ pub enum SampleStatus {
     Refused(Fault),
 }
 
+impl SampleStatus {
+    /// All of them, in the order of the C interface.
+    pub const ALL: [Self; 10] = [
+        Self::Taken,
+        Self::Resting,
+        Self::Settling,
+        Self::Refused(Fault::Missing),
+        Self::Refused(Fault::NotFinite),
+        Self::Refused(Fault::Spike),
+        Self::Refused(Fault::Frozen),
+        Self::Refused(Fault::Unexpected),
+        Self::Refused(Fault::Implausible),
+        Self::Refused(Fault::Restarted),
+    ];
+
+    /// The word for it in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Taken => "taken",
+            Self::Resting => "resting",
+            Self::Settling => "settling",
+            Self::Refused(Fault::Missing) => "missing",
+            Self::Refused(Fault::NotFinite) => "not finite",
+            Self::Refused(Fault::Spike) => "spike",
+            Self::Refused(Fault::Frozen) => "frozen",
+            Self::Refused(Fault::Unexpected) => "unexpected",
+            Self::Refused(Fault::Implausible) => "not possible",
+            Self::Refused(Fault::Restarted) => "restarted",
+        }
+    }
+}
+
 impl<T: Real, const N: usize> Sample<T, N> {
     /// Whether all that was measured is finite.
     pub(super) fn finite(&self) -> bool {
