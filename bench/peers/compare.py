@@ -14,6 +14,7 @@ import os
 import platform
 import subprocess
 import sys
+import time
 from importlib import metadata
 from pathlib import Path
 
@@ -29,7 +30,14 @@ PACKAGES = ("numpy", "scipy", "numba", "mujoco", "pin")
 
 def versions(peers: dict[str, Peer]) -> dict[str, str]:
     """Return what was compared, and on what."""
-    found = {"Python": platform.python_version(), "machine": platform.machine(), "cores": str(os.cpu_count())}
+    found = {
+        "date": time.strftime("%Y-%m-%d"),
+        "Python": platform.python_version(),
+        "machine": platform.machine(),
+        "cores": str(os.cpu_count()),
+    }
+    if hasattr(os, "getloadavg"):
+        found["load at the end, this run included"] = f"{os.getloadavg()[0]:.1f}"
     installed = {entry.metadata["Name"].lower(): entry.version for entry in metadata.distributions()}
     found |= {name: installed.get(name, "not installed") for name in PACKAGES}
     compiler = subprocess.run(["c++", "--version"], capture_output=True, text=True, check=False) if "limit" in peers else None
