@@ -12,6 +12,9 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.errors import BadInput, BadInputs
+from armrs.io.raw import RawTable
+from armrs.io.raw.table import column
+from armrs.workflows.importing import trials
 
 SEGMENTS = (armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165), armrs.Segment("forearm", 0.264, 1.264, 0.121, 0.0074))
 JOINTS = (armrs.Joint("shoulder", stiffness=0.6, rest=-0.9, viscosity=0.15), armrs.Joint("elbow", stiffness=0.4, rest=0.7, viscosity=0.1))
@@ -76,7 +79,9 @@ def german_excel(r: Recording, folder: Path) -> Path:
     return _excel(folder / "langsam_1.xlsx", names, values, units=["ms", "°", "°", "N", "N"], above=["Proband 7", "rechter Arm"])
 
 
-def _excel(path: Path, names: list[str], values: np.ndarray, units: list[str] | None = None, above: list[str] | None = None) -> Path:
+def _excel(
+    path: Path, names: list[str], values: np.ndarray | list[list[str]], units: list[str] | None = None, above: list[str] | None = None
+) -> Path:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     for line in above or []:
@@ -84,7 +89,7 @@ def _excel(path: Path, names: list[str], values: np.ndarray, units: list[str] | 
     book.active.append(names)
     if units:
         book.active.append(units)
-    for row in values.tolist():
+    for row in values.tolist() if isinstance(values, np.ndarray) else values:
         book.active.append(row)
     book.save(path)
     return path
@@ -137,6 +142,21 @@ def motion_file(r: Recording, folder: Path) -> Path:
     return write_text(path, names, values, sep="\t", above=head)
 
 
+def saved_again(r: Recording, folder: Path) -> Path:
+    """A motion file that a spreadsheet program saved: commas between the cells, and after the lines of the header."""
+    path = motion_file(r, folder)
+    head, _, rows = path.read_text().partition("endheader\n")
+    lines = [*(line + ",,,," for line in (*head.splitlines(), "endheader")), *rows.replace("\t", ",").splitlines()]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def numbers_as_text(r: Recording, folder: Path) -> Path:
+    names, values = table(r, names=["Zeit", "Schulter", "Ellbogen", "Kraft y", "Kraft z"], t=1e3, angle=DEGREE)
+    rows = [[f"{x:.12g}".replace(".", ",") for x in row] for row in values.tolist()]
+    return _excel(folder / "langsam_1.xlsx", names, rows, units=["ms", "°", "°", "N", "N"], above=["Proband 7"])
+
+
 def parquet(r: Recording, folder: Path) -> Path:
     from armrs.io.samples import write_samples
 
@@ -182,6 +202,8 @@ CASES: dict[str, tuple[Writer, dict[str, object], float]] = {
     "German spreadsheet": (german_spreadsheet, {}, 1e-7),
     "US Excel": (us_excel, {}, 1e-12),
     "German Excel with a row of units": (german_excel, {}, 1e-12),
+    "Excel with numbers as text": (numbers_as_text, {}, 1e-10),
+    "OpenSim storage that a spreadsheet saved": (saved_again, {}, 0.0),
     "MATLAB 5": (matlab_5, {}, 0.0),
     "MATLAB 7.3": (matlab_7_3, {}, 0.0),
     "C3D with analogs": (c3d_with_analogs, {"points": ("SHO", "ELB", "HAND")}, 3e-6),
@@ -251,6 +273,7 @@ HOPELESS: dict[str, tuple[Writer, str]] = {
     "one force": (text(names=["t_s", "q1_rad", "q2_rad", "Fy_N", "other"]), "no column for Fz"),
     "an angle in newtons": (text(names=["t_s", "q1 [N]", "q2_rad", "Fy_N", "Fz_N"]), "a unit of angle for q1"),
     "two shoulders": (text(names=["t_s", "shoulder_rad", "shoulder [rad]", "Fy_N", "Fz_N"]), "one column for q1"),
+    "markers without their names": (c3d_with_analogs, "shoulder to handle, of SHO, ELB, HAND"),
     "words": (lambda r, folder: _written(folder / "slow_1.csv", b"hello\nworld\n"), "no block of rows"),
     "a picture": (lambda r, folder: _written(folder / "slow_1.csv", b"\x89PNG\r\n\x1a\n\0\0\0" * 20), "binary data"),
     "no workbook": (lambda r, folder: _written(folder / "slow_1.xlsx", b"PK\x03\x04 broken"), "no readable workbook"),
@@ -301,6 +324,51 @@ def test_all_problems_are_said_at_once(recording: Recording, tmp_path: Path, cap
     assert cli.main(["import", str(path), "--model", str(tmp_path / "model.toml"), "-o", str(tmp_path / "session")]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) >= 3 and all(line.startswith("armrs: ") for line in lines)
+
+
+def test_the_name_of_a_movement_keeps_its_letters(recording: Recording) -> None:
+    """`shoulder 1` was the movement `shoulde`."""
+    expected = {
+        "shoulder 1": ("shoulder", 1),
+        "fast2": ("fast", 2),
+        "Schulter_r3": ("schulter", 3),
+        "slow trial 04": ("slow", 4),
+        "run7": ("movement", 7),
+    }
+    columns = tuple(
+        column(name, values) for name, values in zip(SI, np.column_stack([recording.t, recording.q, recording.q]).T, strict=True)
+    )
+    named, left, _ = trials.arrange([RawTable(Path(f"{title}.csv"), title, columns, ()) for title in expected])
+    assert [(n.configuration, n.repeat) for n in named] == list(expected.values()) and not left
+
+
+def test_sheets_of_a_workbook_are_trials_by_their_titles(recording: Recording, tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["subject 7, right arm"])
+    names, values = table(recording, names=["Zeit [ms]", "Schulter [°]", "Ellbogen [°]", "Kraft y [N]", "Kraft z [N]"], t=1e3, angle=DEGREE)
+    for title in ("Schulter 1", "Schulter 2", "Ellbogen 1"):
+        sheet = book.create_sheet(title)
+        for row in (names, *values.tolist()):
+            sheet.append(row)
+    book.save(tmp_path / "Messung.xlsx")
+    done = armrs.import_recordings([tmp_path / "Messung.xlsx"], tmp_path / "set", model=KNOWN)
+    assert [(t.configuration, t.repeat) for t in done.recipe.trials] == [("schulter", 1), ("schulter", 2), ("ellbogen", 1)]
+    assert done.notes[0] == "sheets 'Schulter 1', 'Schulter 2', 'Ellbogen 1'; no table in 'Sheet'"
+    again = armrs.import_recordings([done.folder / "import.toml"], tmp_path / "again", model=KNOWN)
+    assert [t.configuration for t in again.recipe.trials] == ["schulter", "schulter", "ellbogen"]
+
+
+def test_a_model_of_more_joints_than_were_recorded(recording: Recording, tmp_path: Path) -> None:
+    arm = armrs.initialise(tmp_path / "subject", body_mass=78.0, height=1.80, sex="male")
+    with pytest.raises(
+        BadInput, match=r"found angles of 2 joints, allowed 3, as the model has \(a model of 2: armrs init --lengths-m \?,\?"
+    ):
+        armrs.import_recordings([text()(recording, tmp_path)], tmp_path / "set", model=arm.model)
+    two = armrs.initialise(tmp_path / "two", body_mass=78.0, height=1.80, sex="male", lengths=(None, None)).model.segments
+    assert sum(s.mass for s in two) == pytest.approx(sum(s.mass for s in arm.model.segments))
+    _, other, hand = arm.model.segments
+    assert two[1].mass * two[1].com == pytest.approx(other.mass * other.com + hand.mass * (other.length + hand.com))
 
 
 def test_repeats_that_are_counted_from_zero(recording: Recording, tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from typing import Any
 from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io import files
-from ..model import Joint, Model, Segment
+from ..model import Joint, Model, Segment, Subject
+from .experiment import literature_arm
 
 SEGMENTS = ("upper arm", "forearm", "hand")
 JOINTS = ("shoulder", "elbow", "wrist")
@@ -168,6 +169,7 @@ def initialise(
     Notes
     -----
     No joint has a law: stiffness, damping and friction are unknown, and belong to what `identify` and `gap` find.
+    With two lengths the hand belongs to the forearm, which then reaches from elbow to handle.
     """
     target = files.output_folder(folder)
     checks.flag("replace", replace)
@@ -177,10 +179,12 @@ def initialise(
             raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)
     expected = segment_expectations(body_mass, height, sex, lengths)
     segments = tuple(e.segment() for e in expected)
+    if len(lengths) == len(SEGMENTS) - 1:
+        segments, _ = literature_arm(Subject(body_mass, height, sex), list(lengths))
     model = Model(segments, tuple(Joint(name) for name in JOINTS[: len(segments)]), segment_uncertainty=UNCERTAINTY)
     for item in worn:
         model = model.with_mass(item.segment, item.mass, item.at)
-    assumed = _assumed(expected, lengths, worn)
+    assumed = _assumed(segments, expected, lengths, worn)
 
     def write(part: Path) -> list[Path]:
         files.write_text(part / "model.toml", _model_text(model, assumed), kind=".toml")
@@ -191,17 +195,27 @@ def initialise(
     return Initialised(target, model, assumed)
 
 
-def _assumed(expected: Sequence[Expected], lengths: Sequence[float | None], worn: Sequence[Worn]) -> tuple[str, ...]:
+def _assumed(
+    segments: Sequence[Segment], expected: Sequence[Expected], lengths: Sequence[float | None], worn: Sequence[Worn]
+) -> tuple[str, ...]:
     lines = []
-    for e, measured in zip(expected, lengths, strict=True):
+    for s, e, measured in zip(segments, expected, lengths, strict=True):
         source = "measured" if measured is not None else "scaled with height"
+        mass, com = (f" ± {e.mass[1]:.3f}", f" ± {e.com[1]:.3f}") if s.name == e.name else ("", "")
         lines.append(
-            f"{e.name}: length {e.length:.3f} m ({source}), mass {e.mass[0]:.3f} ± {e.mass[1]:.3f} kg, "
-            f"centre of mass {e.com[0]:.3f} ± {e.com[1]:.3f} m from its joint"
+            f"{s.name}: length {s.length:.3f} m ({source}), mass {s.mass:.3f}{mass} kg, centre of mass {s.com:.3f}{com} m from its joint"
         )
     lines += [f"{SEGMENTS[w.segment - 1]}: {w.mass:g} kg worn at {'its end' if w.at is None else f'{w.at:g} m'}" for w in worn]
     lines.append(f"masses, centres of mass and inertias are uncertain by {100 * UNCERTAINTY:.0f} % (one standard deviation)")
-    lines.append("the hand is counted to the third knuckle; the grip is neutral (thumb up)")
+    if len(segments) == len(SEGMENTS) - 1:
+        lines.append(
+            "the hand belongs to the forearm, which reaches from the elbow to the handle; three lengths make it a segment of its own"
+        )
+    elif len(segments) == len(SEGMENTS):
+        lines.append(
+            "the hand is a segment of its own, counted to the third knuckle; two lengths (--lengths-m ?,?) make an arm without a wrist"
+        )
+    lines.append("the grip is neutral (thumb up)")
     lines.append("joint laws are unknown: stiffness, damping and friction are left to be identified")
     return tuple(lines)
 

@@ -36,18 +36,20 @@ def read_workbook(path: Path) -> list[RawTable]:
         book.close()
     except Exception as error:  # openpyxl raises what zip, XML and its own parts raise
         raise BadInput("file", Text(f"no readable workbook ({error})"), "an Excel workbook (.xlsx)") from None
-    tables = {title: table for title, rows in sheets.items() if (table := _table(path, title, rows)) is not None}
+    tables = {title: table for title, rows in sheets.items() if (table := _table(path, rows)) is not None}
     if not tables:
         raise BadInput("file", Text(f"no table of numbers in {', '.join(sheets)}"), "a sheet with one row a sample")
-    if len(tables) == 1:
-        (only,) = tables.values()
-        return [RawTable(path, path.stem, only.columns, only.notes)]
-    return list(tables.values())
+    left = [repr(title) for title in sheets if title not in tables]
+    said = f"{'sheets' if len(tables) > 1 else 'sheet'} {', '.join(map(repr, tables))}" + (
+        f"; no table in {', '.join(left)}" if left else ""
+    )
+    titled = [(path.stem if len(tables) == 1 else f"{path.stem} {title}", table) for title, table in tables.items()]
+    return [RawTable(path, title, table.columns, (said, *table.notes)) for title, table in titled]
 
 
-def _table(path: Path, title: str, rows: list[list[Any]]) -> RawTable | None:
+def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
     """Return the table of a sheet: the longest run of rows with two numbers or more, and the words above it."""
-    numeric = [sum(isinstance(cell, (int, float)) and not isinstance(cell, bool) for cell in row) >= 2 for row in rows]
+    numeric = [_is_sample(row) for row in rows]
     start, end = _longest(numeric)
     if end - start < _FEWEST:
         return None
@@ -66,10 +68,16 @@ def _table(path: Path, title: str, rows: list[list[Any]]) -> RawTable | None:
             columns.append(column(label, values, units[k].strip("[]() ")))
         elif any(cell is not None for cell in cells):
             dropped.append(label)
-    notes = [f"sheet {title!r}"]
-    if dropped:
-        notes.append(f"left out, since they hold no numbers: {', '.join(dropped)}")
-    return RawTable(path, f"{path.stem} {title}", tuple(columns), tuple(notes))
+    notes = [f"left out, since they hold no numbers: {', '.join(dropped)}"] if dropped else []
+    return RawTable(path, path.stem, tuple(columns), tuple(notes))
+
+
+def _is_sample(row: list[Any]) -> bool:
+    """Whether a row holds two numbers or more; numbers that are text count where the row begins with one."""
+    if sum(isinstance(cell, (int, float)) and not isinstance(cell, bool) for cell in row) >= 2:
+        return True
+    filled = [_number(cell) for cell in row if cell is not None and cell != ""]
+    return sum(np.isfinite(filled)) >= 2 and bool(np.isfinite(filled[0]))
 
 
 def _words(row: list[Any], width: int) -> list[str]:

@@ -179,12 +179,18 @@ def _decided(
     tables = _tables(paths, points, problems)
     mapped_tables = [_renamed(table, mapped) for table in tables]
     named, left, roles = trials.arrange(mapped_tables)
-    if not named and not problems:
+    markers = next((p for p in paths if p.suffix.lower() == ".c3d" and not points), None)
+    if not named and not problems and markers is not None:
+        names = list(dict.fromkeys(c.label.rpartition(".")[0] for t in tables for c in t.columns if c.label.endswith((".x", ".y", ".z"))))
+        problems.append(
+            BadInput("--points", Text("nothing"), f"the markers of the joints, shoulder to handle, of {', '.join(names)}", file=markers)
+        )
+    elif not named and not problems:
         found = Text(f"columns {', '.join(repr(c.name) for c in tables[0].columns[:12])}")
         problems.append(BadInput("columns", found, "an angle of every joint", file=tables[0].path, hint="--map q1=COLUMN,q2=COLUMN"))
-    problems += [BadInput("file", Text("neither angles nor forces of a trial"), "a recording", file=t.path) for t in left]
     if not named:
         raise BadInputs.of(problems)
+    problems += [BadInput("file", Text("neither angles nor forces of a trial"), "a recording", file=t.path) for t in left]
     channels = columns.guess([n.table for n in named], _present(mapped, named[0].table), problems)
     force_tables = [n.forces for n in named if n.forces is not None]
     if force_tables:
@@ -257,7 +263,14 @@ def _plane(channels: list[Channel]) -> tuple[list[Channel], list[str]]:
 def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, problems: list[BadInput]) -> None:
     symbols = {c.symbol for c in channels}
     offered = ", ".join(repr(c.name) for c in table.columns)
-    needed = ["t", *(f"q{j}" for j in range(1, n_joints + 1))]
+    angles = [f"q{j}" for j in range(1, n_joints + 1)]
+    there = [symbol for symbol in angles if symbol in symbols]
+    if 0 < len(there) < n_joints and there == angles[: len(there)]:
+        found, allowed = Text(f"angles of {len(there)} joints"), f"{n_joints}, as the model has"
+        hint = f"a model of {len(there)}: armrs init --lengths-m {','.join('?' * len(there))}; or --map {angles[len(there)]}=COLUMN"
+        problems.append(BadInput("columns", found, allowed, file=table.path, hint=hint))
+        angles = there
+    needed = ["t", *angles]
     if symbols & {"Fy", "Fz"} or not any(s.startswith("tau") for s in symbols):
         needed += ["Fy", "Fz"]
     for symbol in needed:

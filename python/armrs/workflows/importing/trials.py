@@ -9,7 +9,10 @@ from dataclasses import dataclass
 from ...io.raw import RawTable
 from .columns import symbol_of, words
 
-_REPEAT = re.compile(r"^(?P<name>.*?)[\s_\-.]*(?:trial|rep|repeat|run|take|wdh|nr|no|t|r)?[\s_\-.#]*(?P<number>\d+)$", flags=re.IGNORECASE)
+_REPEAT = re.compile(
+    r"^(?P<name>.*?)[\s_\-.]*(?:(?<![^\W\d_])(?:trial|rep|repeat|run|take|wdh|nr|no|t|r))?[\s_\-.#]*(?P<number>\d+)$", flags=re.IGNORECASE
+)
+"""A name and the number of a repeat; a word for the number is a word of its own: `shoulder 1` is no `shoulde`."""
 _TEST = {"test", "holdout", "validation"}
 _FORCE_WORDS = {"force", "forces", "kraft", "kraefte", "krafte", "ft", "loadcell", "sensor"}
 _FEWEST = 3
@@ -36,7 +39,7 @@ def arrange(tables: Sequence[RawTable]) -> tuple[list[Named], list[RawTable], st
     placed: list[tuple[RawTable, str, int, bool]] = []
     counts: dict[str, int] = {}
     used: set[tuple[str, int]] = set()
-    split = [_split(table.title) for table in with_angles]
+    split = [_split(title) for title in _titles(with_angles)]
     from_zero = {name for name, number in split if number == 0}
     for table, (name, number) in zip(with_angles, split, strict=True):
         if number is not None and name in from_zero:
@@ -67,6 +70,13 @@ def arrange(tables: Sequence[RawTable]) -> tuple[list[Named], list[RawTable], st
 def _has(table: RawTable, start: str) -> bool:
     symbols = (symbol_of(c) for c in table.columns)
     return any(s is not None and s.startswith(start) and not s.startswith("qr") for s in symbols)
+
+
+def _titles(tables: Sequence[RawTable]) -> list[str]:
+    """Return the titles, those of one workbook's sheets without the name of the workbook."""
+    if len({t.path for t in tables}) == 1 and len(tables) > 1:
+        return [t.title.removeprefix(t.path.stem).strip() or t.title for t in tables]
+    return [t.title for t in tables]
 
 
 def _split(title: str) -> tuple[str, int | None]:
