@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from armrs import cli
 from armrs.report import series
 from armrs.workflows import demo
 from browser import opened
-from test_docs import DOCS, blocks
+from test_cohort import population, table
+from test_docs import DOCS, ROOT, blocks
 
 A4 = {"width": 718, "height": 1047}
 """Within margins of 1 cm, in CSS pixels."""
@@ -30,12 +32,17 @@ def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (out / "EXPERIMENT.toml").write_text(experiment, encoding="utf-8")
     for verb, *arguments in (
         ["simulate", truth, "--trial", trial],
-        ["identify", str(slow_arm), "--with", "coulomb"],
+        ["identify", str(slow_arm), "--with", "coulomb", "--history", str(out / "history.sqlite"), "--date", "2026-01-02"],
+        ["identify", str(slow_arm), "--with", "coulomb", "--history", str(out / "history.sqlite"), "--date", "2026-02-02"],
         ["passive", str(slow_arm)],
         ["record", str(out / "EXPERIMENT.toml")],
         ["plan", truth, "--angles-deg=-80:-20,30:90", "--evaluations", "20"],
     ):
         assert cli.main([verb, *arguments, "-o", str(out / verb)]) in (0, 1)
+    source = table(out / "cohort.csv", population(np.random.default_rng(3), 12, 2, 1.0, "a"))
+    assert cli.main(["cohort", str(source), "-o", str(out / "cohort")]) == 0
+    shutil.copytree(ROOT / "examples" / "cosim", out / "cosim")
+    assert cli.main(["fmu", "run", str(out / "cosim" / "wall.toml"), "-o", str(out / "fmu")]) == 0
     result = armrs.find_gap(demo.measure_two_speeds(demo.true_model()), separate=False)
     (out / "gap").mkdir()
     result.report(out / "gap" / "report.html")
@@ -46,7 +53,9 @@ def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-EVERY = ["simulate", "identify", "passive", "record", "plan", "gap", "summary", "both"]
+EVERY = ["simulate", "identify", "passive", "record", "plan", "gap", "cohort", "fmu", "summary", "both"]
+WIDER = "[...document.querySelectorAll('.wide')].filter(e => e.scrollWidth > e.clientWidth).map(e => e.innerText)"
+"""Tables that must be scrolled."""
 
 
 def violations(page: Any) -> list[str]:
@@ -58,18 +67,24 @@ def violations(page: Any) -> list[str]:
 def test_axe_core_finds_nothing_and_nothing_is_wider_than_the_window(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html", width=1400) as seen:
         assert violations(seen.page) == []
+        seen.page.set_viewport_size({"width": 1200, "height": 800})
+        assert seen.page.evaluate(WIDER) == []
         seen.page.emulate_media(color_scheme="dark")
         assert violations(seen.page) == []
         seen.page.set_viewport_size({"width": 390, "height": 800})
         assert violations(seen.page) == []
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= 390
+        if verb == "summary":
+            assert seen.page.evaluate(WIDER) == []
 
 
 @pytest.mark.parametrize("verb", EVERY)
 def test_nothing_is_cut_on_a4(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html") as seen:
-        seen.page.emulate_media(media="print")
+        seen.page.emulate_media(media="print", color_scheme="dark")
         seen.page.set_viewport_size(A4)
+        assert seen.page.evaluate("getComputedStyle(document.body).color") == "rgb(29, 31, 35)"  # dark on paper, whatever the screen is
+        assert seen.page.evaluate(WIDER) == []
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= A4["width"]
         parts = "[...document.querySelectorAll('figure, tr, .panels svg')]"
         assert seen.page.evaluate(f"{parts}.every(e => getComputedStyle(e.closest('figure, table, svg')).breakInside === 'avoid')")
@@ -85,6 +100,21 @@ def test_pictures_say_what_is_seen_and_headings_are_listed(pages: Path, verb: st
             listed = seen.page.evaluate("[...document.querySelectorAll('.contents a')].map(a => document.querySelector(a.hash).innerText)")
             assert listed == seen.page.evaluate("[...document.querySelectorAll('h2[id]')].map(h => h.innerText)")
             assert len(listed) > 2
+
+
+@pytest.mark.parametrize("verb", ["identify", "passive", "plan", "gap"])
+def test_a_sketch_of_the_arm_heads_the_report(pages: Path, verb: str) -> None:
+    with opened(pages / verb / "report.html") as seen:
+        first = seen.page.evaluate("document.querySelector('img, h2').outerHTML.slice(0, 400)")
+        assert first.startswith("<img") and "arm" in first
+
+
+@pytest.mark.parametrize("verb", EVERY)
+def test_no_number_has_ten_digits(pages: Path, verb: str) -> None:
+    with opened(pages / verb / "report.html") as seen:
+        seen.page.evaluate("document.querySelectorAll('code').forEach(e => e.remove())")
+        cells = seen.page.evaluate("[...document.querySelectorAll('p, li, td, th, figcaption')].map(e => e.innerText)")
+        assert [cell for cell in cells if re.search(r"\d[\d.]{9,}", cell)] == []
 
 
 @pytest.mark.parametrize("verb", ["simulate", "gap", "record"])

@@ -11,6 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from armrs import plotting
+from armrs.io.trial import Trial
+from armrs.report.sketch import sketch
+from armrs.workflows import demo
 
 T = np.linspace(0.0, 2.0, 101)
 
@@ -159,3 +162,19 @@ def test_the_palette_tells_neighbours_apart_in_grey() -> None:
     """The first colours differ in lightness, for prints without colour."""
     light = [np.dot(matplotlib.colors.to_rgb(c), [0.2126, 0.7152, 0.0722]) for c in plotting.CYCLE[:2]]
     assert abs(light[0] - light[1]) > 0.2
+
+
+@pytest.mark.parametrize("count", [1, 4, 11])
+def test_names_above_the_sketch_cross_neither_arm_nor_robot(count: int, ax: matplotlib.axes.Axes) -> None:
+    model = demo.true_model()
+    t = np.array([0.0, 0.02, 0.04])
+    q, robot_q = np.tile(np.radians([-40.0, 60.0]), (3, 1)), np.tile(np.radians([120.0, 90.0]), (3, 1))
+    trial = Trial("a.csv", "a", 1, "fit", t, q, np.zeros((3, 2)), None, robot_q)
+    sketch(model, [trial], {("joint", 0)}, [(f"1  shoulder: coulomb torque 0.1385 ± 0.0013 N m, {k}", "black") for k in range(count)], ax)
+    ax.get_figure().draw_without_rendering()
+    boxes = [text.get_window_extent() for text in ax.texts if len(text.get_text()) > 2]
+    assert len(boxes) == count + 1  # and that of the robot
+    for line in ax.lines:
+        if line.get_alpha() is None and len(line.get_xdata()) > 1:
+            path = line.get_path().transformed(line.get_transform())
+            assert not any(path.intersects_bbox(box, filled=False) for box in boxes)

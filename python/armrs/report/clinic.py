@@ -71,7 +71,14 @@ SLOW = (
         "N m per 10°",
         math.pi / 18.0,
     ),
-    Quantity("passive", "range", "Range moved through", "how far the joint was moved, no test of how far it can go", "°", 180.0 / math.pi),
+    Quantity(
+        "passive",
+        "range",
+        "Range moved through",
+        "how far the joint was moved in one movement, no test of how far it can go",
+        "°",
+        180.0 / math.pi,
+    ),
 )
 """What slow movements say of a joint."""
 Key = tuple[str, str, int]
@@ -355,6 +362,8 @@ def words_of(line: Line) -> list[str]:
         usual += {"within": ", usual", "not clear": ", not clear"}.get(line.beside_norm, f", {line.beside_norm} it")
     value = "not measured" if line.value is None else _number(line.value, line)
     between = "" if line.interval is None else f"{_number(line.interval[0], line)} to {_number(line.interval[1], line)}"
+    if between == f"{value} to {value}":
+        between = ""
     if line.at_limit and line.interval is not None:
         value, between = "none seen", f"at most {_number(line.interval[1], line)}"
     return [line.joint, f"{line.quantity.title} [{line.quantity.unit}]", value, between, usual, line.trend or ""]
@@ -384,13 +393,17 @@ def _number(value: float, line: Line | None = None) -> str:
     """Write a number with two digits of its uncertainty, or three of its own."""
     width = 0.0 if line is None or line.interval is None else 0.25 * (line.interval[1] - line.interval[0])
     size = width if width > 0.0 else 0.1 * abs(value)
-    decimals = 0 if size <= 0.0 else min(max(1 - math.floor(math.log10(size)), 0), 3)
+    finest = 3 if line is None or line.quantity.unit != "°" else 1
+    decimals = 0 if size <= 0.0 else min(max(1 - math.floor(math.log10(size)), 0), finest)
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
 def _picture(lines: Sequence[Line]) -> html.Picture | None:
     """Draw every quantity with its interval, one panel each, the usual range behind."""
-    shown = [q for q in (*QUANTITIES, *SLOW) if any(line.quantity is q and line.value is not None for line in lines)]
+    # How far a joint was moved was chosen: the table says it.
+    shown = [
+        q for q in (*QUANTITIES, *SLOW) if q.parameter != "range" and any(line.quantity is q and line.value is not None for line in lines)
+    ]
     if not shown:
         return None
     with plotting.style():

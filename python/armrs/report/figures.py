@@ -20,6 +20,7 @@ from ..workflows.plan import MOST_UNCERTAIN
 from ..workflows.simulate import Run, Simulated
 from . import plotting, tables
 from .animation import points
+from .sketch import sketch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,8 +69,30 @@ def identified(result: Identified, data: Mapping[str, Any]) -> Figures:
     """Return the figures of an identification: parameters with intervals, and torques measured and fitted for every movement."""
     joints = data["data"]["joints"]
     names = list(dict.fromkeys(e.trial.configuration for e in result.explained))[:MOST_CONFIGURATIONS]
-    first: Figures = {"parameters": partial(parameters, [*data["parameters"], *data["combinations"]], joints, data["level"])}
+    first: Figures = {
+        "arm": partial(_arm, result.model, [e.trial for e in result.explained], _measured_in_joints(data, joints)),
+        "parameters": partial(parameters, [*data["parameters"], *data["combinations"]], joints, data["level"]),
+    }
     return {**first, **{f"torques-{slug(name)}": partial(_torques, result, name, joints) for name in names}}
+
+
+def _measured_in_joints(data: Mapping[str, Any], joints: Sequence[str]) -> list[tuple[int, str]]:
+    """Return what the measurement says of each joint: its number, and words."""
+    items = [p for p in data["parameters"] if p["joint"] and p["kind"] not in ("segment", "combination") and p["decided_by"] == "data"]
+    return [
+        (p["joint"], f"{joints[p['joint'] - 1]}: {tables.label(p)} {tables.number(p['value'], p['std'])} ± {tables.spread(p['std'])} "
+         f"{tables.unit(p['unit'])}") for p in items
+    ]  # fmt: skip
+
+
+def _arm(model: Model, trials: Sequence[Trial], measured: Sequence[tuple[int, str]]) -> Drawn:
+    """Draw the arm with what was measured where it acts."""
+    figure = plotting.figure(7.0, 3.2 + 0.2 * min(len(measured), 11))
+    marked = {("joint", joint - 1) for joint, _ in measured}
+    sketch(model, trials, marked, [(f"{joint}  {said}", plotting.INK) for joint, said in measured], figure.subplots())
+    seen = "; ".join(said for _, said in measured[:MOST_CONFIGURATIONS]) or "no law of a joint rests on the measurement"
+    text = f"The arm in the middle of its movements, g is the direction of gravity. Marked joints are those with a measured law: {seen}."
+    return Drawn("arm", "The arm", text, figure, "first")
 
 
 def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level: float) -> Drawn:
@@ -98,8 +121,8 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
 
 
 def history(courses: Sequence[Mapping[str, Any]]) -> Figures:
-    """Return the figure of a history; nothing where no parameter was followed."""
-    return {"history": partial(_history, courses)} if courses else {}
+    """Return the figure of a history; nothing where no parameter was followed over two sessions."""
+    return {"history": partial(_history, courses)} if any(len(c["dates"]) > 1 for c in courses) else {}
 
 
 def _history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
@@ -142,10 +165,14 @@ def _movements(movements: Sequence[Mapping[str, Any]], model: Model) -> Drawn:
         waypoints = np.radians(np.asarray(movement["waypoints_deg"], dtype=float))
         legs = [np.linspace(a, b, 25) for a, b in itertools.pairwise(waypoints)]
         hand = points(model, np.concatenate(legs))[:, -1]
-        for k, pose in enumerate(points(model, waypoints)):
+        poses = points(model, waypoints)
+        for k, pose in enumerate(poses):
             shade = plotting.shade(k / max(1, len(waypoints) - 1))
             ax.plot(*pose.T, color=shade, lw=2.2, marker="o", ms=4, solid_capstyle="round")
-            ax.annotate(str(k + 1), pose[-1], xytext=(5, 3), textcoords="offset points", fontsize=9)
+            here = [n for n, other in enumerate(poses) if np.hypot(*(other[-1] - pose[-1])) < 0.01]
+            if k == here[0]:
+                numbers = ", ".join(str(n + 1) for n in here)
+                ax.annotate(numbers, pose[-1], xytext=(5, 3), textcoords="offset points", fontsize=9)
         ax.plot(*hand.T, color=plotting.GREY, lw=1.0, ls="--")
         ax.set(title=f"movement {number}", xlabel="forward, y [m]", ylabel="up, z [m]" if (number - 1) % columns == 0 else "")
         ax.set_aspect("equal", adjustable="box", anchor="C")
@@ -156,7 +183,7 @@ def _movements(movements: Sequence[Mapping[str, Any]], model: Model) -> Drawn:
         "The arm at the waypoints of each movement, numbered in their order, from dark to bright; the dashed line is the way of the hand. "
         "Joints move together between two waypoints."
     )
-    return Drawn("movements", "The movements", text, figure)
+    return Drawn("movements", "The movements", text, figure, "first")
 
 
 def _planned(predictions: Sequence[Mapping[str, Any]], joints: Sequence[str], compared: Mapping[str, Any] | None) -> Drawn:
@@ -308,8 +335,18 @@ def passive(result: PassiveMoments) -> Figures:
     """Return the figures of passive moments: one a configuration, and one for each joint that depends on its neighbour."""
     names = [joint.name for joint in result.dataset.model.joints]
     configurations = list(dict.fromkeys(c.configuration for c in result.curves))[:MOST_CONFIGURATIONS]
-    first: Figures = {f"passive-{slug(name)}": partial(_hysteresis, result, name, names) for name in configurations}
+    widths: dict[int, list[float]] = {}
+    for c in result.curves:
+        widths.setdefault(c.joint, []).append(float(np.nanmean(c.half_width)))
+    said = [(j, f"{names[j - 1]}: half width of the hysteresis {_from_to(own)} N m") for j, own in sorted(widths.items())]
+    first: Figures = {"arm": partial(_arm, result.dataset.model, [m.trial for m in result.trials], said)} if said else {}
+    first = {**first, **{f"passive-{slug(name)}": partial(_hysteresis, result, name, names) for name in configurations}}
     return {**first, **{f"dependence-{d.joint}": partial(_dependence, result, d, names) for d in result.dependence}}
+
+
+def _from_to(values: Sequence[float]) -> str:
+    low, high = tables.digits(min(values)), tables.digits(max(values))
+    return low if low == high else f"{low} to {high}"
 
 
 def _hysteresis(result: PassiveMoments, configuration: str, names: Sequence[str]) -> Drawn:

@@ -27,6 +27,24 @@ class Table:
     rows: Sequence[Sequence[object]]
     left: int = 1
 
+    def __post_init__(self) -> None:
+        shown = [[digits(cell, 4) if isinstance(cell, float) else cell for cell in row] for row in self.rows]
+        object.__setattr__(self, "rows", shown)
+
+
+def digits(value: float, count: int = 3) -> str:
+    """Write a number with `count` digits, without an exponent below a million.
+
+    >>> digits(2431.4, 2), digits(2.58153e-05)
+    ('2400', '2.58e-05')
+    """
+    return f"{float(f'{value:.{count}g}'):.{max(count, 6)}g}"
+
+
+def probability(value: float) -> str:
+    """Write a probability; what is below 1e-12 is not told apart."""
+    return "< 1e-12" if value < 1e-12 else f"{value:.2g}"
+
 
 def minus(text: str) -> str:
     """Return the text of a number with the sign that is as wide as a plus."""
@@ -233,7 +251,7 @@ def dependence(data: Mapping[str, Any]) -> Table:
                 f"{d['adjacent']} {d['adjacent_name']}",
                 *(f"{by_name[n]['value']:.3g} ± {by_name[n]['std']:.2g}" for n in ("upper", "lower", "stiffness", "coupling")),
                 f"{d['steepness_1_rad']:g}",
-                f"{d['p_value']:.2g}",
+                probability(d["p_value"]),
                 "yes" if d["coupled"] else "no",
             ]
         )
@@ -312,13 +330,16 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
     for c in courses:
         several = c["change"] is not None and math.isfinite(c["change"])
         cells = [
-            [f"{c[name]:+.2g} ± {c[f'{name}_std']:.2g}", f"{c[p]:.2g}", "yes" if c[changed] else "no"] if several else ["–"] * 3
+            [f"{c[name]:+.2g} ± {c[f'{name}_std']:.2g}", probability(c[p]), "yes" if c[changed] else "no"] if several else ["–"] * 3
             for name, p, changed in (("since_last", "since_last_p_value", "changed_since_last"), ("change", "p_value", "changed"))
         ]
         last = f"{c['values'][-1]:.4g} ± {c['stds'][-1]:.2g}"
         rows.append([course_label(c), c["unit"], len(c["dates"]), last, *cells[0], *cells[1]])
     columns = ["since the session before", "p (Holm)", "changed", "since all before", "p (Holm)", "changed"]
-    return Table(["parameter", "unit", "sessions", "last", *columns], rows, left=2)
+    head = ["parameter", "unit", "sessions", "last", *columns]
+    # The session before is all before the second one.
+    shown = {0: 4, 1: 4, 2: 7}.get(max((len(c["dates"]) for c in courses), default=0), len(head))
+    return Table(head[:shown], [row[:shown] for row in rows], left=2)
 
 
 def comparison(data: Mapping[str, Any]) -> Table:
@@ -347,6 +368,6 @@ def smallest_effects(would_show: Sequence[Mapping[str, Any]]) -> Table:
         key = (w["kind"], w["parameter"], w["unit"])
         cells = rows.setdefault(key, [None] * (most + 2))
         at = w["joint"] - 1 if w["joint"] else most + ({"Fy": 0, "Fz": 1}.get(w["channel"], 0) if w["channel"] else 0)
-        cells[at] = f"{w['at_least']:.2g}"
+        cells[at] = digits(w["at_least"], 2)
     head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole or Fy", "Fz"]
     return Table(head, [[kind, parameter, unit(held_in), *cells] for (kind, parameter, held_in), cells in rows.items()], 3)

@@ -28,6 +28,12 @@ DEPENDENCE_MEANING = (
     "a slope, and a coupling: how much it changes with the adjacent angle. The coupling is tested against a model without it, over trials."
 )
 
+SYMBOLS = (
+    "m is the mass of a segment, l the distance of its centre of mass from the joint, I its inertia about the centre of mass and a its "
+    "length; the number is that of the segment, counted from the base."
+)
+"""What the names of inertial parameters mean."""
+
 WRONG_MASS = (
     "A mass or centre of mass that is wrong in the model looks like a coupling too: its weight depends on the sum of both angles, and so "
     "does what is left of it."
@@ -180,6 +186,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     head(result, verdict(result))
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
+    print(f"{SYMBOLS}\n")
     show(
         "Calibration of the sensors, what was believed beforehand being the tolerance declared",
         tables.estimates(result["calibration"], joints, level),

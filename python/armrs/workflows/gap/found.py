@@ -108,6 +108,9 @@ class Missing:
         Probability of such a gain by chance, all questions that were asked counted.
     share : float
         Share of what can be explained that is lost without it.
+    without : float or None
+        What the model would be off by without it, everything else refitted: root mean square in units of what repeats differ by. None
+        without repeats, and for what was set apart.
     alternatives : tuple of Alternative
     trial : str or None
         Where it was in one trial only, its file; None for what is in all of them.
@@ -131,6 +134,7 @@ class Missing:
     span: tuple[float, float] | None = None
     family: str = ""
     decided: bool = True
+    without: float | None = None
 
     def __str__(self) -> str:
         place = f" joint {self.joint}" if self.joint else f" {self.channel}" if self.channel else ""
@@ -388,7 +392,7 @@ class GapFound(Tabular):
         """Return the result as it is written to JSON."""
         return {
             "verdict": self.verdict,
-            "effects": [_without_none(dataclasses.asdict(e), keep=("joint", "channel")) for e in self.effects],
+            "effects": [_without_none(dataclasses.asdict(e), keep=("joint", "channel", "without")) for e in self.effects],
             "where": [dataclasses.asdict(w) for w in self.where],
             "gap": {name: gap_to_dict(g) for name, g in self.gap.items()},
             "open": [{"channel": name, **dataclasses.asdict(g.open)} for name, g in self.gap.items() if g.open is not None],

@@ -29,10 +29,10 @@ _NEAR_NOISE = 2.0
 
 def found(dataset: Dataset, led: bool, raw: Mapping[str, Any], warnings: Sequence[str]) -> GapFound:
     """Return what the core found in a data set as objects."""
-    together = tuple(_missing(item, dataset) for item in raw["named"])
+    (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
+    together = tuple(_with_rest(_missing(item, dataset), before_ratio, after_ratio) for item in raw["named"])
     apart = tuple(_apart(item, dataset, raw) for item in raw["apart"])
     effects = tuple(sorted(map(_in_family, (*together, *apart)), key=lambda e: -e.share))
-    (before_ratio, before_z, before), (after_ratio, after_z, after) = raw["lack"]
     share = max(after, 0.0) / before if math.isfinite(before) and before > 0 else 0.0
     gap = gaps(dataset, led, raw)
     is_open = any(g.open is not None for g in gap.values())
@@ -80,6 +80,12 @@ def verdict_of(*, named: bool, is_open: bool, z: float, ratio: float, share: flo
 
 def _in_family(effect: Missing) -> Missing:
     return dataclasses.replace(effect, family=catalogue()[effect.kind].family, decided=not effect.alternatives)
+
+
+def _with_rest(effect: Missing, before: float, after: float) -> Missing:
+    """Return an effect with what is left without it: its share of the squares lies between those of the two models."""
+    left = after + effect.share * (before - after)
+    return dataclasses.replace(effect, without=math.sqrt(left) if math.isfinite(left) and left >= 0.0 else None)
 
 
 def _without_intervals(effect: Missing) -> Missing:

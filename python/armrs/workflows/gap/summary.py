@@ -10,6 +10,7 @@ import numpy as np
 from ...catalogue import Kind, catalogue
 from ...report import plotting
 from ...report.figures import Drawn
+from ...report.sketch import sketch
 from ...report.tables import number, spread, unit
 from .found import ChannelGap, GapFound, Missing
 from .headline import still_open
@@ -33,7 +34,7 @@ def summary(result: GapFound) -> Drawn:
     named = len(result.effects)
     figure = plotting.figure(10.6, max(3.9, 0.34 * len(gaps) + 1.7, 0.3 * min(named, _LINES) + 1.5))
     left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.0, 1.05)})
-    sketch(result, left)
+    drawn_arm(result, left)
     text = "Left, the arm in the middle of its movements, with the named effects where they act."
     if not named:
         text = "Left, the arm in the middle of its movements; no effect was named."
@@ -52,34 +53,17 @@ def summary(result: GapFound) -> Drawn:
 # ---- the arm
 
 
-def sketch(result: GapFound, ax: Axes) -> None:
-    """Draw the arm in the middle of its movements, the robot where there is one, and the named effects."""
-    model = result.dataset.model
-    q = np.median(np.concatenate([t.q[t.valid] for t in result.dataset.trials]), axis=0)
-    directions = np.cumsum(q)
-    steps = np.array([s.length for s in model.segments])[:, None] * np.column_stack([np.cos(directions), np.sin(directions)])
-    points = np.vstack([model.base, np.asarray(model.base) + np.cumsum(steps, axis=0)])
-    reach = float(np.ptp(points, axis=0).max())
-    if model.robot is not None:
-        _robot(result, points[-1], ax)
-    acting = {place for effect in result.effects for place in marks(effect, catalogue()[effect.kind])}
-    for k in range(len(steps)):
-        marked = ("segment", k) in acting
-        ax.plot(*points[k : k + 2].T, color=plotting.BLUE if marked else plotting.INK, lw=6.0, solid_capstyle="round", zorder=2)
-    for k, point in enumerate(points[:-1]):
-        marked = ("joint", k) in acting
-        ax.plot(*point, marker="o", ms=15 if marked else 9, mfc=plotting.BLUE if marked else "white", mec=plotting.INK, mew=1.8, zorder=4)
-        if marked:
-            ax.text(point[0], point[1], str(k + 1), color="white", ha="center", va="center", fontsize=9, fontweight="bold", zorder=5)
-    hand = ("hand", 0) in acting
-    ax.plot(*points[-1], marker="s", ms=11, mfc=plotting.BLUE if hand else "white", mec=plotting.INK, mew=1.8, zorder=4)
-    _down(points, reach, ("frame", 0) in acting, ax)
-    for first, last in ((k - 1, k) for place, k in acting if place == "across"):
-        _bow(points, first, last, reach, ax)
-    _labels(result, points, ax)
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.margins(0.06)
-    ax.set_axis_off()
+def drawn_arm(result: GapFound, ax: Axes) -> None:
+    """Draw the arm, the robot where there is one, and the named effects, each with its place and its size."""
+    dataset = result.dataset
+    joints = [j.name for j in dataset.model.joints]
+    marked = {place for effect in result.effects for place in marks(effect, catalogue()[effect.kind])}
+    lines = []
+    for effect in result.effects:
+        named = f"{joints[effect.joint - 1]}: " if effect.joint else f"{effect.channel}: " if effect.channel else ""
+        here = f"{effect.joint}  {named}" if effect.joint else f"■  {named}" if catalogue()[effect.kind].where != "frame" else "g  "
+        lines.append((here + _words(effect), plotting.INK if getattr(effect, "decided", True) is not False else plotting.RED))
+    sketch(dataset.model, dataset.trials, marked, lines, ax)
 
 
 def marks(effect: Missing, kind: Kind) -> list[tuple[str, int]]:
@@ -89,65 +73,6 @@ def marks(effect: Missing, kind: Kind) -> list[tuple[str, int]]:
     if effect.joint is not None:
         return [("segment" if kind.where == "segment" else "joint", effect.joint - 1)]
     return [("frame" if kind.where == "frame" else "hand", 0)]
-
-
-def _robot(result: GapFound, tip: np.ndarray, ax: Axes) -> None:
-    robot = result.dataset.model.robot
-    angles = [t.robot_q[t.valid] for t in result.dataset.trials if t.robot_q is not None]
-    if robot is None or not angles:
-        return
-    first = float(np.median(np.concatenate(angles), axis=0)[0])
-    base = np.asarray(robot.base)
-    elbow = base + robot.lengths[0] * np.array([np.cos(first), np.sin(first)])
-    line = np.vstack([base, elbow, tip])
-    ax.plot(*line.T, color=plotting.SILVER, lw=4.0, solid_capstyle="round", zorder=1)
-    ax.plot(*base, marker="s", ms=10, color=plotting.SILVER, zorder=1)
-    ax.text(base[0], base[1], "robot  ", color=plotting.GREY, ha="right", va="center", fontsize=9)
-
-
-def _down(points: np.ndarray, reach: float, marked: bool, ax: Axes) -> None:
-    """Draw the weight's direction at the base."""
-    colour = plotting.BLUE if marked else plotting.SILVER
-    at = points[0] - [0.12 * reach, 0.0]
-    ax.plot([at[0], at[0]], [at[1], at[1] - 0.2 * reach], color=colour, lw=2.2 if marked else 1.4)
-    ax.plot(at[0], at[1] - 0.2 * reach, marker="v", ms=8, color=colour)
-    ax.text(at[0], at[1] - 0.26 * reach, "g", color=colour, ha="center", va="top", fontsize=10)
-
-
-def _bow(points: np.ndarray, first: int, last: int, reach: float, ax: Axes) -> None:
-    """Draw a cord over two joints, beside the segment between them."""
-    along = points[last] - points[first]
-    normal = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-9)
-    s = np.linspace(-0.25, 1.25, 40)
-    path = points[first] + s[:, None] * along + (0.1 * reach * (0.4 + np.sin(np.pi * np.clip(s, 0, 1))))[:, None] * normal
-    ax.plot(*path.T, color=plotting.BLUE, lw=2.0, ls=(0, (2, 1.2)), zorder=3)
-
-
-def _labels(result: GapFound, points: np.ndarray, ax: Axes) -> None:
-    """Write the named effects above the sketch, each with its place and its size."""
-    joints = [j.name for j in result.dataset.model.joints]
-    lines = []
-    for effect in result.effects:
-        named = f"{joints[effect.joint - 1]}: " if effect.joint else f"{effect.channel}: " if effect.channel else ""
-        here = f"{effect.joint}  {named}" if effect.joint else f"■  {named}" if catalogue()[effect.kind].where != "frame" else "g  "
-        lines.append((here + _words(effect), plotting.INK if getattr(effect, "decided", True) is not False else plotting.RED))
-    if len(lines) > _LINES:
-        lines = [*lines[: _LINES - 1], (f"and {len(lines) - _LINES + 1} more", plotting.GREY)]
-    for k, (line, colour) in enumerate(lines):
-        ax.annotate(
-            line,
-            (0.0, 1.0),
-            xycoords="axes fraction",
-            xytext=(0, -15 * k),
-            textcoords="offset points",
-            va="top",
-            fontsize=9.5,
-            color=colour,
-        )
-    if lines:
-        # The sketch keeps out of their way.
-        top, low = points[:, 1].max(), points[:, 1].min()
-        ax.plot(points[0, 0], top + (top - low + 0.2) * 0.11 * len(lines), alpha=0.0)
 
 
 def _words(effect: Missing) -> str:

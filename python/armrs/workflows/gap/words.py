@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...report import words as common
-from ...report.tables import Table, number, smallest_effects, spread, unit
+from ...report.tables import Table, digits, number, smallest_effects, spread, unit
 from . import headline
 from .headline import effect_name, joined
 from .reading import MISFIT
@@ -67,7 +67,7 @@ def _separating(alternative: Mapping[str, Any]) -> str:
     separation = alternative.get("separation")
     if separation is None:
         return ""
-    now, then = (f"{separation[key]:.2g}" for key in ("now", "then"))
+    now, then = (digits(separation[key], 2) for key in ("now", "then"))
     if separation["then"] < _TELLS:
         best = alternative["separating_movement"]
         return f"none of the movements tried would; the best, {best}, leaves them {then} standard deviations apart (now {now})."
@@ -98,7 +98,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
         if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
             verdict = "more than noise" if lack["z"] >= MISFIT else "what noise does"
             lines.append(
-                f"{words} leaves {lack['ratio']:.3g} times the square of what repeats differ by ({lack['z']:+.1f} "
+                f"{words} leaves {digits(lack['ratio'])} times the square of what repeats differ by ({_deviations(lack['z'])} "
                 f"standard deviations): {verdict}."
             )
     if not lines:
@@ -116,6 +116,11 @@ def left(result: Mapping[str, Any]) -> list[str]:
         looks = result["unexplained"]["looks_like"]
         lines.append(f"{looks[0].upper()}{looks[1:]}.")
     return lines
+
+
+def _deviations(z: float) -> str:
+    """Write how many standard deviations something is off: beyond a hundred the number says nothing."""
+    return "more than 100" if z > 100.0 else f"{round(z, 1) + 0.0:+.1f}"
 
 
 def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
@@ -163,16 +168,34 @@ def suspects(data: Mapping[str, Any], most: int = 10) -> Table:
 def missing(data: Mapping[str, Any]) -> Table:
     """Return the named effects with their estimates."""
     rows: list[list[object]] = []
+    repeated = any(effect.get("without") is not None for effect in data["effects"])
     for effect in data["effects"]:
         place = effect["joint"] or effect["channel"]
+        alone = f"{effect['share']:.0%}" if effect["share"] > 0.005 else "< 1 %"
+        if repeated:
+            alone = "–" if effect.get("without") is None else digits(effect.get("without"), 2)
         fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
         for k, (name, value) in enumerate((fitted or effect["parameters"]).items()):
-            head = [effect["kind"], place, f"{effect['share']:.0%}"] if k == 0 else ["", "", ""]
+            head = [effect["kind"], place, alone] if k == 0 else ["", "", ""]
             ends = None
             if value["std"] is not None:
                 ends = " … ".join(number(end, value["std"]) for end in value["interval"])
             rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), ends, unit(value["unit"])])
-    return Table(["effect", "at", "share", "parameter", "value", "± std", "95 % interval", "unit"], rows, 4)
+    return Table(
+        ["effect", "at", "misfit without it" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"], rows, 4
+    )
+
+
+def worth(data: Mapping[str, Any]) -> str:
+    """Return what the third column of `missing` says."""
+    if all(effect.get("without") is None for effect in data["effects"]):
+        return "The share is what would be lost of all that is explained if this one effect were left out and everything else refitted."
+    with_all = data["lack_of_fit"]["amended"]["ratio"] ** 0.5
+    return (
+        "Misfit without it: how far the model would be off if this one effect were left out and everything else refitted, in root mean "
+        f"square and in units of what repeats differ by. With every effect it is off by {digits(with_all, 2)}. What was set apart has no "
+        "such number."
+    )
 
 
 def gap(data: Mapping[str, Any]) -> Table:

@@ -1,0 +1,95 @@
+"""What reports state agrees with itself: shares, maps, names of colours, and what is installed for what is shown."""
+
+from __future__ import annotations
+
+import re
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.colors import rgb_to_hsv, to_hex, to_rgb
+
+import armrs
+from armrs.report import plotting
+from armrs.thesis import simulation
+from armrs.workflows import demo
+from armrs.workflows.gap import figures, maps, words
+from test_docs import ROOT, blocks
+
+
+def gap_of(**channel: float | None) -> dict[str, Any]:
+    whole = {"before": 1.0, "calibrated": 0.5, "after": 0.2, "floor": 0.2} | channel
+    return {"gap": {"Fy_N": whole}, "effects": [{"trial": None}], "open": []}
+
+
+@pytest.mark.parametrize(("after", "closed"), [(0.1, "100%"), (0.35, "50%"), (0.2, "100%")])
+def test_no_more_than_all_of_a_gap_is_closed(after: float, closed: str) -> None:
+    """Below what repeats differ by there is nothing to close: `104 %` was printed."""
+    (row,) = words.gap(gap_of(after=after)).rows
+    assert closed in row
+
+
+def effect(**more: Any) -> dict[str, Any]:
+    value = {"value": 0.2, "std": 0.01, "interval": [0.18, 0.22], "unit": "N m"}
+    return {"kind": "coulomb", "joint": 2, "channel": None, "share": 0.001, "without": 3.4, "parameters": {"torque": value}} | more
+
+
+def test_the_worth_of_an_effect_is_told_in_units_of_the_scatter() -> None:
+    """A share of what is explained was 0 % in most rows of the table of an arm without laws."""
+    found = {"effects": [effect(), effect(without=None)], "lack_of_fit": {"amended": {"ratio": 1.21}}}
+    table = words.missing(found)
+    assert table.head[2] == "misfit without it" and [row[2] for row in table.rows] == ["3.4", "–"]
+    assert "off by 1.1." in words.worth(found)
+    unrepeated = {"effects": [effect(without=None)], "lack_of_fit": {"amended": {"ratio": None}}}
+    assert words.missing(unrepeated).rows[0][2] == "< 1 %" and "share" in words.worth(unrepeated)
+
+
+def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
+    """`+40589.3 standard deviations` and `-0.0` were printed."""
+    lack = {"calibrated": {"ratio": 2431.4, "z": 40589.3}, "amended": {"ratio": 0.999, "z": -0.01}}
+    said = words.left(
+        {"lack_of_fit": lack, "effects": [effect()], "gap": {}, "open": [], "unexplained": {"share": 0.0, "looks_like": None}}
+    )
+    assert "2430 times" in said[0] and "more than 100 standard deviations" in said[0]
+    assert "(+0.0 standard deviations)" in said[1]
+
+
+def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:
+    """A pale cell is a tint of white, a cell that was not visited is grey."""
+    t = np.arange(0.0, 20.0, 0.01)
+    q = np.column_stack([np.sin(t)])
+    seen = SimpleNamespace(
+        trial=SimpleNamespace(role="fit"), q=q, qd=np.column_stack([np.cos(t)]), torque=1e-9 * q, valid=lambda: np.full(len(t), True)
+    )
+    with plotting.style():
+        figure = figures.missing_torque(["elbow"], {"calibrated": [seen, seen]}).figure  # type: ignore[list-item]
+        figure.canvas.draw()
+    ax = figure.axes[0]
+    assert to_hex(ax.get_facecolor()) == to_hex(plotting.FAINT) != "#ffffff"
+    visited = np.isfinite(maps.residual_map([seen, seen], 0).torque)  # type: ignore[list-item]
+    white = ax.collections[0].get_facecolor().reshape(*visited.shape, 4)
+    assert 0.1 < visited.mean() < 1.0
+    assert (white[visited] == 1.0).all() and (white[~visited][:, 3] == 0.0).all()
+
+
+def test_the_film_names_the_colours_that_it_has() -> None:
+    """The arm in #D55E00 was called red."""
+    run = armrs.simulate(demo.true_model(), armrs.Movement(np.radians([[-60.0, 60.0], [-58.0, 61.0]]), speed=0.5, acceleration=2.0))
+    film = simulation._film(simulation.Comparison(run, demo.measure_two_speeds), "t")  # type: ignore[arg-type]
+    said = dict(re.findall(r"(robot|arm) \((\w+)\)", str(film["text"])))
+    hues = {"orange": (15.0, 45.0), "blue": (190.0, 250.0)}
+    colours = {chain["name"]: chain["colour"] for chain in film["chains"]}  # type: ignore[attr-defined]
+    assert said.keys() == colours.keys()
+    for name, colour in colours.items():
+        low, high = hues[said[name]]
+        assert low < 360.0 * rgb_to_hsv(to_rgb(colour))[0] < high
+
+
+def test_what_the_readme_shows_is_installed_and_short() -> None:
+    """C3D was missing after `make demo`; the first examples copied lists."""
+    assert re.search(r"^files = \[.*ezc3d", (ROOT / "pyproject.toml").read_text(encoding="utf-8"), flags=re.M)
+    built = re.search(r"^\$\(STAMPS\)/build:.*?\n\n", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.M | re.S)
+    assert built is not None and "--extras files" in built[0]
+    python = [content for language, _, content in blocks(ROOT / "README.md") if language == "python"]
+    assert len(python) >= 3 and not any(re.search(r"\blist\(|\.copy\(|\[\*", content) for content in python)
