@@ -122,3 +122,41 @@ def test_the_contact_is_tunable(kind: str, files: dict[tuple[int, str], Path]) -
     with pytest.raises(SlaveError):
         arm.set("body[1].m", 1.0)
     arm.free()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_force_goes_on_along_a_line_within_a_step(fmi: int, files: dict[tuple[int, str], Path], tmp_path: Path) -> None:
+    """FMI 2.0 has a function for derivatives of inputs; in FMI 3.0 they are inputs themselves."""
+    fmpy = pytest.importorskip("fmpy")
+    description = fmpy.read_model_description(str(files[fmi, "force"]))
+    references = {v.name: [v.valueReference] for v in description.modelVariables}
+    folder = fmpy.extract(str(files[fmi, "force"]), unzipdir=str(tmp_path))
+
+    def force(time: float) -> float:
+        return float(5.0 * np.sin(3.0 * np.pi * time))
+
+    def end(parts: int, rates: bool) -> float:
+        """Return the angle after 1 s: the force is a polygon with corners every 20 ms, given at as many times between them."""
+        fmu = fmpy.instantiate_fmu(folder, description, "CoSimulation")
+        if fmi == 2:
+            fmu.setupExperiment(startTime=0.0)
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        write, read = (fmu.setReal, fmu.getReal) if fmi == 2 else (fmu.setFloat64, fmu.getFloat64)
+        for k in range(50):
+            start, slope = force(0.02 * k), (force(0.02 * (k + 1)) - force(0.02 * k)) / 0.02
+            for part in range(parts):
+                write(references["handle.F[1]"], [start + slope * 0.02 * part / parts])
+                if rates and fmi == 2:
+                    fmu.setRealInputDerivatives(references["handle.F[1]"], [1], [slope])
+                elif rates:
+                    write(references["der(handle.F[1])"], [slope])
+                fmu.doStep(0.02 * (k + part / parts), 0.02 / parts)
+        [angle] = read(references["q[1]"])
+        fmu.terminate()
+        fmu.freeInstance()
+        return float(angle)
+
+    once = end(1, rates=True)
+    assert abs(once - end(20, rates=True)) < 1e-9
+    assert abs(once - end(1, rates=False)) > 1e-3

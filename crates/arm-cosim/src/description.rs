@@ -45,11 +45,12 @@ pub fn model_description(spec: &ArmSpec, fmi: Fmi) -> Result<String, Refused> {
     for (reference, variable) in table.iter().enumerate() {
         // Value references are places from one in FMI 2.0, where time is left out.
         let state = variable.quantity.state().filter(|_| exchange);
-        let state = state.and_then(|s| table.iter().position(|v| v.quantity == s));
+        let integral = state.or(variable.quantity.input());
+        let integral = integral.and_then(|s| table.iter().position(|v| v.quantity == s));
         match fmi {
             Fmi::Two if variable.causality == Causality::Independent => {}
-            Fmi::Two => scalar_variable(&mut xml, reference, variable, state)?,
-            Fmi::Three => float64(&mut xml, reference, variable, state)?,
+            Fmi::Two => scalar_variable(&mut xml, reference, variable, integral)?,
+            Fmi::Three => float64(&mut xml, reference, variable, integral)?,
         }
     }
     xml.close("ModelVariables");
@@ -256,11 +257,11 @@ fn float64(
     xml: &mut Xml,
     reference: usize,
     variable: &Variable,
-    state: Option<usize>,
+    integral: Option<usize>,
 ) -> Result<(), Refused> {
     let mut attributes = general(reference, variable);
     attributes.extend(numeric(variable)?);
-    attributes.extend(state.map(|s| ("derivative", s.to_string())));
+    attributes.extend(integral.map(|s| ("derivative", s.to_string())));
     xml.leaf("Float64", &borrowed(&attributes));
     Ok(())
 }
@@ -269,11 +270,11 @@ fn scalar_variable(
     xml: &mut Xml,
     reference: usize,
     variable: &Variable,
-    state: Option<usize>,
+    integral: Option<usize>,
 ) -> Result<(), Refused> {
     xml.open("ScalarVariable", &borrowed(&general(reference, variable)));
     let mut real = numeric(variable)?;
-    real.extend(state.map(|s| ("derivative", s.to_string())));
+    real.extend(integral.map(|s| ("derivative", s.to_string())));
     xml.leaf("Real", &borrowed(&real));
     xml.close("ScalarVariable");
     Ok(())
@@ -313,7 +314,7 @@ fn interfaces(xml: &mut Xml, spec: &ArmSpec, fmi: Fmi, exchange: bool) {
         xml.leaf("ModelExchange", &[&[identifier], steps, states].concat());
     }
     let steps: &[(&str, &str)] = match fmi {
-        Fmi::Two => &[varies, order],
+        Fmi::Two => &[varies, ("canInterpolateInputs", "true"), order],
         Fmi::Three => &[varies, ("fixedInternalStepSize", &step), order],
     };
     xml.leaf("CoSimulation", &[&[identifier], steps, states].concat());

@@ -10,7 +10,7 @@ use crate::spec::ArmSpec;
 pub(crate) trait Plant: Send + Sync {
     /// Starts anew at the start of the specification.
     fn start(&mut self, spec: &ArmSpec, time: f64) -> Result<(), SimulationError>;
-    /// Sets an input; any of the handle's starts its motion anew.
+    /// Sets an input; any of the handle's starts its motion and its force anew, any of the motors' their torques.
     fn set_input(&mut self, quantity: Quantity, value: f64);
     /// Sets a continuous state.
     fn set_state(&mut self, quantity: Quantity, value: f64);
@@ -37,7 +37,7 @@ pub(crate) trait Plant: Send + Sync {
 /// The state of a plant but for the inputs, as numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SavedPlant {
-    /// Angles, speeds, works, memories, origin of time, age of the handle.
+    /// Angles, speeds, works, memories, origin of time, ages of the handle's inputs and of the motors'.
     pub numbers: Vec<f64>,
     /// Whole inner steps since the origin.
     pub ticks: u64,
@@ -98,10 +98,17 @@ impl<const N: usize> Plant for Coupled<N> {
         let outside = &mut self.outside;
         match quantity {
             Quantity::ForceOnArm(axis) => outside.force_on_arm[axis] = value,
-            Quantity::RobotPosition(axis) => (outside.position[axis], outside.age) = (value, 0.0),
-            Quantity::RobotVelocity(axis) => (outside.velocity[axis], outside.age) = (value, 0.0),
+            Quantity::ForceRate(axis) => outside.force_rate[axis] = value,
+            Quantity::RobotPosition(axis) => outside.position[axis] = value,
+            Quantity::RobotVelocity(axis) => outside.velocity[axis] = value,
+            Quantity::RobotAcceleration(axis) => outside.acceleration[axis] = value,
             Quantity::Torque(joint) => outside.torque[joint] = value,
-            _ => {}
+            Quantity::TorqueRate(joint) => outside.torque_rate[joint] = value,
+            _ => return,
+        }
+        match quantity {
+            Quantity::Torque(_) | Quantity::TorqueRate(_) => outside.torque_age = 0.0,
+            _ => outside.age = 0.0,
         }
     }
 
@@ -121,13 +128,14 @@ impl<const N: usize> Plant for Coupled<N> {
         let mut state = self.stepper.snapshot();
         (state.origin, state.ticks) = (time, 0);
         self.stepper.restore(&state);
-        self.outside.age = 0.0;
+        (self.outside.age, self.outside.torque_age) = (0.0, 0.0);
         self.tip = None;
     }
 
     fn advance(&mut self, duration: f64) -> Result<(), SimulationError> {
         self.stepper.advance(&self.outside, duration)?;
         self.outside.age += duration;
+        self.outside.torque_age += duration;
         self.tip = None;
         Ok(())
     }
@@ -173,7 +181,7 @@ impl<const N: usize> Plant for Coupled<N> {
     }
 
     fn size(&self) -> usize {
-        2 * N + 4 + self.stepper.memories() + 2
+        2 * N + 4 + self.stepper.memories() + 3
     }
 
     fn save(&self) -> SavedPlant {
@@ -190,7 +198,7 @@ impl<const N: usize> Plant for Coupled<N> {
             .chain(qd.iter())
             .chain(&work)
             .chain(&memory)
-            .chain(&[origin, self.outside.age])
+            .chain(&[origin, self.outside.age, self.outside.torque_age])
             .copied()
             .collect();
         SavedPlant { numbers, ticks }
@@ -216,7 +224,7 @@ impl<const N: usize> Plant for Coupled<N> {
             origin: rest[0],
             ticks: saved.ticks,
         });
-        self.outside.age = rest[1];
+        (self.outside.age, self.outside.torque_age) = (rest[1], rest[2]);
         self.tip = None;
     }
 }

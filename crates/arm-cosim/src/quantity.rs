@@ -13,6 +13,12 @@ pub enum Quantity {
     RobotVelocity(usize),
     /// Torque of a motor in a joint.
     Torque(usize),
+    /// Time derivative of the force on the arm.
+    ForceRate(usize),
+    /// Acceleration of the robot's handle.
+    RobotAcceleration(usize),
+    /// Time derivative of the torque of a motor.
+    TorqueRate(usize),
     /// Angle of a joint.
     Angle(usize),
     /// Speed of a joint.
@@ -64,6 +70,17 @@ impl Quantity {
             Self::AngleRate(joint) => Some(Self::Angle(joint)),
             Self::SpeedRate(joint) => Some(Self::Speed(joint)),
             Self::WorkRate(which) => Some(Self::Work(which)),
+            _ => None,
+        }
+    }
+
+    /// The input whose time derivative this is.
+    pub const fn input(self) -> Option<Self> {
+        match self {
+            Self::ForceRate(axis) => Some(Self::ForceOnArm(axis)),
+            Self::RobotVelocity(axis) => Some(Self::RobotPosition(axis)),
+            Self::RobotAcceleration(axis) => Some(Self::RobotVelocity(axis)),
+            Self::TorqueRate(joint) => Some(Self::Torque(joint)),
             _ => None,
         }
     }

@@ -241,6 +241,51 @@ impl Slave {
         Ok(())
     }
 
+    /// Sets how inputs go on: their time derivatives are variables of their own, and that of `robot.r` is `robot.v`. A zero of
+    /// another order is nothing to do.
+    ///
+    /// # Errors
+    /// [`Status::Error`] for a variable without a derivative of that order; else as [`Slave::set`].
+    pub fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), Refused> {
+        if references.len() != orders.len() || references.len() != values.len() {
+            return self.failed(
+                "references, orders and values of derivatives differ in number".to_owned(),
+            );
+        }
+        let (mut rates, mut given) = (Vec::new(), Vec::new());
+        for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
+            let derivative = |at: usize| {
+                let of = self.table.get(at)?.quantity;
+                let mut table = self.table.iter();
+                table.position(|v| v.quantity.input() == Some(of))
+            };
+            let at = reference as usize;
+            let is_input = self
+                .table
+                .get(at)
+                .is_some_and(|v| v.causality == Causality::Input);
+            let rate = (0..order).try_fold(at, |at, _| derivative(at));
+            match rate.filter(|_| is_input && order > 0) {
+                Some(rate) => {
+                    rates.push(u32::try_from(rate).unwrap_or(u32::MAX));
+                    given.push(value);
+                }
+                None if is_input && order > 0 && value == 0.0 => {}
+                None => {
+                    return self.failed(format!(
+                        "the value reference {reference} has no derivative of order {order} that can be set"
+                    ));
+                }
+            }
+        }
+        self.set(&rates, &given)
+    }
+
     /// Reads variables by value reference, in every mode.
     ///
     /// # Errors

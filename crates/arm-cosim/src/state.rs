@@ -6,7 +6,7 @@ use crate::plant::SavedPlant;
 use crate::status::Refused;
 
 /// Marks the bytes, with the version of their layout.
-const MAGIC: [u8; 8] = *b"ARMRSST1";
+const MAGIC: [u8; 8] = *b"ARMRSST2";
 
 /// Everything that the future of a slave depends on.
 #[derive(Clone, Debug, PartialEq)]

@@ -163,6 +163,9 @@ impl Variable {
     }
 }
 
+/// The least length \[m\] and mass \[kg\] that the core takes.
+const SMALLEST: f64 = f32::MIN_POSITIVE as f64;
+
 const AXES: [&str; 2] = ["y, forward", "z, up"];
 
 /// All variables of an arm. The value reference of a variable is its place in the table.
@@ -176,6 +179,7 @@ pub fn variables(spec: &ArmSpec) -> Result<Vec<Variable>, Refused> {
     inputs(spec, &mut table);
     outputs(spec, &mut table);
     rates(spec, &mut table);
+    input_rates(&mut table);
     parameters(spec, &mut table);
     effects(spec, &mut table)?;
     table.push(
@@ -197,7 +201,7 @@ fn inputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
                 input(Quantity::ForceOnArm(axis), format!("handle.F[{n}]"), "N")
                     .start(0.0)
                     .nominal(10.0)
-                    .says(format!("Force of the environment on the arm at its handle, along {along}; held during a step.")),
+                    .says(format!("Force of the environment on the arm at its handle, along {along}, when it is set; goes on with der(handle.F[{n}]).")),
             ),
             Port::Motion => {
                 table.push(
@@ -211,18 +215,42 @@ fn inputs(spec: &ArmSpec, table: &mut Vec<Variable>) {
                     input(Quantity::RobotVelocity(axis), format!("robot.v[{n}]"), "m/s")
                         .start(0.0)
                         .nominal(0.1)
-                        .says(format!("Velocity of the robot's handle, along {along}; held during a step.")),
+                        .says(format!("Velocity of the robot's handle when it is set, along {along}; goes on with der(robot.v[{n}]).")),
                 );
             }
         }
     }
     for joint in 0..spec.joints() {
+        let n = joint + 1;
         table.push(
-            input(Quantity::Torque(joint), format!("tau[{}]", joint + 1), "N m")
+            input(Quantity::Torque(joint), format!("tau[{n}]"), "N m")
                 .start(0.0)
-                .says(format!("Torque of a motor in joint {}, counter-clockwise on what lies beyond it; held during a step.", joint + 1)),
+                .says(format!("Torque of a motor in joint {n} when it is set, counter-clockwise on what lies beyond it; goes on with der(tau[{n}]).")),
         );
     }
+}
+
+/// How inputs go on between communication points. Behind the rest, as only some importers set them.
+fn input_rates(table: &mut Vec<Variable>) {
+    let rates: Vec<_> = table
+        .iter()
+        .filter_map(|v| {
+            let (quantity, unit, nominal) = match v.quantity {
+                Quantity::ForceOnArm(axis) => (Quantity::ForceRate(axis), "N/s", 100.0),
+                Quantity::RobotVelocity(axis) => (Quantity::RobotAcceleration(axis), "m/s²", 1.0),
+                Quantity::Torque(joint) => (Quantity::TorqueRate(joint), "N m/s", 10.0),
+                _ => return None,
+            };
+            let name = format!("der({})", v.name);
+            let text = format!(
+                "Time derivative of {}, held until it is set anew; not used in Model Exchange.",
+                v.name
+            );
+            let rate = Variable::new(quantity, name, unit, Causality::Input);
+            Some(rate.start(0.0).nominal(nominal).says(text))
+        })
+        .collect();
+    table.extend(rates);
 }
 
 fn output(quantity: Quantity, name: String, unit: &'static str) -> Variable {
@@ -369,12 +397,12 @@ fn parameters(spec: &ArmSpec, table: &mut Vec<Variable>) {
         let (n, at) = (i + 1, format!("body[{}]", i + 1));
         table.extend([
             parameter(Quantity::Length(i), format!("{at}.a"), "m", s.length)
-                .least(f64::MIN_POSITIVE)
+                .least(SMALLEST)
                 .says(format!(
                     "Length of segment {n}, joint to joint or to the handle."
                 )),
             parameter(Quantity::Mass(i), format!("{at}.m"), "kg", s.mass)
-                .least(f64::MIN_POSITIVE)
+                .least(SMALLEST)
                 .says(format!("Mass of segment {n}.")),
             parameter(Quantity::Com(i), format!("{at}.l"), "m", s.com[0]).says(format!(
                 "Centre of mass of segment {n} from its proximal joint, along it."
@@ -507,6 +535,9 @@ pub(crate) fn put(spec: &mut ArmSpec, quantity: Quantity, value: f64) {
         | Quantity::RobotPosition(_)
         | Quantity::RobotVelocity(_)
         | Quantity::Torque(_)
+        | Quantity::ForceRate(_)
+        | Quantity::RobotAcceleration(_)
+        | Quantity::TorqueRate(_)
         | Quantity::TipPosition(_)
         | Quantity::TipVelocity(_)
         | Quantity::ForceOnRobot(_)

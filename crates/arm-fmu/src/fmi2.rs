@@ -175,6 +175,23 @@ pub unsafe extern "C" fn fmi2DoStep(
     unsafe { guarded(instance, "fmi2DoStep", |s| s.do_step(time, step)) }
 }
 
+/// Sets how inputs go on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
+    instance: Handle,
+    references: *const u32,
+    n: usize,
+    orders: *const c_int,
+    values: *const f64,
+) -> c_int {
+    // SAFETY: see `pointers`.
+    unsafe {
+        guarded(instance, "fmi2SetRealInputDerivatives", |s| {
+            s.set_input_derivatives(read(references, n)?, read(orders, n)?, read(values, n)?)
+        })
+    }
+}
+
 /// Reads first time derivatives of outputs.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
@@ -310,7 +327,6 @@ without_variables! {
     fmi2SetInteger(*const c_int);
     fmi2SetBoolean(*const c_int);
     fmi2SetString(*const *const c_char);
-    fmi2SetRealInputDerivatives(*const c_int, *const f64);
 }
 
 refused! {

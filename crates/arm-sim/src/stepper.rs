@@ -29,26 +29,38 @@ pub enum Port {
 /// What acts on the arm from outside. Each port reads what belongs to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outside<const N: usize> {
-    /// Force port: force on the arm at its tip, held \[N\].
+    /// Force port: force on the arm at its tip when `age` was zero \[N\].
     pub force_on_arm: Plane<f64>,
+    /// Force port: its time derivative, held \[N/s\].
+    pub force_rate: Plane<f64>,
     /// Motion port: the handle \[m\] when `age` was zero.
     pub position: Plane<f64>,
-    /// Motion port: velocity of the handle, held: it goes on along a straight line \[m/s\].
+    /// Motion port: velocity of the handle when `age` was zero \[m/s\].
     pub velocity: Plane<f64>,
-    /// Time since the handle was where `position` says \[s\].
+    /// Motion port: acceleration of the handle, held \[m/s²\].
+    pub acceleration: Plane<f64>,
+    /// Time since handle or force were as they say \[s\].
     pub age: f64,
-    /// Torques of motors in the joints, held \[N m\].
+    /// Torques of motors in the joints when `torque_age` was zero \[N m\].
     pub torque: Joints<f64, N>,
+    /// Their time derivatives, held \[N m/s\].
+    pub torque_rate: Joints<f64, N>,
+    /// Time since the torques were as they say \[s\].
+    pub torque_age: f64,
 }
 
 impl<const N: usize> Default for Outside<N> {
     fn default() -> Self {
         Self {
             force_on_arm: [0.0; 2],
+            force_rate: [0.0; 2],
             position: [0.0; 2],
             velocity: [0.0; 2],
+            acceleration: [0.0; 2],
             age: 0.0,
             torque: Joints::zeros(),
+            torque_rate: Joints::zeros(),
+            torque_age: 0.0,
         }
     }
 }
@@ -61,14 +73,15 @@ fn input<const N: usize>(
     (time, later): (f64, f64),
 ) -> Input<f64, N> {
     let since = outside.age + later;
+    let [r, v, a] = [outside.position, outside.velocity, outside.acceleration];
     let mut input = Input {
         time,
         handle: Handle {
-            position: [0, 1].map(|i| outside.position[i] + outside.velocity[i] * since),
-            velocity: outside.velocity,
-            acceleration: [0.0; 2],
+            position: [0, 1].map(|i| r[i] + v[i] * since + 0.5 * a[i] * since * since),
+            velocity: [0, 1].map(|i| v[i] + a[i] * since),
+            acceleration: a,
         },
-        torque: outside.torque,
+        torque: outside.torque + outside.torque_rate * (outside.torque_age + later),
     };
     add_ripple(&mut input, setup);
     input
@@ -229,7 +242,7 @@ impl<const N: usize> Stepper<N> {
         outside: &Outside<N>,
         near: &Joints<f64, N>,
     ) -> Result<Joints<f64, N>, SimulationError> {
-        self.apply(outside);
+        self.apply(outside, 0.0);
         start::equilibrium(&self.model, &self.input(outside), near)
     }
 
@@ -266,7 +279,8 @@ impl<const N: usize> Stepper<N> {
     /// Advances by a communication step: a whole number of inner steps where `duration` is one but for rounding, and else
     /// the next number of equal steps that are no longer than the inner step.
     ///
-    /// Does not allocate. `outside.age` is not changed: it grows by `duration` unless new inputs are set.
+    /// A force with a rate is held at its mean over each inner step. Does not allocate. The ages in `outside` are not changed: they
+    /// grow by `duration` unless new inputs are set.
     ///
     /// # Errors
     /// [`SimulationError`] for a duration that is not positive or too long, and when the state ceases to be finite; the state
@@ -281,7 +295,7 @@ impl<const N: usize> Stepper<N> {
             });
         }
         self.keep();
-        self.apply(outside);
+        self.apply(outside, 0.0);
         let whole = (steps + 0.5).floor();
         let regular = whole >= 1.0 && (steps - whole).abs() < 1e-6;
         let (count, h) = if regular {
@@ -297,20 +311,23 @@ impl<const N: usize> Stepper<N> {
         } else {
             (self.time(), 0)
         };
-        let setup = &self.setup;
-        let input_at = |half: u64| {
+        let input_at = |setup: &Setup<f64, N>, half: u64| {
             let time = from + 0.5 * (first + half) as f64 * h;
             input(setup, outside, (time, 0.5 * half as f64 * h))
         };
-        let mut next = input_at(0);
+        let is_forced_evenly = outside.force_rate == [0.0; 2];
+        let mut next = input_at(&self.setup, 0);
         for done in 1..=count {
             let start = next;
-            next = input_at(2 * done);
+            next = input_at(&self.setup, 2 * done);
             let inputs = Inputs {
                 start: &start,
-                middle: &input_at(2 * done - 1),
+                middle: &input_at(&self.setup, 2 * done - 1),
                 end: &next,
             };
+            if !is_forced_evenly {
+                self.apply(outside, (done as f64 - 0.5) * h);
+            }
             let at = (&mut self.state, &mut self.memory);
             advance(&self.model, Integrator::Rk4, h, inputs, at);
             if let Some(joint) = diverged(&self.state) {
@@ -331,7 +348,7 @@ impl<const N: usize> Stepper<N> {
 
     /// What can be seen from outside at the present state and inputs.
     pub fn seen(&mut self, outside: &Outside<N>) -> Seen<N> {
-        self.apply(outside);
+        self.apply(outside, 0.0);
         let State { q, qd, .. } = &self.state;
         let pose = Pose::new(q);
         let input = self.input(outside);
@@ -347,7 +364,7 @@ impl<const N: usize> Stepper<N> {
                 less(handle.velocity, tip_velocity),
                 less(handle.acceleration, tip_acceleration),
             ),
-            _ => [0.0; 2],
+            _ => outside.force_rate,
         };
         Seen {
             tip,
@@ -363,7 +380,7 @@ impl<const N: usize> Stepper<N> {
     /// Position and velocity of the tip \[m, m/s\], and the force on the arm there \[N\]: less work than [`Stepper::seen`].
     #[inline]
     pub fn tip(&mut self, outside: &Outside<N>) -> (Plane<f64>, Plane<f64>, Plane<f64>) {
-        self.apply(outside);
+        self.apply(outside, 0.0);
         let State { q, qd, .. } = &self.state;
         let pose = Pose::new(q);
         let input = self.input(outside);
@@ -413,9 +430,11 @@ impl<const N: usize> Stepper<N> {
         input(&self.setup, outside, (self.time(), 0.0))
     }
 
-    fn apply(&mut self, outside: &Outside<N>) {
+    /// Sets the force at the tip to what it is `later` from now \[s\].
+    fn apply(&mut self, outside: &Outside<N>, later: f64) {
         if let Link::Forced(force) = &mut self.model.link {
-            *force = outside.force_on_arm;
+            let since = outside.age + later;
+            *force = [0, 1].map(|i| outside.force_on_arm[i] + outside.force_rate[i] * since);
         }
     }
 

@@ -100,13 +100,13 @@ class System:
 
     @property
     def unconnected(self) -> list[str]:
-        """Inputs that nothing drives; they keep their start values."""
+        """Inputs that nothing drives, but for derivatives of others; they keep their start values."""
         driven = {c.target for c in self.connections}
         return [
             f"{name}.{v.name}"
             for name, slave in self.slaves.items()
             for v in slave.variables.values()
-            if v.causality == "input" and not any((name, element) in driven for element in v.elements)
+            if v.causality == "input" and not v.name.startswith("der(") and not any((name, element) in driven for element in v.elements)
         ]
 
     @property

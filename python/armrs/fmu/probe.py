@@ -186,6 +186,7 @@ def _steps(trial: Trial, slave: ImportedSlave) -> dict[str, list[Any]]:
         _advance(trial, slave, middle, 0.5 * trial.size)
         _advance(trial, slave, middle + 0.5 * trial.size, trial.size)
     _output_derivatives(trial, slave)
+    _input_derivatives(trial, slave)
     return first
 
 
@@ -254,6 +255,13 @@ def _output_derivatives(trial: Trial, slave: ImportedSlave) -> None:
     if order and outputs:
         trial.step("reading derivatives of outputs")
         slave.get_output_derivatives(outputs)
+
+
+def _input_derivatives(trial: Trial, slave: ImportedSlave) -> None:
+    inputs = [v.name for v in trial.readable("input") if v.is_signal and v.variability == "continuous"]
+    if trial.fmi == 2 and trial.flag("canInterpolateInputs") and inputs:
+        trial.step("setting derivatives of inputs")
+        slave.set_input_derivatives(inputs, [0.0] * len(inputs))
 
 
 def _tunables(trial: Trial, slave: ImportedSlave) -> None:

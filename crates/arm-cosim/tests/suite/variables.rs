@@ -33,6 +33,61 @@ fn rows_are_sound() {
 }
 
 #[test]
+fn every_limit_of_a_variable_is_taken() {
+    for spec in both() {
+        for v in variables(&spec).unwrap() {
+            let settable = v.start.is_some() && v.causality != Causality::Local;
+            let limits = [v.range.0, v.range.1];
+            for limit in limits.into_iter().filter(|l| settable && l.is_finite()) {
+                let mut arm = Slave::new(spec.clone()).unwrap();
+                let reference = arm.reference(&v.name).unwrap();
+                arm.set(&[reference], &[limit]).unwrap();
+                arm.enter_initialization_mode(0.0, None).unwrap();
+                let taken = arm.exit_initialization_mode();
+                assert!(taken.is_ok(), "{} = {limit}: {taken:?}", v.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_inputs_are_variables() {
+    let mut arms = both().map(|spec| Slave::new(spec).unwrap());
+    let of = |arm: &Slave, name: &str| arm.reference(name).unwrap();
+    for (port, name, order, rate) in [
+        (0, "handle.F[1]", 1, "der(handle.F[1])"),
+        (0, "tau[2]", 1, "der(tau[2])"),
+        (1, "robot.r[2]", 1, "robot.v[2]"),
+        (1, "robot.r[2]", 2, "der(robot.v[2])"),
+    ] {
+        let arm = &mut arms[port];
+        let (input, rate) = (of(arm, name), of(arm, rate));
+        let set = arm.set_input_derivatives(&[input], &[order], &[0.5 * f64::from(order)]);
+        assert!(set.is_ok(), "{name}: {set:?}");
+        let mut value = [0.0];
+        arm.get(&[rate], &mut value).unwrap();
+        assert_eq!(value[0], 0.5 * f64::from(order), "{name}");
+    }
+    let forced = &mut arms[0];
+    for (name, order) in [
+        ("handle.F[1]", 0),
+        ("handle.F[1]", -1),
+        ("handle.F[1]", i32::MAX),
+        ("q[1]", 1),
+    ] {
+        let reference = of(forced, name);
+        let refused = forced.set_input_derivatives(&[reference], &[order], &[1.0]);
+        assert!(
+            refused
+                .unwrap_err()
+                .message
+                .contains(&format!("no derivative of order {order}"))
+        );
+        forced.reset().unwrap();
+    }
+}
+
+#[test]
 fn references_are_places_and_descriptions_agree() {
     for spec in both() {
         let slave = Slave::new(spec.clone()).unwrap();

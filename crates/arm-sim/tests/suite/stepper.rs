@@ -123,6 +123,54 @@ fn a_handle_moves_on_within_a_step_and_from_step_to_step() {
 }
 
 #[test]
+fn inputs_with_rates_go_on_within_a_step() {
+    let (mut whole, mut parts) = (stepper(&rig(), Port::Force), stepper(&rig(), Port::Force));
+    let ramp = Outside {
+        force_on_arm: [4.0, -2.0],
+        force_rate: [300.0, 150.0],
+        torque: [0.1, 0.2, -0.1].into(),
+        torque_rate: [5.0, -3.0, 1.0].into(),
+        ..Outside::default()
+    };
+    whole.advance(&ramp, 80.0 * DT).unwrap();
+    for k in 0..80 {
+        let (middle, since) = ((f64::from(k) + 0.5) * DT, f64::from(k) * DT);
+        let now = Outside {
+            force_on_arm: [0, 1].map(|i| ramp.force_on_arm[i] + ramp.force_rate[i] * middle),
+            force_rate: [0.0; 2],
+            torque_age: since,
+            ..ramp
+        };
+        parts.advance(&now, DT).unwrap();
+    }
+    assert!((whole.q() - parts.q()).amax() < 1e-13);
+
+    let mut handle = stepper(&rig(), Port::Motion);
+    let mut held = handle.clone();
+    let moving = Outside {
+        position: [0.35, -0.30],
+        acceleration: [2.0, -1.0],
+        ..Outside::default()
+    };
+    handle.advance(&moving, 80.0 * DT).unwrap();
+    for k in 0..80 {
+        // The same parabola, a piece at a time.
+        let since = f64::from(k) * DT;
+        let [y, z] = [0, 1].map(|i| {
+            let (r, a) = (moving.position[i], moving.acceleration[i]);
+            (r + 0.5 * a * since * since, a * since)
+        });
+        let now = Outside {
+            position: [y.0, z.0],
+            velocity: [y.1, z.1],
+            ..moving
+        };
+        held.advance(&now, DT).unwrap();
+    }
+    assert!((handle.q() - held.q()).amax() < 1e-12);
+}
+
+#[test]
 fn the_work_of_a_port_is_the_energy_the_arm_gains() {
     let arm = arms::human_arm();
     let setup = arm_core::Setup::new(&arm, arm_core::Contact::new([2000.0; 2], [20.0; 2]));
