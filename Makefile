@@ -17,7 +17,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: help demo test bench bench-kernels hidden fuzz crosscheck wheel sdist docs guide mutants lint-workflows clean build format rust python
+.PHONY: help demo test bench bench-kernels hidden fuzz crosscheck fmu-libraries wheel sdist docs guide mutants lint-workflows clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -87,6 +87,10 @@ format: $(STAMPS)/dev ## format Rust and Python, mend what lints can mend
 
 crosscheck: ## the same bits on other architectures and two microcontrollers; half an hour the first time
 	scripts/crosscheck
+
+fmu-libraries: $(STAMPS)/dev ## libraries for FMUs on Linux and Windows, in out/fmu-libraries, run under QEMU and Wine
+	$(BIN)/python -m pip install ziglang cargo-zigbuild
+	scripts/crosscheck --strict fmu
 
 # On Linux with Zig's linker, which knows old versions of glibc; elsewhere as it is.
 OLD_GLIBC := $(if $(filter Linux,$(shell uname)),yes)

@@ -5,7 +5,7 @@ linked against glibc 2.17, so that FMUs run on older systems as well; this needs
 `--of-tests`, and the packages that cargo is to test after it, it is the one that the Rust tests are compiled with: of the same bits,
 slower, and there without compiling anything twice.
 
-`--target TRIPLE` builds for another machine instead (`scripts/foreign.sh` says which). `--into DIR` puts the library where
+`--target TRIPLE` builds for another machine instead (`scripts/foreign.sh` says which and with what). `--into DIR` puts the library where
 `armrs fmu export --library DIR` takes it from, and not into the package.
 """
 
@@ -31,13 +31,11 @@ def main() -> None:
     portable, target, into = "--portable" in sys.argv, option("--target"), option("--into")
     machine, system = of(target)
     name = SYSTEMS[system]
-    if target and not portable:
-        built = foreign(target, name)
+    if target or portable:
+        built = foreign(target or f"{machine}-unknown-linux-gnu", name, portable)
     else:
         command = ["cargo", "build", "--release", "-p", "arm-fmu"]
-        if portable:
-            command[1:2] = ["zigbuild", "--target", f"{machine}-unknown-linux-gnu.{OLDEST[0]}.{OLDEST[1]}"]
-        elif sys.argv[1:2] == ["--of-tests"]:
+        if sys.argv[1:2] == ["--of-tests"]:
             command = ["cargo", "test", "--no-run", "--tests", *sys.argv[2:]]
         built = library(command, name)
     content = built.read_bytes()
@@ -70,13 +68,15 @@ def of(target: str) -> tuple[str, str]:
     return MACHINES.get(machine, machine), {"win32": "windows"}.get(sys.platform, sys.platform)
 
 
-def foreign(target: str, name: str) -> Path:
-    """Build for another machine."""
-    work = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "crosscheck"
-    done = subprocess.run([str(ROOT / "scripts" / "foreign.sh"), target, str(work), "-p", "arm-fmu"], check=False)
+def foreign(target: str, name: str, portable: bool) -> Path:
+    """Build for another machine, or for older systems."""
+    work = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).absolute() / "crosscheck"
+    old = portable and "linux" in target
+    glibc = {"ARMRS_GLIBC": version(OLDEST)} if old else {}
+    done = subprocess.run([str(ROOT / "scripts" / "foreign.sh"), target, str(work), "-p", "arm-fmu"], check=False, env=os.environ | glibc)
     if done.returncode:
         sys.exit(done.returncode)
-    return work / "foreign" / target / "release" / name
+    return work / ("portable" if old else "foreign") / target / "release" / name
 
 
 def library(command: list[str], name: str) -> Path:

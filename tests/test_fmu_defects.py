@@ -269,6 +269,19 @@ def test_nothing_is_found_in_a_good_fmu_of_another_tool(module: str, source: str
     assert errors(tmp_path / "Small.fmu") == []
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_nothing_is_found_in_a_container_of_another_tool(fmi: int, tmp_path: Path) -> None:
+    pytest.importorskip("pythonfmu3")
+    pytest.importorskip("fmu_manipulation_toolbox")
+    (tmp_path / "small.py").write_text(SLAVE_3, encoding="utf-8")
+    (tmp_path / "container.json").write_text('{"name": "container.fmu", "fmu": ["Small.fmu"], "step_size": 0.01}', encoding="utf-8")
+    program = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
+    for command in (["-m", "pythonfmu3", "build", "-f", "small.py"], ["-c", program, "-container", "container.json", "-fmi", str(fmi)]):
+        done = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert errors(tmp_path / "container.fmu") == []
+
+
 @NEEDS_COMPILER
 @pytest.mark.parametrize(
     ("defect", "how"), [("EXITS", "ends the process with status 0"), ("ABORTS", "signal 6"), ("HANGS", "does not return within 2 s")]

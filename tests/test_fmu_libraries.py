@@ -108,3 +108,11 @@ def test_a_folder_without_libraries_is_refused(folder: Path, tmp_path: Path) -> 
     ):
         with pytest.raises(BadInput, match=words):
             export_fmu(true_model(), tmp_path / "arm.fmu", libraries=place)
+
+
+def test_fmi_2_is_refused_on_a_machine_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platform.machine", lambda: "aarch64")
+    monkeypatch.setattr("sys.platform", "linux")
+    with pytest.raises(BadInput, match=r"FMI 2\.0 has no folder for libraries of aarch64-linux"):
+        export_fmu(true_model(), tmp_path / "arm.fmu", fmi=2)
+    assert not (tmp_path / "arm.fmu").exists()
