@@ -9,6 +9,7 @@ use crate::GapError;
 use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
+use crate::extent::extent;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linearization_point::{Change, LinearizationPoint};
 use crate::sensitivity::response::Response;
@@ -166,7 +167,7 @@ impl Candidate {
     pub fn at_rest_as(mut self, effect: &Effect<f64>) -> Self {
         if let Some(smoothing) = effect.kind.smoothed_by() {
             self.effect.parameters[smoothing] = effect.parameters[smoothing];
-            self.refined.retain(|&p| p != smoothing || !effect.is_dry());
+            self.refined.retain(|&p| Some(p) != held(effect));
         }
         self
     }
@@ -486,9 +487,13 @@ fn motions<const N: usize>(
 
 /// The shapes of an effect that are refined once it is named: of friction that sticks, not the speed below which it would creep.
 fn refined(effect: &Effect<f64>, question: &Question) -> Vec<usize> {
-    let held = effect.kind.smoothed_by().filter(|_| effect.is_dry());
     let shapes = question.refined.iter().copied();
-    shapes.filter(|&p| Some(p) != held).collect()
+    shapes.filter(|&p| Some(p) != held(effect)).collect()
+}
+
+/// The parameter that stays as it is in friction that sticks: the speed over which it would be smoothed.
+fn held(effect: &Effect<f64>) -> Option<usize> {
+    effect.kind.smoothed_by().filter(|_| effect.is_dry())
 }
 
 /// The candidates of one question about a kind at a place.
@@ -521,12 +526,7 @@ fn ask<const N: usize>(
         shapes = waves.iter().map(shape).collect();
     }
     let joint = plain.index.min(N - 1);
-    let angles = || {
-        let all = movements.iter().flat_map(|m| &m.motion).map(|m| m.q[joint]);
-        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
-            (a.min(q), b.max(q))
-        })
-    };
+    let angles = || extent(movements.iter().flat_map(|m| &m.motion).map(|m| m.q[joint]));
     for (p, values) in question.shapes {
         let (low, high) = angles();
         let values = match values {

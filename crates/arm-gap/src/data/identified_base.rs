@@ -12,6 +12,7 @@ use arm_ident::regression::unknown::Source;
 
 use crate::data::passive_law::{Free, Passive};
 use crate::data::session::{ComparisonMode, Session};
+use crate::extent::extent;
 
 /// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
 const LIKELY: f64 = 2.0;
@@ -148,10 +149,7 @@ impl<const N: usize> Session<N> {
     /// The middle of the angles that a joint reached in the fit trials \[rad\].
     fn middle(&self, joint: usize) -> f64 {
         let trials = self.trials.iter().filter(|t| t.role == Role::Fit);
-        let angles = trials.flat_map(|t| &t.q).map(|q| q[joint]);
-        let (low, high) = angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
-            (f64::min(a, q), f64::max(b, q))
-        });
+        let (low, high) = extent(trials.flat_map(|t| &t.q).map(|q| q[joint]));
         0.5 * (low + high)
     }
 
@@ -166,11 +164,8 @@ impl<const N: usize> Session<N> {
             for (joint, count) in moving.iter_mut().enumerate() {
                 let range = course.as_ref().map_or(f64::INFINITY, |course| {
                     let angles = std::iter::zip(&course.seen[joint], &course.counted);
-                    let counted = angles.filter(|(_, counted)| **counted).map(|(q, _)| *q);
-                    let (low, high) = counted
-                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| {
-                            (a.min(q), b.max(q))
-                        });
+                    let counted = angles.filter(|(_, counted)| **counted);
+                    let (low, high) = extent(counted.map(|(q, _)| *q));
                     high - low
                 });
                 *count += usize::from(range > STILL);

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::GapError;
 use crate::data::noise::{Noise, dot};
 use crate::data::prepared_session::{PreparedSession, flat};
+use crate::extent::extent;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::factor;
 
@@ -36,9 +37,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 // An arm that swings freely has no torque to show, but its inertia has.
                 let seen = self.fitted.iter().flat_map(|&t| &self.courses[t].seen[c]);
                 let all = seen.chain(point.residuals.iter().flat_map(|r| &r[c]));
-                let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                    (a.min(*v), b.max(*v))
-                });
+                let (low, high) = extent(all.copied());
                 (high - low).max(0.0)
             })
             .collect();
