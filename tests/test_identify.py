@@ -277,10 +277,27 @@ def test_a_calibration_far_beyond_its_tolerance_is_not_decided_by_the_model(slow
     """Forces 60 ms early, and no friction in the model: a delay of 3.6 times its tolerance was said to be decided by prior."""
     data = armrs.load_dataset(slow_arm)
     late = [dataclasses.replace(t, force_on_arm=np.roll(t.force_on_arm, -3, axis=0), original={}) for t in data.trials]
-    result = armrs.identify(data.replace(trials=tuple(late)))
+    result = armrs.identify(data.replace(trials=tuple(late)), with_effects=())
     delay = next(e for e in result.calibration if e.name == "time delay")
     assert abs(delay.value) > 3.0 * data.tolerance.time_delay_s and delay.std > 0.5 * data.tolerance.time_delay_s
     assert delay.decided_by == "data"
     assert any("time delay came out" in line for line in result.warnings)
     small = [e for e in result.calibration if abs(e.value) < e.std]
     assert small and all(e.decided_by == "prior" for e in small)
+
+
+def test_an_arm_of_which_little_is_known_is_identified_with_default_options(tmp_path: Path) -> None:
+    """Three segments by the literature, cameras, no joint law: the model as given cannot be simulated, and what measured motion alone
+    tells of the wrist is noise."""
+    laboratory = Path(__file__).parents[1] / "bench" / "sweep" / "little_known" / "EXPERIMENT.toml"
+    armrs.record(laboratory, tmp_path)
+    dataset, truth = armrs.load_dataset(tmp_path), armrs.load_model(tmp_path / "truth" / "truth.toml")
+    found = armrs.identify(dataset)
+    assert found.is_sound and not found.left_out
+    laws = [e for e in found.parameters if e.kind in ("elastic", "viscous", "coulomb")]
+    assert len(laws) == 15
+    values = [(e, value_in(truth, e.name, kind=e.kind, joint=e.joint)) for e in laws]
+    assert sum(e.interval[0] <= value <= e.interval[1] for e, value in values) >= 13
+    assert all(abs(e.value - value) < 3.5 * e.std for e, value in values)
+    alone = armrs.identify(dataset, with_effects=())
+    assert not [e for e in alone.parameters if e.kind in ("elastic", "viscous", "coulomb")]

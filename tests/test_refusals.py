@@ -118,7 +118,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "an effect twice": ((*IDENTIFY, "--with", "coulomb,coulomb"), nothing, "--with: found coulomb twice, allowed each kind once"),
     "an effect of a plan twice": (("plan", "data/model.toml", "--angles-deg", "-60:60,0:90", "--with", "viscous, viscous"), nothing, "--with: found viscous twice"),
     "a date without a history": ((*IDENTIFY, "--date", "2026-01-01"), nothing, "--date: found no --history, allowed --date beside --history FILE"),
-    "nothing to find": (IDENTIFY, lambda f: f.edit("model.toml", "segment_uncertainty = 0.1", "segment_uncertainty = 0.0 #"), "model.toml: [arm], segment_uncertainty: found 0.0, allowed above 0, or an effect to fit"),
+    "nothing to find": ((*IDENTIFY, "--with", "none"), lambda f: f.edit("model.toml", "segment_uncertainty = 0.1", "segment_uncertainty = 0.0 #"), "model.toml: [arm], segment_uncertainty: found 0.0, allowed above 0, or an effect to fit"),
     "unknown method": ((*IDENTIFY, "--method", "best"), nothing, "'best' is not one of"),
     "level of one": ((*IDENTIFY, "--level", "1"), nothing, "--level: found 1.0"),
     "level that is no number": ((*IDENTIFY, "--level", "nan"), nothing, "--level: found nan"),

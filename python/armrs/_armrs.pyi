@@ -95,6 +95,7 @@ class _Identified(TypedDict):
     neglected_inertia: list[float]
     speed_noise: list[float]
     speed_noise_allowed: float
+    not_simulated: str | None
     trades: list[str]
     parameters: list[_Estimate]
     combinations: list[_Estimate]

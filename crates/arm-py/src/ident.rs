@@ -228,6 +228,8 @@ fn outcome<'py, const N: usize>(
         "speed_noise_allowed",
         arm_ident::regression::measured_motion::QUIET,
     )?;
+    let not_simulated = result.not_simulated.as_ref();
+    out.set_item("not_simulated", not_simulated.map(ToString::to_string))?;
     out.set_item("trades", &result.trades)?;
     for (name, list) in [
         ("parameters", &result.parameters),

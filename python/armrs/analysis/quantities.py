@@ -28,7 +28,7 @@ def value_in(model: Model, name: str, *, kind: str = "segment", joint: int | Non
     model : Model
     name : str
         A sum of products, brackets not nested, of masses `m1`, centres of mass `l1` (along) and `n1` (normal), lengths `a1` and inertias
-        `I1` about the centre of mass, or the name of a parameter of an effect.
+        `I1` about the centre of mass, or the name of a parameter of an effect, or a product of such.
     kind : str
         "segment", "combination", or a kind of effect.
     joint : int, optional
@@ -43,8 +43,9 @@ def value_in(model: Model, name: str, *, kind: str = "segment", joint: int | Non
         return _sum(model, name)
     if kind not in catalogue():
         return None
-    own = [e.parameters[name] for e in model.all_effects if e.kind == kind and e.joint == joint and name in e.parameters]
-    return sum(own)
+    factors = name.split("*")
+    own = [e.parameters for e in model.all_effects if e.kind == kind and e.joint == joint and e.parameters.keys() >= {*factors}]
+    return sum(math.prod(parameters[factor] for factor in factors) for parameters in own)
 
 
 def _sum(model: Model, name: str) -> float | None:

@@ -77,7 +77,8 @@ def identify(
         typer.Option(
             "--with",
             metavar="KIND,…",
-            help="Kinds of joint effects (see armrs effects) that are fitted at every joint besides the model's.",
+            help="Kinds of joint effects (see armrs effects) that are fitted at every joint besides the model's, or none. When absent: "
+            "elastic, viscous and coulomb in joints without a law.",
         ),
     ] = None,
     cutoff_hz: Annotated[
@@ -108,7 +109,7 @@ def identify(
         result = run_identification(
             data,
             method=method.value,
-            with_effects=() if with_ is None else with_,
+            with_effects=() if with_ == "none" else with_,
             cutoff=cutoff_hz,
             motion=motion.value,
             level=level,

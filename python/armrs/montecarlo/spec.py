@@ -33,7 +33,7 @@ class Question:
     Attributes
     ----------
     method, motion : str
-    with_effects : tuple of str
+    with_effects : tuple of str, optional
     cutoff : float, optional
         [Hz]
     level : float
@@ -42,7 +42,7 @@ class Question:
     """
 
     method: str = "joint"
-    with_effects: tuple[str, ...] = ()
+    with_effects: tuple[str, ...] | None = None
     cutoff: float | None = None
     motion: str = "auto"
     level: float = 0.95
@@ -196,14 +196,14 @@ def _question(table: object) -> Question:
     place = "[identify]"
     given = checks.table(place, table)
     checks.keys(place, given, optional=["method", "with", "cutoff_Hz", "motion", "level", "bootstrap"])
-    kinds = given.get("with", [])
-    if not isinstance(kinds, list) or not all(isinstance(kind, str) for kind in kinds):
+    kinds = given.get("with")
+    if kinds is not None and not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
         raise BadInput(f"{place}, with", kinds, 'a list of kinds of effects, as in ["coulomb"]')
     level = checks.number(f"{place}, level", given.get("level", 0.95), **LEVELS)
     cutoff = given.get("cutoff_Hz")
     return Question(
         method=checks.choice(f"{place}, method", given.get("method", "joint"), ("joint", "cascade")),
-        with_effects=tuple(kinds),
+        with_effects=None if kinds is None else tuple(kinds),
         cutoff=None if cutoff is None else checks.number(f"{place}, cutoff_Hz", cutoff, above=0.0, unit="Hz"),
         motion=checks.choice(f"{place}, motion", given.get("motion", "auto"), ("auto", "measured", "simulated")),
         level=level,
@@ -215,7 +215,7 @@ def _check_question(question: Question, model: Model) -> None:
     try:
         effects_of(model, question.with_effects)
         if question.method == "cascade":
-            cascade_can(question.with_effects, question.motion)
+            cascade_can(question.with_effects or (), question.motion)
     except BadInput as error:
         named = BadInput("with" if error.place == "with_effects" else error.place, error.found, error.allowed, hint=error.hint)
         raise named.within(place="[identify]") from None

@@ -233,7 +233,7 @@ def _demonstrate(out: Path, command: str | None, say: Callable[[str], None]) -> 
     say("passive moments")
     passive = passive_moments(dataset)
     say("identifying the model as it was handed over")
-    plain = identify(dataset)
+    plain = identify(dataset, with_effects=())
     say("identifying with what was found")
     found = identify(dataset, with_effects=found_in_joints(gap))
     made = Demonstration(truth, found, plain, passive, gap, slow, (description, second))

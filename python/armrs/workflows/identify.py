@@ -197,7 +197,7 @@ def identify(
     dataset: Dataset | str | os.PathLike[str],
     *,
     method: str = "joint",
-    with_effects: Sequence[str] | str = (),
+    with_effects: Sequence[str] | str | None = None,
     cutoff: float | None = None,
     motion: str = "auto",
     level: float = 0.95,
@@ -209,13 +209,14 @@ def identify(
     dataset : Dataset or path
     method : {"joint", "cascade"}
         All joints at once with physical constraints, or the thesis' order wrist, elbow, shoulder.
-    with_effects : sequence of str, or names separated by commas
-        Kinds of joint effects that are fitted at every joint besides those of the model.
+    with_effects : sequence of str, or names separated by commas, optional
+        Kinds of joint effects that are fitted at every joint besides those of the model; () for those of the model alone. When absent:
+        spring, viscosity and dry friction in each joint that the model leaves without a law, by the joint method.
     cutoff : float, optional
         Cutoff of the common low-pass [Hz]; chosen from the data when absent.
     motion : {"auto", "measured", "simulated"}
-        Where the speeds and accelerations come from. "auto": simulated along the robot's path where it is known, and measured where
-        the arm that was simulated moves elsewhere, which is said in `warnings`.
+        Where the speeds and accelerations come from. "auto": simulated along the robot's path where it is known, with what measured
+        motion tells of the arm where the model as given moves elsewhere; measured, which is said in `warnings`, where that does too.
     level : float
         Probability of the intervals.
 
@@ -243,13 +244,13 @@ def identify(
 
 
 def _checked(
-    dataset: Dataset, method: str, with_effects: Sequence[str] | str, cutoff: float | None, motion: str, level: float
-) -> tuple[str, ...]:
+    dataset: Dataset, method: str, with_effects: Sequence[str] | str | None, cutoff: float | None, motion: str, level: float
+) -> Sequence[str] | None:
     """Refuse what cannot be identified, or not with these settings; return the kinds of effects to fit."""
     refuse_added(dataset)
     checks.choice("method", method, ("joint", "cascade"))
     checks.choice("motion", motion, ("auto", "measured", "simulated"))
-    kinds = checks.texts("with_effects", with_effects, "kinds of effects")
+    kinds = checks.texts("with_effects", () if with_effects is None else with_effects, "kinds of effects")
     checks.number("level", level, **LEVELS)
     slowest = min(trial.rate for trial in dataset.trials)
     if cutoff is not None and checks.number("cutoff", cutoff, above=0.0, unit="Hz") >= 0.4 * slowest:
@@ -259,7 +260,7 @@ def _checked(
     for trial in dataset.trials:
         if trial.force_on_arm is None and trial.tau is None:
             raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
-    return tuple(kinds)
+    return None if with_effects is None and method == "joint" else kinds
 
 
 def _result(dataset: Dataset, raw: _Identified, effects: list[Effect], settings: Mapping[str, Any], follows: Sequence[str]) -> Identified:
@@ -313,15 +314,15 @@ def _identified(
     built: _armrs.Rig, columns: list[dict[str, Any]], settings: dict[str, Any], dataset: Dataset
 ) -> tuple[_Identified, tuple[str, ...]]:
     """Return what the core identified, and a line where the measured motion had to take the place of the simulated one."""
-    try:
-        return _armrs.identify(built, columns, settings), ()
-    except IdentificationError as error:
-        # An arm of which little is known moves elsewhere than its model; one whose robot does not fit is refused.
-        if settings["motion"] != "auto" or settings["method"] != "joint" or not hand_meets_handle(dataset):
-            raise
-        why = str(error).split(":")[0] if "differs from" in str(error) else "the arm cannot be simulated"
-    raw = _armrs.identify(built, columns, settings | {"motion": "measured"})
-    return raw, (f"speeds and accelerations are measured, not simulated: with what the model has {why}",)
+    raw = _armrs.identify(built, columns, settings)
+    error = raw["not_simulated"]
+    if error is None:
+        return raw, ()
+    # An arm of which little is known moves elsewhere than its model; one whose robot does not fit is refused.
+    if not hand_meets_handle(dataset):
+        raise IdentificationError(error)
+    why = error.split(":")[0] if "differs from" in error else "the arm cannot be simulated"
+    return raw, (f"speeds and accelerations are measured, not simulated: with what measured motion tells {why}",)
 
 
 _INERTIA_FELT = 1.0
@@ -368,10 +369,26 @@ def _unmoved(method: str, parameters: Sequence[Estimate]) -> tuple[str, ...]:
     )
 
 
-def effects_of(model: Model, with_effects: Sequence[str]) -> tuple[list[Effect], list[bool]]:
-    """Return the effects of a model with those wanted besides, and which of them are fitted."""
-    effects = [*model.all_effects, *_added(model, checks.texts("with_effects", with_effects, "kinds of effects"))]
+PASSIVE_LAWS = ("elastic", "viscous", "coulomb")
+"""What resists in every passive joint (equation 3.12 of the thesis)."""
+_NO_LAWS = ("segment", "muscle")
+"""Families of joint effects that say nothing of how a passive joint resists."""
+
+
+def effects_of(model: Model, with_effects: Sequence[str] | None) -> tuple[list[Effect], list[bool]]:
+    """Return the effects of a model with those wanted, or with passive laws where joints have none, and which of them are fitted."""
+    wanted = None if with_effects is None else checks.texts("with_effects", with_effects, "kinds of effects")
+    effects = [*model.all_effects, *(_passive_laws(model) if wanted is None else _added(model, wanted))]
     return effects, [e.kind in _joint_kinds() for e in effects]
+
+
+def _passive_laws(model: Model) -> list[Effect]:
+    """Return the laws of the joints that the model leaves without one."""
+    kinds = _joint_kinds()
+    laws = [e for e in model.all_effects if e.kind in kinds and kinds[e.kind].family not in _NO_LAWS]
+    # What acts over two joints belongs to both.
+    taken = {joint for e in laws for joint in (e.joint, e.joint - kinds[e.kind].first_joint + 1)}
+    return [Effect(kind, j) for j in range(1, model.n_joints + 1) if j not in taken for kind in PASSIVE_LAWS]
 
 
 def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dict[str, Any]:

@@ -1,12 +1,14 @@
 //! The laws of joints that the model leaves without one, as measured motion has them.
 //!
 //! A rigid model of literature values cannot follow a person: its free wrist falls. What every passive joint may have, springs with
-//! a rest angle, viscosity and dry friction ([`arm_core::effect::Probe::passive`]), is linear in the equation of motion of the
-//! measured angles, and is identified there together with the segments.
+//! a rest angle, viscosity and dry friction ([`arm_core::effect::Probe::passive`]), is linear in the equation of motion, and is
+//! identified together with the segments: along simulated motion where the arm can be simulated with what measured motion tells, or with
+//! what is typical, else along the measured one.
 
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
 use arm_ident::inference::estimate::{Estimate, Quantity};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
+use arm_ident::inference::start::{middle, weight_moment};
 use arm_ident::regression::trial::{Model, Role};
 use arm_ident::regression::unknown::Source;
 
@@ -16,22 +18,10 @@ use crate::extent::extent;
 
 /// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
 const LIKELY: f64 = 2.0;
-/// Part of the whole arm's weight moment that each joint's typical sizes are read off at least: muscles that cross a wrist are made
-/// for more than the weight of a hand.
-const OF_THE_ARM: f64 = 0.3;
 /// Standard deviation of a rest angle about the middle of the angles that were reached \[rad\].
 const REST_SD: f64 = 1.0;
-/// Distance between the two rest angles at which a spring is regressed \[rad\].
-const APART: f64 = 6.0;
 /// Furthest start of a segment from its literature values, in standard deviations.
 const FURTHEST_START: f64 = 3.0;
-
-/// What a joint law is asked with in the regression: one column, or two with a rest angle.
-struct Column {
-    joint: usize,
-    kind: Kind,
-    rest: Option<usize>,
-}
 
 impl<const N: usize> Session<N> {
     /// The same session with the passive base of joints without any law, as measured motion has it.
@@ -43,59 +33,53 @@ impl<const N: usize> Session<N> {
         if joints.is_empty() || !forces || self.swings_freely() {
             return self;
         }
-        let (columns, fitted) = self.columns(&joints);
         let model = Model {
             chain: self.chain,
             segment_uncertainty: self.segment_uncertainty,
-            fitted,
+            fitted: self.passive_laws(&joints),
             held: self.effects.clone(),
             contact: self.contact,
         };
+        let motion = match self.comparison {
+            ComparisonMode::Led => MotionSource::Auto,
+            ComparisonMode::Torque => MotionSource::Measured,
+        };
         let options = Options {
-            motion: MotionSource::Measured,
+            motion,
             tolerance: self.tolerance,
             ..Options::default()
         };
         let Ok(found) = identify(&model, &self.trials, &options) else {
             return self;
         };
-        let estimate = |place: usize| {
+        let std = |place: usize| {
             let own = |e: &&Estimate| e.quantity == Quantity::Unknown(Source::Effect(place, 0));
             let e = found.parameters.iter().find(own);
-            e.map_or((0.0, f64::INFINITY), |e| (e.value, e.std))
+            e.map_or(f64::INFINITY, |e| e.std)
         };
         let still = match self.comparison {
             ComparisonMode::Led => self.hardly_moving(),
             ComparisonMode::Torque => [false; N],
         };
-        let mut place = 0;
-        for column in &columns {
-            let (value, sd) = estimate(place);
-            let effect = model.fitted[place];
-            let mut passive = self.passive(effect, column);
-            if let Some(smoothing) = column.kind.smoothed_by()
+        for (place, law) in found.fitted.iter().enumerate() {
+            let mut passive = self.passive(model.fitted[place]);
+            if let Some(smoothing) = law.kind.smoothed_by()
                 && self.comparison == ComparisonMode::Led
             {
                 // A joint that rests sticks, until the data say otherwise.
                 passive.effect.parameters[smoothing] = 0.0;
             }
-            place += 1;
-            let mut size = value;
-            if let Some(rest) = column.rest {
-                let (second, _) = estimate(place);
-                let beyond = model.fitted[place].parameters[rest] - effect.parameters[rest];
-                place += 1;
-                size += second;
-                if size > 0.0 {
-                    let moved = effect.parameters[rest] + second * beyond / size;
-                    let middle = effect.parameters[rest];
-                    passive.effect.parameters[rest] =
-                        moved.clamp(middle - 2.0 * REST_SD, middle + 2.0 * REST_SD);
-                }
+            let size = law.parameters[0];
+            if let Some(rest) = rest_angle(law.kind)
+                && size > 0.0
+            {
+                let middle = passive.effect.parameters[rest];
+                let (low, high) = (middle - 2.0 * REST_SD, middle + 2.0 * REST_SD);
+                passive.effect.parameters[rest] = law.parameters[rest].clamp(low, high);
             }
-            passive.likely = size > 0.0 && size > LIKELY * sd;
+            passive.likely = size > 0.0 && size > LIKELY * std(place);
             passive.effect.parameters[0] = if passive.likely { size } else { 0.0 };
-            if still[column.joint] {
+            if still[law.index] {
                 self.hold(&mut passive);
             }
             self.base.push(passive);
@@ -125,32 +109,22 @@ impl<const N: usize> Session<N> {
         })
     }
 
-    /// The columns of the regression, and the effects that they are the linear parameters of.
-    fn columns(&self, joints: &[usize]) -> (Vec<Column>, Vec<Effect<f64>>) {
-        let (mut columns, mut effects) = (Vec::new(), Vec::new());
-        for &joint in joints {
-            for &kind in KINDS.iter().filter(|k| k.probe().passive) {
-                let rest = kind.probe().questions.first().and_then(|q| q.rest);
-                let mut effect = Effect::<f64>::new(kind, joint);
-                effect.parameters[0] = 0.0;
-                if let Some(rest) = rest {
-                    let middle = self.middle(joint);
-                    effect.parameters[rest] = middle;
-                    effects.push(effect);
-                    effect.parameters[rest] += if middle > 0.0 { -APART } else { APART };
-                }
-                effects.push(effect);
-                columns.push(Column { joint, kind, rest });
+    /// What passive joints have, in those that have no law: without any size, springs at rest in the middle of the measured angles.
+    fn passive_laws(&self, joints: &[usize]) -> Vec<Effect<f64>> {
+        let fit = || self.trials.iter().filter(|t| t.role == Role::Fit);
+        let law = |joint, kind: Kind| {
+            let mut effect = Effect::<f64>::new(kind, joint);
+            effect.parameters[0] = 0.0;
+            if let Some(rest) = rest_angle(kind) {
+                effect.parameters[rest] = middle(fit(), joint);
             }
-        }
-        (columns, effects)
-    }
-
-    /// The middle of the angles that a joint reached in the fit trials \[rad\].
-    fn middle(&self, joint: usize) -> f64 {
-        let trials = self.trials.iter().filter(|t| t.role == Role::Fit);
-        let (low, high) = extent(trials.flat_map(|t| &t.q).map(|q| q[joint]));
-        0.5 * (low + high)
+            effect
+        };
+        let passive = || KINDS.iter().filter(|k| k.probe().passive);
+        joints
+            .iter()
+            .flat_map(|&joint| passive().map(move |&kind| law(joint, kind)))
+            .collect()
     }
 
     /// Which joints stay where they are in all fit trials but for noise. In one of them a sensor may slip.
@@ -184,10 +158,10 @@ impl<const N: usize> Session<N> {
     }
 
     /// A law with what is known of its numbers beforehand.
-    fn passive(&self, effect: Effect<f64>, column: &Column) -> Passive {
+    fn passive(&self, effect: Effect<f64>) -> Passive {
         /// Change of a law's size that a response is taken with, as a share of its typical size.
         const STEP: f64 = 0.01;
-        let sd = column.kind.probe().typical * self.weight_moment(column.joint);
+        let sd = effect.kind.probe().typical * self.weight_moment(effect.index);
         let size = Free {
             parameter: 0,
             mean: 0.0,
@@ -195,7 +169,7 @@ impl<const N: usize> Session<N> {
             lower: 0.0,
             step: STEP * sd,
         };
-        let rest = column.rest.map(|parameter| Free {
+        let rest = rest_angle(effect.kind).map(|parameter| Free {
             parameter,
             mean: effect.parameters[parameter],
             sd: REST_SD,
@@ -209,19 +183,13 @@ impl<const N: usize> Session<N> {
         }
     }
 
-    /// The weight moment that typical sizes of a joint are read off \[N m\]: of all segments from that joint on, stretched out.
+    /// The weight moment that typical sizes of a joint are read off \[N m\].
     pub fn weight_moment(&self, joint: usize) -> f64 {
-        let [y, z] = self.chain.gravity();
-        let g = libm::sqrt(y * y + z * z);
-        let beyond = |joint: usize| {
-            let mut reach = 0.0;
-            let mut sum = 0.0;
-            for segment in &self.chain.segments()[joint..] {
-                sum += segment.mass * g * (reach + segment.com[0]);
-                reach += segment.length;
-            }
-            sum
-        };
-        f64::max(beyond(joint), OF_THE_ARM * beyond(0))
+        weight_moment(&self.chain, joint)
     }
+}
+
+/// The rest angle among the parameters of a spring.
+fn rest_angle(kind: Kind) -> Option<usize> {
+    kind.probe().questions.first().and_then(|q| q.rest)
 }

@@ -77,6 +77,7 @@ pub(super) fn summarise<const N: usize>(
         clusters,
         neglected_inertia: moved_by_inertia(&certainty, model, steps)?,
         speed_noise: vec![0.0; N],
+        not_simulated: None,
         explained: prepared.iter().map(|pieces| explain(pieces, x)).collect(),
         chain,
         fitted,

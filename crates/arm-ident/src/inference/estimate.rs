@@ -4,6 +4,7 @@ use arm_core::effect::Effect;
 pub use arm_core::estimator::Decision;
 use arm_core::{Chain, Joints};
 
+use crate::error::IdentError;
 use crate::regression::unknown::Source;
 use arm_numerics::least_squares::program::Status;
 
@@ -93,6 +94,8 @@ pub struct Identified<const N: usize> {
     /// Noise of each joint's speed relative to the speed itself, where the motion was measured; zero where it was simulated.
     /// Above a few tenths friction, viscosity and inertia are biased in a way that no interval shows.
     pub speed_noise: Vec<f64>,
+    /// Why the motion was measured where it was to be simulated if that could be done.
+    pub not_simulated: Option<IdentError>,
     /// For each trial handed in: how it is explained.
     pub explained: Vec<Explained<N>>,
     /// The arm with the estimates.

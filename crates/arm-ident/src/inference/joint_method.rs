@@ -4,6 +4,7 @@ use crate::error::IdentError;
 use crate::inference::cutoff::best_cutoff;
 use crate::inference::estimate::Identified;
 use crate::inference::multistart::{Ended, best};
+use crate::inference::start::{SHARES, typical};
 use crate::inference::summary::{Fit, summarise};
 use crate::inference::weighted_fit::{Solved, explain, weighted};
 use crate::regression::equation::{Building, effect_value, value_of};
@@ -28,7 +29,8 @@ const SETTLED: f64 = 1e-2;
 /// Where the motion in the regressors comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotionSource {
-    /// Simulated where the handle's path is known in every trial, else measured.
+    /// Simulated where the handle's path is known in every trial: from the model as given or, where that arm moves elsewhere, from what
+    /// measured motion tells of it, or from what is typical. Measured where none of these can be simulated.
     Auto,
     /// Filtered and differentiated angles.
     Measured,
@@ -78,11 +80,6 @@ pub fn identify<const N: usize>(
         }));
     }
     let scale_free = fit.iter().all(|t| t.is_unloaded());
-    let simulate = match options.motion {
-        MotionSource::Auto => fit.iter().all(|t| can_simulate(t)),
-        MotionSource::Measured => false,
-        MotionSource::Simulated => true,
-    };
     let unknowns = unknowns(model, &options.tolerance, &fit);
     if unknowns
         .iter()
@@ -94,30 +91,18 @@ pub fn identify<const N: usize>(
             expected: 1,
         }));
     }
-    let cutoff = match options.cutoff {
-        Some(cutoff) => cutoff,
-        // Simulated motion is not bent by the filter: the lowest cutoff keeps out most noise.
-        None if simulate => candidates(&fit)[0],
-        None => best_cutoff(model, &unknowns, &fit)?,
-    };
     let task = Task {
         unknowns: &unknowns,
         trials,
         fit: &fit,
-        cutoff,
-        simulate,
+        cutoff: candidates(&fit)[0],
+        simulate: false,
         scale_free,
     };
-    let first = if simulate {
-        damped(model, cutoff)
-    } else {
-        model.clone()
-    };
-    let mut found = task.settle(first.clone())?;
-    // Where the robot holds every joint the motion is known, and the problem has one minimum.
-    if simulate && N > HELD {
-        found = task.restarted(found, &first);
-    }
+    let (task, found, not_simulated) = task.found(model, options)?;
+    let Task {
+        cutoff, simulate, ..
+    } = task;
     let Settled {
         model: current,
         solved,
@@ -140,10 +125,12 @@ pub fn identify<const N: usize>(
     if !simulate {
         result.speed_noise = relative_speed_noise(&fit_trials, cutoff)?.to_vec();
     }
+    result.not_simulated = not_simulated;
     Ok(result)
 }
 
 /// What rounds of a fit have in common.
+#[derive(Clone, Copy)]
 struct Task<'a, const N: usize> {
     unknowns: &'a [Unknown],
     trials: &'a [Trial<N>],
@@ -186,6 +173,69 @@ fn of_effects(unknowns: &[Unknown]) -> impl Iterator<Item = (usize, &Unknown)> {
 }
 
 impl<const N: usize> Task<'_, N> {
+    /// The fit along the motion that is asked for, and why that was measured where it was to be simulated if that could be done.
+    fn found(
+        self,
+        model: &Model<N>,
+        options: &Options,
+    ) -> Result<(Self, Settled<N>, Option<IdentError>), IdentError> {
+        let measured = || self.by_measured(model, options.cutoff);
+        let simulated = |from: &Model<N>| self.by_simulation(from, options.cutoff);
+        let certain = |(task, found)| (task, found, None);
+        match options.motion {
+            MotionSource::Simulated => return simulated(model).map(certain),
+            MotionSource::Auto if self.fit.iter().all(|t| can_simulate(t)) => {}
+            MotionSource::Auto | MotionSource::Measured => return measured().map(certain),
+        }
+        if let Ok(found) = simulated(model) {
+            return Ok(certain(found));
+        }
+        // An arm of which little is known moves elsewhere than its model.
+        let seen = measured()?;
+        let mut along = simulated(&seen.1.model);
+        for share in SHARES {
+            let typical = |error| simulated(&typical(model, self.fit, share)).map_err(|_| error);
+            along = along.or_else(typical);
+        }
+        Ok(match along {
+            Ok(found) => certain(found),
+            Err(error) => (seen.0, seen.1, Some(error)),
+        })
+    }
+
+    /// The fit along filtered and differentiated angles.
+    fn by_measured(
+        mut self,
+        model: &Model<N>,
+        cutoff: Option<f64>,
+    ) -> Result<(Self, Settled<N>), IdentError> {
+        self.cutoff = match cutoff {
+            Some(cutoff) => cutoff,
+            None => best_cutoff(model, self.unknowns, self.fit)?,
+        };
+        let found = self.settle(model.clone())?;
+        Ok((self, found))
+    }
+
+    /// The fit along simulated motion. That is not bent by the filter: the lowest cutoff keeps out most noise.
+    fn by_simulation(
+        mut self,
+        from: &Model<N>,
+        cutoff: Option<f64>,
+    ) -> Result<(Self, Settled<N>), IdentError> {
+        self.simulate = true;
+        self.cutoff = cutoff.unwrap_or(self.cutoff);
+        let first = damped(from, self.cutoff);
+        let found = self.settle(first.clone())?;
+        // Where the robot holds every joint the motion is known, and the problem has one minimum.
+        let found = if N > HELD {
+            self.restarted(found, &first)
+        } else {
+            found
+        };
+        Ok((self, found))
+    }
+
     /// The best of further starts where a fit may have ended in the wrong minimum.
     fn restarted(&self, found: Settled<N>, first: &Model<N>) -> Settled<N> {
         let unknowns = self.unknowns;

@@ -8,5 +8,6 @@ pub(crate) mod independent_blocks;
 pub mod joint_method;
 pub(crate) mod multistart;
 pub mod rank;
+pub mod start;
 pub(crate) mod summary;
 pub(crate) mod weighted_fit;

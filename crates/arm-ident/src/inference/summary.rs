@@ -129,6 +129,7 @@ pub(crate) fn summarise<const N: usize>(
         clusters,
         neglected_inertia: vec![0.0; N],
         speed_noise: vec![0.0; N],
+        not_simulated: None,
         explained,
         chain: fit.model.chain,
         fitted: fit.model.fitted.clone(),
