@@ -2,8 +2,7 @@
 //!
 //! A rigid model of literature values cannot follow a person: its free wrist falls. What every passive joint may have, springs with
 //! a rest angle, viscosity and dry friction ([`arm_core::effect::Probe::passive`]), is linear in the equation of motion, and is
-//! identified together with the segments: along simulated motion where the arm can be simulated with what measured motion tells, or with
-//! what is typical, else along the measured one.
+//! identified together with the segments: along the measured motion or, where a joint's speed is noise, along the simulated one.
 
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
 use arm_ident::inference::estimate::{Estimate, Quantity};
@@ -18,6 +17,9 @@ use crate::extent::extent;
 
 /// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
 const LIKELY: f64 = 2.0;
+/// Noise of a joint's speed, as a share of the speed, above which the motion is simulated: what measured motion tells of that joint is
+/// noise. Below it is nearer than a simulation that lacks what is to be found.
+const NOISY: f64 = 0.3;
 /// Standard deviation of a rest angle about the middle of the angles that were reached \[rad\].
 const REST_SD: f64 = 1.0;
 /// Furthest start of a segment from its literature values, in standard deviations.
@@ -40,18 +42,21 @@ impl<const N: usize> Session<N> {
             held: self.effects.clone(),
             contact: self.contact,
         };
-        let motion = match self.comparison {
-            ComparisonMode::Led => MotionSource::Auto,
-            ComparisonMode::Torque => MotionSource::Measured,
+        let along = |motion| {
+            let options = Options {
+                motion,
+                tolerance: self.tolerance,
+                ..Options::default()
+            };
+            identify(&model, &self.trials, &options)
         };
-        let options = Options {
-            motion,
-            tolerance: self.tolerance,
-            ..Options::default()
-        };
-        let Ok(found) = identify(&model, &self.trials, &options) else {
+        let Ok(mut found) = along(MotionSource::Measured) else {
             return self;
         };
+        let noisy = found.speed_noise.iter().any(|&noise| noise > NOISY);
+        if noisy && self.comparison == ComparisonMode::Led {
+            found = along(MotionSource::Auto).unwrap_or(found);
+        }
         let std = |place: usize| {
             let own = |e: &&Estimate| e.quantity == Quantity::Unknown(Source::Effect(place, 0));
             let e = found.parameters.iter().find(own);
