@@ -118,6 +118,8 @@ impl Segment {
     pub fn with_mass(&self, mass: f64, at: f64) -> Self {
         let total = self.mass + mass;
         let com = (self.mass * self.com + mass * at) / total;
+        // Between the two whatever rounding says: a segment's end is as far as a model may have it.
+        let com = com.clamp(self.com.min(at), self.com.max(at));
         let normal = self.mass * self.com_normal / total;
         let square = |value: f64| value * value;
         let shift = square(self.com - com) + square(self.com_normal - normal);

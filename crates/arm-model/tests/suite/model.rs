@@ -312,3 +312,19 @@ fn the_core_gets_the_arm_as_it_stands() {
     assert!((hand.mass * hand.com - (1.264 * 0.121 + 0.5 * 0.264)).abs() < 1e-15);
     assert!(model.with_mass(1, 0.5, Some(0.3)).is_err());
 }
+
+/// Where a segment's centre of mass is at its end, the mean with a mass there was beyond it by rounding, and the model refused.
+#[test]
+fn a_mass_at_the_end_of_a_segment_leaves_its_centre_of_mass_on_it() {
+    let model = model();
+    for n in 1..200 {
+        let length = 0.08 + 1e-3 * f64::from(n) / 7.0;
+        let change = |parts: &mut Parts| {
+            (parts.segments[1].length, parts.segments[1].com) = (length, length);
+            parts.segments[1].mass = 0.5 + 0.01 * f64::from(n);
+        };
+        let at_its_end = model.change(change).unwrap();
+        let heavier = at_its_end.with_mass(1, 0.193, None).unwrap();
+        assert_eq!(heavier.segments[1].com, length);
+    }
+}
