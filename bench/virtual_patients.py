@@ -1,0 +1,100 @@
+"""Virtual patients stretched in two sessions: whether reflexes are recovered, changes between the sessions seen, and only those.
+
+    python bench/virtual_patients.py [--patients 200] [--seed 61001] [--json FILE]
+
+Each patient of `tests/patients.py` (laws written there anew, tone that drifts from trial to trial, muscle activity) is drawn, and recorded
+twice. In every second one the reflex' gain is a fifth larger or smaller in the second session. Both sessions go through `armrs spasticity`
+and its history; what it calls changed is compared with the truth.
+
+Exit status: 0 when every figure holds, 1 when one does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import armrs
+from armrs.workflows import history
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+import patients
+
+CHANGE = 1.2
+"""Factor of the gain in the second session, or one over it."""
+TRUE = {"gain": "gain", "threshold": "threshold", "latency": "latency", "viscosity": "viscosity", "torque": "dry"}
+"""The patient's attribute of each quantity that a history keeps."""
+
+
+def pair(number: int, seed: int, counts: dict[str, list[bool]]) -> None:
+    """Record one patient twice and count what was found right."""
+    draw = np.random.default_rng(seed)
+    first = patients.Patient.drawn(draw)
+    factor = (1.0, CHANGE, 1.0, 1.0 / CHANGE)[number % 4]
+    second = dataclasses.replace(first, gain=factor * first.gain)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "history.sqlite"
+        for session, patient in enumerate((first, second)):
+            found = armrs.spasticity(patients.session(patient, 2 * seed + session, emg=True))
+            judge(found, patient, counts)
+            courses = history.add(file, found, f"2026-0{session + 1}-03").courses
+    called = {c.name for c in courses if c.changed_since_last}
+    if factor != 1.0:
+        counts["change of the gain seen"].append("gain" in called)
+    else:
+        counts["nothing called changed where nothing is"].append(not called)
+    counts["nothing else called changed"].append(not called - {"gain"})
+
+
+def judge(found: armrs.Spasticity, patient: patients.Patient, counts: dict[str, list[bool]]) -> None:
+    """Compare the reflex of one session with the truth."""
+    estimates = {e.name: e for e in found.followed()}
+    counts["reflex found"].append("gain" in estimates)
+    for name, attribute in TRUE.items():
+        if name not in estimates:
+            continue
+        true, e = getattr(patient, attribute), estimates[name]
+        if name in ("gain", "threshold"):
+            counts[f"{name} within 10 %"].append(abs(e.value - true) <= 0.1 * true)
+        if name == "latency":
+            counts["latency within 5 ms"].append(abs(e.value - true) <= 5e-3)
+        counts[f"interval of {attribute} holds"].append(e.interval[0] <= true <= e.interval[1])
+
+
+def holds(name: str, share: float) -> bool:
+    """Say whether a share is as it should be."""
+    if name.startswith("interval"):
+        return 0.9 <= share <= 0.98
+    return share >= (0.95 if "called" in name else 0.9)
+
+
+def main() -> int:
+    """Run."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--patients", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=61001)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    counts: dict[str, list[bool]] = {"reflex found": []}
+    names = ["gain within 10 %", "threshold within 10 %", "latency within 5 ms"]
+    names += [f"interval of {attribute} holds" for attribute in TRUE.values()]
+    names += ["change of the gain seen", "nothing called changed where nothing is", "nothing else called changed"]
+    counts |= {name: [] for name in names}
+    for number in range(options.patients):
+        pair(number, options.seed + number, counts)
+    shares = {name: (sum(right), len(right)) for name, right in counts.items()}
+    for name, (right, of) in shares.items():
+        print(f"{name:45s} {right:4d} of {of:4d} = {right / max(of, 1):6.1%} {'' if of and holds(name, right / of) else '  short'}")
+    if options.json:
+        options.json.write_text(json.dumps(shares, indent=1) + "\n", encoding="utf-8")
+    return 0 if all(of and holds(name, right / of) for name, (right, of) in shares.items()) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
