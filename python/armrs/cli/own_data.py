@@ -116,10 +116,10 @@ def import_(
     zero: Annotated[Zero | None, typer.Option(help="Where the first segment points at zero.")] = None,
     clockwise: Annotated[str | None, typer.Option(metavar="1,2,…|none", help="Joints whose angle is clockwise positive.")] = None,
     force_on: Annotated[Side | None, typer.Option("--force-on", help="What the recorded force acts on.")] = None,
-    points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints in C3D and TRC, first joint to handle.")] = "",
+    points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle.")] = "",
     json: JsonFile = None,
 ) -> None:
-    """Turn own recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO) into a data set.
+    """Turn own recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO, exports of Vicon, Qualisys, OptiTrack) into a data set.
 
     Separators, decimal commas, encodings, units and columns are recognised. How angles are counted and what the force acts on are read off
     the balance of the arm, unless you say them. Every decision is printed and kept in import.toml, which repeats the import.
@@ -167,9 +167,9 @@ def _files(source: Path) -> list[Path]:
 
     if not source.is_dir():
         return [source]
-    found = sorted(path for path in source.iterdir() if path.suffix.lower() in (*SUFFIXES, ".trc") and path.is_file())
+    found = sorted(path for path in source.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file())
     if not found:
-        raise BadInput("RAW", Text("a folder without recordings"), f"files of {', '.join((*SUFFIXES, '.trc'))}", file=source)
+        raise BadInput("RAW", Text("a folder without recordings"), f"files of {', '.join(SUFFIXES)}", file=source)
     return found
 
 

@@ -166,7 +166,11 @@ def read_c3d(path: Path) -> Markers:
     ArmrsError
         When ezc3d is not installed.
     """
-    content = c3d.read(path)
+    return markers_of(c3d.read(path))
+
+
+def markers_of(content: c3d.C3D) -> Markers:
+    """Return the points of a C3D file that was read; errors as in `read_c3d`."""
     if content.unit not in METRES:
         raise BadInput("POINT:UNITS", content.unit or Text("nothing"), " or ".join(METRES))
     if not content.points.size:

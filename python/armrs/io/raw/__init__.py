@@ -6,17 +6,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import BadInput, Text
-from . import matlab, motion, text, workbook
+from . import matlab, motion, programs, text, workbook
 from .table import RawColumn as RawColumn
 from .table import RawTable as RawTable
 
 _READERS: dict[tuple[str, ...], Callable[[Path], RawTable | list[RawTable]]] = {
-    text.SUFFIXES: text.read_text_table,
+    text.SUFFIXES: programs.read_text,
     workbook.SUFFIXES: workbook.read_workbook,
     matlab.SUFFIXES: matlab.read_matlab,
     motion.PARQUET_SUFFIXES: motion.read_parquet,
     motion.MOTION_SUFFIXES: motion.read_motion_table,
-    motion.C3D_SUFFIXES: motion.read_c3d_tables,
+    motion.C3D_SUFFIXES: motion.read_c3d_table,
+    motion.TRC_SUFFIXES: motion.read_trc_table,
 }
 """By suffix. A new format is one module and one line here."""
 
@@ -29,7 +30,8 @@ def read_raw(path: Path) -> list[RawTable]:
     Parameters
     ----------
     path : Path
-        By its suffix: text (`.csv`, `.txt`, `.tsv`, `.dat`, `.asc`), Excel, MATLAB, Parquet, OpenSim motion (`.mot`, `.sto`) or C3D.
+        By its suffix: text (`.csv`, `.txt`, `.tsv`, `.dat`, `.asc`, `.log`), also as Vicon, Qualisys, OptiTrack and Biodex export it;
+        Excel, MATLAB, Parquet, OpenSim motion (`.mot`, `.sto`), TRC or C3D.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Tables that already have names and time: Parquet, OpenSim motion files, and the analog channels of C3D files."""
+"""Recordings that already have names and time: Parquet, OpenSim motion files, markers in TRC, markers and analog channels in C3D files."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from .. import c3d
-from ..opensim import read_motion
+from ..markers import markers_of
+from ..opensim import read_motion, read_trc
 from ..samples import parquet_table
 from .table import RawTable, column
 
 PARQUET_SUFFIXES = (".parquet",)
 MOTION_SUFFIXES = (".mot", ".sto")
 C3D_SUFFIXES = (".c3d",)
+TRC_SUFFIXES = (".trc",)
 _NO_ANGLE = re.compile(r"force|moment|torque|emg|_[vp][xyz]$|_t[xyz]$|_f[xyz]$", flags=re.IGNORECASE)
 """Names of columns that the header's unit of angles does not concern."""
 
@@ -46,26 +48,20 @@ def read_motion_table(path: Path) -> RawTable:
     return RawTable(path, path.stem, tuple(columns), notes)
 
 
-def read_c3d_tables(path: Path) -> RawTable:
-    """Read points and analog channels of a C3D file on the clock of the analog channels, or of the points where there are none.
+def read_trc_table(path: Path) -> RawTable:
+    """Read the markers of a TRC file."""
+    markers = read_trc(path)
+    return RawTable(path, path.stem, (), markers.warnings, markers)
 
-    A point `WRIST` becomes the columns `WRIST.x`, `WRIST.y`, `WRIST.z`. Points have fewer samples: their cells between frames are empty.
-    """
+
+def read_c3d_table(path: Path) -> RawTable:
+    """Read the analog channels of a C3D file on their clock, and its points as markers."""
     content = c3d.read(path)
-    frames = len(content.points)
-    ratio = max(1, round(content.analog_rate / content.rate)) if len(content.analog) else 1
-    n = len(content.analog) or frames
-    rate = content.analog_rate if len(content.analog) else content.rate
-    columns = [column("time", np.arange(n) / rate, "s")]
-    for k, label in enumerate(content.labels):
-        for axis, name in enumerate("xyz"):
-            values = np.full(n, np.nan)
-            values[: ratio * frames : ratio] = content.points[: -(-n // ratio), k, axis]
-            columns.append(column(f"{label}.{name}", values, content.unit))
+    columns = [column("time", np.arange(len(content.analog)) / content.analog_rate, "s")] if len(content.analog) else []
     for k, label in enumerate(content.analog_labels[: content.analog.shape[1] if content.analog.size else 0]):
         stated = content.analog_units[k] if k < len(content.analog_units) else ""
         columns.append(column(label, np.ascontiguousarray(content.analog[:, k]), stated))
     notes = (
         f"{len(content.labels)} points at {content.rate:g} Hz, {len(content.analog_labels)} analog channels at {content.analog_rate:g} Hz",
     )
-    return RawTable(path, path.stem, tuple(columns), notes)
+    return RawTable(path, path.stem, tuple(columns), notes, markers_of(content) if content.points.size else None)

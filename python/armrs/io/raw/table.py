@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..markers import Markers
 from .units import UNITS
 
 _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>]\s*$")
@@ -50,12 +51,15 @@ class RawTable:
     columns : tuple of RawColumn
     notes : tuple of str
         What the reader decided: encoding, separator, decimal mark, columns left out.
+    markers : Markers or None
+        Trajectories of markers, where the recording has them; the columns may be on another clock.
     """
 
     path: Path
     title: str
     columns: tuple[RawColumn, ...]
     notes: tuple[str, ...] = field(default=())
+    markers: Markers | None = None
 
     @property
     def n_rows(self) -> int:

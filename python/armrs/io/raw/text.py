@@ -14,13 +14,15 @@ from ...errors import BadInput, Text
 from .table import RawColumn, RawTable, column
 from .units import unit
 
-SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
 _COMMENT = ("#", "%", "//", '"#')
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", " ": "blanks"}
 _PROBED = 400
 """Lines in which header, separator and decimal mark are looked for."""
 _FEWEST = 3
 """Rows of numbers that make a table."""
+_TWO_PARTS = ("ZeitInSec", "ZeitInNanoSec")
+"""Columns that hold the time of KUKA's DataRecorder."""
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "#NV", "-", "--", "null", "None", "inf", "-inf"]
 _NUMBER = {".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"), ",": re.compile(r"[-+]?(\d+,?\d*|,\d+)([eE][-+]?\d+)?")}
 
@@ -37,6 +39,13 @@ class _Layout:
     score: float
 
 
+def decoded_lines(path: Path) -> tuple[list[str], str]:
+    """Return the lines of a text that are not blank, and the name of its encoding."""
+    content, encoding = _decoded(path.read_bytes())
+    # Form feeds and other separators of str.splitlines may stand in a remark.
+    return [line for line in re.split(r"\r\n|\r|\n", content) if line.strip()], encoding
+
+
 def read_text_table(path: Path) -> RawTable:
     """Read a text table.
 
@@ -45,9 +54,11 @@ def read_text_table(path: Path) -> RawTable:
     BadInput
         When no block of numbers is found. Without the file's name in it; the caller adds it.
     """
-    content, encoding = _decoded(path.read_bytes())
-    # Form feeds and other separators of str.splitlines may stand in a remark.
-    lines = [line for line in re.split(r"\r\n|\r|\n", content) if line.strip()]
+    return table_of(path, *decoded_lines(path))
+
+
+def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
+    """Return the table in a text, from what `decoded_lines` returned; errors as in `read_text_table`."""
     lines = [line for index, line in enumerate(lines) if not (index and _is_comment(line))]
     layout = _layout(lines[:_PROBED])
     if layout is None:
@@ -57,7 +68,19 @@ def read_text_table(path: Path) -> RawTable:
     notes = [f"text in {encoding}, cells between {_SEPARATORS[layout.separator]}, decimal {'comma' if layout.decimal == ',' else 'point'}"]
     if dropped:
         notes.append(f"left out, since they hold no numbers: {', '.join(dropped)}")
-    return RawTable(path, path.stem, tuple(columns), tuple(notes))
+    return RawTable(path, path.stem, tuple(_one_clock(columns, notes)), tuple(notes))
+
+
+def _one_clock(columns: list[RawColumn], notes: list[str]) -> list[RawColumn]:
+    """Return columns in which seconds and nanoseconds of one clock, as KUKA's recorder writes them, are one column."""
+    by_name = {c.name: c for c in columns}
+    if not by_name.keys() >= set(_TWO_PARTS):
+        return columns
+    whole, part = (by_name[name] for name in _TWO_PARTS)
+    notes.append(f"time: {whole.name} and {part.name} together")
+    # The whole seconds are those since 1970: beside them a float64 keeps 0.2 µs, so they are counted from the first.
+    together = (whole.values - whole.values[0]) + 1e-9 * part.values
+    return [column("time", together, "s"), *(c for c in columns if c is not whole and c is not part)]
 
 
 def _decoded(raw: bytes) -> tuple[str, str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 _DEGREE = math.pi / 180.0
 _POUND_FORCE = 4.4482216152605
 _KILOGRAM_FORCE = 9.80665
+_FOOT_POUND = 0.3048 * _POUND_FORCE
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,10 @@ UNITS: dict[str, Unit] = {
     **_spelled("time", {"s sec secs second seconds sek sekunden": 1.0, "min": 60.0}),
     **_spelled("time", {"ms msec millisec milliseconds millisekunden": 1e-3, "µs us μs usec": 1e-6}),
     **_spelled("angle", {"rad radian radians": 1.0, "deg ° degree degrees grad": _DEGREE, "mrad": 1e-3}),
-    **_spelled("speed", {"rad/s rad_s rads": 1.0, "deg/s °/s deg_s grad/s": _DEGREE}),
+    **_spelled("speed", {"rad/s rad_s rads": 1.0, "deg/s °/s deg_s grad/s deg/sec": _DEGREE}),
     **_spelled("force", {"N newton newtons": 1.0, "kN": 1e3, "mN": 1e-3, "daN": 10.0, "kgf kp": _KILOGRAM_FORCE, "lbf": _POUND_FORCE}),
-    **_spelled("moment", {"Nm N·m N*m Nmeter": 1.0, "kNm": 1e3, "Nmm N·mm": 1e-3, "Ncm N·cm": 1e-2}),
+    **_spelled("moment", {"Nm N·m N*m N.m N-m Nmeter": 1.0, "kNm": 1e3, "Nmm N·mm N.mm mm.N": 1e-3, "Ncm N·cm": 1e-2}),
+    **_spelled("moment", {"ft-lbs ft-lb": _FOOT_POUND}),
     **_spelled("length", {"m meter metre": 1.0, "cm": 1e-2, "mm": 1e-3}),
     **_spelled("voltage", {"V volt": 1.0, "mV": 1e-3, "µV uV μV": 1e-6}),
 }  # fmt: skip

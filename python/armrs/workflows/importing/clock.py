@@ -22,6 +22,10 @@ _CREEP = 0.02
 """Speed at which friction has most of its size [rad/s]."""
 _OVERLAP = 0.6
 """Least part of the angles that forces must cover."""
+_ALIKE = 3.0
+"""Shifts that leave at most this many times as much unexplained as the best are compared by the balance of the arm."""
+_MOST = 6
+"""As many are compared at most."""
 _EXPLAINED = 0.6
 """Least share of the force's variance that the posture must explain: less is no match."""
 
@@ -34,8 +38,10 @@ class Shift:
     explained: float
 
 
-def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) -> Shift:
-    """Return the shift of the force's clock at which posture and motion explain the forces best.
+def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) -> list[Shift]:
+    """Return the shifts of the force's clock at which posture and motion explain the forces about equally well, the best first.
+
+    A movement that repeats itself explains them at several; which is the right one, the balance of the arm tells.
 
     Parameters
     ----------
@@ -69,7 +75,10 @@ def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) 
     if best.explained < _EXPLAINED:
         said = Text(f"forces of which the movement explains {100 * best.explained:.0f} % at best")
         raise BadInput("clock of the forces", said, "forces of the same trial")
-    return best
+    share = np.array([shift.explained for shift in found])
+    around = np.pad(share, 1, constant_values=-np.inf)
+    peaks = np.flatnonzero((share >= around[:-2]) & (share > around[2:]) & (1.0 - share <= _ALIKE * (1.0 - best.explained)))
+    return sorted((found[k] for k in peaks), key=lambda shift: -shift.explained)[:_MOST]
 
 
 def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray, near: float) -> float:

@@ -79,6 +79,8 @@ def symbol_of(column: RawColumn) -> str | None:
         return f"{match[1]}{match[2]}"
     if _mentions(tokens, _ACCELERATION):
         return None
+    if any(token.startswith("cart") for token in tokens):  # of a robot's flange, as KUKA names them: cartForce1_X, cartTorque1_TauX
+        return _force(tokens, dimension)
     return _force(tokens, dimension) or _joint(tokens, dimension)
 
 

@@ -70,6 +70,18 @@ def candidates(n_joints: int, given: Mapping[str, object], has_force: bool) -> I
         yield Convention(reference, zero, tuple(turned), side)  # type: ignore[arg-type]
 
 
+def balance(model: Model, motion: Motion | None, convention: Convention) -> Balance:
+    """Return what a motion leaves unexplained in a convention; all of it where there is no motion."""
+    left = 1.0 if motion is None else unexplained(model, motion.read_as(_reading(convention, model.n_joints)))
+    return Balance(convention, left)
+
+
+def best(model: Model, recording: tuple[np.ndarray, np.ndarray, np.ndarray], given: Mapping[str, object]) -> Balance:
+    """Return the convention in which one recording balances best; arguments as in `decide`."""
+    motion = motion_of([(*recording, None)])
+    return min((balance(model, motion, c) for c in candidates(model.n_joints, given, has_force=True)), key=lambda b: b.unexplained)
+
+
 def decide(
     model: Model,
     recordings: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
@@ -90,10 +102,7 @@ def decide(
         Gets a refusal where several conventions balance the arm equally well, or none does.
     """
     motion = motion_of([(t, q, force, None) for t, q, force in recordings])
-    found = []
-    for c in candidates(model.n_joints, given, has_force=True):
-        left = 1.0 if motion is None else unexplained(model, motion.read_as(_reading(c, model.n_joints)))
-        found.append(Balance(c, left))
+    found = [balance(model, motion, c) for c in candidates(model.n_joints, given, has_force=True)]
     usual = found[0]
     ranked = sorted(found, key=lambda b: b.unexplained)
     best = usual if usual.unexplained <= _CLOSE * ranked[0].unexplained else ranked[0]

@@ -13,8 +13,7 @@ import numpy as np
 from ... import checks
 from ...errors import BadInput, BadInputs, Text
 from ...io import files, tomlfile
-from ...io.markers import MARKER_SUFFIXES, planar_motion
-from ...io.motions import read_markers
+from ...io.markers import planar_motion
 from ...io.raw import RawColumn, RawTable, read_raw
 from ...io.raw.units import unit
 from ...io.samples import write_samples
@@ -25,6 +24,7 @@ from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
 _FORWARD_AND_UP = {("x", "y"): ("x", "y"), ("x", "z"): ("x", "z"), ("y", "z"): ("y", "z"), ("x", "y", "z"): ("y", "z")}
 """Axes of a force sensor -> the one forward and the one up. Of three, the first is taken to point sideways."""
+_AXES = ("Fx", "Fy", "Fz")
 
 
 @dataclass(frozen=True)
@@ -155,20 +155,38 @@ def _tables(paths: Sequence[Path], points: tuple[str, ...], problems: list[BadIn
 
 def _read(path: Path, points: tuple[str, ...]) -> list[RawTable]:
     """Return the tables of a file; markers become angles where `points` names those of the joints."""
-    if path.suffix.lower() not in MARKER_SUFFIXES or not points:
-        if path.suffix.lower() == ".trc":
-            raise BadInput("--points", Text("nothing"), "the markers of the joints, shoulder to handle", file=path)
-        return read_raw(path)
-    markers = read_markers(path)
-    motion = planar_motion(markers, points)
-    found = [RawColumn("time", "time", "s", markers.t)]
+    try:
+        return [_with_angles(table, points) if points and table.markers is not None else table for table in read_raw(path)]
+    except BadInput as error:
+        raise error.within(file=error.file or path) from None
+
+
+def _with_angles(table: RawTable, points: tuple[str, ...]) -> RawTable:
+    """Return a table with the angles that its markers show, on their clock, and its forces in the plane of the movement."""
+    if table.markers is None:
+        return table
+    motion = planar_motion(table.markers, points)
+    found = [RawColumn("time", "time", "s", motion.t)]
     found += [RawColumn(f"q{j}", f"q{j}", "rad", np.ascontiguousarray(q)) for j, q in enumerate(motion.q.T, start=1)]
-    if path.suffix.lower() == ".c3d":
-        (raw,) = read_raw(path)
-        (time,) = (c for c in raw.columns if c.name == "time")
-        analog = [c for c in raw.columns if c is not time and not c.name.endswith((".x", ".y", ".z"))]
-        found += [RawColumn(c.name, c.label, c.unit, np.interp(markers.t, time.values, c.values)) for c in analog]
-    return [RawTable(path, path.stem, tuple(found), (f"angles from the markers {', '.join(points)}", *motion.warnings()))]
+    clock = next((c.values for c in table.columns if columns.symbol_of(c) == "t"), motion.t)
+    named = [(columns.symbol_of(c) or "", c) for c in table.columns]
+    others = [
+        RawColumn(c.name, c.label, c.unit, np.interp(motion.t, clock, c.values))
+        for symbol, c in named
+        if symbol != "t" and not symbol.startswith(("q", "dq"))
+    ]
+    forces = {symbol: c for symbol, c in named if symbol in _AXES}
+    notes = [*table.notes, f"angles from the markers {', '.join(points)}", *motion.warnings()]
+    if len(forces) == sum(symbol in _AXES for symbol, _ in named) == len(_AXES) and len({c.unit for c in forces.values()}) == 1:
+        in_file = np.column_stack([np.interp(motion.t, clock, forces[axis].values) for axis in _AXES])
+        unit_of_all = forces[_AXES[0]].unit
+        names = {c.name for c in forces.values()}
+        others = [c for c in others if c.name not in names]
+        for symbol, direction in (("Fy", motion.forward), ("Fz", motion.upward)):
+            others.append(RawColumn(symbol, symbol, unit_of_all, in_file @ direction))
+        said = (" ".join(f"{value:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
+        notes.append("forces: {} are taken in the axes of the markers; forward is ({}), up is ({})".format(", ".join(sorted(names)), *said))
+    return RawTable(table.path, table.title, (*found, *others), tuple(notes))
 
 
 def _decided(
@@ -179,11 +197,14 @@ def _decided(
     tables = _tables(paths, points, problems)
     mapped_tables = [_renamed(table, mapped) for table in tables]
     named, left, roles = trials.arrange(mapped_tables)
-    markers = next((p for p in paths if p.suffix.lower() == ".c3d" and not points), None)
-    if not named and not problems and markers is not None:
-        names = list(dict.fromkeys(c.label.rpartition(".")[0] for t in tables for c in t.columns if c.label.endswith((".x", ".y", ".z"))))
+    seen = next((t for t in left if t.markers is not None), None)
+    if seen is not None and seen.markers is not None and not points:
+        names = ", ".join(dict.fromkeys(name.rpartition(":")[2] for name in seen.markers.names))
+        problems.append(BadInput("--points", Text("nothing"), f"the markers of the joints, shoulder to handle, of {names}", file=seen.path))
+        left = [t for t in left if t.markers is None]
+    elif not tables and not problems:
         problems.append(
-            BadInput("--points", Text("nothing"), f"the markers of the joints, shoulder to handle, of {', '.join(names)}", file=markers)
+            BadInput("file", Text("what belongs to another recording"), "the recording of the movement beside it", file=paths[0])
         )
     elif not named and not problems:
         found = Text(f"columns {', '.join(repr(c.name) for c in tables[0].columns[:12])}")
@@ -204,7 +225,7 @@ def _decided(
     _complete(channels, model.n_joints, named[0].table, problems)
     if problems:
         raise BadInputs.of(problems)
-    reads = [_aligned(n, channels, problems) for n in named]
+    reads = [_aligned(n, channels, model, given, problems) for n in named]
     recorded = [_arrays(read, channels, model.n_joints) for read in reads]
     if recorded[0][2] is not None:
         together = [(t, q, f) for t, q, f in recorded if f is not None]
@@ -284,18 +305,35 @@ def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, probl
             problems.append(BadInput("columns", found, allowed, file=table.path))
 
 
-def _aligned(named: trials.Named, channels: Sequence[Channel], problems: list[BadInput]) -> _Read:
+def _aligned(
+    named: trials.Named, channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
+) -> _Read:
+    """Return a trial with its forces on the clock of its angles: of the shifts that posture allows, that in which the arm balances."""
     trial = RawTrial(os.fspath(named.table.path), named.table.title, named.configuration, named.repeat, named.role)
     if named.forces is None:
         return _Read(trial, named.table, None)
     q = np.column_stack([_values(named.table, c) for c in channels if c.symbol.startswith("q") and c.symbol[1:].isdigit()])
     force = np.column_stack([_values(named.forces, _by(channels, s)) for s in ("Fy", "Fz")])
+    trial = replace(trial, force_file=os.fspath(named.forces.path), force_shift=0.0)
     try:
-        shift = clock.align(_values(named.table, _by(channels, "t")), q, _values(named.forces, _by(channels, "t of forces")), force).seconds
+        shifts = clock.align(_values(named.table, _by(channels, "t")), q, _values(named.forces, _by(channels, "t of forces")), force)
     except BadInput as error:
         problems.append(error.within(file=named.forces.path))
-        shift = 0.0
-    return _Read(replace(trial, force_file=os.fspath(named.forces.path), force_shift=shift), named.table, named.forces)
+        return _Read(trial, named.table, named.forces)
+    reads = [_Read(replace(trial, force_shift=shift.seconds), named.table, named.forces) for shift in shifts]
+    if len(reads) == 1:
+        return reads[0]
+    return min(reads, key=lambda read: _unexplained(read, channels, model, given))
+
+
+def _unexplained(read: _Read, channels: Sequence[Channel], model: Model, given: Mapping[str, object]) -> float:
+    """Return what a trial leaves unexplained in the convention that suits its clock best, after that was refined in it."""
+    t, q, force = _arrays(read, channels, model.n_joints)
+    if force is None:
+        return 1.0
+    found = conventions.best(model, (t, q, force), given)
+    t, q, force = _arrays(_refined(read, channels, found.convention, model), channels, model.n_joints)
+    return min(found.unexplained, conventions.best(model, (t, q, force), given).unexplained) if force is not None else 1.0
 
 
 def _refined(read: _Read, channels: Sequence[Channel], convention: Convention, model: Model) -> _Read:
