@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
-use crate::data::noise::{Noise, dot};
-use crate::data::prepared_session::{PreparedSession, flat};
+use crate::data::noise::{Noise, Thinned, dot};
+use crate::data::prepared_session::PreparedSession;
 use crate::extent::extent;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::factor;
@@ -21,10 +21,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         let observed_share = self.observed_share();
         let mut deviations = Vec::new();
         // For each deviation what a trial may differ by without noise.
-        let mut shifts: Vec<Arc<Vec<Vec<Vec<f64>>>>> = Vec::new();
+        let mut shifts: Vec<Arc<Vec<Thinned>>> = Vec::new();
         for repeats in self.repeats(point) {
             let own = point.own.iter();
-            let columns = own.map(|r| flat(&r.0[repeats.group], &repeats.samples));
+            let columns = own.map(|r| Thinned::of(&r.0[repeats.group], &repeats.samples));
             let columns = Arc::new(columns.collect::<Vec<_>>());
             for deviation in repeats.deviations() {
                 deviations.push(deviation);
@@ -73,8 +73,8 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// what is known of shifts allow.
     fn noise_of(
         &self,
-        deviations: &[Vec<Vec<f64>>],
-        shifts: &[Arc<Vec<Vec<Vec<f64>>>>],
+        deviations: &[Thinned],
+        shifts: &[Arc<Vec<Thinned>>],
         (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
         const TURNS: usize = 3;
@@ -108,8 +108,8 @@ impl<const N: usize> PreparedSession<'_, N> {
                 let Some(solver) = factor(gram) else { continue };
                 add(deviation, columns, (-solver.solve(&score)).as_slice());
                 taken.extend(solver.spread().iter().map(|shares| {
-                    let mut series: Vec<Vec<f64>> =
-                        deviation.iter().map(|c| vec![0.0; c.len()]).collect();
+                    let mut series = deviation.clone();
+                    series.channels.iter_mut().for_each(|c| c.fill(0.0));
                     add(&mut series, columns, shares.as_slice());
                     series
                 }));
@@ -121,9 +121,10 @@ impl<const N: usize> PreparedSession<'_, N> {
 }
 
 /// Adds shares of columns, each with its channels, to a series.
-fn add(series: &mut [Vec<f64>], columns: &[Vec<Vec<f64>>], shares: &[f64]) {
+fn add(series: &mut Thinned, columns: &[Thinned], shares: &[f64]) {
     for (share, column) in shares.iter().zip(columns) {
-        for (value, part) in series.iter_mut().flatten().zip(column.iter().flatten()) {
+        let values = series.channels.iter_mut().flatten();
+        for (value, part) in values.zip(column.channels.iter().flatten()) {
             *value += share * part;
         }
     }

@@ -16,6 +16,46 @@ const ORDER: usize = 4;
 /// model's own simplifications are no better, however smooth the noise of the sensors is.
 const LEAST: f64 = 5e-4;
 
+/// Channels at the samples of a trial that are compared.
+#[derive(Clone, Debug)]
+pub struct Thinned {
+    /// `[channel][sample]`.
+    pub channels: Channels,
+    /// How far each sample is from the one before it; see [`ValidSegments::spacing`].
+    pub spacing: Vec<usize>,
+}
+
+impl From<Channels> for Thinned {
+    /// Channels of which no sample is missing.
+    fn from(channels: Channels) -> Self {
+        let count = channels.first().map_or(0, Vec::len);
+        Self {
+            channels,
+            spacing: vec![1; count],
+        }
+    }
+}
+
+impl Thinned {
+    /// Of channels of a whole trial.
+    pub fn of(channels: &Channels, valid_segments: &ValidSegments) -> Self {
+        Self {
+            channels: valid_segments.pick(channels),
+            spacing: valid_segments.spacing(),
+        }
+    }
+
+    /// The pieces of a channel between which samples are missing.
+    fn runs<'a>(&self, channel: &'a [f64]) -> Vec<&'a [f64]> {
+        let inner = (1..channel.len()).filter(|&t| self.spacing[t] > 1);
+        let ends: Vec<usize> = inner.chain([channel.len()]).collect();
+        let starts = std::iter::once(0).chain(ends.iter().copied());
+        std::iter::zip(starts, &ends)
+            .map(|(a, &b)| &channel[a..b])
+            .collect()
+    }
+}
+
 /// What makes rows white.
 #[derive(Clone, Debug)]
 pub struct Noise {
@@ -46,9 +86,9 @@ impl Noise {
         })
     }
 
-    /// From deviations, for each trial its channels, thinned, in one list of stretches.
+    /// From deviations.
     ///
-    /// * `deviations` - `[series][channel]`, already scaled for the freedom that their mean took
+    /// * `deviations` - of each trial, already scaled for the freedom that their mean took
     /// * `taken` - the like, whose products add up to the covariance of what was taken out of them and may have been noise
     /// * `range` - size of each channel, below a share of which no noise is believed
     /// * `told` - share of the samples of each channel that tell anything; the others are zero
@@ -56,8 +96,8 @@ impl Noise {
     /// # Errors
     /// [`GapError::Numerics`] for series too short.
     pub fn of(
-        deviations: &[Vec<Vec<f64>>],
-        taken: &[Vec<Vec<f64>>],
+        deviations: &[Thinned],
+        taken: &[Thinned],
         range: &[f64],
         told: &[f64],
     ) -> Result<Self, GapError> {
@@ -65,12 +105,17 @@ impl Noise {
         let mut whiteners = Vec::with_capacity(channels);
         for (c, range) in range.iter().enumerate() {
             let least = (LEAST * range).max(1e-12);
-            let noisy: Vec<Vec<f64>> = deviations.iter().map(|d| roughened(&d[c], least)).collect();
-            let series: Vec<&[f64]> = noisy.iter().map(Vec::as_slice).collect();
+            let rough = |d: &Thinned| roughened(&d.channels[c], least);
+            let noisy: Vec<Vec<f64>> = deviations.iter().map(rough).collect();
+            let pairs = std::iter::zip(deviations, &noisy);
+            let series: Vec<&[f64]> = pairs.flat_map(|(d, own)| d.runs(own)).collect();
             let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
             let model = if varies {
-                let taken: Vec<&[f64]> = taken.iter().map(|d| d[c].as_slice()).collect();
-                let mut model = AutoRegression::selected_about_zero(&series, &taken, ORDER)?;
+                let taken = taken.iter().flat_map(|d| d.runs(&d.channels[c]));
+                let taken: Vec<&[f64]> = taken.collect();
+                let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
+                let order = ORDER.min(longest.saturating_sub(2));
+                let mut model = AutoRegression::selected_about_zero(&series, &taken, order)?;
                 model.sd /= told[c].max(1e-6).sqrt();
                 model
             } else {
@@ -82,12 +127,9 @@ impl Noise {
             whiteners.push(Whitener::new(&model)?);
         }
         let mut correlation = vec![0.0; channels * channels];
-        let count: usize = deviations.iter().map(|d| d[0].len()).sum();
+        let count: usize = deviations.iter().map(|d| d.spacing.len()).sum();
         for series in deviations.iter().chain(taken) {
-            let mut white = series.clone();
-            for (values, whitener) in white.iter_mut().zip(&whiteners) {
-                whitener.apply(values);
-            }
+            let white = whitened(&whiteners, series);
             for a in 0..channels {
                 for b in 0..channels {
                     correlation[a * channels + b] += dot(&white[a], &white[b]);
@@ -155,16 +197,7 @@ impl Noise {
 
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
     pub fn whiten(&self, channels: &Channels, valid_segments: &ValidSegments) -> Vec<f64> {
-        let picked = valid_segments.pick(channels);
-        let whitened = std::iter::zip(&self.whiteners, picked).map(|(whitener, pieces)| {
-            let mut row = Vec::with_capacity(valid_segments.len());
-            for mut piece in pieces {
-                whitener.apply(&mut piece);
-                row.extend(piece);
-            }
-            row
-        });
-        self.unmixed(whitened.collect())
+        self.whiten_thinned(&Thinned::of(channels, valid_segments))
     }
 
     /// Whitens a set of channels of one trial, whose samples weigh as they do there.
@@ -186,13 +219,9 @@ impl Noise {
         row
     }
 
-    /// Whitens channels that are thinned already, in one stretch.
-    pub fn whiten_thinned(&self, channels: &[Vec<f64>]) -> Vec<f64> {
-        let mut rows = channels.to_vec();
-        for (row, whitener) in rows.iter_mut().zip(&self.whiteners) {
-            whitener.apply(row);
-        }
-        self.unmixed(rows)
+    /// Whitens channels that are thinned already.
+    pub fn whiten_thinned(&self, thinned: &Thinned) -> Vec<f64> {
+        self.unmixed(whitened(&self.whiteners, thinned))
     }
 
     fn unmixed(&self, mut rows: Vec<Vec<f64>>) -> Vec<f64> {
@@ -205,6 +234,15 @@ impl Noise {
         }
         rows.into_iter().flatten().collect()
     }
+}
+
+/// Each channel of a series, whitened by itself.
+fn whitened(whiteners: &[Whitener], series: &Thinned) -> Channels {
+    let mut white = series.channels.clone();
+    for (values, whitener) in white.iter_mut().zip(whiteners) {
+        whitener.with_gaps(&series.spacing).apply(values);
+    }
+    white
 }
 
 /// A series with white noise of a given size on it, the same in every run.
@@ -308,9 +346,8 @@ mod tests {
                 })
                 .collect::<Vec<f64>>()
         };
-        let series: Vec<Vec<Vec<f64>>> = (0..400)
-            .map(|_| (0..CHANNELS).map(|_| slow()).collect())
-            .collect();
+        let mut one = || (0..CHANNELS).map(|_| slow()).collect::<Channels>();
+        let series: Vec<Thinned> = (0..400).map(|_| one().into()).collect();
         let noise = Noise::of(&series, &[], &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
         for c in 0..CHANNELS {
             let squares = series.iter().map(|s| {

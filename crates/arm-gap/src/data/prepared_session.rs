@@ -8,7 +8,7 @@ use crate::data::repeats::groups;
 use crate::data::session::Session;
 use crate::data::valid_segments::{ObservableForce, ValidSegments};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::measurement_model::prediction::{Channels, Course};
+use crate::measurement_model::prediction::Course;
 use crate::threads;
 
 /// What rest takes from the comparison of a movement.
@@ -200,10 +200,4 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub fn parallel<R: Send>(&self, jobs: usize, one: impl Fn(usize) -> R + Sync) -> Vec<R> {
         threads::parallel(self.threads, jobs, one)
     }
-}
-
-/// Thinned channels with their stretches joined.
-pub fn flat(channels: &Channels, valid_segments: &ValidSegments) -> Vec<Vec<f64>> {
-    let picked = valid_segments.pick(channels).into_iter();
-    picked.map(|pieces| pieces.concat()).collect()
 }

@@ -1,7 +1,9 @@
 //! What the repeats of a movement differ by, which noise is read off.
 
-use crate::data::prepared_session::{PreparedSession, flat};
+use crate::data::noise::Thinned;
+use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
+use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Mean square of a deviation, in medians of those of all trials, beyond which a trial tells of something else than noise: a sensor
@@ -17,23 +19,27 @@ pub(crate) struct Repeats {
     /// The samples.
     pub samples: ValidSegments,
     /// Channels of each trial.
-    trials: Vec<Vec<Vec<f64>>>,
+    trials: Vec<Channels>,
 }
 
 impl Repeats {
     /// What each trial differs by from the mean of all, scaled to the noise of one trial.
-    pub fn deviations(&self) -> Vec<Vec<Vec<f64>>> {
+    pub fn deviations(&self) -> Vec<Thinned> {
         let n = self.trials.len() as f64;
         let scale = libm::sqrt(n / (n - 1.0));
         let off = |c: usize, i: usize, value: f64| {
             let mean = self.trials.iter().map(|t| t[c][i]).sum::<f64>() / n;
             scale * (value - mean)
         };
-        let one = |trial: &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+        let spacing = self.samples.spacing();
+        let one = |trial: &Channels| {
             let channels = trial.iter().enumerate();
-            channels
-                .map(|(c, own)| own.iter().enumerate().map(|(i, v)| off(c, i, *v)).collect())
-                .collect()
+            let off = channels
+                .map(|(c, own)| own.iter().enumerate().map(|(i, v)| off(c, i, *v)).collect());
+            Thinned {
+                channels: off.collect(),
+                spacing: spacing.clone(),
+            }
         };
         self.trials.iter().map(one).collect()
     }
@@ -46,7 +52,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             let (members, samples) = self.agreeing(group)?;
             let trials = members
                 .iter()
-                .map(|&m| flat(&point.residuals[m], &samples))
+                .map(|&m| samples.pick(&point.residuals[m]))
                 .collect();
             Some(Repeats {
                 group,
@@ -83,7 +89,7 @@ fn outlier(repeats: &[Repeats]) -> Option<(usize, usize)> {
         .enumerate()
         .flat_map(|(g, repeats)| {
             let trials = repeats.deviations().into_iter().enumerate();
-            trials.map(move |(t, channels)| (g, t, channels.iter().map(square).collect()))
+            trials.map(move |(t, own)| (g, t, own.channels.iter().map(square).collect()))
         })
         .collect();
     let channels = squares.first().map_or(0, |(_, _, own)| own.len());

@@ -3,7 +3,7 @@
 use crate::GapError;
 use crate::candidates::candidate::Library;
 use crate::data::noise::{Noise, dot};
-use crate::data::prepared_session::{PreparedSession, flat};
+use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::priors;
 use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -81,7 +81,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             })
             .collect();
         let rows = |channels: &Channels, trial: usize| -> Vec<f64> {
-            let picked = flat(channels, &self.valid_segments[trial]);
+            let picked = self.valid_segments[trial].pick(channels);
             std::iter::zip(picked, &size)
                 .flat_map(|(values, size)| values.into_iter().map(move |v| v / size))
                 .collect()

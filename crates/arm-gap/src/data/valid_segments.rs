@@ -11,8 +11,8 @@ use crate::measurement_model::prediction::{Channels, Course, away_from_gaps, mar
 const SAMPLES_PER_PERIOD: f64 = 2.5;
 /// Periods of the cutoff around rest, where dry friction holds a joint, that count as rest.
 const NEAR_REST: f64 = 0.6;
-/// Fewest samples in a stretch that is used.
-const SHORTEST: usize = 8;
+/// Fewest samples of a trial that is compared.
+const FEWEST: usize = 8;
 
 /// What the force on the arm tells at one sample.
 ///
@@ -28,10 +28,12 @@ pub enum ObservableForce {
     Neither,
 }
 
-/// The samples of a trial that are compared: stretches without a gap, thinned to the common band.
+/// The samples of a trial that are compared: those without a gap near them, thinned to the common band.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ValidSegments {
-    samples: Vec<Vec<usize>>,
+    samples: Vec<usize>,
+    /// Samples of the trial from one that may be compared to the next.
+    step: usize,
     /// What the force tells at every sample of the trial; both components where nothing is listed.
     observable: Arc<Vec<ObservableForce>>,
 }
@@ -52,37 +54,40 @@ impl ValidSegments {
         let n = trial.len();
         let usable = |i: usize| sound[i] && left_out.get(i) != Some(&true);
         // On one grid for all trials, so that repeats have the same samples.
-        let mut samples = Vec::new();
-        let mut current = Vec::new();
-        for i in (0..n).step_by(step) {
-            if usable(i) {
-                current.push(i);
-            } else if !current.is_empty() {
-                samples.push(core::mem::take(&mut current));
-            }
-        }
-        samples.push(current);
-        samples.retain(|stretch| stretch.len() >= SHORTEST);
         Self {
-            samples,
+            samples: (0..n).step_by(step).filter(|&i| usable(i)).collect(),
+            step,
             observable,
         }
+        .of_some_length()
+    }
+
+    /// The same, or nothing where that is too little.
+    fn of_some_length(mut self) -> Self {
+        if self.samples.len() < FEWEST {
+            self.samples.clear();
+        }
+        self
     }
 
     /// Those before a sample.
     fn until(&self, end: usize) -> Self {
-        let before = |stretch: &Vec<usize>| stretch.iter().copied().filter(|&i| i < end).collect();
-        let mut samples: Vec<Vec<usize>> = self.samples.iter().map(before).collect();
-        samples.retain(|stretch| stretch.len() >= SHORTEST);
+        self.with(self.samples().filter(|&i| i < end).collect())
+            .of_some_length()
+    }
+
+    /// Some of them.
+    fn with(&self, samples: Vec<usize>) -> Self {
         Self {
             samples,
+            step: self.step,
             observable: Arc::clone(&self.observable),
         }
     }
 
     /// One sample after the last.
     fn end(&self) -> usize {
-        self.samples().last().map_or(0, |last| last + 1)
+        self.samples.last().map_or(0, |last| last + 1)
     }
 
     /// Those of two repeats of which one may have been broken off; `None` where they differ before.
@@ -114,7 +119,7 @@ impl ValidSegments {
 
     /// Number of samples.
     pub fn len(&self) -> usize {
-        self.samples.iter().map(Vec::len).sum()
+        self.samples.len()
     }
 
     /// Whether nothing is left.
@@ -125,7 +130,7 @@ impl ValidSegments {
     /// Number of samples at which each of some channels tells anything.
     pub fn rows_per_channel(&self, channels: usize) -> Vec<usize> {
         let count = |least: usize| {
-            let components = self.samples.iter().flatten().map(|&i| match self.at(i) {
+            let components = self.samples().map(|i| match self.at(i) {
                 ObservableForce::Both => 2,
                 ObservableForce::Along(_) => 1,
                 ObservableForce::Neither => 0,
@@ -144,48 +149,26 @@ impl ValidSegments {
     /// Parts of the same number of samples, in order; the last may be shorter.
     pub fn parts(&self, count: usize) -> Vec<Self> {
         let size = self.len().div_ceil(count.max(1)).max(1);
-        let mut parts: Vec<Self> = Vec::new();
-        let mut seen = 0;
-        for stretch in &self.samples {
-            let mut rest = stretch.as_slice();
-            while !rest.is_empty() {
-                if seen % size == 0 {
-                    parts.push(Self {
-                        samples: Vec::new(),
-                        observable: Arc::clone(&self.observable),
-                    });
-                }
-                let (head, tail) = rest.split_at((size - seen % size).min(rest.len()));
-                if let Some(part) = parts.last_mut() {
-                    part.samples.push(head.to_vec());
-                }
-                (seen, rest) = (seen + head.len(), tail);
-            }
-        }
-        parts
+        let parts = self.samples.chunks(size);
+        parts.map(|part| self.with(part.to_vec())).collect()
     }
 
-    /// The values of channels at the samples: `[channel][stretch][sample]`.
+    /// The values of channels at the samples: `[channel][sample]`.
     ///
     /// Where the force tells one component alone, it stands in the place of the first, and zero in that of the second.
-    pub fn pick(&self, channels: &Channels) -> Vec<Vec<Vec<f64>>> {
-        let one = |channel: &Vec<f64>| -> Vec<Vec<f64>> {
-            let at = |s: &Vec<usize>| s.iter().map(|&i| channel[i]).collect();
-            self.samples.iter().map(at).collect()
-        };
-        let mut picked: Vec<Vec<Vec<f64>>> = channels.iter().map(one).collect();
+    pub fn pick(&self, channels: &Channels) -> Channels {
+        let one = |channel: &Vec<f64>| self.samples().map(|i| channel[i]).collect();
+        let mut picked: Channels = channels.iter().map(one).collect();
         if !self.observable.is_empty()
             && let [.., first, second] = picked.as_mut_slice()
         {
-            for (k, stretch) in self.samples.iter().enumerate() {
-                for (at, &i) in stretch.iter().enumerate() {
-                    let (y, z) = (&mut first[k][at], &mut second[k][at]);
-                    (*y, *z) = match self.at(i) {
-                        ObservableForce::Both => (*y, *z),
-                        ObservableForce::Along(unit) => (unit[0] * *y + unit[1] * *z, 0.0),
-                        ObservableForce::Neither => (0.0, 0.0),
-                    };
-                }
+            for (at, &i) in self.samples.iter().enumerate() {
+                let (y, z) = (&mut first[at], &mut second[at]);
+                (*y, *z) = match self.at(i) {
+                    ObservableForce::Both => (*y, *z),
+                    ObservableForce::Along(unit) => (unit[0] * *y + unit[1] * *z, 0.0),
+                    ObservableForce::Neither => (0.0, 0.0),
+                };
             }
         }
         picked
@@ -193,7 +176,14 @@ impl ValidSegments {
 
     /// The samples one after the other.
     pub fn samples(&self) -> impl Iterator<Item = usize> + '_ {
-        self.samples.iter().flatten().copied()
+        self.samples.iter().copied()
+    }
+
+    /// How far each sample is from the one before it, where 1 is next to it; the first is from nothing.
+    pub fn spacing(&self) -> Vec<usize> {
+        let first = self.samples.first().map(|_| 0);
+        let steps = self.samples.windows(2).map(|w| (w[1] - w[0]) / self.step);
+        first.into_iter().chain(steps).collect()
     }
 
     fn at(&self, sample: usize) -> ObservableForce {
@@ -222,9 +212,10 @@ fn around(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
 mod tests {
     use super::*;
 
-    fn of(samples: Vec<Vec<usize>>) -> ValidSegments {
+    fn of(stretches: Vec<Vec<usize>>) -> ValidSegments {
         ValidSegments {
-            samples,
+            samples: stretches.concat(),
+            step: 1,
             observable: Arc::default(),
         }
     }
@@ -246,9 +237,17 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_of_less_than_eight_samples_is_not_used() {
+    fn a_trial_of_less_than_eight_samples_is_not_compared() {
         let until = |end| of(vec![(0..20).collect()]).until(end).len();
         assert_eq!((until(7), until(8), until(30)), (0, 8, 20));
+    }
+
+    #[test]
+    fn samples_know_how_far_they_are_from_those_before_them() {
+        let mut some = of(vec![vec![0, 4, 8], vec![20], vec![28, 32]]);
+        some.step = 4;
+        assert_eq!(some.spacing(), [0, 1, 1, 3, 2, 1]);
+        assert!(of(Vec::new()).spacing().is_empty());
     }
 
     #[test]
@@ -267,15 +266,16 @@ mod tests {
         told[1] = ObservableForce::Along([0.6, 0.8]);
         told[2] = ObservableForce::Neither;
         let segments = ValidSegments {
-            samples: vec![(0..8).collect()],
+            samples: (0..8).collect(),
+            step: 1,
             observable: Arc::new(told),
         };
         assert_eq!(segments.rows_per_channel(3), [8, 7, 6]);
         let picked = segments.pick(&vec![vec![1.0; 8], vec![10.0; 8], vec![20.0; 8]]);
-        assert_eq!(picked[0][0], [1.0; 8]);
+        assert_eq!(picked[0], [1.0; 8]);
         // 0.6 · 10 + 0.8 · 20.
-        assert_eq!(picked[1][0][..3], [10.0, 22.0, 0.0]);
-        assert_eq!(picked[2][0][..3], [20.0, 0.0, 0.0]);
+        assert_eq!(picked[1][..3], [10.0, 22.0, 0.0]);
+        assert_eq!(picked[2][..3], [20.0, 0.0, 0.0]);
         assert_eq!(of(vec![(0..8).collect()]).rows_per_channel(3), [8; 3]);
     }
 }

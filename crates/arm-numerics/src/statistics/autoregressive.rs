@@ -3,7 +3,8 @@
 //! A series is one uninterrupted trial. Several trials are given side by side and never joined: no lag crosses their ends.
 
 use crate::error::{NumericsError, check_finite, check_least, check_range};
-use crate::linalg::matrix::dot;
+use crate::linalg::matrix::{Matrix, dot};
+use crate::linalg::orthogonal::{Qr, solve_upper};
 
 /// `γ_k = (1/n) Σ_t (x_t − x̄)(x_{t+k} − x̄)` for `k = 0 … lags`.
 ///
@@ -201,9 +202,12 @@ fn burg_path(mut forward: Vec<Vec<f64>>, order: usize, samples: usize) -> Vec<Au
 /// The first `p` samples are whitened with the predictors of lower order, so no sample is lost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitener {
-    /// Predictor of order 0, 1, … p, with one over the standard deviation of its error.
-    predictors: Vec<(Vec<f64>, f64)>,
+    /// Predictor of order 0, 1, … p.
+    predictors: Vec<Predictor>,
 }
+
+/// Coefficients of the samples before, the nearest first, with one over the standard deviation of the error.
+type Predictor = (Vec<f64>, f64);
 
 impl Whitener {
     /// The whitener of a model.
@@ -236,15 +240,94 @@ impl Whitener {
     /// Whitens one column of one trial in place.
     pub fn apply(&self, column: &mut [f64]) {
         let order = self.predictors.len() - 1;
-        // Backwards, so that every sample still finds its unfiltered past.
-        for t in (0..column.len()).rev() {
-            let (a, inverse) = &self.predictors[t.min(order)];
-            let predicted = a
-                .iter()
-                .enumerate()
-                .fold(0.0, |sum, (i, a)| sum + a * column[t - 1 - i]);
-            column[t] = (column[t] - predicted) * inverse;
+        whiten(column, |t| &self.predictors[t.min(order)]);
+    }
+
+    /// The whitener of series of which samples are missing.
+    ///
+    /// Each sample is predicted from as many known ones before it as the model has coefficients, at the lags that they have: exactly where
+    /// none is missing, and nearly (Vecchia 1988) after a gap.
+    ///
+    /// * `spacing` - how far each sample is from the one before it, in samples; the first is not read
+    pub fn with_gaps(&self, spacing: &[usize]) -> GappedWhitener {
+        let order = self.predictors.len() - 1;
+        let mut predictors = self.predictors.clone();
+        let mut reach = 0;
+        let place = spacing.iter().enumerate().map(|(t, step)| {
+            // How many samples lie before this one without a gap.
+            reach = if t > 0 && *step == 1 { reach + 1 } else { 0 };
+            if reach >= order.min(t) {
+                return t.min(order);
+            }
+            let before = spacing[..=t].iter().rev().take(order.min(t));
+            let lags = before.scan(0, |lag, step| {
+                *lag += step;
+                Some(*lag)
+            });
+            predictors.push(self.predictor(&lags.collect::<Vec<usize>>()));
+            predictors.len() - 1
+        });
+        let place = place.collect();
+        GappedWhitener { place, predictors }
+    }
+
+    /// The best linear predictor from the samples at some lags, nearest first, with one over the standard deviation of its error.
+    fn predictor(&self, lags: &[usize]) -> Predictor {
+        let covariance = self.covariance(lags.last().copied().unwrap_or(0));
+        let gram = Matrix::from_fn(lags.len(), lags.len(), |i, j| {
+            covariance[lags[i].abs_diff(lags[j])]
+        });
+        let towards: Vec<f64> = lags.iter().map(|&lag| covariance[lag]).collect();
+        let mut a = towards.clone();
+        let factor = Qr::new(gram);
+        factor.apply_transposed(&mut a);
+        solve_upper(&factor.leading(lags.len()), lags.len(), &mut a);
+        let known = dot(&a, &towards);
+        // Never better known than from all that came before it.
+        let best = self
+            .predictors
+            .last()
+            .map_or(0.0, |(_, inverse)| 1.0 / (inverse * inverse));
+        (a, 1.0 / (covariance[0] - known).max(best).sqrt())
+    }
+
+    /// Autocovariance at lags up to one: each from those below it, by the predictor of the highest order that they allow.
+    fn covariance(&self, most: usize) -> Vec<f64> {
+        let order = self.predictors.len() - 1;
+        let (_, inverse) = self.predictors[0];
+        let mut covariance = vec![1.0 / (inverse * inverse)];
+        for lag in 1..=most {
+            let (a, _) = &self.predictors[lag.min(order)];
+            let next = a.iter().enumerate();
+            covariance.push(next.fold(0.0, |sum, (i, a)| sum + a * covariance[lag - 1 - i]));
         }
+        covariance
+    }
+}
+
+/// A [`Whitener`] of series of which samples are missing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GappedWhitener {
+    /// Which predictor each sample has.
+    place: Vec<usize>,
+    predictors: Vec<Predictor>,
+}
+
+impl GappedWhitener {
+    /// Whitens one column of as many samples in place.
+    pub fn apply(&self, column: &mut [f64]) {
+        whiten(column, |t| &self.predictors[self.place[t]]);
+    }
+}
+
+/// Subtracts from each sample what is predicted of it, and scales the rest.
+fn whiten<'a>(column: &mut [f64], predictor: impl Fn(usize) -> &'a Predictor) {
+    // Backwards, so that every sample still finds its unfiltered past.
+    for t in (0..column.len()).rev() {
+        let (a, inverse) = predictor(t);
+        let past = a.iter().enumerate();
+        let predicted = past.fold(0.0, |sum, (i, a)| sum + a * column[t - 1 - i]);
+        column[t] = (column[t] - predicted) * inverse;
     }
 }
 

@@ -83,6 +83,76 @@ fn whitening_makes_unit_white_noise_and_loses_no_sample() {
     assert!(gap(&power, &[1.0; 4]) < 0.05, "{power:?}");
 }
 
+#[test]
+fn where_samples_are_missing_the_others_are_whitened_with_what_is_known() {
+    let model = AutoRegression {
+        coefficients: SECOND_ORDER.to_vec(),
+        sd: 0.3,
+    };
+    let whitener = Whitener::new(&model).expect("stationary");
+    let mut noise = Noise::new(64);
+    let whole = second_order(&mut noise, 40_000);
+    let mut plain = whole.clone();
+    whitener.apply(&mut plain);
+    let mut same = whole.clone();
+    whitener.with_gaps(&vec![1; whole.len()]).apply(&mut same);
+    assert_eq!(plain, same);
+
+    // Runs of three samples with gaps of one to four between them.
+    let mut spacing = Vec::new();
+    let mut kept = Vec::new();
+    let mut at = 0;
+    for run in 0.. {
+        let step = if run == 0 { 0 } else { 2 + run % 4 };
+        if at + step + 3 > whole.len() {
+            break;
+        }
+        at += step;
+        kept.extend_from_slice(&whole[at..at + 3]);
+        spacing.extend([step, 1, 1]);
+        at += 2;
+    }
+    let mut white = kept.clone();
+    whitener.with_gaps(&spacing).apply(&mut white);
+    let gamma = autocovariance(&white, 5).expect("long");
+    assert!((gamma[0] - 1.0).abs() < 0.03, "{gamma:?}");
+    assert!(gamma[1..].iter().all(|g| g.abs() < 0.03), "{gamma:?}");
+    // Each run by itself: what the runs have in common is counted again and again.
+    let apart: Vec<usize> = spacing
+        .iter()
+        .map(|&s| if s == 1 { 1 } else { 1000 })
+        .collect();
+    let mut again = kept.clone();
+    whitener.with_gaps(&apart).apply(&mut again);
+    let gamma = autocovariance(&again, 5).expect("long");
+    assert!(gamma[1..].iter().any(|g| g.abs() > 0.06), "{gamma:?}");
+}
+
+/// A first-order autoregression has no memory beyond the sample before, at whatever lag: the whitener is the exact one.
+#[test]
+fn after_a_gap_a_first_order_autoregression_is_predicted_from_the_sample_before_it() {
+    let (rho, sd) = (0.9_f64, 0.5);
+    let model = AutoRegression {
+        coefficients: vec![rho],
+        sd,
+    };
+    let whitener = Whitener::new(&model).expect("stationary");
+    let mut column = [1.0, 2.0, -1.0, 0.5];
+    whitener.with_gaps(&[0, 1, 5, 2]).apply(&mut column);
+    let variance = sd * sd / (1.0 - rho * rho);
+    let white = |value: f64, before: f64, lag: usize| {
+        let r = [rho; 5][..lag].iter().product::<f64>();
+        (value - r * before) / (variance * (1.0 - r * r)).sqrt()
+    };
+    let expected = [
+        1.0 / variance.sqrt(),
+        white(2.0, 1.0, 1),
+        white(-1.0, 2.0, 5),
+        white(0.5, -1.0, 2),
+    ];
+    assert!(gap(&column, &expected) < 1e-12, "{column:?}");
+}
+
 /// AR(1) with ρ = 0.9: `n (1 − ρ)/(1 + ρ) = n / 19`.
 #[test]
 fn slow_noise_counts_for_few_samples() {
