@@ -141,3 +141,22 @@ def test_no_run_is_good_with_more_than_its_accuracy() -> None:
                 if run.verdict == "good" and estimate.name in expected:
                     error = float(np.max(np.abs(run.columns[estimate.name] - expected[estimate.name])))
                     assert error <= estimate.allowed, (number, step, estimate, error)
+
+
+@pytest.mark.parametrize("inner", [0.01, 0.025, 0.05])
+def test_steps_inside_of_an_arm_are_estimated_too(inner: float) -> None:
+    """With inner steps that stay as they are, halved communication steps would have the same bits, and no error would be seen."""
+    joints, algorithm, _ = cases()[1]
+
+    def swinging(step: float) -> Slave:
+        return Slave(made(1, joints, algorithm, 0.1)[1].model, start=[-1.2, 0.4], step=step, name="arm")
+
+    system = couple([swinging(inner)], [], step=0.2, duration=2.0)
+    run = run_system(system)
+    finer = couple([system.slaves["arm"].finer()], [], step=0.1, duration=2.0)
+    expected = run_system(couple([swinging(1e-4)], [], step=0.2, duration=2.0)).columns
+    found = estimates(run, run_system(finer))
+    assert len(found) == joints
+    for estimate in found:
+        error = float(np.max(np.abs(run.columns[estimate.name] - expected[estimate.name])))
+        assert 0.5 * error <= estimate.error <= 2.0 * error, (estimate, error)

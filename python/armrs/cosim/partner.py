@@ -199,6 +199,11 @@ class Partner(abc.ABC):
     def reset(self) -> None:
         """Go back to how the slave was made."""
 
+    def finer(self) -> Partner:
+        """Return the slave for a run with half the step: itself after a reset, or another with half the step inside."""
+        self.reset()
+        return self
+
     def free(self) -> None:  # noqa: B027
         """Give back what the slave holds; it is not used any more."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 from collections import Counter
@@ -74,7 +75,7 @@ class Slave(Partner):
         self.internal_step = checks.number("step", step, above=0.0, unit="s")
         self.model = model
         self.name = checks.text("name", "arm" if name is None else name)
-        coupling = {
+        self._coupling: dict[str, Any] = {
             "name": self.name,
             "port": port,
             "step": self.internal_step,
@@ -84,7 +85,10 @@ class Slave(Partner):
             "rest": checks.flag("rest", rest),
         }
         self.port = port
-        self.compiled = _armrs.ArmSlave(_armrs.Rig(model), coupling)
+        self._compile()
+
+    def _compile(self) -> None:
+        self.compiled = _armrs.ArmSlave(_armrs.Rig(self.model), self._coupling)
         self.variables = {row["name"]: _variable(row) for row in self.compiled.variables()}
 
     def __repr__(self) -> str:
@@ -110,6 +114,14 @@ class Slave(Partner):
     def time(self) -> float:
         """Time [s]."""
         return self.compiled.time
+
+    def finer(self) -> Slave:
+        """Return the same slave as it was made, with half the inner step."""
+        other = copy.copy(self)
+        other.internal_step = step = 0.5 * self._coupling["step"]
+        other._coupling = self._coupling | {"step": step}
+        other._compile()
+        return other
 
     def enter_initialization_mode(self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None) -> None:
         """Begin the initialization; the tolerance means nothing to a fixed step."""
