@@ -105,10 +105,12 @@ def _with_options_of(verb: str | None) -> typer.Typer:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given in [[], *([group.name] for group in app.registered_groups)]:
+        given = [*given, "--help"]
     try:
         command = typer.main.get_command(_with_options_of(next((word for word in given if not word.startswith("-")), None)))
         # Not `command.main`, which turns some errors into exits of its own.
-        with command.make_context("armrs", given or ["--help"], obj=tuple(given)) as context:
+        with command.make_context("armrs", given, obj=tuple(given)) as context:
             result = command.invoke(context)
         sys.stdout.flush()
     except typer.Exit as end:

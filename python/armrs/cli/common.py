@@ -36,6 +36,9 @@ MaybeFolder = Annotated[
 OutFile = Annotated[
     Path | None, typer.Option("-o", "--out", metavar="FILE", parser=_named, help="The FMU to write; MODEL.fmu when absent.")
 ]
+ArchiveFile = Annotated[
+    Path | None, typer.Option("-o", "--out", metavar="FILE", parser=_named, help="The archive to write; SYSTEM.ssp when absent.")
+]
 Source = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder with dataset.toml, or that file.")]
 
 _STDOUT = Path("-")

@@ -11,7 +11,7 @@ import typer
 
 from ..errors import BadInput, Text
 from ..report import console
-from .common import JsonFile, MaybeFolder, OutFile, SamplesFormat, command_line, present, samples_suffix, writable
+from .common import ArchiveFile, JsonFile, MaybeFolder, OutFile, SamplesFormat, command_line, present, samples_suffix, writable
 
 if TYPE_CHECKING:
     from ..cosim.system import System
@@ -22,9 +22,9 @@ Libraries = Annotated[
 Step = Annotated[float | None, typer.Option("--step", metavar="S", help="Communication step of an SSP system [s].")]
 Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Length of the run of an SSP system [s].")]
 
-app = typer.Typer(
-    name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.", no_args_is_help=True
-)
+File = Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU of FMI 2.0 or 3.0.")]
+
+app = typer.Typer(name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.")
 
 
 class Port(str, enum.Enum):
@@ -64,7 +64,11 @@ def fmu_export(
     writable(None, json)
     target = out if out is not None else Path(model.with_suffix(".fmu").name)
     start = _angles("--start-deg", start_deg)
-    slave = Slave(model, port=port.value, start=start, rest=rest, step=dt, name=model.stem)
+    try:
+        slave = Slave(model, port=port.value, start=start, rest=rest, step=dt, name=model.stem)
+    except BadInput as error:
+        option = {"step": "--dt", "start": "--start-deg"}.get(error.place)
+        raise error if option is None or error.file else BadInput(option, error.found, error.allowed) from None
     written = export_fmu(slave, target, fmi=int(version.value), libraries=library)
     binaries, _, without = collected(int(version.value), library)
     if without:
@@ -85,7 +89,7 @@ def fmu_export(
 
 @app.command("info", short_help="Print what a unit says of itself.")
 def fmu_info(
-    file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
+    file: File,
     json: JsonFile = None,
 ) -> None:
     """Print what an FMU says of itself: capabilities, variables, units."""
@@ -98,7 +102,7 @@ def fmu_info(
 
 @app.command("check", short_help="Check file, description and library of a unit.")
 def fmu_check(
-    file: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU for co-simulation, FMI 2.0 or 3.0.")],
+    file: File,
     library: Annotated[bool, typer.Option(help="Try the library, which runs its native code with your rights.")] = True,
     json: JsonFile = None,
 ) -> int:
@@ -178,7 +182,7 @@ def fmu_run(
 @app.command("ssp", short_help="Write a system as an archive of SSP 1.0.")
 def fmu_ssp(
     system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],
-    out: OutFile = None,
+    out: ArchiveFile = None,
     version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard of exported arms.")] = Fmi.two,
     library: Libraries = None,
     json: JsonFile = None,

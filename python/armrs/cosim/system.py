@@ -230,6 +230,10 @@ def _check_start(slave: Partner, name: str, value: object) -> None:
     if name not in slave.variables:
         raise unknown_name(place, name, slave.variables, what="variable")
     kind = slave.variables[name].type
+    if kind in ("Binary", "Clock"):
+        raise BadInput(f"{place}, {name}", Text(f"a variable of type {kind}"), "numbers, truth values and texts")
+    if slave.variables[name].causality == "structuralParameter":
+        raise BadInput(f"{place}, {name}", Text("a structural parameter"), "variables that change no size of an array")
     if kind == "String":
         if not isinstance(value, str):
             raise BadInput(f"{place}, {name}", value, "a text")

@@ -24,6 +24,7 @@ def about(path: str | os.PathLike[str]) -> dict[str, Any]:
         "description": description.text,
         "tool": description.tool,
         "token": description.token,
+        "interfaces": list(description.interfaces),
         "platforms": platforms,
         "capabilities": {key: value for key, value in description.flags.items() if key != "modelIdentifier"},
         "experiment": description.experiment,
@@ -38,6 +39,7 @@ def info_words(data: dict[str, Any]) -> None:
         "FMI": data["fmi_version"],
         "made by": data["tool"] or "unknown",
         "token": data["token"],
+        "offers": ", ".join(data["interfaces"]),
         "machines": ", ".join(data["platforms"]) or "none",
         **data["capabilities"],
     }
