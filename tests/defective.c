@@ -1,6 +1,6 @@
 /* A small FMU of FMI 3.0 that does what its description promises, unless a macro breaks one promise. It integrates its input.
    Variables: 0 time, 1 x (input), 2 k (tunable parameter), 3 s (output, state), 4 z = k x (output), 5 n (Int32), 6 b (Boolean),
-   7 label (String), 8 der(s). The functions that it does not have are added as stubs by the test. */
+   7 label (String), 8 der(s), 9 size (UInt64, structural parameter), 10 blob (Binary). The functions that it does not have are added as stubs by the test. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -11,7 +11,7 @@
 
 typedef uint32_t VR;
 typedef void (*Update)(void *, double, bool, bool, bool, bool, bool *, double *);
-typedef struct { double t, x, k, s; int32_t n; bool b, stepping; int instances; double first; Update update; } Model;
+typedef struct { double t, x, k, s; int32_t n; bool b, stepping, early, inside; int instances; double first; Update update; } Model;
 static int alive;
 #ifdef SHARED
 static Model shared;
@@ -47,6 +47,10 @@ static Model *make(void) {
 #ifdef SECOND_REFUSED
     if (alive) return NULL;
 #endif
+#ifdef ONLY_ONCE
+    static int made;
+    if (made++) return NULL;
+#endif
     alive++;
 #ifdef SHARED
     Model *m = &shared;
@@ -69,11 +73,14 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
 #ifdef UPDATE_REFUSED
     if (update) return NULL;
 #endif
+#ifdef EARLY_REFUSED
+    if (early) return NULL;
+#endif
 #ifdef TOKEN_REFUSED
     return NULL;
 #endif
     Model *m = make();
-    if (m) m->update = update;
+    if (m) { m->update = update; m->early = early; }
     return m;
 }
 void *fmi3InstantiateModelExchange(const char *name, const char *token, const char *path, bool visible, bool logging, void *e, void *log) {
@@ -114,6 +121,9 @@ int fmi3GetFloat64(void *v, const VR *r, size_t n, double *out, size_t m) {
     Model *a = v;
     for (size_t i = 0; i < n; i++) {
         double z = a->k * a->x, all[] = {a->t, a->x, a->k, a->s, z, 0, 0, 0, a->x};
+#ifdef UPDATE_UNREADABLE
+        if (a->inside) return 3;
+#endif
 #ifdef UNREADABLE
         if (r[i] == 4) return 3;
 #endif
@@ -128,6 +138,9 @@ int fmi3SetFloat64(void *v, const VR *r, size_t n, const double *in, size_t m) {
     Model *a = v;
     for (size_t i = 0; i < n; i++) {
         if (r[i] == 1) {
+#ifdef UPDATE_UNSETTABLE
+            if (a->inside) return 3;
+#endif
 #ifdef INPUT_REFUSED
             if (a->stepping) return 3;
 #endif
@@ -175,6 +188,32 @@ int fmi3SetString(void *v, const VR *r, size_t n, const char *const *in, size_t 
 #endif
     return 0;
 }
+/* Two intermediate updates; true when the importer ends the step in the middle. */
+static bool updated(Model *m, double t, double h) {
+    bool asked = false, may_return = m->early;
+    double at = 0, middle = t + h / 2, end = t + h;
+#ifdef UPDATE_BEYOND
+    end = t + 2 * h;
+#endif
+#ifdef UPDATE_BACK
+    end = t + h / 4;
+#endif
+#ifdef EARLY_OFFERED
+    may_return = true;
+#endif
+    m->inside = true;
+    m->update(NULL, middle, true, true, true, may_return, &asked, &at);
+    if (!asked) m->update(NULL, end, false, true, true, false, &asked, &at);
+    m->inside = false;
+#ifdef EARLY_IGNORED
+    asked = false;
+#endif
+    if (asked) { m->s += h / 2 * (m->x + 1); m->t = middle; }
+#ifdef EARLY_AT_START
+    if (asked) m->t = t;
+#endif
+    return asked;
+}
 int fmi3DoStep(void *v, double t, double h, bool prior, bool *event, bool *end, bool *early, double *last) {
     Model *m = v;
     *event = *end = *early = false;
@@ -221,8 +260,11 @@ int fmi3DoStep(void *v, double t, double h, bool prior, bool *event, bool *end, 
 #ifdef EVENT
     *event = true;
 #endif
-    if (m->update) { bool asked = false; double at = 0; m->update(NULL, t + h, false, false, true, false, &asked, &at); }
+    if (m->update && updated(m, t, h)) { *early = true; *last = m->t; return 0; }
     m->s += h * m->x + h;
+#ifdef UPDATE_CHANGES
+    if (m->update) m->s += 1;
+#endif
 #ifdef RANDOM
     static int calls;
     m->s += 1e-3 * ++calls;
@@ -275,6 +317,20 @@ int fmi3DeserializeFMUState(void *v, const unsigned char *bytes, size_t n, void 
 #endif
     return 0;
 }
+int fmi3GetAdjointDerivative(void *v, const VR *u, size_t nu, const VR *k, size_t nk, const double *seed, size_t ns, double *out, size_t no) {
+#ifdef ADJOINT_REFUSED
+    return 3;
+#endif
+    for (size_t j = 0; j < nk; j++) {
+        out[j] = 0;
+        for (size_t i = 0; i < nu; i++)
+            if (u[i] == 4 && k[j] == 1) out[j] += ((Model *)v)->k * seed[i];
+#ifdef ADJOINT_WRONG
+        out[j] += 1;
+#endif
+    }
+    return 0;
+}
 int fmi3GetDirectionalDerivative(void *v, const VR *u, size_t nu, const VR *k, size_t nk, const double *seed, size_t ns, double *out, size_t no) {
 #ifdef DERIVATIVE_REFUSED
     return 3;
@@ -312,6 +368,35 @@ int fmi3UpdateDiscreteStates(void *v, bool *again, bool *end, bool *nominals, bo
     *again = true;
 #endif
     return 0;
+}
+int fmi3EnterConfigurationMode(void *v) {
+#ifdef CONFIGURATION_REFUSED
+    return 3;
+#endif
+    return 0;
+}
+int fmi3ExitConfigurationMode(void *v) { return 0; }
+int fmi3GetUInt64(void *v, const VR *r, size_t n, uint64_t *out, size_t m) { for (size_t i = 0; i < n; i++) out[i] = 3; return 0; }
+int fmi3SetUInt64(void *v, const VR *r, size_t n, const uint64_t *in, size_t m) {
+#ifdef STRUCTURE_REFUSED
+    return 3;
+#endif
+    return 0;
+}
+int fmi3GetBinary(void *v, const VR *r, size_t n, size_t *sizes, const uint8_t **out, size_t m) {
+    static const uint8_t blob[] = {0xC0, 0x00, 0xFE};
+    *out = blob;
+    *sizes = sizeof blob;
+#ifdef BINARY_START
+    *sizes = 2;
+#endif
+    return 0;
+}
+int fmi3SetBinary(void *v, const VR *r, size_t n, const size_t *sizes, const uint8_t *const *in, size_t m) {
+#ifdef BINARY_REFUSED
+    return 3;
+#endif
+    return *sizes == 3 && in[0][2] == 0xFE ? 0 : 3;
 }
 int fmi3EnterContinuousTimeMode(void *v) { return 0; }
 int fmi3SetTime(void *v, double t) { ((Model *)v)->t = t; return 0; }

@@ -17,18 +17,21 @@ SMALL = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="small" instantiationToken="{small}" variableNamingConvention="structured">
   <ModelExchange modelIdentifier="small"/>
   <CoSimulation modelIdentifier="small" canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="true"
-    canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="1" hasEventMode="true" providesIntermediateUpdate="true"/>
+    canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="1" hasEventMode="true" providesIntermediateUpdate="true"
+    canReturnEarlyAfterIntermediateUpdate="true" providesAdjointDerivatives="true"/>
   <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
   <ModelVariables>
     <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
-    <Float64 name="x" valueReference="1" causality="input" variability="continuous" start="0"/>
+    <Float64 name="x" valueReference="1" causality="input" variability="continuous" intermediateUpdate="true" start="0"/>
     <Float64 name="k" valueReference="2" causality="parameter" variability="tunable" initial="exact" start="2"/>
-    <Float64 name="s" valueReference="3" causality="output" variability="continuous" initial="exact" start="1"/>
+    <Float64 name="s" valueReference="3" causality="output" variability="continuous" initial="exact" intermediateUpdate="true" start="1"/>
     <Float64 name="z" valueReference="4" causality="output" variability="continuous" initial="calculated"/>
     <Int32 name="n" valueReference="5" causality="input" variability="discrete" start="3"/>
     <Boolean name="b" valueReference="6" causality="input" variability="discrete" start="true"/>
     <String name="label" valueReference="7" causality="parameter" variability="tunable" initial="exact"><Start value="text"/></String>
     <Float64 name="der(s)" valueReference="8" causality="local" variability="continuous" initial="calculated" derivative="3"/>
+    <UInt64 name="size" valueReference="9" causality="structuralParameter" variability="fixed" start="3"/>
+    <Binary name="blob" valueReference="10" causality="input" variability="discrete"><Start value="C000FE"/></Binary>
   </ModelVariables>
   <ModelStructure>
     <Output valueReference="3" dependencies="3"/>
@@ -51,7 +54,22 @@ LIBRARY = {
     "EVENT_MODE_REFUSED": "hasEventMode",
     "STEP_MODE_REFUSED": "EnterStepMode",
     "EVENTS_NEVER_END": "need more than",
+    "CONFIGURATION_REFUSED": "EnterConfigurationMode",
+    "STRUCTURE_REFUSED": "variable size: its own start value cannot be set in the configuration mode",
+    "BINARY_START": "variable blob: start is c000fe in the description and c000 in the library",
+    "BINARY_REFUSED": "SetBinary",
+    "ADJOINT_REFUSED": "GetAdjointDerivative",
+    "ADJOINT_WRONG": "the derivative of z by x is 3, GetDirectionalDerivative gives 2",
     "UPDATE_REFUSED": "providesIntermediateUpdate",
+    "UPDATE_BEYOND": "the callback is called for 0.02 s in the step from 0 s to 0.01 s",
+    "UPDATE_BACK": "the callback is called for 0.0025 s after the steps up to 0.005 s were finished",
+    "UPDATE_UNREADABLE": "s cannot be read in an intermediate update that allows it",
+    "UPDATE_UNSETTABLE": "x cannot be set in an intermediate update that allows it",
+    "UPDATE_CHANGES": "with intermediate updates",
+    "EARLY_OFFERED": "it offers to return early, which was not allowed",
+    "EARLY_REFUSED": "an instance with early returns is refused",
+    "EARLY_IGNORED": "it was asked at 0.005 s to return early, which it had offered, and did not",
+    "EARLY_AT_START": "it returns early from the step from 0 s to 0.01 s with lastSuccessfulTime 0 s",
     "EXCHANGE_REFUSED": "Model Exchange is refused",
     "STATES_MISCOUNTED": "GetNumberOfContinuousStates",
     "RATES_REFUSED": "GetContinuousStateDerivatives",

@@ -16,12 +16,14 @@ import pytest
 
 import fmu_defects
 from armrs import cli
+from armrs.cosim.library import platform_folder
 from armrs.errors import BadInput
 from armrs.fmu.check import check_fmu
 from armrs.fmu.export import export_fmu
 from armrs.workflows.demo import true_model
 
 CASES = [(fmi, name) for fmi in (2, 3) for name in (*fmu_defects.BOTH, *(fmu_defects.TWO if fmi == 2 else fmu_defects.THREE))]
+PLACE, SUFFIX = platform_folder(3)
 NEEDS_COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 LIMITED = pytest.mark.skipif(sys.platform != "linux", reason="memory and writing are limited on Linux alone")
 
@@ -76,6 +78,45 @@ def test_wrong_dependencies_are_found(tmp_path: Path) -> None:
     assert "InitialUnknown z: changes with x, which is not among its dependencies" in found
 
 
+@NEEDS_COMPILER
+@pytest.mark.parametrize("defect", ["", "EXCHANGE_REFUSED", "RATES_REFUSED", "STATES_MISCOUNTED"])
+def test_an_fmu_for_model_exchange_alone_is_tried(defect: str, tmp_path: Path) -> None:
+    description = re.sub(r"(?s)  <CoSimulation.*?/>\n", "", fmu_defects.SMALL)
+    found = errors(fmu_defects.small(tmp_path, defect, description))
+    assert [fmu_defects.LIBRARY[defect] in text for text in found] == [True] if defect else found == []
+
+
+@NEEDS_COMPILER
+def test_an_fmu_that_can_be_instantiated_only_once_is_tried_in_several_processes(tmp_path: Path) -> None:
+    once = fmu_defects.SMALL.replace('modelIdentifier="small"', 'modelIdentifier="small" canBeInstantiatedOnlyOncePerProcess="true"')
+    assert errors(fmu_defects.small(tmp_path, "ONLY_ONCE", once)) == []
+    assert errors(fmu_defects.small(tmp_path, "ONLY_ONCE"))
+    [found] = errors(fmu_defects.small(tmp_path, "EARLY_IGNORED", once))
+    assert fmu_defects.LIBRARY["EARLY_IGNORED"] in found
+
+
+@NEEDS_COMPILER
+def test_an_fmu_that_needs_its_tool_is_no_defect(tmp_path: Path) -> None:
+    description = fmu_defects.SMALL.replace(
+        '<CoSimulation modelIdentifier="small"', '<CoSimulation modelIdentifier="small" needsExecutionTool="true"'
+    )
+    assert errors(fmu_defects.small(tmp_path, "TOKEN_REFUSED", description)) == []
+
+
+@NEEDS_COMPILER
+def test_each_interface_may_have_a_library_of_its_own(tmp_path: Path) -> None:
+    description = fmu_defects.SMALL.replace('<ModelExchange modelIdentifier="small"', '<ModelExchange modelIdentifier="other"')
+    source = fmu_defects.small(tmp_path, "RATES_REFUSED", description)
+    shutil.move(tmp_path / f"small{SUFFIX}", tmp_path / f"other{SUFFIX}")
+    fmu_defects.small(tmp_path)
+    with zipfile.ZipFile(source, "w") as packed:
+        packed.writestr("modelDescription.xml", description)
+        for name in ("small", "other"):
+            packed.write(tmp_path / f"{name}{SUFFIX}", f"binaries/{PLACE}/{name}{SUFFIX}")
+    [found] = errors(source)
+    assert "GetContinuousStateDerivatives" in found
+
+
 ALIAS = """
     <ScalarVariable name="alias" valueReference="{reference}" variability="{variability}" causality="local"><Real {unit}/></ScalarVariable>
 """
@@ -114,12 +155,9 @@ def test_a_library_writes_nothing_outside_its_folder(tmp_path: Path) -> None:
     library = tmp_path / "small.so"
     parts = [str(Path(fmu_defects.__file__).parent / "defective.c"), str(tmp_path / "stubs.c"), str(tmp_path / "write.c")]
     subprocess.run(["cc", "-shared", "-fPIC", "-w", "-o", str(library), *parts, "-lm"], check=True)
-    from armrs.cosim.library import platform_folder
-
-    place, suffix = platform_folder(3)
     with zipfile.ZipFile(source, "w") as packed:
         packed.writestr("modelDescription.xml", fmu_defects.SMALL)
-        packed.write(library, f"binaries/{place}/small{suffix}")
+        packed.write(library, f"binaries/{PLACE}/small{SUFFIX}")
     found = check_fmu(source)
     if any(f.place == "sandbox" for f in found):
         pytest.skip("this kernel has no Landlock")

@@ -129,6 +129,7 @@ class ImportedSlave(Partner):
                 shutil.rmtree(remove, ignore_errors=True)
             raise
         self._handle: int | None = handle
+        self._mode = mode  # callbacks live as long as the instance
         self._instance = c_void_p(handle)
         self._plans: dict[tuple[str, ...], _Plan] = {}
         self._flags = [c_bool() for _ in range(3)]
@@ -290,6 +291,25 @@ class ImportedSlave(Partner):
         else:
             self.call("GetDirectionalDerivative", *ends[0], *ends[1], given, room)
         return np.array(room)
+
+    def get_adjoint_derivative(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> np.ndarray:
+        """Return derivatives of a combination of variables by others (FMI 3.0), shape (len(knowns),)."""
+        n, m = len(unknowns), len(knowns)
+        room, given = (c_double * m)(), (c_double * n)(*seed)
+        ends = [(self._references(list(names)), c_size_t(len(names))) for names in (unknowns, knowns)]
+        self.call("GetAdjointDerivative", *ends[0], *ends[1], given, c_size_t(n), room, c_size_t(m))
+        return np.array(room)
+
+    def get_binary(self, name: str) -> bytes:
+        """Return a scalar variable of the type Binary (FMI 3.0)."""
+        size, place = c_size_t(), c_void_p()
+        self.call("GetBinary", self._references([name]), c_size_t(1), byref(size), byref(place), c_size_t(1))
+        return ctypes.string_at(place, size.value) if place.value else b""
+
+    def set_binary(self, name: str, value: bytes) -> None:
+        """Set a scalar variable of the type Binary (FMI 3.0)."""
+        place = ctypes.c_char_p(value)
+        self.call("SetBinary", self._references([name]), c_size_t(1), byref(c_size_t(len(value))), byref(place), c_size_t(1))
 
     def terminate(self) -> None:
         """End the run."""

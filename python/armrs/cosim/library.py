@@ -96,17 +96,17 @@ class Library:
         resources : Path, optional
         logging : bool
         **mode
-            FMI 3.0: `event_mode`, whether the event mode is used; `intermediate`, the callback of the intermediate update.
+            FMI 3.0: `event_mode`, whether the event mode is used; `early`, whether a step may return early; `intermediate`, the callback
+            of the intermediate update; `required`, the value references that are read and set in it.
         """
         text = [c_char_p(part.encode()) for part in (name, token)]
         if self.fmi == 3:
             make = self.function("InstantiateCoSimulation", c_void_p)
-            update = mode.get("intermediate")
-            uses = c_bool(mode.get("event_mode", False))
-            off = c_bool(False)
-            return make(
-                *text, _folder(resources), off, c_bool(logging), uses, off, None, c_size_t(0), None, self._log_3, update or c_void_p(None)
-            )
+            modes = [c_bool(mode.get(word, False)) for word in ("event_mode", "early")]
+            required = mode.get("required", ())
+            references = (ctypes.c_uint32 * len(required))(*required)
+            calls = (None, self._log_3, mode.get("intermediate") or c_void_p(None))
+            return make(*text, _folder(resources), c_bool(False), c_bool(logging), *modes, references, c_size_t(len(required)), *calls)
         make = self.function("Instantiate", c_void_p)
         return make(text[0], c_int(1), text[1], _uri(resources), byref(self._callbacks), c_int(0), c_int(logging))
 
@@ -166,9 +166,9 @@ def platform_folder(fmi: int) -> tuple[str, str]:
     return ("darwin64" if system == "darwin" else f"{ {'windows': 'win'}.get(system, system) }{bits}"), suffix
 
 
-def library_path(folder: Path, description: Description, file: str | os.PathLike[str]) -> Path:
-    """Return the library of an unpacked FMU for this machine."""
-    identifier = description.identifier
+def library_path(folder: Path, description: Description, file: str | os.PathLike[str], interface: str = "") -> Path:
+    """Return the library of an unpacked FMU for this machine; each interface may have one of its own, co-simulation goes before."""
+    identifier = description.interfaces[interface].get("modelIdentifier", "") if interface else description.identifier
     if not _C_NAME.fullmatch(identifier):
         # A path here would load a library from outside the archive.
         raise BadInput("modelIdentifier", identifier, "a name as in C", file=file)

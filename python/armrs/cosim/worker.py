@@ -31,7 +31,7 @@ def main() -> None:
         from ..fmu import probe
 
         channel.send({"unlimited": limits.restrict(channel.folder)})
-        probe.run(Path(task["path"]), channel.folder / "fmu", channel.send)
+        probe.run(Path(task["path"]), channel.folder / "fmu", channel.send, task["part"])
     else:
         from .imported import ImportedSlave
 

@@ -14,7 +14,7 @@ from typing import Any
 from ..cosim.library import platform_folder
 from ..cosim.process import Confined, ProcessEnded
 from ..errors import BadInput
-from . import rules, schema
+from . import probe, rules, schema
 from .archive import DESCRIPTION, archive, read_xml, unpack
 from .content import in_archive, in_terminals
 from .description import Description, parse
@@ -86,7 +86,8 @@ def check_fmu(path: str | os.PathLike[str], *, library: bool = True, seconds: fl
             found += _binary(files, description)
             found += [Finding("error", place, text) for place, text in in_terminals(files, description)]
     if library and description is not None and not any(f.place.startswith("binaries") for f in found):
-        found += _tried(Path(path), seconds)
+        for part in probe.parts(description):
+            found += _tried(Path(path), seconds, part)
     return sorted(dict.fromkeys(found), key=lambda f: f.level != "error")
 
 
@@ -127,8 +128,8 @@ def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Findin
             yield Finding(level, f"binaries/{place}", f"{there}, wanted is {identifier}{suffix}, named as modelIdentifier says")
 
 
-def _tried(path: Path, seconds: float) -> list[Finding]:
-    """Try the library in a process of its own, so that its crash is a finding and not ours."""
+def _tried(path: Path, seconds: float, part: int | None) -> list[Finding]:
+    """Try the library, or a part of what it promises, in a process of its own, so that its crash is a finding and not ours."""
     folder = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
     process = None
     found: list[Finding] = []
@@ -136,7 +137,7 @@ def _tried(path: Path, seconds: float) -> list[Finding]:
     try:
         unpack(path, folder / "fmu")
         process = Confined("armrs.cosim.worker", folder)
-        process.send({"task": "try", "path": str(path)})
+        process.send({"task": "try", "path": str(path), "part": part})
         unlimited = process.receive(seconds).get("unlimited", [])
         found += [Finding("note", "sandbox", str(text)) for text in unlimited]
         while step != "end":

@@ -179,13 +179,13 @@ def _variables_of_3(root: ElementTree.Element, units: dict[str, Unit]) -> Iterat
     elements = list(root.iterfind("ModelVariables/*"))
     by_reference = {e.get("valueReference"): e for e in elements}
     for element in elements:
-        start = element.get("start")
-        if element.tag in ("String", "Binary"):
-            inner = [child.get("value", "") for child in element.iterfind("Start")]
-            start = None if not inner else inner[0]
+        start: str | list[str] | None = element.get("start")
         dimensions = tuple(_dimension(d, by_reference) for d in element.iterfind("Dimension"))
         if math.prod(dimensions) > _MOST_NUMBERS:
             raise BadInput(f"variable {element.get('name')}", Text(f"{math.prod(dimensions)} elements"), f"at most {_MOST_NUMBERS}")
+        if element.tag in ("String", "Binary"):
+            inner = [child.get("value", "") for child in element.iterfind("Start")]
+            start = inner or None
         kind = "Int64" if element.tag == "Enumeration" else element.tag
         yield _variable(element, element, (types.get(element.get("declaredType")), kind, start), units, dimensions)
 
@@ -212,7 +212,7 @@ def _variables_of_2(root: ElementTree.Element, units: dict[str, Unit]) -> Iterat
 def _variable(
     element: ElementTree.Element,
     typed: ElementTree.Element,
-    own: tuple[ElementTree.Element | None, str, str | None],
+    own: tuple[ElementTree.Element | None, str, str | list[str] | None],
     units: dict[str, Unit],
     dimensions: tuple[int, ...],
 ) -> Variable:
@@ -236,7 +236,7 @@ def _variable(
         unit=unit,
         exponents=None if known is None else known.exponents,
         scale=1.0 if known is None else known.factor,
-        start=_start(kind, start, name) if not dimensions else _starts(kind, start, name),
+        start=_starts(kind, start, name) if dimensions else _start(kind, start, name),
         min=finite(attribute("min")),
         max=finite(attribute("max")),
         nominal=finite(attribute("nominal")) or 1.0,
@@ -254,13 +254,16 @@ def _variability(element: ElementTree.Element, *, floating: bool, is_two: bool) 
     return "continuous" if floating else "discrete"
 
 
-def _starts(kind: str, value: str | None, name: str) -> tuple[Any, ...] | None:
-    return None if value is None else tuple(_start(kind, part, name) for part in value.split())
+def _starts(kind: str, value: str | list[str] | None, name: str) -> tuple[Any, ...] | None:
+    """Return the values of an array; texts stand in elements of their own."""
+    return None if value is None else tuple(_start(kind, part, name) for part in (value.split() if isinstance(value, str) else value))
 
 
-def _start(kind: str, value: str | None, name: str) -> Any:
+def _start(kind: str, value: str | list[str] | None, name: str) -> Any:
     if value is None:
         return None
+    if isinstance(value, list):
+        value = value[0]
     if kind in ("String", "Binary"):
         return value
     if kind == "Boolean":

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import math
-import struct
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -16,28 +15,35 @@ from ..cosim.library import Library, library_path
 from ..cosim.partner import Status, Variable
 from ..errors import ArmrsError, SlaveError
 from . import names, promises
-from .description import parse
-from .trial import MOST_SHOWN, Trial
+from .description import Description, parse
+from .trial import MOST_SHOWN, Trial, same
 
 _ROUNDED = 1e-12
 """Relative difference of a start value that a decimal number with 15 digits may cause."""
-_SOLVED = 1e-6
-"""Relative difference that a solver with a tolerance may leave between a step and its repetition."""
 
 
-def run(path: Path, folder: Path, send: Callable[[dict[str, Any]], None]) -> None:
-    """Try an unpacked FMU from its library to everything that it promises."""
+def run(path: Path, folder: Path, send: Callable[[dict[str, Any]], None], part: int | None = None) -> None:
+    """Try an unpacked FMU from its library to everything that it promises, or one part of it: there are `parts` of them."""
     description = parse((folder / "modelDescription.xml").read_bytes())
     trial = Trial(path, folder, description, send)
     trial.step("loading the library")
     try:
-        if _symbols(trial) and "CoSimulation" in description.interfaces:
-            _life(trial)
-            for promise in promises.ALL:
-                _guarded(trial, promise)
+        if _symbols(trial):
+            tried = (_life, *promises.ALL)
+            for promise in tried if part is None else tried[part : part + 1]:
+                if not trial.needs_tool:
+                    _guarded(trial, promise)
+            if "ScheduledExecution" in description.interfaces:
+                trial.find("ScheduledExecution", "not tried", level="note")
     except ArmrsError as refused:
         trial.find("library", str(refused))
     trial.step("end")
+
+
+def parts(description: Description) -> list[int | None]:
+    """Return the parts that need a process each: all together but for libraries that can be instantiated only once in one."""
+    once = any(flags.get("canBeInstantiatedOnlyOncePerProcess") in ("true", "1") for flags in description.interfaces.values())
+    return list(range(1 + len(promises.ALL))) if once and not description.flag("needsExecutionTool") else [None]
 
 
 def _guarded(trial: Trial, promise: Callable[[Trial], None]) -> None:
@@ -49,10 +55,17 @@ def _guarded(trial: Trial, promise: Callable[[Trial], None]) -> None:
 
 
 def _symbols(trial: Trial) -> bool:
+    """Load the libraries, of which each interface may have one of its own, and look for the functions of the standard in them."""
+    interfaces: dict[str, list[str]] = {}
+    for kind, attributes in trial.description.interfaces.items():
+        interfaces.setdefault(attributes.get("modelIdentifier", ""), []).append(kind)
+    return all(_symbols_of(trial, kinds) for kinds in interfaces.values())
+
+
+def _symbols_of(trial: Trial, interfaces: list[str]) -> bool:
     fmi = trial.fmi
-    library = Library(library_path(trial.folder, trial.description, trial.path), fmi)
-    wanted = names.functions(fmi, trial.description.interfaces)
-    missing = [f"fmi{fmi}{name}" for name in wanted if not library.has(f"fmi{fmi}{name}")]
+    library = Library(library_path(trial.folder, trial.description, trial.path, interfaces[0]), fmi)
+    missing = [f"fmi{fmi}{name}" for name in names.functions(fmi, interfaces) if not library.has(f"fmi{fmi}{name}")]
     if missing:
         trial.find("library", f"{len(missing)} functions of the standard are missing: {', '.join(missing[:MOST_SHOWN])}")
         return False
@@ -66,12 +79,15 @@ def _symbols(trial: Trial) -> bool:
 
 def _life(trial: Trial) -> None:
     """Make an instance, compare its start values, step it, go back, reset it."""
+    if "CoSimulation" not in trial.description.interfaces:
+        return
     trial.step("making an instance")
     try:
         slave = trial.make()
     except SlaveError as error:
         if trial.flag("needsExecutionTool"):
             trial.find("CoSimulation, needsExecutionTool", f"it needs the tool that made it: not tried ({error})", level="note")
+            trial.needs_tool = True
             return
         if trial.fmi == 3 and trial.flag("hasEventMode") and _made_with_events(trial):
             text = "an instance that does not use the event mode is refused: not tried, and no partner for armrs"
@@ -87,7 +103,7 @@ def _life(trial: Trial) -> None:
     slave.enter_initialization_mode(trial.start)
     trial.step("comparing start values")
     _starts(trial, slave)
-    for promise in (promises.dependencies, promises.directional_derivatives):
+    for promise in promises.IN_INITIALIZATION:
         _guarded(trial, partial(promise, slave=slave))
     slave.exit_initialization_mode()
     _reads(trial, slave)
@@ -177,7 +193,7 @@ def _steps(trial: Trial, slave: ImportedSlave) -> dict[str, list[Any]]:
         trial.step("going back to a state")
         _disturb(trial, slave)
         slave.set_state(state)
-        _compare(trial, f"library, {word}", first, _advance(trial, slave, trial.start, trial.size), "after going back and making it again")
+        trial.compare(f"library, {word}", first, _advance(trial, slave, trial.start, trial.size), "after going back and making it again")
         _serialized(trial, slave, state, first)
         slave.free_state(state)
     trial.step("making steps of other lengths")
@@ -211,7 +227,7 @@ def _serialized(trial: Trial, slave: ImportedSlave, state: Any, first: dict[str,
     copy = slave.deserialize_state(content)
     slave.set_state(copy)
     slave.free_state(copy)
-    _compare(trial, "library, SerializeFMUState", first, _advance(trial, slave, trial.start, trial.size), "from the state read back")
+    trial.compare("library, SerializeFMUState", first, _advance(trial, slave, trial.start, trial.size), "from the state read back")
 
 
 def _advance(trial: Trial, slave: ImportedSlave, time: float, size: float) -> dict[str, list[Any]]:
@@ -223,7 +239,7 @@ def _advance(trial: Trial, slave: ImportedSlave, time: float, size: float) -> di
         trial.find(place, f"the step of {size:g} s from {time:g} s is discarded: {done.message}")
     elif done.early_return:
         trial.find(place, "it returns early, which was not allowed when the instance was made")
-    elif abs(done.last_successful_time - end) > 1e-6 * size + 1e-12 * abs(end) + _lag(slave):
+    elif abs(done.last_successful_time - end) > 1e-6 * size + 1e-12 * abs(end) + trial.lag:
         trial.find(place, f"lastSuccessfulTime is {done.last_successful_time:g} s after a step to {end:g} s")
     if done.event and not trial.flag("hasEventMode"):
         trial.find(place, "it asks for event handling and has no event mode")
@@ -240,13 +256,8 @@ def _time(trial: Trial, slave: ImportedSlave, end: float) -> None:
     """Compare the independent variable with the time of the importer; FMI 2.0 cannot say which inner step it may lag behind by."""
     for v in trial.readable("independent") if trial.fmi == 3 else []:
         found = float(slave.values(v.name)[0])
-        if not abs(found - end) <= 1e-9 * max(1.0, abs(end)) + _lag(slave):
+        if not abs(found - end) <= 1e-9 * max(1.0, abs(end)) + trial.lag:
             trial.find(f"variable {v.name}", f"is {found:g} after a step to {end:g} s", level="note", sort="time")
-
-
-def _lag(slave: ImportedSlave) -> float:
-    """How far a slave with a fixed inner step may be from the end of a communication step [s]."""
-    return 1.000001 * (slave.internal_step or 0.0)
 
 
 def _output_derivatives(trial: Trial, slave: ImportedSlave) -> None:
@@ -273,7 +284,7 @@ def _tunables(trial: Trial, slave: ImportedSlave) -> None:
 
 def _second_instance(trial: Trial, slave: ImportedSlave) -> None:
     """Make a second instance: it begins where the first began, and does not touch it."""
-    if trial.flag("canBeInstantiatedOnlyOncePerProcess"):
+    if trial.only_once:
         return
     trial.step("making a second instance beside the first")
     before = trial.outputs(slave)
@@ -287,7 +298,7 @@ def _second_instance(trial: Trial, slave: ImportedSlave) -> None:
     _starts(trial, other)
     other.exit_initialization_mode()
     other.do_step(trial.start, trial.size)
-    _compare(trial, "library, instantiate", before, trial.outputs(slave), "after a second instance made one")
+    trial.compare("library, instantiate", before, trial.outputs(slave), "after a second instance made one")
     other.free()
 
 
@@ -295,24 +306,7 @@ def _reset(trial: Trial, slave: ImportedSlave, first: dict[str, list[Any]]) -> N
     trial.step("resetting")
     slave.reset()
     trial.begin(slave)
-    _compare(trial, "library, Reset", first, _advance(trial, slave, trial.start, trial.size), "after a reset")
-
-
-def _compare(trial: Trial, place: str, once: dict[str, list[Any]], again: dict[str, list[Any]], when: str) -> None:
-    for name, values in once.items():
-        pairs = list(zip(values, again[name], strict=True))
-        if all(same(a, b) if isinstance(a, float) else a == b for a, b in pairs):
-            continue
-        text = f"{name} is {_short(values)} after a step and {_short(again[name])} {when}"
-        # A solver that begins anew ends within its tolerance.
-        if all(math.isclose(a, b, rel_tol=_SOLVED) if isinstance(a, float) else a == b for a, b in pairs):
-            trial.find(place, text, level="note", sort=f"{place} nearly")
-        else:
-            trial.find(place, text, sort=place)
-
-
-def _short(values: list[Any]) -> str:
-    return repr(values[0]) if len(values) == 1 else repr(values)[:80]
+    trial.compare("library, Reset", first, _advance(trial, slave, trial.start, trial.size), "after a reset")
 
 
 def initial_of(v: Variable) -> str:
@@ -321,8 +315,3 @@ def initial_of(v: Variable) -> str:
         return v.initial
     exact = v.causality in ("input", "parameter", "structuralParameter") or v.variability == "constant"
     return "exact" if exact else "calculated"
-
-
-def same(a: float, b: float) -> bool:
-    """Whether two numbers have the same bits."""
-    return struct.pack("<d", a) == struct.pack("<d", b)

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from ctypes import byref, c_bool, c_double, c_int, c_size_t, c_void_p
 
 from ..cosim.imported import ImportedSlave
-from ..cosim.library import UPDATE_3, Library, library_path
+from ..cosim.library import Library, library_path
 from ..cosim.partner import Variable
 from ..errors import ArmrsError, SlaveError
+from .intermediate import early_return, intermediate_update
 from .trial import Trial
 
 _MOST_TRIED = 200
@@ -52,7 +53,7 @@ def directional_derivatives(trial: Trial, slave: ImportedSlave) -> None:
     if not trial.flag(word):
         return
     trial.step("reading directional derivatives")
-    unknowns = [v.name for v in trial.readable("output") if v.is_signal and v.variability == "continuous" and v.initial != "exact"]
+    unknowns = _unknowns(trial)
     knowns = [v for v in _changeable(trial) if v.causality == "input"]
     for known in knowns[:_MOST_TRIED] if unknowns else []:
         derivative = slave.get_directional_derivative(unknowns, [known.name], [1.0])
@@ -67,6 +68,61 @@ def directional_derivatives(trial: Trial, slave: ImportedSlave) -> None:
             if not abs(found - expected) <= _DERIVATIVE_OFF * max(1.0, abs(expected)):
                 text = f"the derivative of {name} by {known.name} is {found:.6g}, finite differences give {expected:.6g}"
                 trial.find("library, GetDirectionalDerivative", text, sort="derivatives")
+
+
+def adjoint_derivatives(trial: Trial, slave: ImportedSlave) -> None:
+    """Compare adjoint derivatives with directional derivatives in the initialization."""
+    if trial.fmi == 2 or not (trial.flag("providesAdjointDerivatives") and trial.flag("providesDirectionalDerivatives")):
+        return
+    trial.step("reading adjoint derivatives")
+    unknowns, knowns = _unknowns(trial), [v.name for v in _changeable(trial) if v.causality == "input"][:_MOST_TRIED]
+    if not unknowns or not knowns:
+        return
+    columns = [slave.get_directional_derivative(unknowns, [known], [1.0]) for known in knowns]
+    for k, unknown in enumerate(unknowns):
+        row = slave.get_adjoint_derivative([unknown], knowns, [1.0])
+        for known, found, column in zip(knowns, row, columns, strict=True):
+            if not abs(found - column[k]) <= _NOISE * max(1.0, abs(column[k])):
+                text = f"the derivative of {unknown} by {known} is {found:.6g}, GetDirectionalDerivative gives {column[k]:.6g}"
+                trial.find("library, GetAdjointDerivative", text, sort="adjoint")
+
+
+def configuration(trial: Trial) -> None:
+    """Set structural parameters to their start values in the configuration mode, which an FMU that has some must offer."""
+    structural = [v for v in trial.readable("structuralParameter") if v.start is not None and not v.dimensions]
+    if not structural or trial.wants_events or "CoSimulation" not in trial.description.interfaces:
+        return
+    trial.step("setting structural parameters in the configuration mode")
+    slave = trial.make()
+    slave.call("EnterConfigurationMode")
+    try:
+        for v in structural:
+            slave.set(v.name, v.start)
+    except SlaveError as error:
+        trial.find(f"variable {v.name}", f"its own start value cannot be set in the configuration mode: {error}")
+    else:
+        slave.call("ExitConfigurationMode")
+        trial.begin(slave)
+    slave.free()
+
+
+def binaries(trial: Trial, slave: ImportedSlave) -> None:
+    """Compare binary variables with their start values, and set inputs and parameters to them."""
+    for v in trial.description.variables if trial.fmi == 3 else ():
+        if v.type != "Binary" or v.dimensions or v.start is None:
+            continue
+        trial.step("comparing binary start values")
+        try:
+            said = bytes.fromhex(v.start)
+        except ValueError:
+            trial.find(f"variable {v.name}", f"start is {v.start[:80]!r}, allowed are hexadecimal digits", sort="binary")
+            continue
+        found = slave.get_binary(v.name)
+        if found != said:
+            shown = f"start is {said.hex()[:80]} in the description and {found.hex()[:80]} in the library"
+            trial.find(f"variable {v.name}", shown, sort="binary")
+        if v.causality in ("input", "parameter"):
+            slave.set_binary(v.name, said)
 
 
 def event_mode(trial: Trial) -> None:
@@ -101,34 +157,13 @@ def _discrete(trial: Trial, slave: ImportedSlave) -> None:
     trial.find("library, UpdateDiscreteStates", f"the discrete states need more than {_MOST_EVENTS} updates")
 
 
-def intermediate_update(trial: Trial) -> None:
-    """Make an instance with a callback for intermediate updates where they are promised, and a step with it."""
-    if trial.fmi == 2 or trial.wants_events or not trial.flag("providesIntermediateUpdate"):
-        return
-    trial.step("making an instance with an intermediate update")
-    calls = []
-    update = UPDATE_3(lambda *given: calls.append(float(given[1])))
-    try:
-        slave = trial.make(intermediate=update)
-    except SlaveError as error:
-        trial.find("CoSimulation, providesIntermediateUpdate", f"an instance with a callback is refused: {error}")
-        return
-    trial.begin(slave)
-    trial.step("making a step with an intermediate update")
-    slave.do_step(trial.start, trial.size)
-    if not calls:
-        trial.find("CoSimulation, providesIntermediateUpdate", f"the callback is not called in a step of {trial.size:g} s", level="note")
-    slave.terminate()
-    slave.free()
-
-
 def model_exchange(trial: Trial) -> None:
     """Initialize an instance for Model Exchange, and compare the number of its states and their derivatives with the description."""
     flags = trial.description.interfaces.get("ModelExchange")
     if flags is None or flags.get("needsExecutionTool") in ("true", "1"):
         return
     trial.step("making an instance for Model Exchange")
-    library = Library(library_path(trial.folder, trial.description, trial.path), trial.fmi)
+    library = Library(library_path(trial.folder, trial.description, trial.path, "ModelExchange"), trial.fmi)
     resources = trial.folder / "resources"
     handle = library.instantiate_model_exchange("tried", trial.description.token, resources)
     if not handle:
@@ -202,6 +237,11 @@ def _events_of_2(call: Callable[..., None]) -> None:
             return
 
 
+def _unknowns(trial: Trial) -> list[str]:
+    """Return outputs that have derivatives in the initialization."""
+    return [v.name for v in trial.readable("output") if v.is_signal and v.variability == "continuous" and v.initial != "exact"]
+
+
 def _changeable(trial: Trial) -> list[Variable]:
     """Scalar inputs and parameters that have a start value."""
     return [v for v in trial.readable("input", "parameter") if v.is_signal and v.start is not None]
@@ -214,5 +254,7 @@ def _moved(v: Variable) -> float:
     return start + size if v.max is None or start + size <= v.max else start - size
 
 
-ALL: tuple[Callable[[Trial], None], ...] = (event_mode, intermediate_update, model_exchange)
+ALL: tuple[Callable[[Trial], None], ...] = (configuration, event_mode, intermediate_update, early_return, model_exchange)
 """Promises that need an instance of their own."""
+IN_INITIALIZATION = (binaries, dependencies, directional_derivatives, adjoint_derivatives)
+"""Promises that are tried while an instance is initialized."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +16,8 @@ from .description import Description, finite
 
 MOST_SHOWN = 5
 """Findings of one sort that are shown, of possibly thousands of variables."""
+_SOLVED = 1e-6
+"""Relative difference that a solver with a tolerance may leave between a step and its repetition."""
 
 
 @dataclass
@@ -33,6 +37,8 @@ class Trial:
         How many findings of each sort there were.
     wants_events : bool
         Whether no instance is made that does not use the event mode.
+    needs_tool : bool
+        Whether no instance is made because the tool is missing that made the FMU.
     """
 
     path: Path
@@ -41,6 +47,7 @@ class Trial:
     send: Callable[[dict[str, Any]], None]
     shown: dict[str, int] = field(default_factory=dict)
     wants_events: bool = False
+    needs_tool: bool = False
 
     def step(self, what: str) -> None:
         """Say what comes next, for the case that it crashes."""
@@ -66,6 +73,11 @@ class Trial:
         return self.description.flag(name)
 
     @property
+    def only_once(self) -> bool:
+        """Whether this process holds one instance at most, ever."""
+        return self.flag("canBeInstantiatedOnlyOncePerProcess")
+
+    @property
     def start(self) -> float:
         """Start time of the default experiment [s]."""
         return finite(self.description.experiment.get("startTime")) or 0.0
@@ -75,6 +87,11 @@ class Trial:
         """Communication step that is tried [s]."""
         sizes = (finite(self.description.experiment.get("stepSize")), self.description.number("fixedInternalStepSize"), 0.01)
         return next(size for size in sizes if size is not None and size > 0.0)
+
+    @property
+    def lag(self) -> float:
+        """How far a slave with a fixed inner step may be from the end of a communication step [s]."""
+        return 1.000001 * (self.description.number("fixedInternalStepSize") or 0.0)
 
     def begin(self, slave: ImportedSlave) -> None:
         """Bring an instance to its first step."""
@@ -89,3 +106,25 @@ class Trial:
     def outputs(self, slave: ImportedSlave) -> dict[str, list[Any]]:
         """All outputs that can be read."""
         return {v.name: slave.values(v.name) for v in self.readable("output")}
+
+    def compare(self, place: str, once: dict[str, list[Any]], again: dict[str, list[Any]], when: str) -> None:
+        """Report outputs that are not as they were."""
+        for name, values in once.items():
+            pairs = list(zip(values, again[name], strict=True))
+            if all(same(a, b) if isinstance(a, float) else a == b for a, b in pairs):
+                continue
+            text = f"{name} is {_short(values)} after a step and {_short(again[name])} {when}"
+            # A solver that begins anew ends within its tolerance.
+            if all(math.isclose(a, b, rel_tol=_SOLVED) if isinstance(a, float) else a == b for a, b in pairs):
+                self.find(place, text, level="note", sort=f"{place} nearly")
+            else:
+                self.find(place, text, sort=place)
+
+
+def same(a: float, b: float) -> bool:
+    """Whether two numbers have the same bits."""
+    return struct.pack("<d", a) == struct.pack("<d", b)
+
+
+def _short(values: list[Any]) -> str:
+    return repr(values[0]) if len(values) == 1 else repr(values)[:80]
