@@ -3,7 +3,6 @@
 pub mod candidates;
 pub mod data;
 mod error;
-mod extent;
 pub mod joint_torque;
 pub mod measurement_model;
 pub mod selection;

@@ -4,12 +4,12 @@ use arm_core::effect::{
     Effect, Kind, Local, Motion, Nature, Place, Question, Values, advance_states, resisting_torque,
 };
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
+use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
 use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
-use crate::extent::extent;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linearization_point::{Change, LinearizationPoint};
 use crate::sensitivity::response::Response;

@@ -9,11 +9,11 @@ use arm_ident::inference::estimate::{Estimate, Quantity};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::inference::start::{middle, weight_moment};
 use arm_ident::regression::trial::{Model, Role};
-use arm_ident::regression::unknown::Source;
+use arm_ident::regression::unknown::{Source, spring};
+use arm_numerics::statistics::extent::extent;
 
 use crate::data::passive_law::{Free, Passive};
 use crate::data::session::{ComparisonMode, Session};
-use crate::extent::extent;
 
 /// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
 const LIKELY: f64 = 2.0;
@@ -75,7 +75,7 @@ impl<const N: usize> Session<N> {
                 passive.effect.parameters[smoothing] = 0.0;
             }
             let size = law.parameters[0];
-            if let Some(rest) = rest_angle(law.kind)
+            if let Some((_, rest)) = spring(law)
                 && size > 0.0
             {
                 let middle = passive.effect.parameters[rest];
@@ -120,7 +120,7 @@ impl<const N: usize> Session<N> {
         let law = |joint, kind: Kind| {
             let mut effect = Effect::<f64>::new(kind, joint);
             effect.parameters[0] = 0.0;
-            if let Some(rest) = rest_angle(kind) {
+            if let Some((_, rest)) = spring(&effect) {
                 effect.parameters[rest] = middle(fit(), joint);
             }
             effect
@@ -174,7 +174,7 @@ impl<const N: usize> Session<N> {
             lower: 0.0,
             step: STEP * sd,
         };
-        let rest = rest_angle(effect.kind).map(|parameter| Free {
+        let rest = spring(&effect).map(|(_, parameter)| Free {
             parameter,
             mean: effect.parameters[parameter],
             sd: REST_SD,
@@ -192,9 +192,4 @@ impl<const N: usize> Session<N> {
     pub fn weight_moment(&self, joint: usize) -> f64 {
         weight_moment(&self.chain, joint)
     }
-}
-
-/// The rest angle among the parameters of a spring.
-fn rest_angle(kind: Kind) -> Option<usize> {
-    kind.probe().questions.first().and_then(|q| q.rest)
 }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
+use arm_numerics::statistics::extent::extent;
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
 use crate::data::noise::{Noise, Thinned, dot};
 use crate::data::prepared_session::PreparedSession;
-use crate::extent::extent;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::factor;
 

@@ -1,6 +1,7 @@
 //! Where a fit along simulated motion starts: what a passive joint typically has.
 
 use arm_core::Chain;
+use arm_numerics::statistics::extent::extent;
 
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::spring;
@@ -30,9 +31,7 @@ pub fn weight_moment<const N: usize>(chain: &Chain<f64, N>, joint: usize) -> f64
 /// The middle of the angles that a joint reached \[rad\]; zero without samples.
 pub fn middle<'a, const N: usize>(trials: impl Iterator<Item = &'a Trial<N>>, joint: usize) -> f64 {
     let angles = trials.flat_map(|t| &t.q).map(|q| q[joint]);
-    let (low, high) = angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| {
-        (low.min(q), high.max(q))
-    });
+    let (low, high) = extent(angles);
     if low > high { 0.0 } else { 0.5 * (low + high) }
 }
 

@@ -113,7 +113,7 @@ pub fn unknowns<const N: usize>(
 }
 
 /// Amplitude and rest angle among the parameters of a spring whose torque is linear in both amplitude and amplitude · rest.
-pub(crate) fn spring(effect: &Effect<f64>) -> Option<(usize, usize)> {
+pub fn spring(effect: &Effect<f64>) -> Option<(usize, usize)> {
     let probe = effect.kind.probe();
     let mut questions = probe.questions.iter();
     questions.find_map(|question| question.rest.map(|rest| (question.free[0], rest)))

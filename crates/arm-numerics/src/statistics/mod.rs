@@ -2,5 +2,6 @@
 
 pub mod autoregressive;
 pub mod distributions;
+pub mod extent;
 pub mod long_run;
 pub mod sandwich_covariance;

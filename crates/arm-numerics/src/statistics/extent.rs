@@ -1,5 +1,7 @@
+//! How far some values reach.
+
 /// The least and the greatest of some values; infinite, the wrong way round, of none.
-pub(crate) fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
     })
