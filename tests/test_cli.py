@@ -169,3 +169,18 @@ def test_without_the_compiled_module_the_line_says_so(monkeypatch: pytest.Monkey
     monkeypatch.setattr(catalogue, "catalogue", dict)
     assert cli.main(["effects"]) == 1
     assert "the compiled module armrs._armrs is missing" in capsys.readouterr().err
+
+
+def test_no_verb_replaces_the_report_of_another(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The second was written over the first, whose figures stayed beside it; the same verb replaces its own."""
+    out = tmp_path / "out"
+    assert [cli.main(["identify", str(slow_arm), "-o", str(out)]) for _ in range(2)] == [0, 0]
+    page = (out / "report.html").read_bytes()
+    capsys.readouterr()
+    for arguments in (
+        ["simulate", str(slow_arm / "truth.toml"), "--trial", str(slow_arm / "trials" / "slow_1.csv")],
+        ["report", str(out / "identified.json")],
+    ):
+        line = refused(capsys, *arguments, "-o", out)
+        assert "report.html: file: found the report of armrs identify, allowed a folder of its own: another -o DIR" in line
+    assert (out / "report.html").read_bytes() == page and not (out / "simulated.json").exists()

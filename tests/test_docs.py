@@ -246,3 +246,9 @@ def test_the_thesis_is_cited() -> None:
         assert "Kodek" in text and "Timotej" in text and "2004" in text, name
         assert "Estimation of Upper Extremity Biomechanical Parameters Using a Robot Manipulator" in text, name
     assert all(part in THESIS for part in ("Timotej Kodek", "Using a Robot Manipulator", "2004"))
+
+
+def test_the_readme_copies_no_lists_of_a_model() -> None:
+    """Its library snippets built an arm from four lists beside the model."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "Arm.from_model(model)" in text and "armrs.Arm(" not in text

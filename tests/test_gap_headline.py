@@ -40,7 +40,7 @@ DRY = effect("coulomb", 2, ("torque", 0.161, 0.006, "N m"))
 
 def test_a_named_effect_is_told_with_its_size_and_what_it_is_worth() -> None:
     assert headline(result("explained", DRY)) == (
-        "The model lacks coulomb in joint 2 (elbow), torque 0.1610 ± 0.0060 N m: with it, the gap of Fz on held-out trials falls from 2.4 to "
+        "The model lacks coulomb in joint 2 (elbow), torque 0.1610 ± 0.0060 N m: with it, the gap of the contact force upward (Fz) on held-out trials falls from 2.4 to "
         "0.16 N, where repeats differ by 0.15 N."
     )
 
@@ -55,14 +55,14 @@ def test_an_open_gap_contradicts_no_sentence() -> None:
         assert "Nothing is missing" not in said and "falls from" not in said
         assert "off by 0.015 rad, where repeats differ by 0.0019 rad" in said
         assert [row[-1] for row in gap(told).rows] == ["open", "open"]
-        assert any("q3 is open on the test trials" in line for line in left(told))
+        assert any("the angle of joint 3 (q3) is open on the test trials" in line for line in left(told))
 
 
 def test_what_the_result_calls_open_counts_with_its_place() -> None:
     listed = [{"channel": "q3_rad", "trial": "trials/fast_2.csv", "t_start": 3.14, "t_end": 4.6}]
     told = result("unexplained", DRY, open=listed)
     assert still_open(told) == ["q3_rad"]
-    assert headline(told).endswith("q3 is still off by 0.0019 rad, where repeats differ by 0.0018 rad (trials/fast_2.csv, 3.1 to 4.6 s).")
+    assert headline(told).endswith("(q3) is still off by 0.0019 rad, where repeats differ by 0.0018 rad (trials/fast_2.csv, 3.1 to 4.6 s).")
     assert "and something that the catalogue has no name for" in headline(told)
     # What it calls closed is closed, whatever the ratio: its test knows what the floor is uncertain by.
     assert still_open(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.3, 0.15)}, open=[])) == []

@@ -377,3 +377,17 @@ def test_repeats_that_are_counted_from_zero(recording: Recording, tmp_path: Path
     sources = [write_text(tmp_path / f"slow_{k}.csv", names, values + 1e-7 * k) for k in range(3)]
     made = armrs.import_recordings(sources, tmp_path / "set", model=KNOWN)
     assert [(t.repeat, t.role) for t in armrs.load_dataset(made.folder).trials] == [(1, "fit"), (2, "fit"), (3, "test")]
+
+
+def test_an_import_replaces_a_former_one_whole_and_nothing_of_another_origin(recording: Recording, tmp_path: Path) -> None:
+    """Trials of a former import stayed beside those of the next, and the model that `armrs init` had written was replaced."""
+    names, values = table(recording, names=SI)
+    sources = [write_text(tmp_path / f"slow_{k}.csv", names, values + 1e-7 * k) for k in (1, 2, 3)]
+    armrs.import_recordings(sources, tmp_path / "set", model=KNOWN)
+    armrs.import_recordings(sources[:1], tmp_path / "set", model=KNOWN)
+    assert [path.name for path in (tmp_path / "set" / "trials").iterdir()] == ["slow_1.csv"]
+    subject = armrs.initialise(tmp_path / "subject", body_mass=78.0, height=1.80, sex="male", lengths=(0.322, 0.264))
+    before = (subject.folder / "model.toml").read_bytes()
+    with pytest.raises(BadInput, match="a data set that armrs import did not write"):
+        armrs.import_recordings(sources, subject.folder, model=subject.model)
+    assert (subject.folder / "model.toml").read_bytes() == before and not (subject.folder / "import.toml").exists()

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 import armrs
+import patients
 from armrs import cli
 from armrs.report import series
 from armrs.workflows import demo
 from browser import opened
 from test_cohort import population, table
 from test_docs import DOCS, ROOT, blocks
+from test_sweep import EXPERIMENT as ONE_ARM
 
 A4 = {"width": 718, "height": 1047}
 """Within margins of 1 cm, in CSS pixels."""
@@ -41,11 +43,18 @@ def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert cli.main([verb, *arguments, "-o", str(out / verb)]) in (0, 1)
     source = table(out / "cohort.csv", population(np.random.default_rng(3), 12, 2, 1.0, "a"))
     assert cli.main(["cohort", str(source), "-o", str(out / "cohort")]) == 0
+    (out / "one.toml").write_text(ONE_ARM, encoding="utf-8")
+    (out / "SWEEP.toml").write_text(SWEEP, encoding="utf-8")
+    assert cli.main(["sweep", str(out / "SWEEP.toml"), "-o", str(out / "sweep"), "--jobs", "1"]) == 0
+    (out / "spasticity").mkdir()
+    reflexes = armrs.spasticity(patients.session(patients.Patient(), 7001, emg=True))
+    reflexes.report(out / "spasticity" / "report.html")
     shutil.copytree(ROOT / "examples" / "cosim", out / "cosim")
     assert cli.main(["fmu", "run", str(out / "cosim" / "wall.toml"), "-o", str(out / "fmu")]) == 0
     result = armrs.find_gap(demo.measure_two_speeds(demo.true_model()), separate=False)
     (out / "gap").mkdir()
     result.report(out / "gap" / "report.html")
+    notebook(out / "notebook", [result, reflexes, armrs.identify(slow_arm), armrs.passive_moments(slow_arm)])
     cli.main(["report", str(out / "identify" / "identified.json"), "--summary", "-o", str(out / "summary")])
     (out / "summary" / "summary.html").rename(out / "summary" / "report.html")
     both = [str(out / "simulate" / "simulated.json"), str(out / "record" / "record.json")]
@@ -53,7 +62,29 @@ def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-EVERY = ["simulate", "identify", "passive", "record", "plan", "gap", "cohort", "fmu", "summary", "both"]
+def notebook(folder: Path, results: list[Any]) -> None:
+    """Write what a notebook shows of results, between the least of a page."""
+    folder.mkdir()
+    shown = "".join(f"<section>{result._repr_html_()}</section>" for result in results)
+    head = '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>x</title></head>'
+    (folder / "report.html").write_text(f"{head}<body><main><h1>Results</h1>{shown}</main></body></html>", encoding="utf-8")
+
+
+EVERY = ["simulate", "identify", "passive", "record", "plan", "gap", "cohort", "fmu", "summary", "both", "sweep", "spasticity"]
+SWEEP = """\
+name = "small"
+cases = 3
+seed = 5
+experiment = "one.toml"
+
+[identify]
+with = ["coulomb"]
+
+[[vary]]
+key = "segment[2].com"
+range = [0.9, 1.1]
+apply = "scale"
+"""
 WIDER = "[...document.querySelectorAll('.wide')].filter(e => e.scrollWidth > e.clientWidth).map(e => e.innerText)"
 """Tables that must be scrolled."""
 
@@ -63,7 +94,7 @@ def violations(page: Any) -> list[str]:
     return [f"{v['id']}: {[n['target'] for n in v['nodes']]}" for v in axe.run(page).response["violations"]]
 
 
-@pytest.mark.parametrize("verb", EVERY)
+@pytest.mark.parametrize("verb", [*EVERY, "notebook"])
 def test_axe_core_finds_nothing_and_nothing_is_wider_than_the_window(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html", width=1400) as seen:
         assert violations(seen.page) == []
@@ -102,19 +133,34 @@ def test_pictures_say_what_is_seen_and_headings_are_listed(pages: Path, verb: st
             assert len(listed) > 2
 
 
-@pytest.mark.parametrize("verb", ["identify", "passive", "plan", "gap"])
+@pytest.mark.parametrize("verb", ["identify", "passive", "plan", "gap", "spasticity"])
 def test_a_sketch_of_the_arm_heads_the_report(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html") as seen:
         first = seen.page.evaluate("document.querySelector('img, h2').outerHTML.slice(0, 400)")
         assert first.startswith("<img") and "arm" in first
 
 
-@pytest.mark.parametrize("verb", EVERY)
+@pytest.mark.parametrize("verb", [*EVERY, "notebook"])
 def test_no_number_has_ten_digits(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html") as seen:
         seen.page.evaluate("document.querySelectorAll('code').forEach(e => e.remove())")
         cells = seen.page.evaluate("[...document.querySelectorAll('p, li, td, th, figcaption')].map(e => e.innerText)")
         assert [cell for cell in cells if re.search(r"\d[\d.]{9,}", cell)] == []
+
+
+SYMBOLS = {
+    "identify": ["m is the mass of a segment", "stiffness·rest is the torque of that spring at angle zero"],
+    "sweep": ["m is the mass of a segment", "By data is the share"],
+    "notebook": ["m is the mass of a segment"],
+    "gap": ["q1 and q2: the angle of joint 1", "Fz: the contact force upward", "In formulas R is the torque with which a joint resists"],
+}
+
+
+@pytest.mark.parametrize("verb", SYMBOLS)
+def test_symbols_are_explained_where_they_stand(pages: Path, verb: str) -> None:
+    with opened(pages / verb / "report.html") as seen:
+        text = seen.page.inner_text("main")
+        assert [words for words in SYMBOLS[verb] if words not in text] == []
 
 
 @pytest.mark.parametrize("verb", ["simulate", "gap", "record"])

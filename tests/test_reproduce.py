@@ -185,6 +185,20 @@ def test_the_page_is_clicked_through(made: Path, items: dict[str, dict[str, Any]
         assert page.locator("article").count() == len(items)
 
 
+def test_axe_core_finds_nothing_in_any_part(made: Path) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    with opened(made / "report.html", width=1400) as seen:
+        for key in seen.page.eval_on_selector_all("nav button", "buttons => buttons.map(b => b.dataset.part)"):
+            seen.page.set_viewport_size({"width": 1400, "height": 900})
+            seen.page.click(f"nav button[data-part={key}]")
+            for scheme, width in (("light", 1400), ("dark", 1400), ("dark", 390)):
+                seen.page.emulate_media(color_scheme=scheme)
+                seen.page.set_viewport_size({"width": width, "height": 900})
+                found = axe.run(seen.page).response["violations"]
+                assert [f"{v['id']}: {[n['target'] for n in v['nodes']]}" for v in found] == [], (key, scheme, width)
+                assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
 def test_links_jump_to_what_they_name(made: Path) -> None:
     """The heading stands below the buttons, which stay where they are."""
     with opened(made / "report.html") as seen:

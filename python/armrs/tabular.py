@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from . import views
 from .errors import ArmrsError
@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 
 _SHOWN = 30
 """Rows that a notebook shows; `to_dataframe` has all."""
+SYMBOLS = (
+    "m is the mass of a segment, l the distance of its centre of mass from the joint, I its inertia about the centre of mass and a its "
+    "length; the number is that of the segment, counted from the base. The elastic law of a joint is stiffness times its angle from rest; "
+    "stiffness·rest is the torque of that spring at angle zero."
+)
+"""What the names of inertial parameters and springs mean."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,9 @@ class Tidy:
 
 class Tabular:
     """A result that is also a table. Subclasses say which by `tidy`; those with `to_dict` are also JSON. `views` names what draws them."""
+
+    symbols: ClassVar[str] = ""
+    """What the symbols in the names mean, for readers of the table."""
 
     def tidy(self) -> Tidy:
         """Return the result as a tidy table."""
@@ -122,7 +131,12 @@ class Tabular:
             "<tr>" + "".join(f"<td>{_text(_cell(table.columns[name][k]))}</td>" for name in names) + "</tr>" for k in range(shown)
         )
         more = f"<p>{table.n_rows - shown} more rows: to_dataframe()</p>" if table.n_rows > shown else ""
-        return f"<p>{_text(repr(self))}</p><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{more}"
+        meaning = f"<p>{_text(self.symbols)}</p>" if self.symbols else ""
+        table_html = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        # A table wider than the page is scrolled by itself, also with keys.
+        label = _text(f"table of {type(self).__name__}")
+        scrolled = f'<div role="region" tabindex="0" aria-label="{label}" style="overflow-x: auto">{table_html}</div>'
+        return f"<p>{_text(repr(self))}</p>{scrolled}{meaning}{more}"
 
 
 @dataclass(frozen=True)
@@ -169,6 +183,6 @@ def _unit(unit: str | None) -> str:
 
 
 def _cell(value: object) -> str:
-    if value is None:
+    if value is None or value != value:
         return ""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

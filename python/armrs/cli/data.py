@@ -165,7 +165,9 @@ def report(
         return
     from ..report.pages import write_report
 
-    print(write_report(sources, files.output_folder(out, "-o") / "report.html"))
+    page = files.output_folder(out, "-o") / "report.html"
+    files.refuse_page_of_another(page, "report")
+    print(write_report(sources, page))
 
 
 def _range(low: float, high: float) -> str:

@@ -148,6 +148,7 @@ def import_(
     def human() -> None:
         for note in done.notes:
             print(f"  {note}")
+        print("  (t is time, q1 … are the angles of the joints from the base on, Fy and Fz the force forward and upward)")
         count = len(done.recipe.trials)
         print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}.")
         print(f"Look at {picture}: does the arm stand as it stood, and does the force carry it? Next: armrs check {done.folder}")

@@ -20,6 +20,9 @@ PathLike = str | os.PathLike[str]
 _HOST = re.sub(r"\W", "_", os.uname().nodename if hasattr(os, "uname") else os.environ.get("COMPUTERNAME", ""))[:32] or "host"
 _UNFINISHED = re.compile(r"\..*\.(?P<host>\w+)-(?P<process>\d+)\..*\.part")
 """Names of what a process has not finished writing: it says which process of which machine."""
+_GENERATOR = re.compile(rb'<meta name="generator" content="armrs ([a-z-]+)">')
+_HEAD = 2000
+"""Bytes of a page in which it says what made it."""
 _COMPLETE = ".complete"
 """Suffix of a folder whose files are all written and on their way to their places."""
 _SCRATCH = re.compile(r"armrs-.*?(?P<host>\w+)-(?P<process>\d+)-.*")
@@ -135,6 +138,8 @@ def _write_whole(target: Path, folder: PathLike, write: Callable[[Path], list[Pa
         for name in written:
             _refuse_links(target, name)
             may_replace(target / name, name.suffix)
+            if name.suffix == ".html":
+                refuse_page_of_another(target / name, _maker(temporary / name))
         _flush(temporary)
         if target.exists():
             # From here on the new files are the result: a process that ends now is completed by the next one.
@@ -217,6 +222,20 @@ def _at_work(name: str, pattern: re.Pattern[str]) -> bool:
     except OSError:
         return True
     return True
+
+
+def refuse_page_of_another(path: Path, maker: str | None) -> None:
+    """Refuse to replace a page that another verb made: its figures and numbers would stay behind without it."""
+    there = _maker(path) if path.is_file() else None
+    if there is not None and there != maker:
+        raise BadInput("file", Text(f"the report of armrs {there}"), "a folder of its own: another -o DIR", file=path)
+
+
+def _maker(path: Path) -> str | None:
+    """Return the verb that a page says it was made by."""
+    with path.open("rb") as page:
+        match = _GENERATOR.search(page.read(_HEAD))
+    return match[1].decode("ascii") if match else None
 
 
 def _refuse_links(target: Path, name: Path) -> None:

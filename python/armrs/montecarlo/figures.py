@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_PANELS = 12
+_FEW = 50
+"""Cases up to which a dot is drawn large."""
 
 
 def sweep(summary: Summary, data: Mapping[str, Any]) -> Figures:
@@ -34,10 +36,10 @@ def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:
     shown = sorted(there, key=lambda q: q.decided_by["data"] / q.value.n, reverse=True)[:MOST_PANELS]
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
-    figure = plotting.figure(3.4 * columns, 2.9 * rows)
+    figure = plotting.figure(3.6 * columns, 3.1 * rows)
     for ax, quantity in zip(figure.subplots(rows, columns, squeeze=False).ravel(), shown, strict=False):
         _panel(quantity, ax)
-        ax.set_title(quantity_name({"name": quantity.name, "kind": quantity.kind, "joint": quantity.joint}, joints), fontsize="small")
+        ax.set_title(quantity_name({"name": quantity.name, "kind": quantity.kind, "joint": quantity.joint}, joints), fontsize="medium")
     for ax in figure.axes[len(shown) :]:
         ax.remove()
     _legend(figure, truth=any(ax.lines for ax in figure.axes), cases=any(len(ax.lines) > 1 for ax in figure.axes))
@@ -63,7 +65,14 @@ def _panel(quantity: Quantity, ax: Any) -> None:
     ax.locator_params(axis="x", nbins=5)
     known = there & np.isfinite(truth)
     if known.any() and np.ptp(truth[known]) > 0.0:
-        ax.plot(truth[known], value[known], ".", color=plotting.BLUE, markersize=4, alpha=max(0.15, min(1.0, 60.0 / known.sum())))
+        ax.plot(
+            truth[known],
+            value[known],
+            ".",
+            color=plotting.BLUE,
+            markersize=4 if known.sum() > _FEW else 8,
+            alpha=max(0.15, min(1.0, 60.0 / known.sum())),
+        )
         ends = [truth[known].min(), truth[known].max()]
         ax.plot(ends, ends, color=plotting.ORANGE)
         ax.set(xlabel=f"truth{held_in}", ylabel=f"found{held_in}")
@@ -71,6 +80,7 @@ def _panel(quantity: Quantity, ax: Any) -> None:
     ax.hist(value[there], bins=max(5, min(40, round(math.sqrt(there.sum())))), color=plotting.BLUE)
     if known.any():
         ax.axvline(float(truth[known][0]), color=plotting.ORANGE)
+    ax.yaxis.get_major_locator().set_params(integer=True)
     ax.set(xlabel=f"found{held_in}", ylabel="cases")
 
 

@@ -11,8 +11,13 @@ from ..report.tables import Table
 
 MEANING = (
     "Error is what was found less the truth; claimed is the mean of the standard deviations that the identifications state. Coverage is "
-    "the share of intervals that hold the truth, with what chance makes of it (one standard deviation)."
+    "the share of intervals that hold the truth, with what chance makes of it (one standard deviation). By data is the share of cases in "
+    "which the measurement determined the value."
 )
+
+
+_ROUNDING = 1e-12
+"""Part of a value below which its error is that of the arithmetic."""
 
 
 def verdict(data: Mapping[str, Any]) -> str:
@@ -43,8 +48,8 @@ def recovered(data: Mapping[str, Any]) -> Table:
                 tables.number(value["mean"], spread),
                 tables.spread(spread),
                 "{} … {}".format(*(tables.number(v, spread) for v in value["interval"])) if data["source"] == "dataset" else None,
-                _short(error["mean"]),
-                _short(error["std"]),
+                _error(error["mean"], value["mean"]),
+                _error(error["std"], value["mean"]),
                 _short(q["claimed_std"]),
                 _share(q["coverage"], q["cases"]),
                 None if q["bootstrap"] is None else _short(q["bootstrap"]["std"]),
@@ -81,8 +86,8 @@ def varied(data: Mapping[str, Any]) -> Table:
             "values": lambda n=numbers: f"one of {len(n)}",
         }[kind]()
         limits = "" if item["within"] is None else ", within {:g} to {:g}".format(*item["within"])
-        rows.append([item["key"], {"replace": "=", "scale": "×", "add": "+"}[item["apply"]], drawn + limits])
-    return Table(["what", "", "drawn"], rows, left=3)
+        rows.append([item["key"], {"replace": "as value", "scale": "as factor", "add": "as addend"}[item["apply"]], drawn + limits])
+    return Table(["what", "applied", "drawn"], rows, left=3)
 
 
 def count_lines(data: Mapping[str, Any]) -> list[str]:
@@ -106,6 +111,7 @@ def swept(data: Mapping[str, Any], run: Mapping[str, Any], written: Sequence[Pat
         words.show("What was drawn", varied(data))
     if data["quantities"]:
         words.show("What was found", recovered(data))
+        print(f"{words.SYMBOLS}\n\n{MEANING}\n")
     for line in count_lines(data):
         print(line)
     print(run_line(run))
@@ -129,6 +135,11 @@ def _share(share: float | None, n: int) -> str | None:
     if share is None:
         return None
     return f"{100 * share:.1f} ± {100 * max(share * (1 - share), 1 / (4 * n)) ** 0.5 / n**0.5:.1f} %"
+
+
+def _error(error: float | None, value: float | None) -> str | None:
+    """Return an error; what is rounding beside the value is none."""
+    return "0" if error is not None and value and abs(error) < _ROUNDING * abs(value) else _short(error)
 
 
 def _short(value: float | None) -> str | None:

@@ -205,7 +205,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
     except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
         raise BadInput("content", Text(f"not what a result holds ({error})"), "whole results", file=sources[0]) from None
     engine = html.environment()
-    html.write_page(engine, target, [html.render(engine, "summary.html.j2", page)], title="armrs summary")
+    html.write_page(engine, target, [html.render(engine, "summary.html.j2", page)], title="armrs summary", maker="report")
     return target
 
 

@@ -42,7 +42,15 @@ def cohort_data(result: Cohort, command: str | None = None) -> dict[str, Any]:
 def spasticity_figures(result: Spasticity) -> Figures:
     """Return the figures of reflexes, one a joint."""
     names = [joint.name for joint in result.dataset.model.joints]
-    return {f"stretches-{j.joint}": partial(_stretches, result, j, names[j.joint - 1]) for j in result.joints}
+    arm = partial(figures.arm, result.dataset.model, result.dataset.trials, [_reflex(j, names[j.joint - 1]) for j in result.joints])
+    return {"arm": arm} | {f"stretches-{j.joint}": partial(_stretches, result, j, names[j.joint - 1]) for j in result.joints}
+
+
+def _reflex(found: JointReflex, name: str) -> tuple[int, str]:
+    """Return the number of a joint, and what was found of its reflex."""
+    if not found.reflex.found:
+        return found.joint, f"{name}: no stretch reflex was found"
+    return found.joint, f"{name}: stretch reflex from {np.degrees(found.reflex.parameters['threshold'].value):.3g} °/s on"
 
 
 def _stretches(result: Spasticity, found: JointReflex, name: str) -> Drawn:

@@ -70,7 +70,7 @@ def identified(result: Identified, data: Mapping[str, Any]) -> Figures:
     joints = data["data"]["joints"]
     names = list(dict.fromkeys(e.trial.configuration for e in result.explained))[:MOST_CONFIGURATIONS]
     first: Figures = {
-        "arm": partial(_arm, result.model, [e.trial for e in result.explained], _measured_in_joints(data, joints)),
+        "arm": partial(arm, result.model, [e.trial for e in result.explained], _measured_in_joints(data, joints)),
         "parameters": partial(parameters, [*data["parameters"], *data["combinations"]], joints, data["level"]),
     }
     return {**first, **{f"torques-{slug(name)}": partial(_torques, result, name, joints) for name in names}}
@@ -85,12 +85,14 @@ def _measured_in_joints(data: Mapping[str, Any], joints: Sequence[str]) -> list[
     ]  # fmt: skip
 
 
-def _arm(model: Model, trials: Sequence[Trial], measured: Sequence[tuple[int, str]]) -> Drawn:
-    """Draw the arm with what was measured where it acts."""
+def arm(model: Model, trials: Sequence[Trial], measured: Sequence[tuple[int, str]]) -> Drawn:
+    """Draw the arm with what was measured where it acts: numbers of joints, and words."""
     figure = plotting.figure(7.0, 3.2 + 0.2 * min(len(measured), 11))
     marked = {("joint", joint - 1) for joint, _ in measured}
     sketch(model, trials, marked, [(f"{joint}  {said}", plotting.INK) for joint, said in measured], figure.subplots())
     seen = "; ".join(said for _, said in measured[:MOST_CONFIGURATIONS]) or "no law of a joint rests on the measurement"
+    more = len(measured) - MOST_CONFIGURATIONS
+    seen += f"; and {more} more, in the tables" if more > 0 else ""
     text = f"The arm in the middle of its movements, g is the direction of gravity. Marked joints are those with a measured law: {seen}."
     return Drawn("arm", "The arm", text, figure, "first")
 
@@ -339,7 +341,7 @@ def passive(result: PassiveMoments) -> Figures:
     for c in result.curves:
         widths.setdefault(c.joint, []).append(float(np.nanmean(c.half_width)))
     said = [(j, f"{names[j - 1]}: half width of the hysteresis {_from_to(own)} N m") for j, own in sorted(widths.items())]
-    first: Figures = {"arm": partial(_arm, result.dataset.model, [m.trial for m in result.trials], said)} if said else {}
+    first: Figures = {"arm": partial(arm, result.dataset.model, [m.trial for m in result.trials], said)} if said else {}
     first = {**first, **{f"passive-{slug(name)}": partial(_hysteresis, result, name, names) for name in configurations}}
     return {**first, **{f"dependence-{d.joint}": partial(_dependence, result, d, names) for d in result.dependence}}
 

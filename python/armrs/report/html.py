@@ -113,15 +113,22 @@ def data_uri(png: bytes) -> str:
 
 
 def write_page(
-    engine: Environment, path: Path, parts: Iterable[Markup], *, title: str, styles: Sequence[str] = (), scripts: Sequence[str] = ()
+    engine: Environment,
+    path: Path,
+    parts: Iterable[Markup],
+    *,
+    title: str,
+    maker: str,
+    styles: Sequence[str] = (),
+    scripts: Sequence[str] = (),
 ) -> None:
-    """Write a page of finished parts, with styles and scripts from files beside the templates.
+    """Write a page of finished parts, with styles and scripts from files beside the templates; it says which verb was its `maker`.
 
     Its Content-Security-Policy allows these styles and scripts, by their SHA-256, and images that are in the page; nothing else.
     """
     style = Markup("").join(source(engine, name) for name in ("page.css", *styles))
     script = Markup("").join(source(engine, name) for name in scripts)
-    values = {"title": title, "parts": list(parts), "style": style, "script": script, "policy": _policy(style, script)}
+    values = {"title": title, "parts": list(parts), "style": style, "script": script, "maker": maker, "policy": _policy(style, script)}
     files.write_text(path, render(engine, "page.html.j2", values), kind=".html")
 
 

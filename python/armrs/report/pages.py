@@ -85,7 +85,7 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     return data
 
 
-def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathLike[str]) -> Path:
+def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathLike[str], *, maker: str = "report") -> Path:
     """Write one page about one or more results.
 
     Parameters
@@ -94,6 +94,8 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
         JSON files of results. Figures are taken from where these say, relative to themselves.
     path : path
         The HTML file.
+    maker : str
+        The verb that the page says it was made by: no other verb replaces it.
 
     Raises
     ------
@@ -105,7 +107,7 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
         raise BadInput("sources", sources, "a sequence of paths")
     engine = html.environment()
     parts = [_part(engine, checks.path(f"sources[{k}]", source), k + 1) for k, source in enumerate(sources)]
-    _write(engine, target, parts)
+    _write(engine, target, parts, maker)
     return target
 
 
@@ -114,15 +116,15 @@ def write_page_of(data: Mapping[str, Any], figures: Mapping[str, list[html.Pictu
     engine = html.environment()
     # What a file would hold: NaN is absent there, and arrays are lists.
     plain = json.loads(files.json_text(data))
-    _write(engine, path, [_result(engine, plain, defaultdict(list, figures), moving, 1)])
+    _write(engine, path, [_result(engine, plain, defaultdict(list, figures), moving, 1)], str(plain["verb"]))
     return path
 
 
-def _write(engine: html.Environment, path: Path, parts: Sequence[Markup]) -> None:
+def _write(engine: html.Environment, path: Path, parts: Sequence[Markup], maker: str) -> None:
     """Write a page with the scripts that something in it needs."""
     whole = "".join(parts)
     scripts = [f"{name}.js" for name in ("film", "series") if f'class="{name}"' in whole]
-    html.write_page(engine, path, parts, title="armrs report", scripts=scripts)
+    html.write_page(engine, path, parts, title="armrs report", maker=maker, scripts=scripts)
 
 
 def _part(engine: html.Environment, source: Path, number: int) -> Markup:

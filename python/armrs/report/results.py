@@ -75,7 +75,7 @@ def write_result(folder: Path, stem: str, data: dict[str, Any], drawn: list[figu
         pictures.append(folder / live.FILE)
     document, page = folder / f"{stem}.json", folder / "report.html"
     files.write_json(document, data)
-    pages.write_report([document], page)
+    pages.write_report([document], page, maker=data["verb"])
     return [*pictures, document, page]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..tabular import SYMBOLS as SYMBOLS
 from . import console, tables
 
 if TYPE_CHECKING:
@@ -27,12 +28,6 @@ DEPENDENCE_MEANING = (
     "The elastic moment of a joint as a double exponential of its angle (upper and lower: its size at both ends of what was measured), "
     "a slope, and a coupling: how much it changes with the adjacent angle. The coupling is tested against a model without it, over trials."
 )
-
-SYMBOLS = (
-    "m is the mass of a segment, l the distance of its centre of mass from the joint, I its inertia about the centre of mass and a its "
-    "length; the number is that of the segment, counted from the base."
-)
-"""What the names of inertial parameters mean."""
 
 WRONG_MASS = (
     "A mass or centre of mass that is wrong in the model looks like a coupling too: its weight depends on the sum of both angles, and so "

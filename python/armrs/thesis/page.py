@@ -19,7 +19,9 @@ def write(path: Path, data: Mapping[str, Any], folder: Path) -> None:
     engine = html.environment(TEMPLATES)
     values = {"data": data, "signed": _signed, "drawn": drawn, "picture": lambda entry: html.picture(entry, folder)}
     part = html.render(engine, "thesis.html.j2", values)
-    html.write_page(engine, path, [part], title="The thesis, computed again", styles=["thesis.css"], scripts=["film.js", "thesis.js"])
+    html.write_page(
+        engine, path, [part], title="The thesis, computed again", maker="reproduce", styles=["thesis.css"], scripts=["film.js", "thesis.js"]
+    )
 
 
 def _signed(sheet: Mapping[str, Any]) -> tables.Table:

@@ -179,14 +179,24 @@ def _abilities(dataset: Dataset, blocked: bool) -> tuple[Ability, ...]:
     repeats = len(dataset.fit_trials) > len({t.configuration for t in dataset.fit_trials})
     lacking = [] if repeats else ["repeats to read the noise off"]
     lacking += [] if dataset.test_trials else ['trials with role = "test" to measure the gap on']
-    how = (
-        "in the closed chain with the robot" if _is_led(dataset) else "by joint torques, since robot angles, forces or [robot] are missing"
-    )
+    how = _how_gap(dataset)
     return (
         Ability("identify", bool(efforts), f"{len(efforts)} fit trials with forces or torques" if efforts else "no forces and no torques"),
         Ability("passive", bool(slow), f"slow movements: {', '.join(slow)}" if slow else f"no movement slower than {_SLOW:g} rad/s"),
         Ability("gap", bool(efforts), f"{how}{'; without ' + ' and '.join(lacking) if lacking else ''}"),
     )
+
+
+def _how_gap(dataset: Dataset) -> str:
+    """Return how `gap` compares, and why where it cannot simulate the robot."""
+    if _is_led(dataset):
+        return "in the closed chain with the robot"
+    absent = {
+        "[robot] in the model": dataset.model.robot is None,
+        "the robot's angles (qr1, qr2)": any(t.robot_q is None for t in dataset.trials),
+        "contact forces": any(t.force_on_arm is None for t in dataset.trials),
+    }
+    return f"by joint torques, without {', '.join(name for name, lacks in absent.items() if lacks)}"
 
 
 def _speed(trial: Trial) -> float:

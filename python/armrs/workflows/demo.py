@@ -291,7 +291,7 @@ def _write(out: Path, made: Demonstration, command: str | None) -> list[Path]:
     moments = results.write_passive(passive, plain.passive_data(passive, command), out / "passive")
     own = results.write_result(out, "demo", data, drawn)
     documents = [path for path in (*own, *gap, *identified, *moments) if path.suffix == ".json" and path.parent.name != "figures"]
-    page = pages.write_report(documents, out / "report.html")
+    page = pages.write_report(documents, out / "report.html", maker="demo")
     return [*(path for path in (*gap, *identified, *moments, *own) if path != page), page]
 
 

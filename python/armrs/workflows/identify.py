@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_added
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial
 from ..model import Effect, Model, Segment, Tolerance
-from ..tabular import Tabular, Tidy
+from ..tabular import SYMBOLS, Tabular, Tidy
 from .setup import refuse_wrong_setup
 
 if TYPE_CHECKING:
@@ -141,6 +141,8 @@ class Identified(Tabular):
     explained: tuple[Explained, ...]
     model: Model
     dataset: Dataset
+
+    symbols: ClassVar[str] = SYMBOLS
 
     def __repr__(self) -> str:
         known = f"{self.rank} of {self.unknowns} unknowns determined"

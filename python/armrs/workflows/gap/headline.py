@@ -18,6 +18,15 @@ _FAMILIES = {
     "muscle": "muscle",
 }
 """Families as they are called where their members tie."""
+MEANINGS = {
+    "q": "the angle of joint {}",
+    "qr": "the angle of joint {} of the robot",
+    "tau": "the torque of joint {}",
+    "Fy": "the contact force forward",
+    "Fz": "the contact force upward",
+    "Mx": "the contact moment",
+}
+"""What a channel measures, by its name without the number."""
 _SIZED = 2
 """Effects whose sizes stand in the sentence; of more it only gives the names."""
 
@@ -141,6 +150,7 @@ def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
     name = shown[0] if shown else max(gap, key=lambda n: _times(gap[n], "calibrated"))
     channel = gap[name]
     quantity, held_in = name.rsplit("_", 1)
+    quantity = spoken(quantity)
     held_in = {"Nm": "N m"}.get(held_in, held_in)
     floor = f", where repeats differ by {channel['floor']:.2g} {held_in}" if channel["floor"] else ""
     floor += place(result, name) if shown else ""
@@ -149,6 +159,16 @@ def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
         return f"on held-out trials {quantity} is {'still ' if shown and result['effects'] else ''}off by {value:.2g} {held_in}{floor}"
     them = "it" if len(result["effects"]) == 1 else "them"
     return f"with {them}, the gap of {quantity} on held-out trials falls from {channel['calibrated']:.2g} to {value:.2g} {held_in}{floor}"
+
+
+def spoken(name: str) -> str:
+    """Return the name of a channel with what it measures.
+
+    >>> spoken("tau2"), spoken("Fy")
+    ('the torque of joint 2 (tau2)', 'the contact force forward (Fy)')
+    """
+    stem = name.rstrip("0123456789")
+    return f"{MEANINGS[stem].format(name[len(stem) :])} ({name})" if stem in MEANINGS else name
 
 
 def place(result: Mapping[str, Any], name: str) -> str:

@@ -44,6 +44,32 @@ def is_led(result: Mapping[str, Any]) -> bool:
     return any(name.endswith("_N") for name in result["gap"])
 
 
+FORMULAS = "In formulas R is the torque with which a joint resists, q is its angle and q̇ its speed."
+
+
+def symbols(result: Mapping[str, Any]) -> str:
+    """Return a sentence that says what the names of the channels mean."""
+    names: dict[str, list[int]] = {}
+    for channel in result["gap"]:
+        name = channel.rsplit("_", 1)[0]
+        stem = name.rstrip("0123456789")
+        names.setdefault(stem, []).extend([int(name[len(stem) :])] if name != stem else [])
+    joints = result["data"]["joints"]
+    parts = []
+    for stem, numbers in names.items():
+        if stem in headline.MEANINGS:
+            called = [stem if not numbers else f"{stem}{k}" for k in numbers or [0]]
+            place = joined([f"{k} ({joints[k - 1]})" if stem != "qr" and k <= len(joints) else str(k) for k in numbers])
+            parts.append(f"{joined(called)}: {headline.MEANINGS[stem].format(place)}")
+    sentence = "; ".join(parts)
+    if sentence and not is_led(result) and "q" in names:
+        sentence += (
+            ". Angles are those of the simulated arm under the measured torques (a free swing where there are none), in which errors of "
+            "torque add up"
+        )
+    return f"{sentence}." if sentence else ""
+
+
 _UNTESTED = "Without repeats of a movement, whether what is left is noise cannot be tested."
 
 
@@ -107,8 +133,8 @@ def left(result: Mapping[str, Any]) -> list[str]:
         channel = result["gap"][name]
         quantity, held_in = name.rsplit("_", 1)
         lines.append(
-            f"{quantity} is open on the test trials: off by {headline.left(channel):.2g} {unit(held_in)}, where repeats differ by "
-            f"{channel['floor']:.2g}{headline.place(result, name)}."
+            f"{headline.spoken(quantity)} is open on the test trials: off by {headline.left(channel):.2g} {unit(held_in)}, where repeats "
+            f"differ by {channel['floor']:.2g}{headline.place(result, name)}."
         )
     if result["unexplained"]["share"]:
         lines.append(f"{result['unexplained']['share']:.1%} of what was beyond noise is still there.")
@@ -130,6 +156,8 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     for line in (*others(result), *apart(result)):
         print(line)
     common.show("Gap on the test trials, root mean square of simulated less measured", gap(result))
+    if result["gap"]:
+        print(f"{symbols(result)}\n")
     common.show("Where the calibrated model and the data disagree most", where(result))
     print("\n".join(left(result)) + "\n")
     if result["verdict"] == "nothing_missing":
@@ -152,6 +180,8 @@ def quick(result: Mapping[str, Any]) -> None:
     noise = "" if z is None or z != z else f"; the calibrated model leaves {'more than' if z >= MISFIT else 'what is'} noise ({z:+.1f})"
     print(f"{common.name(result)}{label}, a first look: {said}{noise}.\n")
     common.show("Gap on the test trials, root mean square of simulated less measured", gap({**result, "effects": []}))
+    if result["gap"]:
+        print(f"{symbols(result)}\n")
     common.show("What each would explain alone, to first order", suspects(result))
     print("Nothing is named yet: `armrs gap` without --quick converges by simulation, looks at several together, and confirms.")
 
@@ -230,11 +260,19 @@ def gap(data: Mapping[str, Any]) -> Table:
 
 def where(data: Mapping[str, Any], most: int = 6) -> Table:
     """Return where the calibrated model and the data disagree most."""
+    joints = data["data"]["joints"]
     rows = [
-        [w["trial"], w["condition"], f"{w['t_start']:.3g} to {w['t_end']:.3g}", f"{w['mean']:+.3g}", f"{w['z']:+.1f}"]
+        [w["trial"], _condition(w, joints), f"{w['t_start']:.3g} to {w['t_end']:.3g}", f"{w['mean']:+.3g}", f"{w['z']:+.1f}"]
         for w in data["where"][:most]
     ]
     return Table(["trial", "where", "time [s]", "missing torque [N m]", "standard deviations"], rows, 2)
+
+
+def _condition(place: Mapping[str, Any], joints: Sequence[str]) -> str:
+    """Return in words where the joint of a place moved."""
+    moving = {">": "angle grows", "<": "angle falls", "=": "at rest"}[place["condition"].split()[1]]
+    name = joints[place["joint"] - 1] if place["joint"] <= len(joints) else f"joint {place['joint']}"
+    return f"{name}, {moving}"
 
 
 def nearest(data: Mapping[str, Any], most: int = 8) -> Table:

@@ -401,13 +401,14 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
 def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read]) -> Path:
     """Write the data set whole or not at all, with `import.toml` in it."""
     folder = files.output_folder(out)
+    former = _former(folder)
     kept = replace(recipe, trials=tuple(_seen_from(folder, read.trial) for read in reads))
 
     def write(part: Path) -> list[Path]:
         written = []
         entries = []
         for read in reads:
-            name = f"trials/{read.trial.configuration}_{read.trial.repeat}.csv"
+            name = _name_of(read.trial)
             table = _si_columns(read, recipe, model.n_joints)
             (part / name).parent.mkdir(exist_ok=True)
             write_samples(part / name, list(table), list(table.values()))
@@ -420,8 +421,24 @@ def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read]) -> P
         files.write_text(part / FILE, kept.to_toml(), kind=".toml")
         return [*written, part / "model.toml", part / "dataset.toml", part / FILE]
 
-    files.write_whole(folder, write)
+    written = files.write_whole(folder, write)
+    for name in former - {path.relative_to(folder).as_posix() for path in written}:
+        (folder / name).unlink(missing_ok=True)
     return folder
+
+
+def _former(folder: Path) -> set[str]:
+    """Return the trials that a former import left in a folder; a data set of another origin is refused."""
+    if not (folder / "dataset.toml").exists():
+        return set()
+    if not (folder / FILE).is_file():
+        raise BadInput("-o", Text("a data set that armrs import did not write"), "a folder of its own", file=folder)
+    return {_name_of(trial) for trial in load_recipe(folder / FILE).trials}
+
+
+def _name_of(trial: RawTrial) -> str:
+    """Return the file of a trial below the data set."""
+    return f"trials/{trial.configuration}_{trial.repeat}.csv"
 
 
 def _seen_from(folder: Path, trial: RawTrial) -> RawTrial:
