@@ -22,9 +22,9 @@ import numpy as np
 import armrs
 from armrs import Dataset, Effect, Joint, Model, Movement, Sensors, Simulated, Subject, Tolerance, Trial
 from armrs.analysis.joint_coupling import Course, fit, together
+from armrs.anthropometry import literature_arm
 from armrs.model import AddedMass, Contact, Robot
 from armrs.workflows import passive
-from armrs.workflows.experiment import literature_arm
 
 SHOULDER_HELD = (-68.0, -40.0, -16.0, 10.0, 36.0)
 ELBOW_HELD = (27.0, 40.0, 50.0, 60.0, 70.0)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from ._armrs import __version__ as __version__
     from .analysis.fitting import SimulationFit as SimulationFit
     from .analysis.fitting import fit_by_simulation as fit_by_simulation
+    from .anthropometry import Expected as Expected
+    from .anthropometry import segment_expectations as segment_expectations
     from .catalogue import Parameter as Parameter
     from .custom_effects import OwnEffect as OwnEffect
     from .custom_effects import own_effect as own_effect
@@ -71,10 +73,8 @@ if TYPE_CHECKING:
     from .workflows.identify import identify as identify
     from .workflows.importing import Imported as Imported
     from .workflows.importing import import_recordings as import_recordings
-    from .workflows.initialise import Expected as Expected
     from .workflows.initialise import Worn as Worn
     from .workflows.initialise import initialise as initialise
-    from .workflows.initialise import segment_expectations as segment_expectations
     from .workflows.movement import Movement as Movement
     from .workflows.movement import load_movement as load_movement
     from .workflows.passive import PassiveCurve as PassiveCurve
@@ -97,13 +97,14 @@ if TYPE_CHECKING:
 # No module or package directly below `armrs` is named like a public function: importing it would put it in the place of the function.
 _HOMES = {
     "_armrs": ("Arm", "__version__", "build_profile"),
+    "anthropometry": ("Expected", "segment_expectations"),
     "catalogue": ("Parameter",),
     "io.conversion": ("convert",),
     "io.dataset": ("Dataset", "load_dataset", "write_dataset"),
     "io.multibody": ("ExportedModel", "export_model", "import_model"),
     "workflows.checking": ("Checked", "check_dataset"),
     "workflows.importing": ("Imported", "import_recordings"),
-    "workflows.initialise": ("Expected", "Worn", "initialise", "segment_expectations"),
+    "workflows.initialise": ("Worn", "initialise"),
     "workflows.cohort": ("Cohort", "cohort"),
     "workflows.spasticity": ("Spasticity", "spasticity"),
     "workflows.demo": ("Demonstration", "run_demo"),

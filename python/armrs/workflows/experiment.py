@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import _armrs, checks
+from .. import checks
+from ..anthropometry import literature_arm, segments_of
 from ..errors import BadInput, Text
 from ..io import tomlfile
-from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Segment, Subject, Tolerance, load_model
+from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Subject, Tolerance, load_model
 from .movement import Movement, movement_of
 
 THESIS_ROBOT = Robot(lengths=(0.45, 0.45), base=(1.05, -0.10))
@@ -205,33 +206,6 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     return tomlfile.load(path, experiment_of)
 
 
-def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple[Segment, ...], Sequence[Mapping[str, Any]]]:
-    """Return the segments of a person by de Leva's tables, and the tables' values with their deviations.
-
-    With two lengths the hand belongs to the forearm, which then reaches from elbow to handle.
-    """
-    missing = [name for name in ("body_mass", "height", "sex") if getattr(subject, name) is None]
-    if missing:
-        raise BadInput(f"[subject], {missing[0]}", Text("nothing"), "a value: the literature needs it")
-    assert subject.body_mass is not None and subject.height is not None and subject.sex is not None
-    parts = _armrs.literature(subject.body_mass, subject.height, subject.sex, lengths if len(lengths) == 3 else [lengths[0], None, None])
-    return tuple(_segments(parts, lengths)), parts
-
-
-def _segments(parts: Sequence[Mapping[str, Any]], lengths: list[float | None]) -> list[Segment]:
-    single = [Segment(p["name"], p["length"], p["mass"][0], p["com"][0], p["inertia"][0]) for p in parts]
-    if len(lengths) == 3:
-        return single
-    upper, fore, hand = single
-    mass = fore.mass + hand.mass
-    at = fore.length + hand.com
-    com = (fore.mass * fore.com + hand.mass * at) / mass
-    inertia = fore.inertia + fore.mass * (fore.com - com) ** 2 + hand.inertia + hand.mass * (at - com) ** 2
-    # The handle lies in the hand, about where its centre of mass is.
-    length = lengths[1] if lengths[1] is not None else at
-    return [upper, Segment("forearm and hand", length, mass, min(com, length), inertia)]
-
-
 def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Model], Model] = lambda truth: truth) -> Experiment:
     """Return the experiment that a document describes.
 
@@ -359,7 +333,7 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
     contact = Contact.from_dict(document["contact"], "[contact]") if "contact" in document else THESIS_CONTACT
     plain = tuple(Joint(name) for name in JOINTS[:count])
     return (
-        Model(tuple(_segments(true_parts, lengths)), joints or plain, segment_uncertainty=0.0, robot=robot, contact=contact),
+        Model(tuple(segments_of(true_parts, lengths)), joints or plain, segment_uncertainty=0.0, robot=robot, contact=contact),
         Model(believed, plain, segment_uncertainty=LITERATURE_UNCERTAINTY, robot=robot, contact=contact),
     )
 
@@ -434,4 +408,4 @@ def _devices(table: object) -> Devices:
     return made
 
 
-__all__ = ["Controller", "Devices", "Effect", "Experiment", "Fault", "Run", "Safety", "experiment_of", "literature_arm", "load_experiment"]
+__all__ = ["Controller", "Devices", "Effect", "Experiment", "Fault", "Run", "Safety", "experiment_of", "load_experiment"]

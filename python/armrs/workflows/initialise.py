@@ -8,41 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import _armrs, checks
+from .. import checks
+from ..anthropometry import SEGMENTS, Expected, literature_arm, segment_expectations
 from ..errors import BadInput, Text
 from ..io import files
 from ..model import Joint, Model, Segment, Subject
-from .experiment import literature_arm
 
-SEGMENTS = ("upper arm", "forearm", "hand")
 JOINTS = ("shoulder", "elbow", "wrist")
 UNCERTAINTY = 0.10
 """Relative standard deviation of masses, centres of mass and inertias from body mass and height: between people of one build, after de Leva
 (1996) and Zatsiorsky and Seluyanov (1983)."""
-
-
-@dataclass(frozen=True)
-class Expected:
-    """What the literature expects of one segment.
-
-    Attributes
-    ----------
-    name : str
-    length : float
-        Measured, or scaled with height [m].
-    mass, com, inertia : (float, float)
-        Mean and standard deviation among people: [kg], from the proximal joint [m], about the centre of mass [kg m²].
-    """
-
-    name: str
-    length: float
-    mass: tuple[float, float]
-    com: tuple[float, float]
-    inertia: tuple[float, float]
-
-    def segment(self) -> Segment:
-        """Return the segment with the expected values."""
-        return Segment(self.name, self.length, self.mass[0], self.com[0], self.inertia[0])
 
 
 @dataclass(frozen=True)
@@ -90,48 +65,6 @@ class Initialised:
         """Return the result as plain data."""
         segments = [{n: getattr(s, n) for n in ("name", "length", "mass", "com", "inertia")} for s in self.model.segments]
         return {"verb": "init", "folder": os.fspath(self.folder), "segments": segments, "assumed": list(self.assumed)}
-
-
-def segment_expectations(
-    body_mass: float, height: float, sex: str, lengths: Sequence[float | None] = (None, None, None)
-) -> tuple[Expected, ...]:
-    """Return what the literature expects of upper arm, forearm and hand.
-
-    Parameters
-    ----------
-    body_mass : float
-        [kg]
-    height : float
-        [m]
-    sex : {"male", "female"}
-    lengths : sequence of (float or None)
-        Measured lengths of one to three segments, proximal first [m]; None is scaled with height.
-
-    Returns
-    -------
-    tuple of Expected
-        One for each of `lengths`.
-
-    Notes
-    -----
-    Means: de Leva (1996), J. Biomech. 29, table 4. Standard deviations: regressions of Zatsiorsky and Seluyanov (1983, 1985).
-
-    Examples
-    --------
-    >>> import armrs
-    >>> round(armrs.segment_expectations(78.0, 1.80, "male", [0.322])[0].mass[0], 3)
-    2.114
-    """
-    body_mass = checks.number("body_mass", body_mass, least=1.0, most=500.0, unit="kg")
-    height = checks.number("height", height, least=0.3, most=3.0, unit="m", hint="centimetres?")
-    checks.choice("sex", sex, ("male", "female"))
-    checks.instance("lengths", lengths, list, tuple)
-    if not 1 <= len(lengths) <= len(SEGMENTS):
-        raise BadInput("lengths", Text(f"{len(lengths)} lengths"), f"1 to {len(SEGMENTS)}: {', '.join(SEGMENTS)}")
-    for k, length in enumerate(lengths, start=1):
-        if length is not None:
-            checks.number(f"lengths, {k}", length, above=0.0, most=1.0, unit="m", hint="centimetres or millimetres?")
-    return tuple(Expected(**item) for item in _armrs.literature(body_mass, height, sex, list(lengths)))
 
 
 def initialise(
