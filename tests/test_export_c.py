@@ -98,8 +98,8 @@ def test_every_kind_reaches_the_device_or_is_refused_by_name(kind: str) -> None:
         return
     with_effect, without = export_c(model), export_c(plain)
     sensed = "sensor" in about.where
-    # Both of these act later: a spring that starts relaxed, and a burst that begins after time zero.
-    late = kind in ("relaxation", "voluntary")
+    # These act later: a spring that starts relaxed, a reflex with a latency, and a burst that begins after time zero.
+    late = kind in ("relaxation", "stretch_reflex", "voluntary")
     assert np.array_equal(with_effect.torques, without.torques) == (sensed or late)
     assert (f'"{kind}"' in with_effect.source) != sensed
     if sensed:

@@ -1,6 +1,6 @@
 //! A three-joint arm as a laboratory would have measured it.
 
-use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
+use arm_core::effect::{Effect, Kind, MAX_STATES, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Segment, gravity, inverse_dynamics, jacobian, models,
 };
@@ -54,7 +54,7 @@ fn fast(n: usize, effects: &[Effect<f64>]) -> Trial<3> {
     let arm = models::human_arm();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut noise = || (rng.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
-    let states = vec![0.0; effects.len()];
+    let states = vec![[0.0; MAX_STATES]; effects.len()];
     let (mut angles, mut torques) = (Vec::with_capacity(n), Vec::with_capacity(n));
     for i in 0..n {
         let t = i as f64 / RATE;

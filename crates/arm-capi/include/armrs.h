@@ -45,12 +45,12 @@
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_arm`.
-#define ARMRS_ARM_WORDS 192
+#define ARMRS_ARM_WORDS 216
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_arm`.
-#define ARMRS_ARM_WORDS 132
+#define ARMRS_ARM_WORDS 144
 #endif
 
 #if !defined(ARMRS_SINGLE)
@@ -510,8 +510,8 @@ armrs_status armrs_arm_init(struct armrs_arm *arm,
                             size_t count,
                             struct armrs_problem *problem);
 
-// Carries the states of effects (relaxation, thixotropy) over a period [s]; nothing for arms without any. A motion that is not
-// finite leaves them as they were.
+// Carries the states of effects (relaxation, thixotropy, a late stretch_reflex) over a period [s]; nothing for arms without
+// any. A motion that is not finite leaves them as they were.
 //
 // # Safety
 // The pointers are null or point to what is said.

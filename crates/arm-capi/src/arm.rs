@@ -3,7 +3,9 @@
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
 
-use arm_core::effect::{ActsOn, Effect, KINDS, Kind, Motion, applied, resisting_torque};
+use arm_core::effect::{
+    ActsOn, Effect, KINDS, Kind, MAX_STATES, Motion, States, applied, resisting_torque,
+};
 use arm_core::{
     Chain, Equation, Load, Pose, Segment, forward_dynamics, gravity, inverse_dynamics, jacobian,
     joint_force, static_torque, tip,
@@ -64,10 +66,10 @@ pub struct armrs_arm {
 
 /// Size of an `armrs_arm`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_ARM_WORDS: usize = 192;
+pub const ARMRS_ARM_WORDS: usize = 216;
 /// Size of an `armrs_arm`.
 #[cfg(feature = "single")]
-pub const ARMRS_ARM_WORDS: usize = 132;
+pub const ARMRS_ARM_WORDS: usize = 144;
 
 pub(crate) type Core = Equation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 
@@ -75,7 +77,7 @@ pub(crate) type Core = Equation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_
 #[derive(Clone, Copy)]
 pub struct Kept {
     pub(crate) equation: Core,
-    pub(crate) memory: [armrs_real; ARMRS_EFFECTS],
+    pub(crate) memory: [States<armrs_real>; ARMRS_EFFECTS],
 }
 
 held!(armrs_arm holds Kept, b"arm  0.1");
@@ -174,7 +176,7 @@ pub unsafe extern "C" fn armrs_arm_init(
         }
         arm.keep(&Kept {
             equation: Equation::new(chain, kept)?,
-            memory: [0.0; ARMRS_EFFECTS],
+            memory: [[0.0; MAX_STATES]; ARMRS_EFFECTS],
         });
         Ok(())
     };
@@ -267,8 +269,8 @@ fn off() -> Effect<armrs_real> {
     }
 }
 
-/// Carries the states of effects (relaxation, thixotropy) over a period [s]; nothing for arms without any. A motion that is not
-/// finite leaves them as they were.
+/// Carries the states of effects (relaxation, thixotropy, a late stretch_reflex) over a period [s]; nothing for arms without
+/// any. A motion that is not finite leaves them as they were.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
@@ -289,7 +291,10 @@ pub unsafe extern "C" fn armrs_arm_advance(
         // A bad sample must not stay in the memory for ever.
         let mut memory = kept.memory;
         kept.equation.advance(&motion.core()?, &mut memory, period);
-        kept.memory = finite(memory)?;
+        for states in memory {
+            finite(states)?;
+        }
+        kept.memory = memory;
         Ok(())
     };
     ended(run())

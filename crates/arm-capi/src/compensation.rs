@@ -2,6 +2,7 @@
 
 use core::mem::MaybeUninit;
 
+use arm_core::effect::MAX_STATES;
 use arm_core::{Compensation, GravityCompensation};
 
 use crate::arm::armrs_arm;
@@ -82,7 +83,7 @@ pub unsafe extern "C" fn armrs_compensation_carry(
         // SAFETY: as promised by the caller.
         let (torque, sd) = unsafe { (places(torque)?, places(sd).ok()) };
         let core = compensation.inner()?;
-        let carry = core.carry(&motion.still().core()?, &[0.0; ARMRS_EFFECTS]);
+        let carry = core.carry(&motion.still().core()?, &[[0.0; MAX_STATES]; ARMRS_EFFECTS]);
         write_carry(&carry, torque, sd)
     };
     ended(run())

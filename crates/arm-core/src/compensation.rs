@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::effect::Motion;
+use crate::effect::{Motion, States};
 use crate::equation::{Equation, Needed};
 use crate::scalar::Real;
 use crate::{Invalid, Joints, check, joints};
@@ -76,8 +76,12 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
     ///
     /// Give a motion without speed for the weight and the passive moments alone.
     ///
-    /// * `memory` - the state of each effect; zeros where none has any
-    pub fn carry(&self, motion: &Motion<T, N>, memory: &[T; E]) -> GravityCompensation<T, N> {
+    /// * `memory` - the states of each effect; zeros where none has any
+    pub fn carry(
+        &self,
+        motion: &Motion<T, N>,
+        memory: &[States<T>; E],
+    ) -> GravityCompensation<T, N> {
         let mut rows = Needed::none();
         self.equation.add_carrying(motion, memory, &mut rows);
         let deviation = |row: &[T; P]| {

@@ -2,7 +2,9 @@
 
 use core::array::from_fn;
 
-use crate::effect::{ActsOn, Effect, Motion, Place, advance_states, any_state, resisting_torque};
+use crate::effect::{
+    ActsOn, Effect, Motion, Place, States, advance_states, any_state, resisting_torque,
+};
 use crate::scalar::Real;
 use crate::{
     Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, regressor, static_torque,
@@ -259,11 +261,11 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     /// The torques that a motion needs.
     ///
     /// * `motion` - without joint forces: they are taken from the arm as expected and from `measured`
-    /// * `memory` - the state of each effect
+    /// * `memory` - the states of each effect
     pub fn needed(
         &self,
         motion: &Motion<T, N>,
-        memory: &[T; E],
+        memory: &[States<T>; E],
         measured: &Measured<T, N>,
     ) -> (Needed<T, N, P>, Joints<T, N>) {
         let mut rows = Needed::none();
@@ -276,7 +278,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     pub(crate) fn add_needed(
         &self,
         motion: &Motion<T, N>,
-        memory: &[T; E],
+        memory: &[States<T>; E],
         measured: &Measured<T, N>,
         rows: &mut Needed<T, N, P>,
     ) -> Joints<T, N> {
@@ -299,7 +301,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     }
 
     /// The torques that carry the arm: its weight, and what its effects resist with at this motion. Inertia is left out.
-    pub fn carrying(&self, motion: &Motion<T, N>, memory: &[T; E]) -> Needed<T, N, P> {
+    pub fn carrying(&self, motion: &Motion<T, N>, memory: &[States<T>; E]) -> Needed<T, N, P> {
         let mut rows = Needed::none();
         self.add_carrying(motion, memory, &mut rows);
         rows
@@ -310,7 +312,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     pub(crate) fn add_carrying(
         &self,
         motion: &Motion<T, N>,
-        memory: &[T; E],
+        memory: &[States<T>; E],
         rows: &mut Needed<T, N, P>,
     ) {
         // The regressor of an arm at rest.
@@ -331,7 +333,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
 
     /// The states of the effects one period later, the motion taken as constant in it.
     /// No period and no speed makes a state run away, see [`advance_states`].
-    pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [T; E], period: T) {
+    pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [States<T>; E], period: T) {
         if self.remembers {
             advance_states(&self.effects, (motion, motion), memory, period);
         }
@@ -360,7 +362,12 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     }
 
     #[inline(never)]
-    fn add_effects(&self, motion: &Motion<T, N>, memory: &[T; E], rows: &mut Needed<T, N, P>) {
+    fn add_effects(
+        &self,
+        motion: &Motion<T, N>,
+        memory: &[States<T>; E],
+        rows: &mut Needed<T, N, P>,
+    ) {
         let mut column = 2 * N;
         for ((effect, &count), &state) in self.effects.iter().zip(&self.linear).zip(memory) {
             if !effect.on {

@@ -1,6 +1,7 @@
 //! An arm whose number of joints is known at run time.
 
 use arm_core::Joints;
+use arm_core::effect::MAX_STATES;
 use arm_sim::{Outside, Seen, SimulationError, Snapshot, Stepper};
 
 use crate::quantity::Quantity;
@@ -181,7 +182,7 @@ impl<const N: usize> Plant for Coupled<N> {
     }
 
     fn size(&self) -> usize {
-        2 * N + 4 + self.stepper.memories() + 3
+        2 * N + 4 + MAX_STATES * self.stepper.memories() + 3
     }
 
     fn save(&self) -> SavedPlant {
@@ -197,7 +198,7 @@ impl<const N: usize> Plant for Coupled<N> {
             .iter()
             .chain(qd.iter())
             .chain(&work)
-            .chain(&memory)
+            .chain(memory.as_flattened())
             .chain(&[origin, self.outside.age, self.outside.torque_age])
             .copied()
             .collect();
@@ -215,12 +216,12 @@ impl<const N: usize> Plant for Coupled<N> {
         let (q, rest) = saved.numbers.split_at(N);
         let (qd, rest) = rest.split_at(N);
         let (work, rest) = rest.split_at(4);
-        let (memory, rest) = rest.split_at(memories);
+        let (memory, rest) = rest.split_at(MAX_STATES * memories);
         self.stepper.restore(&Snapshot {
             q: Joints::from_column_slice(q),
             qd: Joints::from_column_slice(qd),
             work: [work[0], work[1], work[2], work[3]],
-            memory: memory.to_vec(),
+            memory: memory.as_chunks().0.to_vec(),
             origin: rest[0],
             ticks: saved.ticks,
         });

@@ -55,10 +55,7 @@ impl Slave {
     /// # Errors
     /// [`Refused`] for an arm that the core refuses, or that is not offered so: see [`ArmSpec::no_exchange`].
     pub fn for_exchange(spec: ArmSpec) -> Result<Self, Refused> {
-        match spec.no_exchange() {
-            Some(why) => Err(Refused::error(why)),
-            None => Self::made(spec, true),
-        }
+        Self::made(spec, true)
     }
 
     fn made(spec: ArmSpec, exchange: bool) -> Result<Self, Refused> {
@@ -518,6 +515,9 @@ impl Slave {
             if variable.start.is_some() {
                 put(&mut spec, variable.quantity, value);
             }
+        }
+        if let Some(why) = spec.no_exchange().filter(|_| self.exchange) {
+            return Err(Refused::error(why));
         }
         self.plant = plant(&spec)?;
         Ok(spec)

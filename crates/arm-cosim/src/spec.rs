@@ -1,7 +1,7 @@
 //! The arm as it travels: with everything that the simulation of it needs and nothing else.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place};
-use arm_core::{Chain, Contact, Joints, Segment, Setup, models};
+use arm_core::{Chain, Contact, Invalid, Joints, Segment, Setup, models};
 use arm_sim::{Port, SimulationError};
 use serde::{Deserialize, Serialize};
 
@@ -158,10 +158,8 @@ impl ArmSpec {
     ///
     /// The states of effects that carry one are not among those that an importer would integrate.
     pub fn no_exchange(&self) -> Option<String> {
-        let carries = |effect: &&EffectSpec| {
-            let mut kinds = KINDS.iter().map(|kind| kind.info());
-            kinds.any(|info| info.kind == effect.kind && info.memory)
-        };
+        let carries =
+            |effect: &&EffectSpec| core_effect(effect).is_ok_and(|effect| effect.remembers());
         let effect = self.effects.iter().find(carries)?;
         Some(format!(
             "the effect {} carries a state of its own: co-simulation alone",
@@ -267,7 +265,7 @@ impl ArmSpec {
     pub(crate) fn core_effects(&self) -> Result<Vec<Effect<f64>>, SimulationError> {
         self.effects
             .iter()
-            .map(|e| Ok(Effect::new(Kind::named(&e.kind)?, e.index).with(&e.values)))
+            .map(|effect| Ok(core_effect(effect)?))
             .collect()
     }
 
@@ -276,6 +274,10 @@ impl ArmSpec {
         let of = |values: &[f64]| Joints::from_fn(|i, _| values[i]);
         (of(&self.start.q), of(&self.start.qd))
     }
+}
+
+fn core_effect(effect: &EffectSpec) -> Result<Effect<f64>, Invalid> {
+    Ok(Effect::new(Kind::named(&effect.kind)?, effect.index).with(&effect.values))
 }
 
 mod port {

@@ -1,6 +1,6 @@
 //! What `armrs export-c` needs of the core: the unknowns of a model, its calibration, and torques as the C interface gives them.
 
-use arm_core::effect::{ActsOn, Effect, Kind, Motion, applied, resisting_torque};
+use arm_core::effect::{ActsOn, Effect, Kind, MAX_STATES, Motion, applied, resisting_torque};
 use arm_core::{
     Calibration, Chain, Equation, Invalid, Pose, inverse_dynamics, joint_force, static_torque,
 };
@@ -137,7 +137,7 @@ fn torque<const N: usize>(equation: &DeviceEquation<N>, sample: &[f64]) -> Vec<f
     let resisting = resisting_torque(
         equation.effects(),
         &motion.with_joint_force(&bearing),
-        &[0.0; EFFECTS],
+        &[[0.0; MAX_STATES]; EFFECTS],
     );
     let moving = inverse_dynamics(chain, &pose, &qd, &qdd);
     let pushed = static_torque(chain, &pose, [y, z], moment);

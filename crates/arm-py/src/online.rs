@@ -4,7 +4,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use arm_core::Compensation;
-use arm_core::effect::Motion;
+use arm_core::effect::{MAX_STATES, Motion};
 use arm_core::estimator::{Decision, Estimator, Sample, SampleStatus, Settings};
 use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Times};
 use arm_core::{GravityCompensation, Measured};
@@ -429,7 +429,9 @@ impl<const N: usize> Carries for Identified<N> {
         N
     }
     fn carry(&self, time: f64, q: &[f64], qd: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
-        carried(time, q, qd, |motion| self.0.carry(motion, &[0.0; EFFECTS]))
+        carried(time, q, qd, |motion| {
+            self.0.carry(motion, &[[0.0; MAX_STATES]; EFFECTS])
+        })
     }
 }
 

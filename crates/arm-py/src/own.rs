@@ -78,7 +78,7 @@ pub fn declare(
         formula: formula.leak(),
         reference: "of one's own",
         parameters: leak(parameters.into_iter().map(parameter).collect()),
-        memory: false,
+        states: 0,
     }));
     let me = info.kind;
     let ask = move |p: &[f64]| {

@@ -1,6 +1,6 @@
 //! `Rig`: an arm with everything that acts on it, as the core computes with it.
 
-use arm_core::effect::{Effect, Motion, Place, advance_states};
+use arm_core::effect::{Effect, MAX_STATES, Motion, Place, States, advance_states};
 use arm_core::{Chain, Contact, Joints, Pose, Robot, Setup, joint_force};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -92,7 +92,7 @@ impl Rig {
 struct Along<'a, const N: usize> {
     chain: &'a Chain<f64, N>,
     effects: &'a [Effect<f64>],
-    memory: Vec<f64>,
+    memory: Vec<States<f64>>,
     interval: f64,
     time: f64,
     /// Where the states stand.
@@ -101,7 +101,7 @@ struct Along<'a, const N: usize> {
 
 impl<'a, const N: usize> Along<'a, N> {
     fn new(chain: &'a Chain<f64, N>, effects: &'a [Effect<f64>], interval: f64) -> Self {
-        let memory = vec![0.0; effects.len()];
+        let memory = vec![[0.0; MAX_STATES]; effects.len()];
         Self {
             chain,
             effects,

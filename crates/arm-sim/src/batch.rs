@@ -393,12 +393,13 @@ fn step_apart<const N: usize>(
     for i in 0..LANES {
         let run = in_lane(prepared, i);
         let mut lane = state.lane(i);
-        for (one, all) in lane_memory.state.iter_mut().zip(&memory.state) {
+        let lanes = memory.state.as_flattened_mut();
+        for (one, all) in lane_memory.state.as_flattened_mut().iter_mut().zip(&*lanes) {
             *one = all.0[i];
         }
         step_in_pieces(run, number, (&mut lane, &mut lane_memory));
         state.set_lane(i, &lane);
-        for (one, all) in lane_memory.state.iter().zip(&mut memory.state) {
+        for (one, all) in lane_memory.state.as_flattened().iter().zip(lanes) {
             all.0[i] = *one;
         }
     }

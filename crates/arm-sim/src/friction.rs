@@ -22,6 +22,7 @@ use crate::model::{Link, Model};
 use crate::state::{Input, State};
 use crate::step::{self, Inputs, Jam, Memory, PROJECTIONS, remember, rk4};
 use crate::{Handle, Integrator};
+use arm_core::effect::States;
 
 /// Switches that are located in one step.
 const MOST_SWITCHES: usize = 12;
@@ -130,7 +131,7 @@ impl<const N: usize> Part<'_, N> {
     ///
     /// Friction that falls with speed makes a joint that begins to slip run away from rest; the step must not be longer than
     /// that takes, or the slip begins a step too late.
-    fn end(&self, input: &Input<f64, N>, memory: &[f64]) -> f64 {
+    fn end(&self, input: &Input<f64, N>, memory: &[States<f64>]) -> f64 {
         let rest = 1.0 - self.from;
         if !self.model.dry_falls {
             return 1.0;

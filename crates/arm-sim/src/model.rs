@@ -1,6 +1,8 @@
 //! The closed chain at one instant: from state and drive to accelerations, forces and powers.
 
-use arm_core::effect::{Effect, Local, Motion, resisting_besides_dry, resisting_torque};
+use arm_core::effect::{
+    Effect, Local, MAX_STATES, Motion, States, any_state, resisting_besides_dry, resisting_torque,
+};
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
     Setup, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
@@ -45,7 +47,7 @@ pub(crate) struct Model<T, const N: usize> {
     /// Whether some of it depends on speed.
     pub dry_falls: bool,
     pub products: Products<T, N>,
-    /// Whether an effect has a state of its own.
+    /// Whether an effect depends on states of its own.
     pub has_memory: bool,
 }
 
@@ -91,7 +93,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             placement: Placement::of(setup),
             link,
             feels_joint_force: effects.iter().any(feels_joint_force),
-            has_memory: effects.iter().any(|e| e.kind.info().memory),
+            has_memory: any_state(&effects),
             feels_besides_dry: effects.iter().any(feels_besides_dry),
             has_dry: dry.contains(&true),
             dry_falls: effects.iter().any(falls),
@@ -184,7 +186,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// Sum of what all effects resist with besides dry friction \[N m\].
     #[inline(always)]
-    pub fn resisting(&self, motion: &Motion<T, N>, memory: &[T]) -> Joints<T, N> {
+    pub fn resisting(&self, motion: &Motion<T, N>, memory: &[States<T>]) -> Joints<T, N> {
         let mut total = affine(&self.affine, &motion.q, &motion.qd);
         if !self.others.is_empty() {
             self.resist_otherwise(motion, memory, &mut total);
@@ -194,7 +196,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// Apart, so that the usual case stays small.
     #[inline(never)]
-    fn resist_otherwise(&self, motion: &Motion<T, N>, memory: &[T], total: &mut Joints<T, N>) {
+    fn resist_otherwise(
+        &self,
+        motion: &Motion<T, N>,
+        memory: &[States<T>],
+        total: &mut Joints<T, N>,
+    ) {
         let others = if self.has_dry {
             resisting_besides_dry(&self.others, motion, memory)
         } else {
@@ -204,7 +211,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 
     /// Time derivatives of the effects' own states.
-    pub fn memory_rates(&self, motion: &Motion<T, N>, memory: &[T], rates: &mut [T]) {
+    pub fn memory_rates(
+        &self,
+        motion: &Motion<T, N>,
+        memory: &[States<T>],
+        rates: &mut [States<T>],
+    ) {
         for ((effect, &memory), rate) in self.effects.iter().zip(memory).zip(rates) {
             *rate = effect.memory_rate(&motion.local(effect.index, memory));
         }
@@ -220,7 +232,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         input: &Input<T, N>,
         q: &Joints<T, N>,
         qd: &Joints<T, N>,
-        memory: &[T],
+        memory: &[States<T>],
     ) -> Outcome<T, N> {
         let pose = Pose::new(q);
         let mut motion = Motion::new(input.time, *q, *qd);
@@ -256,7 +268,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         input: &Input<T, N>,
         pose: &Pose<T, N>,
         motion: &mut Motion<T, N>,
-        (memory, resisting, force): (&[T], &mut Joints<T, N>, &mut Plane<T>),
+        (memory, resisting, force): (&[States<T>], &mut Joints<T, N>, &mut Plane<T>),
     ) -> Joints<T, N> {
         let qd = motion.qd;
         let terms = (!self.in_link_form()).then(|| self.terms(pose, &qd));
@@ -444,7 +456,7 @@ fn dry_at<T: Scalar>(effect: &Effect<T>, speed: f64) -> T {
         qdd: T::ZERO,
         proximal_q: T::ZERO,
         joint_force: T::ONE,
-        memory: T::ZERO,
+        memory: [T::ZERO; MAX_STATES],
     })
 }
 
@@ -467,7 +479,7 @@ fn feels_joint_force<T: Scalar>(effect: &Effect<T>) -> bool {
         qdd: T::ZERO,
         proximal_q: T::ZERO,
         joint_force: T::ZERO,
-        memory: T::ZERO,
+        memory: [T::ZERO; MAX_STATES],
     };
     let without = effect.torque(&at);
     at.joint_force = T::ONE;

@@ -9,6 +9,7 @@ use crate::recorder::{Instant, Pieces, Recorder, Row};
 use crate::state::State;
 use crate::step::Memory;
 use crate::{Experiment, Partial, SimulationError};
+use arm_core::effect::States;
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Pose, Scalar};
 
@@ -27,7 +28,7 @@ pub(crate) fn run<const N: usize>(
         work: [0.0; 4],
     };
     let mut row = Row::new();
-    let mut sample = |steps: usize, state: &State<f64, N>, memory: &[f64]| {
+    let mut sample = |steps: usize, state: &State<f64, N>, memory: &[States<f64>]| {
         row.fill_solved(&Instant {
             model: &prepared.model,
             input: &prepared.input(schedule.time(steps)),

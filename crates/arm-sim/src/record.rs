@@ -36,7 +36,7 @@ pub struct Recording<const N: usize> {
     pub effects: Vec<(Kind, usize)>,
     /// Torque with which each joint effect resists in its joint \[N m\], `(n, effects)`.
     pub resisting: Vec<f64>,
-    /// State of each joint effect, `(n, effects)`; zero for those without.
+    /// States of each joint effect in turn, `(n, states)`; one that is zero for those without.
     pub memory: Vec<f64>,
     /// What is stored.
     pub energy: EnergyColumns,
@@ -91,6 +91,11 @@ pub struct WorkColumns {
     pub damped: Vec<f64>,
 }
 
+/// How many states of a kind are recorded: one also where there are none, as for the torque.
+pub(crate) fn recorded_states(kind: Kind) -> usize {
+    kind.info().states.max(1)
+}
+
 impl<const N: usize> Recording<N> {
     /// Number of samples.
     pub fn len(&self) -> usize {
@@ -100,6 +105,12 @@ impl<const N: usize> Recording<N> {
     /// Whether nothing was recorded.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
+    }
+
+    /// Number of states of a sample in [`Recording::memory`].
+    pub fn memories(&self) -> usize {
+        let kinds = self.effects.iter();
+        kinds.map(|(kind, _)| recorded_states(*kind)).sum()
     }
 
     /// Change of stored energy less the work that explains it, for each sample \[J\]; zero but for the integration error.
@@ -139,7 +150,7 @@ impl<const N: usize> Recording<N> {
             ("torque.drive", N, &t.drive),
             ("torque.contact", N, &t.contact),
             ("resisting", effects, &self.resisting),
-            ("memory", effects, &self.memory),
+            ("memory", self.memories(), &self.memory),
             ("energy.kinetic", 1, &e.kinetic),
             ("energy.potential", 1, &e.potential),
             ("energy.contact", 1, &e.contact),

@@ -2,7 +2,7 @@
 
 use core::ops::ControlFlow;
 
-use arm_core::effect::Motion;
+use arm_core::effect::{Motion, States};
 use arm_core::{Joints, Plane, Pose, Scalar, contributions};
 
 use crate::Recording;
@@ -10,6 +10,7 @@ use crate::friction::{self, Friction};
 use crate::model::{Link, Model};
 use crate::prepare::Prepared;
 use crate::record::Piece;
+use crate::record::recorded_states;
 use crate::state::{Input, Outcome, State, difference, sum};
 use arm_core::simd_dispatch::{Computation, dispatch};
 
@@ -30,7 +31,7 @@ pub(crate) struct Instant<'a, T, const N: usize> {
     pub input: &'a Input<T, N>,
     pub state: &'a State<T, N>,
     /// States of the effects.
-    pub memory: &'a [T],
+    pub memory: &'a [States<T>],
 }
 
 impl<T: Scalar, const N: usize> Instant<'_, T, N> {
@@ -135,7 +136,8 @@ impl<T: Scalar> Row<T> {
                 _ => e.torque(&local),
             }
         }));
-        row.extend(memory.iter());
+        let effects = model.effects.iter().zip(*memory);
+        row.extend(effects.flat_map(|(e, states)| &states[..recorded_states(e.kind)]));
         for torque in [
             &parts.inertial,
             &parts.centrifugal,
@@ -177,7 +179,7 @@ fn columns<const N: usize>(
     recording: &mut Recording<N>,
     handle: bool,
 ) -> [(&mut Vec<f64>, usize); 25] {
-    let effects = recording.effects.len();
+    let (effects, memories) = (recording.effects.len(), recording.memories());
     let Recording { torque, energy, .. } = recording;
     let work = &mut recording.work;
     [
@@ -190,7 +192,7 @@ fn columns<const N: usize>(
         (&mut recording.force_on_arm, 2),
         (&mut recording.moment_on_arm, 1),
         (&mut recording.resisting, effects),
-        (&mut recording.memory, effects),
+        (&mut recording.memory, memories),
         (&mut torque.inertial, N),
         (&mut torque.centrifugal, N),
         (&mut torque.coriolis, N),

@@ -1,6 +1,6 @@
 //! The state in which a run starts.
 
-use arm_core::effect::{Motion, dry_friction};
+use arm_core::effect::{MAX_STATES, Motion, dry_friction};
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
@@ -100,7 +100,11 @@ fn holds<const N: usize>(
     let force = force(model, input, x);
     let through = model.through_joints(&Pose::new(&q), (&rest, &rest), force);
     let motion = Motion::new(0.0, q, rest).with_joint_force(&through);
-    let most = dry_friction(&model.effects, &motion, &vec![0.0; model.effects.len()]);
+    let most = dry_friction(
+        &model.effects,
+        &motion,
+        &vec![[0.0; MAX_STATES]; model.effects.len()],
+    );
     let needed = imbalance(model, input, x);
     (0..N).all(|j| !held[j] || needed[j].abs() <= most[j])
 }
@@ -253,7 +257,7 @@ fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[
     let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
     let rest = Joints::<f64, N>::zeros();
     let pose = Pose::new(&q);
-    let memory = vec![0.0; model.effects.len()];
+    let memory = vec![[0.0; MAX_STATES]; model.effects.len()];
     let resisting = model.resisting(&Motion::new(0.0, q, rest), &memory);
     let force = force(model, input, x);
     let terms = model.terms(&pose, &rest);

@@ -1,6 +1,6 @@
 //! One step of each integrator, the same source for single runs and lanes.
 
-use arm_core::effect::Motion;
+use arm_core::effect::{MAX_STATES, Motion, States};
 use arm_core::{Joints, Scalar};
 
 use crate::model::{Link, Model};
@@ -41,19 +41,19 @@ impl From<Jam> for SimulationError {
 /// States of the effects, and room for those of the stages.
 #[derive(Clone, Debug)]
 pub(crate) struct Memory<T> {
-    pub state: Vec<T>,
-    stage: Vec<T>,
-    rate: Vec<T>,
-    sum: Vec<T>,
+    pub state: Vec<States<T>>,
+    stage: Vec<States<T>>,
+    rate: Vec<States<T>>,
+    sum: Vec<States<T>>,
     /// The states before a step that may have to be made again.
-    pub kept: Vec<T>,
+    pub kept: Vec<States<T>>,
     /// Why a step could not be made.
     pub jam: Option<Jam>,
 }
 
 impl<T: Scalar> Memory<T> {
     pub fn new(effects: usize) -> Self {
-        let zeros = vec![T::ZERO; effects];
+        let zeros = vec![[T::ZERO; MAX_STATES]; effects];
         Self {
             state: zeros.clone(),
             stage: zeros.clone(),
@@ -114,7 +114,8 @@ pub(crate) fn remember<T: Scalar, const N: usize>(
     if model.has_memory {
         let motion = motion(input, &state.q, &state.qd, now);
         model.memory_rates(&motion, &memory.state, &mut memory.rate);
-        for (m, rate) in memory.state.iter_mut().zip(&memory.rate) {
+        let rates = memory.rate.as_flattened();
+        for (m, rate) in memory.state.as_flattened_mut().iter_mut().zip(rates) {
             *m += h * *rate;
         }
     }
@@ -126,7 +127,7 @@ pub(crate) fn rk4<T: Scalar, const N: usize>(
     model: &Model<T, N>,
     (h, inputs): (f64, Inputs<T, N>),
     (state, memory): (&mut State<T, N>, &mut Memory<T>),
-    mut evaluate: impl FnMut(&Input<T, N>, &Joints<T, N>, &Joints<T, N>, &[T]) -> Outcome<T, N>,
+    mut evaluate: impl FnMut(&Input<T, N>, &Joints<T, N>, &Joints<T, N>, &[States<T>]) -> Outcome<T, N>,
 ) {
     let stages = [
         (inputs.start, 0.0, 1.0),
@@ -146,10 +147,11 @@ pub(crate) fn rk4<T: Scalar, const N: usize>(
             add(&mut qd, ahead, &acceleration);
         }
         if model.has_memory {
-            for (i, at) in memory.stage.iter_mut().enumerate() {
-                let start = memory.state[i];
+            let (starts, rates) = (memory.state.as_flattened(), memory.rate.as_flattened());
+            for (i, at) in memory.stage.as_flattened_mut().iter_mut().enumerate() {
+                let start = starts[i];
                 *at = if stage > 0 {
-                    start + ahead * memory.rate[i]
+                    start + ahead * rates[i]
                 } else {
                     start
                 };
@@ -162,9 +164,10 @@ pub(crate) fn rk4<T: Scalar, const N: usize>(
                 &memory.stage,
                 &mut memory.rate,
             );
-            for (i, sum) in memory.sum.iter_mut().enumerate() {
+            let rates = memory.rate.as_flattened();
+            for (i, sum) in memory.sum.as_flattened_mut().iter_mut().enumerate() {
                 let before = if stage > 0 { *sum } else { T::ZERO };
-                *sum = before + weight * memory.rate[i];
+                *sum = before + weight * rates[i];
             }
         }
         (speed, acceleration) = (qd, now.qdd);
@@ -181,7 +184,8 @@ pub(crate) fn rk4<T: Scalar, const N: usize>(
         *work += sixth * *power;
     }
     if model.has_memory {
-        for (m, sum) in memory.state.iter_mut().zip(&memory.sum) {
+        let sums = memory.sum.as_flattened();
+        for (m, sum) in memory.state.as_flattened_mut().iter_mut().zip(sums) {
             *m += sixth * *sum;
         }
     }

@@ -1,6 +1,6 @@
 //! The native engine a piece at a time: what couples an arm to other simulators drives it through this.
 
-use arm_core::effect::Effect;
+use arm_core::effect::{Effect, MAX_STATES, States};
 use arm_core::{Joints, Plane, Pose, Setup};
 
 use crate::error::finite;
@@ -97,7 +97,7 @@ pub struct Snapshot<const N: usize> {
     /// Work since the start: by the port, by motors, against resistance, lost in the damping of the contact \[J\].
     pub work: [f64; 4],
     /// States of the effects that have one.
-    pub memory: Vec<f64>,
+    pub memory: Vec<States<f64>>,
     /// Time from which whole inner steps are counted \[s\].
     pub origin: f64,
     /// Whole inner steps since.
@@ -228,7 +228,7 @@ impl<const N: usize> Stepper<N> {
             qd,
             work: [0.0; 4],
         };
-        self.memory.state.fill(0.0);
+        self.memory.state.fill([0.0; MAX_STATES]);
         (self.origin, self.ticks) = (time, 0);
         Ok(())
     }
@@ -251,7 +251,7 @@ impl<const N: usize> Stepper<N> {
         self.port
     }
 
-    /// Number of effects, and so of states of effects in a snapshot.
+    /// Number of effects, and so of those whose states are in a snapshot.
     pub fn memories(&self) -> usize {
         self.memory.state.len()
     }

@@ -13,7 +13,7 @@ impl Law for AddedMass {
         formula: "mass at the tip of the last segment: X_j += mass · a_j, J_j += mass · a_j² for every j",
         reference: "parallel-axis theorem; Kodek 2004, equation 3.14",
         parameters: &[Parameter::linear("mass", "kg", 0.0, 50.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.02)]);
 

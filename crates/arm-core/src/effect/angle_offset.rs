@@ -13,7 +13,7 @@ impl Law for AngleOffset {
         formula: "q_read = q + offset",
         reference: "Kodek 2004, appendix A (errors of markers)",
         parameters: &[Parameter::shape("offset", "rad", -3.2, 3.2, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(2e-3)]).promised(Promise::AngleOffset);
 

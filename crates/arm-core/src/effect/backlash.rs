@@ -16,7 +16,7 @@ impl Law for Backlash {
             Parameter::shape("y", "m", 0.0, 0.1, 0.0),
             Parameter::shape("z", "m", 0.0, 0.1, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(2e-4)]).missing(0.003);
 

@@ -20,7 +20,7 @@ impl Law for Biarticular {
             Parameter::shape("ratio", "1", -5.0, 5.0, 1.0),
             Parameter::shape("rest", "rad", -14.0, 14.0, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[1.0, 0.5]))])

@@ -12,7 +12,7 @@ impl Law for ConstantMoment {
         formula: "R = moment",
         reference: "Kodek 2004, section 3.5.1: passive moment taken as constant",
         parameters: &[Parameter::linear("moment", "N m", -100.0, 100.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const RATE_INDEPENDENT: bool = true;
 

@@ -18,7 +18,7 @@ impl Law for ContactCompliance {
             Parameter::shape("y", "m/N", -0.001, 0.1, 0.0),
             Parameter::shape("z", "m/N", -0.001, 0.1, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(5e-6)]);
 

@@ -16,7 +16,7 @@ impl Law for ContactDamping {
             Parameter::linear("y", "N s/m", -1000.0, 10000.0, 0.0),
             Parameter::linear("z", "N s/m", -1000.0, 10000.0, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(10.0)]);
 

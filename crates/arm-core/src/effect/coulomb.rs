@@ -19,7 +19,7 @@ impl Law for Coulomb {
             Parameter::linear("torque", "N m", 0.0, 100.0, 0.0),
             SMOOTHING,
         ],
-        memory: false,
+        states: 0,
     };
     const SMOOTHED_BY: Option<usize> = Some(1);
     const RATE_INDEPENDENT: bool = true;

@@ -16,7 +16,7 @@ impl Law for CubicElastic {
             Parameter::linear("stiffness", "N m/rad³", -10.0, 1000.0, 0.0),
             Parameter::shape("rest", "rad", -7.0, 7.0, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Middle)])

@@ -21,7 +21,7 @@ impl Law for EndRange {
             Parameter::shape("upper", "rad", -7.0, 7.0, 2.0),
             Parameter::shape("lower", "rad", -7.0, 7.0, -2.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[
         Question::of(&[0])

@@ -15,7 +15,7 @@ impl Law for ForceBias {
         formula: "F_read = F + bias",
         reference: "zero error of a strain-gauge sensor; errors of calibration as in Kodek 2004, appendix A",
         parameters: &[Parameter::linear("bias", "N", -100.0, 100.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.1)]).promised(Promise::ForceBias);
 

@@ -14,7 +14,7 @@ impl Law for ForceDrift {
         formula: "F_read = F + rate · t",
         reference: "thermal drift of a strain-gauge sensor",
         parameters: &[Parameter::linear("rate", "N/s", -100.0, 100.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.02)]);
 

@@ -13,7 +13,7 @@ impl Law for ForceGain {
         formula: "F_read = (1 + gain) F",
         reference: "sensitivity error of a strain-gauge sensor",
         parameters: &[Parameter::linear("gain", "1", -0.9, 10.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.01)]).promised(Promise::ForceGain);
 

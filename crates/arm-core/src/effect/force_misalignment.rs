@@ -13,7 +13,7 @@ impl Law for ForceMisalignment {
         formula: "F_read = F turned by angle",
         reference: "rotation of the plane",
         parameters: &[Parameter::shape("angle", "rad", -3.2, 3.2, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(5e-3)]);
 

@@ -16,7 +16,7 @@ impl Law for GravityMoment {
         formula: "com += moment/mass: X_j += moment",
         reference: "Kodek 2004, section 3.5.1 (m·l as unknown)",
         parameters: &[Parameter::linear("moment", "kg m", -5.0, 5.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(2e-3)]);
 

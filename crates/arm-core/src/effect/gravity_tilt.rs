@@ -13,7 +13,7 @@ impl Law for GravityTilt {
         formula: "gravity turned by angle: (0, −g) becomes g (sin angle, −cos angle)",
         reference: "rotation of the plane",
         parameters: &[Parameter::shape("angle", "rad", -0.5, 0.5, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(5e-3)]);
 

@@ -13,7 +13,7 @@ impl Law for Inertia {
         formula: "inertia += change: J_j += change",
         reference: "Kodek 2004, equation 3.4",
         parameters: &[Parameter::linear("change", "kg m²", -1.0, 10.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]);
 

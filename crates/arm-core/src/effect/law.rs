@@ -10,6 +10,12 @@ pub const MAX_PARAMETERS: usize = 6;
 /// Parameter values in the order of [`Info::parameters`]; unused places are zero.
 pub type Parameters<T> = [T; MAX_PARAMETERS];
 
+/// Most states that one effect has.
+pub const MAX_STATES: usize = 3;
+
+/// The states of an effect; unused places are zero.
+pub type States<T> = [T; MAX_STATES];
+
 /// One parameter of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
@@ -90,8 +96,8 @@ pub struct Info {
     pub reference: &'static str,
     /// Its parameters; those in which the torque is linear come first.
     pub parameters: &'static [Parameter],
-    /// Whether it carries a state of its own, advanced with the simulation.
-    pub memory: bool,
+    /// How many states of its own it carries, advanced with the simulation.
+    pub states: usize,
 }
 
 /// What a joint effect sees: one joint at one instant.
@@ -109,8 +115,8 @@ pub struct Local<T> {
     pub proximal_q: T,
     /// Magnitude of the force through the joint \[N\].
     pub joint_force: T,
-    /// The effect's own state, zero at the start.
-    pub memory: T,
+    /// The effect's own states, zero at the start.
+    pub memory: States<T>,
 }
 
 /// What an effect acts on, and so who can apply it: a controller that knows only the arm applies the first two.
@@ -188,9 +194,13 @@ pub trait Law {
     fn proximal_share<T: Scalar>(_p: &Parameters<T>) -> T {
         T::ZERO
     }
-    /// Time derivative of the effect's own state.
-    fn memory_rate<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {
-        T::ZERO
+    /// Whether it does without its states at these values.
+    fn forgets<T: Scalar>(_p: &Parameters<T>) -> bool {
+        false
+    }
+    /// Time derivatives of the effect's own states.
+    fn memory_rate<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> States<T> {
+        [T::ZERO; MAX_STATES]
     }
     /// Changes the rig before a run. What is changed here must not appear in [`Law::torque`] again.
     fn alter<T: Scalar, const N: usize>(
@@ -234,10 +244,10 @@ pub(super) fn smooth_sign_slope<T: Scalar>(sign: T, speed: T, smoothing: T) -> T
 pub(super) const SMOOTHING: Parameter =
     Parameter::shape("smoothing", "rad/s", 1e-4, 1.0, 0.01).or_zero();
 
-/// Values for the leading parameters, zero for the others.
+/// Values for the leading parameters or states, zero for the others.
 #[inline]
-pub(super) fn leading<T: Scalar, const P: usize>(values: [T; P]) -> Parameters<T> {
-    let mut all = [T::ZERO; MAX_PARAMETERS];
+pub(super) fn leading<T: Scalar, const P: usize, const A: usize>(values: [T; P]) -> [T; A] {
+    let mut all = [T::ZERO; A];
     for (place, value) in all.iter_mut().zip(values) {
         *place = value;
     }

@@ -21,7 +21,7 @@ impl Law for LoadFriction {
             Parameter::linear("coefficient", "m", 0.0, 1.0, 0.0),
             SMOOTHING,
         ],
-        memory: false,
+        states: 0,
     };
     const FEELS_FORCE: bool = true;
     const SMOOTHED_BY: Option<usize> = Some(1);

@@ -15,7 +15,9 @@ mod place;
 mod probe;
 mod state;
 
-pub use law::{ActsOn, Info, Law, Local, MAX_PARAMETERS, Parameter, Parameters};
+pub use law::{
+    ActsOn, Info, Law, Local, MAX_PARAMETERS, MAX_STATES, Parameter, Parameters, States,
+};
 pub use own::Own;
 #[cfg(feature = "own")]
 pub use own::OwnLaw;
@@ -121,7 +123,7 @@ macro_rules! catalogue {
             pub(crate) fn add_columns<const N: usize, const P: usize>(
                 &self,
                 motion: &Motion<T, N>,
-                memory: T,
+                memory: States<T>,
                 column: usize,
                 rows: &mut [[T; P]; N],
             ) {
@@ -145,10 +147,17 @@ macro_rules! catalogue {
                 if !self.on { return T::ZERO; }
                 match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters),)* Kind::Own(_) => T::ZERO }
             }
-            /// Time derivative of the effect's own state.
+            /// Whether what it does depends on states of its own.
+            pub fn remembers(&self) -> bool {
+                self.kind.info().states > 0 && match self.kind {
+                    $(Kind::$law => !$module::$law::forgets(&self.parameters),)*
+                    Kind::Own(_) => true,
+                }
+            }
+            /// Time derivatives of the effect's own states.
             #[inline]
-            pub fn memory_rate(&self, at: &Local<T>) -> T {
-                if !self.on { return T::ZERO; }
+            pub fn memory_rate(&self, at: &Local<T>) -> States<T> {
+                if !self.on { return [T::ZERO; MAX_STATES]; }
                 match self.kind {
                     $(Kind::$law => $module::$law::memory_rate(&self.parameters, at),)*
                     Kind::Own(own) => own.memory_rate(&self.parameters, at),
@@ -156,7 +165,7 @@ macro_rules! catalogue {
             }
             /// Adds the torque with which the joints of a moving arm resist; nothing for an index beyond the arm.
             #[inline]
-            fn resist<const N: usize>(&self, motion: &Motion<T, N>, memory: T, total: &mut Joints<T, N>) {
+            fn resist<const N: usize>(&self, motion: &Motion<T, N>, memory: States<T>, total: &mut Joints<T, N>) {
                 // The view of the joint is made within each arm, so that a kind pays only for what it looks at.
                 match self.kind {
                     $(Kind::$law => {
@@ -403,7 +412,7 @@ impl<T: Scalar, const N: usize> Motion<T, N> {
 
     /// What an effect at a joint sees; zero for an index beyond the arm.
     #[inline]
-    pub fn local(&self, joint: usize, memory: T) -> Local<T> {
+    pub fn local(&self, joint: usize, memory: States<T>) -> Local<T> {
         let at = |values: &[T]| values.get(joint).copied().unwrap_or(T::ZERO);
         Local {
             time: self.time,
@@ -448,28 +457,28 @@ pub fn applied<T: Scalar, const N: usize>(
     setup.chain().map_err(|why| (0, why))
 }
 
-/// The effects that are on in one of `N` joints, each with its state; those without one count as zero.
+/// The effects that are on in one of `N` joints, each with its states; those without any count as zero.
 #[inline]
 fn in_joints<'a, T: Scalar, const N: usize>(
     effects: &'a [Effect<T>],
-    memory: &'a [T],
-) -> impl Iterator<Item = (&'a Effect<T>, T)> {
-    let state = |i| memory.get(i).copied().unwrap_or(T::ZERO);
+    memory: &'a [States<T>],
+) -> impl Iterator<Item = (&'a Effect<T>, States<T>)> {
+    let states = |i| memory.get(i).copied().unwrap_or([T::ZERO; MAX_STATES]);
     effects
         .iter()
         .enumerate()
         .filter(|(_, effect)| effect.on && effect.index < N)
-        .map(move |(i, effect)| (effect, state(i)))
+        .map(move |(i, effect)| (effect, states(i)))
 }
 
 /// Sum of what all effects resist with, shoulder first \[N m\].
 ///
-/// * `memory` - the state of each effect, in the same order; missing ones count as zero
+/// * `memory` - the states of each effect, in the same order; missing ones count as zero
 #[inline]
 pub fn resisting_torque<T: Scalar, const N: usize>(
     effects: &[Effect<T>],
     motion: &Motion<T, N>,
-    memory: &[T],
+    memory: &[States<T>],
 ) -> Joints<T, N> {
     let mut total = joints([T::ZERO; N]);
     for (effect, state) in in_joints::<T, N>(effects, memory) {
@@ -483,7 +492,7 @@ pub fn resisting_torque<T: Scalar, const N: usize>(
 pub fn resisting_besides_dry<T: Scalar, const N: usize>(
     effects: &[Effect<T>],
     motion: &Motion<T, N>,
-    memory: &[T],
+    memory: &[States<T>],
 ) -> Joints<T, N> {
     let mut total = joints([T::ZERO; N]);
     for (effect, state) in in_joints::<T, N>(effects, memory) {
@@ -501,7 +510,7 @@ pub fn resisting_besides_dry<T: Scalar, const N: usize>(
 pub fn dry_friction<T: Scalar, const N: usize>(
     effects: &[Effect<T>],
     motion: &Motion<T, N>,
-    memory: &[T],
+    memory: &[States<T>],
 ) -> [T; N] {
     let mut most = [T::ZERO; N];
     for (effect, state) in in_joints::<T, N>(effects, memory) {

@@ -16,7 +16,7 @@ impl Law for MotorInertia {
         formula: "rotor inertia of the joint += inertia, which adds inertia · q̈",
         reference: "Spong 1987; Siciliano, Sciavicco, Villani, Oriolo 2009",
         parameters: &[Parameter::linear("inertia", "kg m²", 0.0, 10.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const ACTS_ON: ActsOn = ActsOn::Arm;
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]).in_family(Family::Segment);

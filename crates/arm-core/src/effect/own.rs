@@ -2,7 +2,7 @@ use core::cmp::Ordering;
 use core::fmt;
 use core::hash::{Hash, Hasher};
 
-use super::law::{Info, Local, MAX_PARAMETERS, Parameters};
+use super::law::{Info, Local, MAX_PARAMETERS, MAX_STATES, Parameters, States};
 use super::probe::Probe;
 use crate::Scalar;
 
@@ -29,7 +29,7 @@ use crate::Scalar;
 ///                 Parameter::linear("height", "N m", 0.0, 10.0, 0.0),
 ///                 Parameter::shape("pitch", "rad", 0.01, 1.0, 0.1),
 ///             ],
-///             memory: false,
+///             states: 0,
 ///         };
 ///         &INFO
 ///     }
@@ -42,7 +42,7 @@ use crate::Scalar;
 /// let kind = Kind::Own(Own::new(&DETENT));
 /// let effect = Effect::<f64>::new(kind, 1).with(&[0.2]);
 /// assert_eq!(effect.validate(2), Ok(()));
-/// let at = Local { time: 0.0, q: 0.05, qd: 0.0, qdd: 0.0, proximal_q: 0.0, joint_force: 0.0, memory: 0.0 };
+/// let at = Local { time: 0.0, q: 0.05, qd: 0.0, qdd: 0.0, proximal_q: 0.0, joint_force: 0.0, memory: [0.0; 3] };
 /// assert_eq!(effect.torque(&at), 0.2 * libm::sin(0.5));
 /// ```
 pub trait OwnLaw: Sync {
@@ -58,9 +58,9 @@ pub trait OwnLaw: Sync {
     }
     /// Torque with which the joint resists \[N m\].
     fn torque(&self, p: &Parameters<f64>, at: &Local<f64>) -> f64;
-    /// Time derivative of the effect's own state, for a law that has one.
-    fn memory_rate(&self, _p: &Parameters<f64>, _at: &Local<f64>) -> f64 {
-        0.0
+    /// Time derivatives of the effect's own states, for a law that has some.
+    fn memory_rate(&self, _p: &Parameters<f64>, _at: &Local<f64>) -> States<f64> {
+        [0.0; MAX_STATES]
     }
 }
 
@@ -92,22 +92,23 @@ impl Own {
         at: &Local<T>,
         f: impl Fn(&Parameters<f64>, &Local<f64>) -> f64,
     ) -> T {
-        const ALL: usize = MAX_PARAMETERS + 7;
+        const SEEN: usize = MAX_PARAMETERS + 6;
+        const ALL: usize = SEEN + MAX_STATES;
         let mut values = [T::ZERO; ALL];
         values[..MAX_PARAMETERS].copy_from_slice(p);
-        values[MAX_PARAMETERS..].copy_from_slice(&[
+        values[MAX_PARAMETERS..SEEN].copy_from_slice(&[
             at.time,
             at.q,
             at.qd,
             at.qdd,
             at.proximal_q,
             at.joint_force,
-            at.memory,
         ]);
+        values[SEEN..].copy_from_slice(&at.memory);
         T::together(values, |v: [f64; ALL]| {
             let mut p = [0.0; MAX_PARAMETERS];
             p.copy_from_slice(&v[..MAX_PARAMETERS]);
-            let [time, q, qd, qdd, proximal_q, joint_force, memory] =
+            let [time, q, qd, qdd, proximal_q, joint_force] =
                 core::array::from_fn(|k| v[MAX_PARAMETERS + k]);
             let at = Local {
                 time,
@@ -116,7 +117,7 @@ impl Own {
                 qdd,
                 proximal_q,
                 joint_force,
-                memory,
+                memory: core::array::from_fn(|k| v[SEEN + k]),
             };
             f(&p, &at)
         })
@@ -126,8 +127,8 @@ impl Own {
         Self::each(p, at, |p, at| self.0.torque(p, at))
     }
 
-    pub(super) fn memory_rate<T: Scalar>(self, p: &Parameters<T>, at: &Local<T>) -> T {
-        Self::each(p, at, |p, at| self.0.memory_rate(p, at))
+    pub(super) fn memory_rate<T: Scalar>(self, p: &Parameters<T>, at: &Local<T>) -> States<T> {
+        core::array::from_fn(|k| Self::each(p, at, |p, at| self.0.memory_rate(p, at)[k]))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Without the feature `own` there is no kind but those of the catalogue: this one has no value.
 
-use super::law::{Info, Local, Parameters};
+use super::law::{Info, Local, Parameters, States};
 use super::probe::Probe;
 use crate::Scalar;
 
@@ -25,7 +25,7 @@ impl Own {
         match self {}
     }
 
-    pub(super) fn memory_rate<T: Scalar>(self, _p: &Parameters<T>, _at: &Local<T>) -> T {
+    pub(super) fn memory_rate<T: Scalar>(self, _p: &Parameters<T>, _at: &Local<T>) -> States<T> {
         match self {}
     }
 }

@@ -109,6 +109,8 @@ pub struct Question {
     pub rest: Option<usize>,
     /// Shapes that are refined once the effect is found.
     pub refined: &'static [usize],
+    /// What is known of a shape before the data, where something is: its position, expected value and standard deviation.
+    pub expected: &'static [(usize, [f64; 2])],
     /// Change of a free parameter that is small and yet seen; zero where the size of the torque tells it.
     pub step: f64,
 }
@@ -134,6 +136,7 @@ impl Question {
             shapes: &[],
             rest: None,
             refined: &[],
+            expected: &[],
             step: 0.0,
         }
     }
@@ -154,6 +157,11 @@ impl Question {
     /// With shapes that are refined once the effect is found.
     pub const fn refining(self, refined: &'static [usize]) -> Self {
         Self { refined, ..self }
+    }
+
+    /// With something known of shapes before the data.
+    pub const fn expecting(self, expected: &'static [(usize, [f64; 2])]) -> Self {
+        Self { expected, ..self }
     }
 
     /// With a step of its own.

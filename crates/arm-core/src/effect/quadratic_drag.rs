@@ -13,7 +13,7 @@ impl Law for QuadraticDrag {
         formula: "R = drag · q̇ |q̇|",
         reference: "Rayleigh 1876; drag of a bluff body",
         parameters: &[Parameter::linear("drag", "N m s²/rad²", 0.0, 100.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::FIRST.in_family(Family::Rate).typically(0.2);
 

@@ -1,4 +1,4 @@
-use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
+use super::law::{Info, Law, Local, Parameter, Parameters, Place, States, leading};
 use super::probe::{Probe, Question, Values};
 use crate::Scalar;
 
@@ -18,7 +18,7 @@ impl Law for Relaxation {
             Parameter::linear("stiffness", "N m/rad", 0.0, 1000.0, 0.0),
             Parameter::shape("time", "s", 0.01, 1000.0, 1.0),
         ],
-        memory: true,
+        states: 1,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[0.3, 1.0, 3.0]))])
@@ -27,15 +27,15 @@ impl Law for Relaxation {
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        p[0] * at.memory
+        p[0] * at.memory[0]
     }
 
     fn gradient<T: Scalar>(_p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
-        leading([at.memory])
+        leading([at.memory[0]])
     }
 
     #[inline]
-    fn memory_rate<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        at.qd - at.memory / p[1]
+    fn memory_rate<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> States<T> {
+        leading([at.qd - at.memory[0] / p[1]])
     }
 }

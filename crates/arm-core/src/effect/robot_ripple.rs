@@ -20,7 +20,7 @@ impl Law for RobotRipple {
             Parameter::shape("frequency", "Hz", 0.01, 100.0, 1.0),
             Parameter::shape("phase", "rad", -7.0, 7.0, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).refining(&[2, 3]).stepping(1e-4)])
         .of_nature(Nature::Periodic);

@@ -13,7 +13,7 @@ impl Law for SegmentLength {
         formula: "length += change",
         reference: "Kodek 2004, appendix A (errors of segment lengths)",
         parameters: &[Parameter::shape("change", "m", -0.5, 0.5, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]);
 

@@ -19,7 +19,7 @@ impl Law for ShoulderMotion {
             Parameter::shape("z", "m/rad", -1.0, 1.0, 0.0),
             Parameter::shape("rest", "rad", -7.0, 7.0, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const ACTS_ON: ActsOn = ActsOn::Rig;
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1])

@@ -6,8 +6,12 @@
 //! One step of an exponential method (Hochbruck, Ostermann 2010, section 2.3): with the motion at the middle of the interval h and
 //! the rate `f(s)` there, `s(t + h) = s + h φ(hλ) f(s)`, `φ(z) = (eᶻ − 1)/z`, `λ = (f(s + δ) − f(s))/δ`. It is of second order,
 //! exact for rates that are linear in the state while the motion stays as it is, and stable however fast the state settles.
+//! Where an effect has several states, `λ` is the matrix of their slopes, and `φ` the rational function that makes this a step of the
+//! Radau IIA method of order 5 (Hairer, Wanner 1996, section IV.5) for the linearised law.
 
-use super::{Effect, Local, Motion};
+use core::array::from_fn;
+
+use super::{Effect, Local, MAX_STATES, Motion, States};
 use crate::Scalar;
 
 /// Fastest growth of a state in one interval, as an exponent: laws that settle have none.
@@ -18,15 +22,64 @@ const FASTEST_DECAY: f64 = -60.0;
 const LEAST_CHANGE: f64 = 1e-3;
 
 impl<T: Scalar> Effect<T> {
-    /// The effect's own state one `interval` \[s\] later, the motion of its joint going straight from one view to the other.
-    pub fn next_state(&self, (from, to): (&Local<T>, &Local<T>), state: T, interval: T) -> T {
+    /// The effect's own states one `interval` \[s\] later, the motion of its joint going straight from one view to the other.
+    pub fn next_states(
+        &self,
+        (from, to): (&Local<T>, &Local<T>),
+        states: States<T>,
+        interval: T,
+    ) -> States<T> {
         let middle = middle(from, to);
-        let rate = |memory: T| self.memory_rate(&Local { memory, ..middle });
-        let now = rate(state);
-        let change = (now * interval).abs() + T::of(LEAST_CHANGE);
-        let slope = (rate(state + change) - now) / change;
-        state + interval * growth(slope * interval) * now
+        let rate = |memory: States<T>| self.memory_rate(&Local { memory, ..middle });
+        let now = rate(states);
+        // What the rates change by with one state.
+        let slope = |k: usize| {
+            let change = (now[k] * interval).abs() + T::of(LEAST_CHANGE);
+            let mut moved = states;
+            moved[k] += change;
+            let there = rate(moved);
+            from_fn(|i| (there[i] - now[i]) / change)
+        };
+        if self.kind.info().states == 1 {
+            let [rate, slope] = [now[0], slope(0)[0]];
+            let mut next = states;
+            next[0] += interval * growth(slope * interval) * rate;
+            return next;
+        }
+        let columns: [States<T>; MAX_STATES] = from_fn(slope);
+        let step = growth_of_several(&columns, interval, &now.map(|v| v * interval));
+        from_fn(|i| states[i] + step[i])
     }
+}
+
+/// `φ(hΛ) v` with `φ(z) = (1 − z/10 + z²/60) / (1 − 3z/5 + 3z²/20 − z³/60)`, for slopes `Λ` in columns.
+fn growth_of_several<T: Scalar>(columns: &[States<T>; 3], h: T, v: &States<T>) -> States<T> {
+    let times = |w: &States<T>| -> States<T> {
+        from_fn(|i| h * (columns[0][i] * w[0] + columns[1][i] * w[1] + columns[2][i] * w[2]))
+    };
+    let sum = |w: &States<T>, factors: [f64; 4]| -> States<T> {
+        let once = times(w);
+        let twice = times(&once);
+        let powers = [*w, once, twice, times(&twice)];
+        from_fn(|i| (0..4).fold(T::ZERO, |sum, k| sum + T::of(factors[k]) * powers[k][i]))
+    };
+    let right = sum(v, [1.0, -0.1, 1.0 / 60.0, 0.0]);
+    let left: [States<T>; 3] = from_fn(|k| {
+        let unit = from_fn(|i| if i == k { T::ONE } else { T::ZERO });
+        sum(&unit, [1.0, -0.6, 0.15, -1.0 / 60.0])
+    });
+    // By Cramer's rule: of states that settle, no eigenvalue of the left side is below one.
+    let det = |[a, b, c]: [&States<T>; 3]| {
+        let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+        a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)
+    };
+    let [x, y, z] = &left;
+    let whole = det([x, y, z]);
+    [
+        det([&right, y, z]) / whole,
+        det([x, &right, z]) / whole,
+        det([x, y, &right]) / whole,
+    ]
 }
 
 /// `(eᶻ − 1)/z`; growth is limited as above.
@@ -51,18 +104,18 @@ fn middle<T: Scalar>(a: &Local<T>, b: &Local<T>) -> Local<T> {
         qdd: mean(a.qdd, b.qdd),
         proximal_q: mean(a.proximal_q, b.proximal_q),
         joint_force: mean(a.joint_force, b.joint_force),
-        memory: T::ZERO,
+        memory: [T::ZERO; MAX_STATES],
     }
 }
 
-/// Whether some effect has a state of its own.
-pub fn any_state<T>(effects: &[Effect<T>]) -> bool {
-    effects.iter().any(|effect| effect.kind.info().memory)
+/// Whether some effect depends on states of its own.
+pub fn any_state<T: Scalar>(effects: &[Effect<T>]) -> bool {
+    effects.iter().any(Effect::remembers)
 }
 
 /// Carries the states of effects from one instant of a motion to another, `interval` \[s\] later.
 ///
-/// * `states` - one for each effect, in the same order; those of effects without a state stay as they are
+/// * `states` - those of each effect, in the same order; those of effects without a state stay as they are
 ///
 /// ```
 /// use arm_core::Joints;
@@ -70,24 +123,22 @@ pub fn any_state<T>(effects: &[Effect<T>]) -> bool {
 /// // A Maxwell element with 0.5 s, stretched at 1 rad/s for a long time: e = q̇ · time.
 /// let spring = Effect::new(Kind::named("relaxation")?, 0).with(&[3.0, 0.5]);
 /// let moving = Motion::new(0.0, Joints::<f64, 1>::zeros(), Joints::<f64, 1>::repeat(1.0));
-/// let mut states = [0.0];
+/// let mut states = [[0.0; 3]];
 /// advance_states(&[spring], (&moving, &moving), &mut states, 20.0);
-/// assert!((states[0] - 0.5).abs() < 1e-12);
+/// assert!((states[0][0] - 0.5).abs() < 1e-12);
 /// # Ok::<(), arm_core::Invalid>(())
 /// ```
 pub fn advance_states<T: Scalar, const N: usize>(
     effects: &[Effect<T>],
     (from, to): (&Motion<T, N>, &Motion<T, N>),
-    states: &mut [T],
+    states: &mut [States<T>],
     interval: T,
 ) {
-    for (effect, state) in effects.iter().zip(states) {
-        if effect.kind.info().memory {
-            let (a, b) = (
-                from.local(effect.index, T::ZERO),
-                to.local(effect.index, T::ZERO),
-            );
-            *state = effect.next_state((&a, &b), *state, interval);
+    for (effect, own) in effects.iter().zip(states) {
+        if effect.remembers() {
+            let none = [T::ZERO; MAX_STATES];
+            let (a, b) = (from.local(effect.index, none), to.local(effect.index, none));
+            *own = effect.next_states((&a, &b), *own, interval);
         }
     }
 }

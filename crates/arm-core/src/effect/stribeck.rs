@@ -22,7 +22,7 @@ impl Law for Stribeck {
             Parameter::shape("speed", "rad/s", 0.001, 10.0, 0.06),
             SMOOTHING,
         ],
-        memory: false,
+        states: 0,
     };
     const SMOOTHED_BY: Option<usize> = Some(2);
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])

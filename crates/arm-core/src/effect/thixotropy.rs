@@ -1,5 +1,5 @@
 use super::law::{
-    Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
+    Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, States, leading, smooth_sign,
     smooth_sign_slope,
 };
 use super::probe::{Family, Probe, Question, Values};
@@ -25,7 +25,7 @@ impl Law for Thixotropy {
             Parameter::shape("recovery", "s", 0.01, 1000.0, 3.0),
             SMOOTHING,
         ],
-        memory: true,
+        states: 1,
     };
     const SMOOTHED_BY: Option<usize> = Some(5);
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
@@ -38,22 +38,22 @@ impl Law for Thixotropy {
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        let intact = T::ONE - at.memory;
+        let intact = T::ONE - at.memory[0];
         intact * (p[0] * smooth_sign(at.qd, p[5]) + p[1] * (at.q - p[2]))
     }
 
     #[inline]
     fn dry<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        (T::ONE - at.memory) * p[0]
+        (T::ONE - at.memory[0]) * p[0]
     }
 
     #[inline]
     fn besides_dry<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        (T::ONE - at.memory) * p[1] * (at.q - p[2])
+        (T::ONE - at.memory[0]) * p[1] * (at.q - p[2])
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
-        let intact = T::ONE - at.memory;
+        let intact = T::ONE - at.memory[0];
         let sign = smooth_sign(at.qd, p[5]);
         leading([
             intact * sign,
@@ -66,7 +66,8 @@ impl Law for Thixotropy {
     }
 
     #[inline]
-    fn memory_rate<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        (T::ONE - at.memory) * at.qd.abs() / p[3] - at.memory / p[4]
+    fn memory_rate<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> States<T> {
+        let intact = T::ONE - at.memory[0];
+        leading([intact * at.qd.abs() / p[3] - at.memory[0] / p[4]])
     }
 }

@@ -13,7 +13,7 @@ impl Law for TimeDelay {
         formula: "F_read(t) = F(t − delay)",
         reference: "two clocks: one for the angles, one for the forces",
         parameters: &[Parameter::shape("delay", "s", -1.0, 1.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(4e-3)]).promised(Promise::TimeDelay);
 

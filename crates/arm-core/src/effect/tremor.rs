@@ -19,7 +19,7 @@ impl Law for Tremor {
             Parameter::shape("frequency", "Hz", 0.1, 50.0, 5.0),
             Parameter::shape("phase", "rad", -7.0, 7.0, 0.0),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::FIRST.of_nature(Nature::Rhythm).in_family(Family::Muscle);
 

@@ -13,7 +13,7 @@ impl Law for Viscous {
         formula: "R = viscosity · q̇",
         reference: "Kodek 2004, equation 3.11",
         parameters: &[Parameter::linear("viscosity", "N m s/rad", 0.0, 100.0, 0.0)],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::FIRST.in_family(Family::Rate).typically(0.2).passive();
 

@@ -20,7 +20,7 @@ impl Law for Voluntary {
             Parameter::shape("start", "s", -1000.0, 100000.0, 0.0),
             Parameter::shape("duration", "s", 0.001, 1000.0, 0.5),
         ],
-        memory: false,
+        states: 0,
     };
     const PROBE: Probe = Probe::FIRST.of_nature(Nature::Burst).in_family(Family::Muscle);
 

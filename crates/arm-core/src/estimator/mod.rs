@@ -32,7 +32,7 @@ use window::Window;
 use core::array::from_fn;
 
 use crate::compensation::GravityCompensation;
-use crate::effect::Motion;
+use crate::effect::{MAX_STATES, Motion, States};
 use crate::equation::{Equation, Measured, Needed, Prior};
 use crate::scalar::Real;
 use crate::{Invalid, joints};
@@ -58,7 +58,7 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     moving: bool,
     /// Periods since the last row.
     since_row: u32,
-    memory: [T; E],
+    memory: [States<T>; E],
     /// Usual size of the torque that the estimate does not explain \[N m\].
     usual: [T; N],
     /// Periods since a sample was last learned from; how often the state was not finite; what became of the last sample.
@@ -116,7 +116,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             settling: 0,
             moving: false,
             since_row: 0,
-            memory: [T::ZERO; E],
+            memory: [[T::ZERO; MAX_STATES]; E],
             usual: tuning.noise,
             age: 0,
             restarts: 0,
@@ -309,10 +309,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         for j in 0..N {
             sum += motion.q[j] + motion.qd[j] + motion.qdd[j] + measured.torque[j] + self.usual[j];
         }
-        self.memory
-            .iter()
-            .fold(sum, |sum, &state| sum + state)
-            .is_finite()
+        let states = self.memory.as_flattened().iter();
+        states.fold(sum, |sum, &state| sum + state).is_finite()
     }
 
     /// Starts anew what a value that is not finite has spoiled: filters, states of effects, and what is usual.
@@ -320,7 +318,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     #[inline(never)]
     fn restart(&mut self) {
         self.running = false;
-        self.memory = [T::ZERO; E];
+        self.memory = [[T::ZERO; MAX_STATES]; E];
         self.usual = self.tuning.noise;
         self.window = Window::EMPTY;
         self.restarts = self.restarts.saturating_add(1);

@@ -143,7 +143,7 @@ fn effect_gradients_are_derivatives() {
     let mut random = Random(64);
     for &kind in KINDS.iter().filter(|k| k.info().place == Place::Joint) {
         for _ in 0..STATES {
-            let local = random.motion::<3>().local(1, random.uniform(-1.0, 1.0));
+            let local = random.motion::<3>().local(1, random.states());
             let effect = random.effect(kind, 1);
             let gradient = effect.gradient(&local);
             for i in 0..kind.info().parameters.len() {
@@ -164,7 +164,7 @@ fn effect_gradients_are_derivatives() {
                     qdd: of(local.qdd),
                     proximal_q: of(local.proximal_q),
                     joint_force: of(local.joint_force),
-                    memory: of(local.memory),
+                    memory: local.memory.map(of),
                 });
                 if kind.info().kind != "motor_inertia" {
                     close(gradient[i], slope.slope);

@@ -1,7 +1,7 @@
 //! What holds for every kind of effect: names, bounds, gradients, the off switch.
 
 use arm_core::effect::{
-    Effect, KINDS, Kind, Local, MAX_PARAMETERS, Motion, Place, resisting_torque,
+    Effect, KINDS, Kind, Local, MAX_PARAMETERS, MAX_STATES, Motion, Place, States, resisting_torque,
 };
 use arm_core::{Contact, Invalid, Joints, Pose, Reading, Setup, inverse_dynamics};
 
@@ -37,7 +37,7 @@ fn needed(
     effect: &Effect<f64>,
     rig: &Setup<f64, 3>,
     motion: &Motion<f64, 3>,
-    memory: f64,
+    memory: States<f64>,
 ) -> Joints<f64, 3> {
     let mut setup = *rig;
     effect.alter(&mut setup);
@@ -207,8 +207,8 @@ fn off_is_the_old_result_bit_for_bit() {
             bits(&resisting_torque(&with, &motion, &[])),
             bits(&resisting_torque(&others, &motion, &[])),
         );
-        let local = motion.local(1, 0.3);
-        assert_eq!(effect.memory_rate(&local), 0.0);
+        let local = motion.local(1, [0.3; 3]);
+        assert_eq!(effect.memory_rate(&local), [0.0; MAX_STATES]);
         assert_eq!(effect.proximal_share(), 0.0);
         assert_eq!(effect.gradient(&local), [0.0; MAX_PARAMETERS]);
     }
@@ -236,7 +236,7 @@ fn defaults_do_nothing() {
         assert_eq!(after, before, "{}", kind.info().kind);
         let motion = random.motion::<3>();
         assert_eq!(
-            resisting_torque(&[effect], &motion, &[0.5]),
+            resisting_torque(&[effect], &motion, &[[0.5; 3]]),
             Joints::<f64, 3>::zeros()
         );
     }
@@ -255,7 +255,7 @@ fn every_kind_does_something() {
         effect.distort(&mut after);
         // Some act only beyond a threshold.
         let torque = (0..50).fold(0.0, |largest: f64, _| {
-            let torque = resisting_torque(&[effect], &random.motion::<3>(), &[0.5]);
+            let torque = resisting_torque(&[effect], &random.motion::<3>(), &[[0.5; 3]]);
             largest.max(torque.amax())
         });
         let acts = altered != rig || after != before || torque > 0.0;
@@ -271,7 +271,7 @@ fn gradients_are_those_of_the_needed_torque() {
     for kind in of_place(Place::Joint) {
         for _ in 0..200 {
             let (rig, motion) = (rig(&mut random), random.motion::<3>());
-            let (effect, memory) = (random.effect(kind, 1), random.uniform(-1.0, 1.0));
+            let (effect, memory) = (random.effect(kind, 1), random.states());
             let gradient = effect.gradient(&motion.local(1, memory));
             for i in 0..MAX_PARAMETERS {
                 let step = 1e-5;
@@ -305,7 +305,7 @@ fn torque_is_linear_in_the_parameters_that_say_so() {
     for kind in of_place(Place::Joint) {
         for _ in 0..100 {
             let (rig, motion) = (rig(&mut random), random.motion::<3>());
-            let (effect, memory) = (random.effect(kind, 1), random.uniform(-1.0, 1.0));
+            let (effect, memory) = (random.effect(kind, 1), random.states());
             let without = Effect {
                 on: false,
                 ..effect
@@ -339,7 +339,8 @@ fn segments_are_linear_in_the_parameters_that_say_so() {
                 on: false,
                 ..effect
             };
-            let [none, one, two] = [without, effect, twice].map(|e| needed(&e, &rig, &motion, 0.0));
+            let [none, one, two] =
+                [without, effect, twice].map(|e| needed(&e, &rig, &motion, [0.0; 3]));
             let curvature = (two - one * 2.0 + none).amax();
             let second_order = if kind.info().kind == "gravity_moment" {
                 // J gains moment²/mass, which turns with the segment's acceleration in space.
@@ -364,15 +365,16 @@ fn memory_is_kept_by_kinds_that_say_so() {
     let mut random = Random(37);
     for &kind in KINDS {
         let effect = random.effect(kind, 1);
-        let local: Local<f64> = random.motion::<3>().local(1, 0.4);
-        let moves = effect.memory_rate(&local) != 0.0;
-        assert_eq!(moves, kind.info().memory, "{}", kind.info().kind);
+        let local: Local<f64> = random.motion::<3>().local(1, [0.4; 3]);
+        let rates = effect.memory_rate(&local);
+        let moving = rates.iter().filter(|rate| **rate != 0.0).count();
+        assert_eq!(moving, kind.info().states, "{}", kind.info().kind);
         let remembers = effect.torque(&local)
             != effect.torque(&Local {
-                memory: 0.1,
+                memory: [0.1; 3],
                 ..local
             });
-        assert_eq!(remembers, kind.info().memory, "{}", kind.info().kind);
+        assert_eq!(remembers, effect.remembers(), "{}", kind.info().kind);
     }
 }
 
@@ -382,8 +384,8 @@ fn both_ends_of_a_shared_torque_are_counted() {
     for kind in of_place(Place::Joint) {
         let effect = random.effect(kind, 2);
         let motion = random.motion::<3>();
-        let total = resisting_torque(&[effect], &motion, &[0.5]);
-        let here = effect.torque(&motion.local(2, 0.5));
+        let total = resisting_torque(&[effect], &motion, &[[0.5; 3]]);
+        let here = effect.torque(&motion.local(2, [0.5; 3]));
         assert_eq!(total[2], here);
         assert_eq!(total[1], effect.proximal_share() * here);
         assert_eq!(total[0], 0.0);

@@ -1,6 +1,6 @@
 //! Random arms and states from written seeds.
 
-use arm_core::effect::{Effect, Kind, Motion};
+use arm_core::effect::{Effect, Kind, Motion, States};
 use arm_core::{Chain, Joints, Segment};
 
 /// SplitMix64 (Steele, Lea, Flood 2014): small, portable and good enough for test states.
@@ -48,6 +48,11 @@ impl Random {
             *value = low + (high - low) * self.uniform(0.2, 0.8);
         }
         effect
+    }
+
+    /// States of an effect.
+    pub fn states(&mut self) -> States<f64> {
+        core::array::from_fn(|_| self.uniform(-1.0, 1.0))
     }
 
     /// A motion of an arm, with forces through its joints.

@@ -29,7 +29,7 @@ const REST: Local<f64> = Local {
     qdd: 0.0,
     proximal_q: 0.0,
     joint_force: 0.0,
-    memory: 0.0,
+    memory: [0.0; 3],
 };
 const fn moving(qd: f64) -> Local<f64> {
     Local { qd, ..REST }
@@ -50,7 +50,7 @@ fn torques_in_the_head() {
     };
     let remembering = Local {
         q: 1.0,
-        memory: 0.5,
+        memory: [0.5, 0.0, 0.0],
         ..moving(1.0)
     };
     let crossed = Local {
@@ -75,7 +75,7 @@ fn torques_in_the_head() {
             "relaxation",
             &[3.0, 4.0],
             Local {
-                memory: 2.0,
+                memory: [2.0, 0.0, 0.0],
                 ..REST
             },
             6.0,
@@ -113,23 +113,26 @@ fn torques_in_the_head() {
 fn memory_in_the_head() {
     // 1 rad/s stretches, 2 rad of stretch fade over 4 s.
     let stretched = Local {
-        memory: 2.0,
+        memory: [2.0, 0.0, 0.0],
         ..moving(1.0)
     };
-    assert_eq!(of("relaxation", &[3.0, 4.0]).memory_rate(&stretched), 0.5);
+    assert_eq!(
+        of("relaxation", &[3.0, 4.0]).memory_rate(&stretched),
+        [0.5, 0.0, 0.0]
+    );
     // Half broken: 0.5·|−1|/0.5 breaks, 0.5/4 builds.
     let half = Local {
-        memory: 0.5,
+        memory: [0.5, 0.0, 0.0],
         ..moving(-1.0)
     };
     let effect = of("thixotropy", &[1.0, 2.0, 0.0, 0.5, 4.0]);
-    assert_eq!(effect.memory_rate(&half), 0.875);
+    assert_eq!(effect.memory_rate(&half), [0.875, 0.0, 0.0]);
 }
 
 /// Torques over a motion, with the state advanced by small steps.
 fn torques(effect: &Effect<f64>, duration: f64, motion: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
     let step = 1e-3;
-    let mut memory = 0.0;
+    let mut memory = [0.0; 3];
     (0..(duration / step) as u32)
         .map(|i| {
             let [q, qd] = motion(f64::from(i) * step);
@@ -139,7 +142,8 @@ fn torques(effect: &Effect<f64>, duration: f64, motion: impl Fn(f64) -> [f64; 2]
                 memory,
                 ..REST
             };
-            memory += step * effect.memory_rate(&local);
+            let rates = effect.memory_rate(&local);
+            memory = core::array::from_fn(|k| memory[k] + step * rates[k]);
             effect.torque(&local)
         })
         .collect()
@@ -423,11 +427,11 @@ fn error_of_stretch(time: f64, omega: f64, rate: f64) -> f64 {
     // ė = ω cos ωt − e/T from rest: e = a (sin ωt + cos ωt / ωT − exp(−t/T) / ωT) ωT, a = ωT / (1 + ω²T²).
     let exact =
         |t: f64| size * (tau * libm::sin(omega * t) + libm::cos(omega * t) - libm::exp(-t / time));
-    let (mut state, mut worst) = (0.0, 0.0_f64);
+    let (mut state, mut worst) = ([0.0; 3], 0.0_f64);
     for i in 0..(3.0 * rate) as u32 {
         let t = f64::from(i) * h;
-        state = spring.next_state((&view(t), &view(t + h)), state, h);
-        worst = worst.max((state - exact(t + h)).abs());
+        state = spring.next_states((&view(t), &view(t + h)), state, h);
+        worst = worst.max((state[0] - exact(t + h)).abs());
     }
     worst / size
 }
@@ -449,10 +453,96 @@ fn states_follow_a_given_motion() {
 fn states_stay_within_their_law_however_fast_they_settle() {
     // Breaks down within 0.1 ms of motion at 10 rad/s; the sampling interval is 200 times that.
     let effect = of("thixotropy", &[1.0, 0.0, 0.0, 0.001, 0.01]);
-    let mut state = 0.0;
+    let mut state = [0.0; 3];
     for i in 0..200 {
         let now = moving(if i % 20 < 10 { 10.0 } else { 0.0 });
-        state = effect.next_state((&now, &now), state, 0.02);
-        assert!((0.0..=1.0).contains(&state), "{state}");
+        state = effect.next_states((&now, &now), state, 0.02);
+        assert!((0.0..=1.0).contains(&state[0]), "{state:?}");
     }
+}
+
+/// A reflex of the elbow with a latency: both directions beyond 0.5 rad/s.
+fn late(latency: f64) -> Effect<f64> {
+    of("stretch_reflex", &[2.0, 0.5, 0.0, latency])
+}
+
+/// Torques of an effect along speeds that are given at equal intervals.
+fn along(effect: &Effect<f64>, interval: f64, speeds: &[f64]) -> Vec<f64> {
+    let mut states = [0.0; 3];
+    let mut torques = vec![effect.torque(&moving(speeds[0]))];
+    for pair in speeds.windows(2) {
+        let (from, to) = (moving(pair[0]), moving(pair[1]));
+        states = effect.next_states((&from, &to), states, interval);
+        let memory = states;
+        torques.push(effect.torque(&Local { memory, ..to }));
+    }
+    torques
+}
+
+#[test]
+fn a_reflex_without_latency_acts_at_once_whatever_its_states() {
+    let mut random = Random(71);
+    for _ in 0..1000 {
+        let speed = random.uniform(-3.0, 3.0);
+        let local = Local {
+            memory: random.states(),
+            ..moving(speed)
+        };
+        for latency in [0.0, 0.0049] {
+            let reflex = late(latency);
+            let expected = 2.0 * ((speed - 0.5).max(0.0) - (-speed - 0.5).max(0.0));
+            assert_eq!(reflex.torque(&local).to_bits(), expected.to_bits());
+            assert_eq!(reflex.memory_rate(&local), [0.0; 3]);
+            assert!(!reflex.remembers());
+        }
+    }
+}
+
+#[test]
+fn a_late_reflex_resists_what_was_stretched_its_latency_before() {
+    let h = 2.5e-4;
+    for latency in [0.01, 0.03, 0.05, 0.1] {
+        let (reflex, at_once) = (late(latency), late(0.0));
+        // A stretch that begins at once: half of the torque is there after the latency.
+        let torques = along(&reflex, h, &[&[0.0][..], &[1.5; 1600]].concat());
+        let half = torques.iter().position(|&r| r > 1.0).unwrap() as f64 * h;
+        assert!((half - latency).abs() < 0.06 * latency, "{half}");
+        assert!((torques[1599] - 2.0).abs() < 1e-3, "{}", torques[1599]);
+        // Movements to and fro within a second: what acts at once, later, but for 7 % of what the torque grows by in one latency.
+        let speed = |t: f64| 1.5 * libm::sin(core::f64::consts::TAU * t);
+        let speeds: Vec<f64> = (0..8000).map(|i| speed(f64::from(i) * h)).collect();
+        let bound = 0.07 * latency * 2.0 * 1.5 * core::f64::consts::TAU;
+        let shift = (latency / h).round() as usize;
+        let exact = along(&at_once, h, &speeds);
+        let found = along(&reflex, h, &speeds);
+        for (now, then) in found[shift..].iter().zip(&exact) {
+            assert!((now - then).abs() < bound, "{latency} {now} {then}");
+        }
+    }
+}
+
+#[test]
+fn states_of_a_late_reflex_follow_in_long_and_short_intervals() {
+    let speed = |t: f64| 1.5 * libm::sin(5.0 * t);
+    let error = |rate: f64, latency: f64| -> f64 {
+        let of_rate = |rate: f64| -> Vec<f64> {
+            (0..(2.0 * rate) as u32)
+                .map(|i| speed(f64::from(i) / rate))
+                .collect()
+        };
+        let fine = along(&late(latency), 1e-4, &of_rate(1e4));
+        let own = along(&late(latency), 1.0 / rate, &of_rate(rate));
+        let every = (1e4 / rate) as usize;
+        let pairs = own.iter().zip(fine.iter().step_by(every));
+        pairs.fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()))
+    };
+    // Second order in the interval. Where the latency is an eighth of it: what the torque grows by in half an interval.
+    let (coarse, fine) = (error(50.0, 0.04), error(200.0, 0.04));
+    assert!(coarse < 0.03, "{coarse}");
+    assert!(fine < coarse / 5.0, "{fine} {coarse}");
+    assert!(
+        error(25.0, 0.005) < 0.02 * 2.0 * 1.5 * 5.0,
+        "{}",
+        error(25.0, 0.005)
+    );
 }

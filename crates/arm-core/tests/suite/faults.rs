@@ -53,7 +53,7 @@ fn sample(arm: &Arm, k: i32, random: &mut Random) -> Sample<f64, 3> {
         force_on_arm: [0.0; 2],
         moment_on_arm: 0.0,
     };
-    let (rows, _) = arm.needed(&motion, &[0.0; 9], &nothing);
+    let (rows, _) = arm.needed(&motion, &[[0.0; 3]; 9], &nothing);
     let noise = Joints::from_fn(|_, _| random.uniform(-0.035, 0.035));
     Sample {
         q: motion.q,
@@ -282,7 +282,7 @@ fn two_hundred_faults_leave_the_torque_within_its_stated_bound() {
                     family.withheld += 1;
                     continue;
                 }
-                let rows = arm.carrying(&still, &[0.0; 9]);
+                let rows = arm.carrying(&still, &[[0.0; 3]; 9]);
                 let (needed, expected) = (rows.torque(&truth(&arm)), rows.torque(&means));
                 for j in 0..3 {
                     let error = (carry.torque[j] - needed[j]).abs();

@@ -1,6 +1,6 @@
 //! Many side by side are each alone: every kernel in lanes has the bits of the same run in `f64`.
 
-use arm_core::effect::{Effect, KINDS, Motion, resisting_torque};
+use arm_core::effect::{Effect, KINDS, Motion, States, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Lanes, Load, Pose, Reading, Scalar, Segment, Setup, forward_dynamics,
     inverse_dynamics,
@@ -102,7 +102,7 @@ fn effects<const L: usize>(seed: u64) {
         for _ in 0..50 {
             let all: [Effect<f64>; L] = core::array::from_fn(|_| random.effect(kind, 1));
             let motions: [Motion<f64, 3>; L] = core::array::from_fn(|_| random.motion());
-            let memory: [f64; L] = core::array::from_fn(|_| random.uniform(0.0, 1.0));
+            let memory: [States<f64>; L] = core::array::from_fn(|_| random.states());
             let effect = Effect {
                 kind,
                 index: 1,
@@ -116,7 +116,7 @@ fn effects<const L: usize>(seed: u64) {
                 qdd: joints(&motions.map(|m| m.qdd)),
                 joint_force: core::array::from_fn(|i| wide(|lane| motions[lane].joint_force[i])),
             };
-            let state = Lanes(memory);
+            let state = core::array::from_fn(|k| wide(|lane| memory[lane][k]));
             let torque = resisting_torque(&[effect], &motion, &[state]);
             let local = motion.local(1, state);
             let (gradient, rate) = (effect.gradient(&local), effect.memory_rate(&local));
@@ -129,7 +129,9 @@ fn effects<const L: usize>(seed: u64) {
                 for (g, a) in gradient.iter().zip(all[lane].gradient(&local)) {
                     same(*g, lane, a);
                 }
-                same(rate, lane, all[lane].memory_rate(&local));
+                for (r, a) in rate.iter().zip(all[lane].memory_rate(&local)) {
+                    same(*r, lane, a);
+                }
             }
             rig(&effect, &all, &mut random);
         }

@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
+use arm_core::effect::{Effect, Kind, Motion, States, resisting_torque};
 use arm_core::estimator::{Decision, Estimator, Fault, Sample, SampleStatus, Settings};
 use arm_core::{
     Compensation, Equation, Invalid, Joints, Measured, Pose, Prior, gravity, inverse_dynamics,
@@ -41,8 +41,8 @@ fn truth(equation: &Equation<f64, 3, 18, 10>) -> [f64; 18] {
     equation.priors(0.1).map(|p| p.mean)
 }
 
-fn memory() -> [f64; 10] {
-    from_fn(|i| 0.03 * i as f64)
+fn memory() -> [States<f64>; 10] {
+    from_fn(|i| from_fn(|k| 0.03 * (i + k) as f64))
 }
 
 #[test]
@@ -115,7 +115,7 @@ fn sample(equation: &Equation<f64, 3, 18, 10>, t: f64) -> Sample<f64, 3> {
         force_on_arm: [0.0; 2],
         moment_on_arm: 0.0,
     };
-    let (rows, _) = equation.needed(&motion, &[0.0; 10], &nothing);
+    let (rows, _) = equation.needed(&motion, &[[0.0; 3]; 10], &nothing);
     Sample {
         q: motion.q,
         lead: None,
@@ -177,7 +177,7 @@ fn exact_data_give_the_truth_from_a_wrong_start() {
     let still = Motion::new(0.0, [-0.7, 1.1, 0.2].into(), [0.0; 3].into());
     let carry = online.carry(&still);
     let needed = equation
-        .carrying(&still, &[0.0; 10])
+        .carrying(&still, &[[0.0; 3]; 10])
         .torque(&truth(&equation));
     for j in 0..3 {
         assert!(
@@ -334,11 +334,11 @@ fn the_error_of_the_carrying_torque_follows_from_the_covariance() {
     covariance[1][1] = 1e-4;
     let carry = Compensation::new(equation, values, &covariance).expect("a covariance");
     let level = Motion::new(0.0, [0.0; 3].into(), [0.0; 3].into());
-    let found = carry.carry(&level, &[0.0; 10]);
+    let found = carry.carry(&level, &[[0.0; 3]; 10]);
     assert!((found.sd[0] - 0.0981).abs() < 1e-9 && (found.sd[1] - 0.0981).abs() < 1e-9);
     assert_eq!(found.sd[2], 0.0);
     let expected = gravity(equation.chain(), &Pose::new(&level.q))
-        + resisting_torque(equation.effects(), &level, &[0.0; 10]);
+        + resisting_torque(equation.effects(), &level, &[[0.0; 3]; 10]);
     assert!((found.torque - expected).norm() < 1e-12);
     covariance[0][0] = -1.0;
     assert!(Compensation::new(equation, values, &covariance).is_err());

@@ -1,6 +1,6 @@
 //! States that no arm can have had, and values that no number can hold.
 
-use arm_cosim::{ArmSpec, Slave, SlaveState, Status};
+use arm_cosim::{ArmSpec, EffectSpec, Slave, SlaveState, Status};
 
 fn ready() -> Slave {
     let mut arm = Slave::new(ArmSpec::sample()).unwrap();
@@ -62,4 +62,54 @@ fn an_output_beyond_all_numbers_is_not_given() {
     arm.set(&[handle], &[0.5]).unwrap();
     arm.get(&[force], &mut [0.0]).unwrap();
     arm.do_step(0.0, 0.01).unwrap();
+}
+
+/// The sample with a reflex of the elbow.
+fn reflexive(latency: f64) -> ArmSpec {
+    let mut spec = ArmSpec::sample();
+    spec.effects.push(EffectSpec {
+        kind: "stretch_reflex".to_owned(),
+        index: 1,
+        values: vec![0.5, 0.1, 0.0, latency],
+    });
+    spec
+}
+
+#[test]
+fn a_saved_state_holds_what_a_late_reflex_felt() {
+    let mut arm = Slave::new(reflexive(0.04)).unwrap();
+    arm.enter_initialization_mode(0.0, None).unwrap();
+    arm.exit_initialization_mode().unwrap();
+    arm.do_step(0.0, 0.1).unwrap();
+    let saved = arm.state().to_bytes();
+    arm.do_step(0.1, 0.1).unwrap();
+    let there = angles(&mut arm);
+    let state = SlaveState::from_bytes(&saved).unwrap();
+    arm.set_state(&state).unwrap();
+    arm.do_step(0.1, 0.1).unwrap();
+    assert_eq!(angles(&mut arm), there);
+    // Its three states are among the numbers: without them the arm goes elsewhere.
+    let words = [6, 5, 4].map(|word| {
+        let at = saved.len() - 8 - 8 * word;
+        f64::from_le_bytes(saved[at..at + 8].try_into().unwrap())
+    });
+    assert!(words.iter().all(|state| state.abs() > 1e-3), "{words:?}");
+}
+
+#[test]
+fn a_reflex_is_offered_for_model_exchange_while_it_acts_at_once() {
+    let refused = Slave::for_exchange(reflexive(0.04)).err().unwrap();
+    assert!(
+        refused.message.contains("stretch_reflex carries a state"),
+        "{refused}"
+    );
+    let mut arm = Slave::for_exchange(reflexive(0.0)).unwrap();
+    let latency = arm.reference("effect[3].latency").unwrap();
+    arm.enter_initialization_mode(0.0, None).unwrap();
+    arm.set(&[latency], &[0.04]).unwrap();
+    let refused = arm.exit_initialization_mode().unwrap_err();
+    assert!(
+        refused.message.contains("stretch_reflex carries a state"),
+        "{refused}"
+    );
 }

@@ -1,7 +1,8 @@
 //! The questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
 
 use arm_core::effect::{
-    Effect, Kind, Local, Motion, Nature, Place, Question, Values, advance_states, resisting_torque,
+    Effect, Kind, Local, MAX_STATES, Motion, Nature, Place, Question, Values, advance_states,
+    resisting_torque,
 };
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 use arm_numerics::statistics::extent::extent;
@@ -143,7 +144,7 @@ impl Candidate {
             step: question.step,
             price: 0.0,
             spread: 1.0,
-            expected: typical(prepared.session, &effect),
+            expected: expected(prepared.session, &effect, question),
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(&motions(prepared, point), &candidate)?;
@@ -384,20 +385,19 @@ pub fn price(width: usize, tried: usize, rows: usize) -> f64 {
     THRESHOLD + width as f64 * libm::log(rows as f64) + 2.0 * libm::log(tried as f64)
 }
 
-/// What is known of the first number of an effect in a joint beforehand, by the weight that the joint bears.
-fn typical<const N: usize>(session: &Session<N>, effect: &Effect<f64>) -> Vec<Free> {
+/// What is known of the numbers of an effect beforehand: of the first one in a joint by the weight that the joint bears, and of shapes
+/// what the question says.
+fn expected<const N: usize>(
+    session: &Session<N>,
+    effect: &Effect<f64>,
+    question: &Question,
+) -> Vec<Free> {
     let typical = effect.kind.probe().typical;
-    if typical == 0.0 || effect.kind.info().place != Place::Joint {
-        return Vec::new();
-    }
-    let sd = typical * session.weight_moment(effect.index.min(N - 1));
-    vec![Free {
-        parameter: 0,
-        mean: 0.0,
-        sd,
-        lower: 0.0,
-        step: 0.0,
-    }]
+    let in_joint = typical != 0.0 && effect.kind.info().place == Place::Joint;
+    let size = in_joint.then(|| typical * session.weight_moment(effect.index.min(N - 1)));
+    let size = size.map(|sd| (0, [0.0, sd]));
+    let shapes = question.expected.iter().copied();
+    size.into_iter().chain(shapes).map(Free::expected).collect()
 }
 
 /// Where a kind may act in a session.
@@ -433,7 +433,7 @@ fn holds_at_rest(kind: Kind) -> bool {
         qdd: 1.0,
         proximal_q: 0.5,
         joint_force: 1.0,
-        memory: 1.0,
+        memory: [1.0; MAX_STATES],
     };
     let gradient = effect.gradient(&starting);
     let free = kind.probe().questions.iter().flat_map(|q| q.free);
@@ -558,7 +558,7 @@ fn ask<const N: usize>(
             step: question.step,
             price: 0.0,
             spread: 1.0,
-            expected: typical(session, &effect),
+            expected: expected(session, &effect, question),
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(movements, &candidate)?;
@@ -577,7 +577,7 @@ fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate)
     for movement in movements {
         let mut square = 0.0;
         let effect = candidate.unit(0, 1.0);
-        let mut memory = [0.0];
+        let mut memory = [[0.0; MAX_STATES]];
         let mut before: Option<&Motion<f64, N>> = None;
         for at in &movement.motion {
             if let Some(from) = before.replace(at) {

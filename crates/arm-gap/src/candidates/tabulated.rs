@@ -190,7 +190,7 @@ impl OwnLaw for Tabulated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use arm_core::effect::{Parameter, Place};
+    use arm_core::effect::{MAX_STATES, Parameter, Place};
 
     const INFO: Info = Info {
         kind: "spring and drag",
@@ -203,7 +203,7 @@ mod tests {
             Parameter::linear("d", "N m s²/rad²", -1.0, 1.0, 0.0),
             Parameter::shape("p", "rad", 0.01, 1.0, 0.2),
         ],
-        memory: false,
+        states: 0,
     };
     const GRID: Grid = Grid {
         angle: [-2.0, 2.0],
@@ -238,7 +238,7 @@ mod tests {
             qdd: 0.0,
             proximal_q: 0.0,
             joint_force: 0.0,
-            memory: 0.0,
+            memory: [0.0; MAX_STATES],
         }
     }
 

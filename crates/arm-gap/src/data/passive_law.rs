@@ -27,3 +27,16 @@ pub struct Free {
     /// A change that is small and yet seen.
     pub step: f64,
 }
+
+impl Free {
+    /// What is expected of a parameter: its position, value and standard deviation.
+    pub fn expected((parameter, [mean, sd]): (usize, [f64; 2])) -> Self {
+        Self {
+            parameter,
+            mean,
+            sd,
+            lower: 0.0,
+            step: 0.0,
+        }
+    }
+}

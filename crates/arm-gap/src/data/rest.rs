@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use arm_core::effect::{Local, Place};
+use arm_core::effect::{Local, MAX_STATES, Place};
 use arm_core::{Pose, jacobian};
 
 use crate::data::prepared_session::{PreparedSession, Rest};
@@ -132,7 +132,7 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
                 qdd: 0.0,
                 proximal_q: 0.0,
                 joint_force: 1.0,
-                memory: 0.0,
+                memory: [0.0; MAX_STATES],
             };
             0.5 * (effect.torque(&local)
                 - effect.torque(&Local {

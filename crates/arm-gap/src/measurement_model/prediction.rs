@@ -1,7 +1,7 @@
 //! What the channels would read if a hypothesis were true.
 
 use arm_core::effect::{
-    Effect, Motion, Place, advance_states, resisting_besides_dry, resisting_torque,
+    Effect, MAX_STATES, Motion, Place, advance_states, resisting_besides_dry, resisting_torque,
 };
 use arm_core::{Joints, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque};
 use arm_ident::regression::kinematics::Kinematics;
@@ -352,7 +352,7 @@ impl<const N: usize> Session<N> {
         let effects = hypothesis.effects();
         let chain = self.rig(hypothesis)?.chain()?;
         let offset = offsets(&effects);
-        let mut states = vec![0.0; effects.len()];
+        let mut states = vec![[0.0; MAX_STATES]; effects.len()];
         let mut before: Option<Motion<f64, N>> = None;
         let mut channels = vec![Vec::with_capacity(course.times.len()); N];
         for (i, &time) in course.times.iter().enumerate() {

@@ -3,7 +3,7 @@
 //! The scheme of the linearised run with a nonlinear equation in every step. What it gives is the run itself and, on top, what two
 //! coarse solutions differ by, so that their common error drops out.
 
-use arm_core::effect::{advance_states, any_state};
+use arm_core::effect::{MAX_STATES, States, advance_states, any_state};
 use arm_core::{Joints, Plane};
 use arm_sim::{Change, SimulationError};
 use nalgebra::SMatrix;
@@ -58,7 +58,8 @@ impl<const N: usize> Linear<'_, N> {
         const LOST: f64 = 1.0;
         let h = self.step;
         let remembers = any_state(&plant.resisting);
-        let mut memory = vec![0.0; if remembers { plant.resisting.len() } else { 0 }];
+        let count = if remembers { plant.resisting.len() } else { 0 };
+        let mut memory = vec![[0.0; MAX_STATES]; count];
         let mut out = Vec::with_capacity(self.states.len());
         let mut follower = Follower::new(self, plant);
         let mut before = self.states[0];
@@ -68,7 +69,7 @@ impl<const N: usize> Linear<'_, N> {
                 follower.start(*hand, start, &memory)?
             } else {
                 let instant = follower.instant(i);
-                let carry = |to: &State<N>, memory: &mut Vec<f64>| {
+                let carry = |to: &State<N>, memory: &mut Vec<States<f64>>| {
                     let motions = (&before.motion(), &to.motion());
                     advance_states(&plant.resisting, motions, memory, h);
                 };
@@ -166,7 +167,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         &mut self,
         hand: Hand,
         (near, friction): (&Joints<f64, N>, &Joints<f64, N>),
-        memory: &[f64],
+        memory: &[States<f64>],
     ) -> Option<Balance<N>> {
         let (line, zero) = (self.line, Joints::zeros());
         let (state, error) = (&line.states[0], line.error(0));
@@ -225,7 +226,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         &mut self,
         instant: &Instant<N>,
         hand: Hand,
-        memory: &[f64],
+        memory: &[States<f64>],
     ) -> Option<(Balance<N>, bool)> {
         let (line, plant) = (self.line, self.plant);
         let Instant { i, reach, .. } = *instant;

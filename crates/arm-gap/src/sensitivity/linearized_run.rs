@@ -4,7 +4,7 @@
 //! arm answers it as a linear system with coefficients that follow the run ([`Slopes`]). A joint that set-valued friction holds in the
 //! run does not answer, and one that slips does so against its friction. A hundred candidates cost less than one simulation each.
 
-use arm_core::effect::{advance_states, any_state};
+use arm_core::effect::{MAX_STATES, States, advance_states, any_state};
 use arm_core::{Joints, Plane, Reading, Setup};
 use arm_sim::{Change, SimulationError, Slopes};
 use nalgebra::SMatrix;
@@ -166,11 +166,11 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 
     /// The states of effects that have one, along the run; nothing where none has.
-    fn memories(&self, plant: &Plant<N>) -> Vec<Vec<f64>> {
+    fn memories(&self, plant: &Plant<N>) -> Vec<Vec<States<f64>>> {
         if !any_state(&plant.resisting) {
             return Vec::new();
         }
-        let mut now = vec![0.0; plant.resisting.len()];
+        let mut now = vec![[0.0; MAX_STATES]; plant.resisting.len()];
         let motion = |state: &State<N>| state.motion();
         let mut out = Vec::with_capacity(self.states.len());
         for (i, state) in self.states.iter().enumerate() {
@@ -188,7 +188,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         out
     }
 
-    fn differentiate(&mut self, plant: &Plant<N>, i: usize, memory: &[f64]) {
+    fn differentiate(&mut self, plant: &Plant<N>, i: usize, memory: &[States<f64>]) {
         let (state, hand) = (self.states[i], self.hands[i]);
         let middle = balance(plant, &state, hand, memory);
         let way = Joints::from_fn(|j, _| Mode::of(state.qd[j]).way());

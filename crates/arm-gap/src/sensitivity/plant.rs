@@ -1,6 +1,6 @@
 //! The equation of motion of a led arm at one instant: what is left over of it, and the force that moves the arm.
 
-use arm_core::effect::{Effect, Motion, Place, dry_friction, resisting_besides_dry};
+use arm_core::effect::{Effect, Motion, Place, States, dry_friction, resisting_besides_dry};
 use arm_core::{
     Chain, Contact, Joints, Placement, Plane, Pose, Scalar, Setup, inverse_dynamics, jacobian,
     joint_force, static_torque, tip,
@@ -65,7 +65,7 @@ impl<const N: usize> Plant<N> {
     }
 
     /// Most that the set-valued dry friction of each joint can resist with \[N m\].
-    pub fn friction(&self, motion: &Motion<f64, N>, memory: &[f64]) -> Joints<f64, N> {
+    pub fn friction(&self, motion: &Motion<f64, N>, memory: &[States<f64>]) -> Joints<f64, N> {
         match self.dry {
             true => Joints::from(dry_friction(&self.resisting, motion, memory)),
             false => Joints::zeros(),
@@ -76,7 +76,7 @@ impl<const N: usize> Plant<N> {
     pub fn resisted(
         &self,
         motion: &Motion<f64, N>,
-        memory: &[f64],
+        memory: &[States<f64>],
         way: &Joints<f64, N>,
     ) -> Joints<f64, N> {
         resisting_besides_dry(&self.resisting, motion, memory)
@@ -145,7 +145,7 @@ pub(super) fn balance<const N: usize>(
     plant: &Plant<N>,
     state: &State<N>,
     hand: Hand,
-    memory: &[f64],
+    memory: &[States<f64>],
 ) -> Balance<N> {
     let pose = Pose::new(&state.q);
     let (at, rate) = plant.handle(state.time, hand);

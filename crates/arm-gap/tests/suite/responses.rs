@@ -24,6 +24,11 @@ fn linearised_responses_are_those_of_the_simulation() {
         hypothesis.named.push(effect);
         hypothesis
     };
+    let late = |gain: f64| -> Hypothesis<2> {
+        let mut hypothesis = named("stretch_reflex", 1);
+        hypothesis.named[0] = hypothesis.named[0].with(&[gain, 0.1, 0.0, 0.04]);
+        hypothesis
+    };
     let plain = session.given();
     let first = Target::Named(0, 0);
     let cases = [
@@ -35,6 +40,8 @@ fn linearised_responses_are_those_of_the_simulation() {
         (named("constant_moment", 0), first, 0.05),
         (named("elastic", 1), first, 0.05),
         (named("relaxation", 1), first, 0.05),
+        (late(0.0), first, 0.05),
+        (late(0.5), Target::Named(0, 3), 2e-3),
         (named("added_mass", 0), first, 0.02),
         (named("segment_length", 1), first, 1e-3),
         (named("gravity_tilt", 0), first, 0.01),
@@ -102,6 +109,7 @@ fn a_changed_hypothesis_is_followed_as_it_is_simulated() {
         ("coulomb", 0, &[0.4]),
         ("thixotropy", 1, &[0.3]),
         ("relaxation", 1, &[2.0, 1.0]),
+        ("stretch_reflex", 1, &[0.5, 0.1, 0.0, 0.04]),
         ("contact_compliance", 0, &[1e-4, 1e-4]),
         ("backlash", 0, &[2e-3, 2e-3]),
         ("shoulder_motion", 0, &[0.01, 0.01]),

@@ -21,6 +21,26 @@ fn a_hidden_spring_is_named_and_nothing_else() {
 }
 
 #[test]
+fn a_late_reflex_is_named_with_its_latency() {
+    let reflex = Kind::named("stretch_reflex").expect("known");
+    let hidden = Effect::new(reflex, 1).with(&[0.8, 0.2, 1.0, 0.055]);
+    let session = session(&[hidden], (3e-4, 0.03));
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    let named = &finding.amended.hypothesis.named;
+    assert_eq!(named.len(), 1, "{named:?}");
+    assert_eq!((named[0].kind, named[0].index), (reflex, 1));
+    let [gain, threshold, direction, latency, ..] = named[0].parameters;
+    assert!(
+        (gain - 0.8).abs() < 0.08 && (threshold - 0.2).abs() < 0.03 && direction == 1.0,
+        "{named:?}"
+    );
+    // From 40 ms, where the search starts.
+    assert!((latency - 0.055).abs() < 0.005, "{named:?}");
+    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
+}
+
+#[test]
 fn nothing_is_named_where_nothing_is_hidden() {
     let session = session(&[], (1e-3, 0.1));
     let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");

@@ -11,7 +11,7 @@ use crate::regression::preprocessing::{Pieces, filtered};
 use crate::regression::rows::Rows;
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Imperfection, Moment, Source, Unknown};
-use arm_core::effect::{Motion, resisting_torque};
+use arm_core::effect::{MAX_STATES, Motion, resisting_torque};
 use arm_core::{Joints, Pose, gravity, joint_force, regressor, static_torque};
 use arm_numerics::signal::derivative::{first, second};
 
@@ -141,7 +141,7 @@ impl<'a, const N: usize> Building<'a, N> {
                     value
                 }
                 Source::Effect(e, p) | Source::RestTorque(e, p) => {
-                    gradient(&model.fitted[e], p, &at, 0.0)
+                    gradient(&model.fitted[e], p, &at, [0.0; MAX_STATES])
                 }
                 Source::Calibration(what @ Imperfection::NeglectedInertia) => {
                     of_calibration(kept, trial, &self.moving, (&predicted, memory, i), what)

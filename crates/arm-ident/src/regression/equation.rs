@@ -9,7 +9,7 @@ use crate::regression::kinematics::Kinematics;
 use crate::regression::rows::Rows;
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Moment, Source, Unknown, spring};
-use arm_core::effect::{Effect, Motion, resisting_torque};
+use arm_core::effect::{Effect, Motion, States, resisting_torque};
 use arm_core::{Chain, Joints, Pose, inverse_dynamics, joint_force, regressor, static_torque};
 
 /// The rows of a trial, built a stretch after another.
@@ -162,7 +162,7 @@ pub(crate) fn gradient<const N: usize>(
     effect: &Effect<f64>,
     p: usize,
     motion: &Motion<f64, N>,
-    memory: f64,
+    memory: States<f64>,
 ) -> Joints<f64, N> {
     let mut column = Joints::zeros();
     if effect.index < N {

@@ -1,12 +1,12 @@
 //! States of effects that have one, along a measured or simulated motion.
 
 use crate::regression::trial::Model;
-use arm_core::effect::{Effect, Motion, advance_states};
+use arm_core::effect::{Effect, MAX_STATES, Motion, States, advance_states};
 
 /// The states of a model's effects, sample after sample; zero at the first.
 pub(crate) struct InternalStates<const N: usize> {
-    pub(crate) fitted: Vec<f64>,
-    pub(crate) held: Vec<f64>,
+    pub(crate) fitted: Vec<States<f64>>,
+    pub(crate) held: Vec<States<f64>>,
     effects: (Vec<Effect<f64>>, Vec<Effect<f64>>),
     /// Where the states stand.
     last: Option<Motion<f64, N>>,
@@ -15,8 +15,8 @@ pub(crate) struct InternalStates<const N: usize> {
 impl<const N: usize> InternalStates<N> {
     pub(crate) fn new(model: &Model<N>) -> Self {
         Self {
-            fitted: vec![0.0; model.fitted.len()],
-            held: vec![0.0; model.held.len()],
+            fitted: vec![[0.0; MAX_STATES]; model.fitted.len()],
+            held: vec![[0.0; MAX_STATES]; model.held.len()],
             effects: (model.fitted.clone(), model.held.clone()),
             last: None,
         }

@@ -1,6 +1,6 @@
 //! Trials made without the code under test: smooth trajectories with analytic derivatives, torques by the core's inverse dynamics.
 
-use arm_core::effect::{Effect, Kind, Motion, resisting_torque};
+use arm_core::effect::{Effect, Kind, MAX_STATES, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Segment, inverse_dynamics, jacobian, static_torque,
 };
@@ -97,7 +97,7 @@ impl<const N: usize> Recipe<N> {
         } else {
             (qd, qdd)
         };
-        let states = vec![0.0; effects.len()];
+        let states = vec![[0.0; MAX_STATES]; effects.len()];
         inverse_dynamics(&self.truth, &Pose::new(&q), &speed, &acceleration)
             + resisting_torque(effects, &Motion::new(t, q, qd), &states)
     }

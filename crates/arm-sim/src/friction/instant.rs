@@ -1,6 +1,6 @@
 //! Dry friction at one instant: which joints stick, and what their friction is.
 
-use arm_core::effect::{Motion, dry_friction};
+use arm_core::effect::{Motion, States, dry_friction};
 use arm_core::{Joints, Plane, Pose, Resistance, Scalar};
 
 use super::gain::{newton, strongest};
@@ -76,7 +76,7 @@ pub(crate) fn at<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     moving: (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[f64],
+    memory: &[States<f64>],
 ) -> (Outcome<f64, N>, Option<Friction<f64, N>>) {
     if !model.has_dry {
         return (model.evaluate(input, moving.0, moving.1, memory), None);
@@ -109,7 +109,7 @@ pub(crate) fn modes<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[f64],
+    memory: &[States<f64>],
     ahead: Option<f64>,
 ) -> (Modes<N>, Solved<N>) {
     let led = matches!(model.link, Link::Rigid);
@@ -165,7 +165,7 @@ fn ambiguous<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[f64],
+    memory: &[States<f64>],
     (modes, solved): (&Modes<N>, &Solved<N>),
 ) -> Option<(usize, f64)> {
     let pose = Pose::new(q);
@@ -196,7 +196,7 @@ fn ambiguous<const N: usize>(
 fn slope<const N: usize>(
     model: &Model<f64, N>,
     motion: &Motion<f64, N>,
-    memory: &[f64],
+    memory: &[States<f64>],
     joint: usize,
 ) -> f64 {
     let change = 1e-3 * (1.0 + motion.joint_force[joint]);
@@ -213,7 +213,7 @@ pub(crate) fn growth<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[f64],
+    memory: &[States<f64>],
     modes: &Modes<N>,
 ) -> f64 {
     /// A change of speed in which friction hardly bends \[rad/s\].
@@ -241,7 +241,7 @@ pub(crate) fn solve<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[f64],
+    memory: &[States<f64>],
     (modes, ahead): (&Modes<N>, Option<f64>),
 ) -> Solved<N> {
     let pose = Pose::new(q);
@@ -451,7 +451,7 @@ struct Rubbing<'a, const N: usize> {
     modes: &'a Modes<N>,
     /// Speeds that joints lose in a second, where they are to rest after a time \[rad/s²\].
     wanted: Joints<f64, N>,
-    memory: &'a [f64],
+    memory: &'a [States<f64>],
 }
 
 /// What follows with friction.

@@ -6,7 +6,7 @@
 
 use core::array::from_fn;
 
-use arm_core::effect::{Motion, dry_friction};
+use arm_core::effect::{MAX_STATES, Motion, States, dry_friction};
 use arm_core::{Contact, Joints, Plane, Pose, joint_force};
 
 use super::settings::RapierSettings;
@@ -34,9 +34,9 @@ pub(super) struct Arm<'a, const N: usize> {
     /// What the joints did in the step before.
     reaction: Reaction<N>,
     /// States of the effects.
-    pub memory: Vec<f64>,
-    rates: Vec<f64>,
-    middle: Vec<f64>,
+    pub memory: Vec<States<f64>>,
+    rates: Vec<States<f64>>,
+    middle: Vec<States<f64>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +66,7 @@ impl<'a, const N: usize> Arm<'a, N> {
     ) -> Result<Self, SimulationError> {
         let (model, dt) = (&prepared.model, prepared.schedule.dt);
         let (q, qd) = prepared.start;
-        let memory = vec![0.0; model.effects.len()];
+        let memory = vec![[0.0; MAX_STATES]; model.effects.len()];
         let input = prepared.input(0.0);
         // How a motion begins is, besides the laws of the effects, all that the engines share.
         let (first, _) = friction::at(model, &input, (&q, &qd), &memory);
@@ -254,11 +254,13 @@ impl<'a, const N: usize> Arm<'a, N> {
         };
         let (memory, rates) = (&mut self.memory, &mut self.rates);
         self.model.memory_rates(&start, memory, rates);
-        for (middle, (state, rate)) in self.middle.iter_mut().zip(memory.iter().zip(&*rates)) {
+        let from = memory.as_flattened().iter().zip(rates.as_flattened());
+        for (middle, (state, rate)) in self.middle.as_flattened_mut().iter_mut().zip(from) {
             *middle = state + 0.5 * self.dt * rate;
         }
         self.model.memory_rates(&sample.middle, &self.middle, rates);
-        for (state, rate) in memory.iter_mut().zip(&*rates) {
+        let rates = rates.as_flattened();
+        for (state, rate) in memory.as_flattened_mut().iter_mut().zip(rates) {
             *state += self.dt * rate;
         }
     }

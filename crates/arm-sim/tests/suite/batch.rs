@@ -47,6 +47,23 @@ fn same_bits(experiments: &[Experiment<3>], threads: usize) {
 }
 
 #[test]
+fn reflexes_that_are_late_and_at_once_run_side_by_side() {
+    for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4] {
+        let mut runs = perturbed(&smooth(0.25), 8);
+        for (i, run) in runs.iter_mut().enumerate() {
+            run.integrator = integrator;
+            let latency = 0.02 * (i % 4) as f64;
+            let reflex = Effect::new(Kind::StretchReflex, 1).with(&[0.8, 0.02, 0.0, latency]);
+            run.effects = vec![reflex];
+        }
+        same_bits(&runs, 1);
+        // The last of three states has the excess itself for its goal; all of an early one stay zero.
+        let [early, late] = [&runs[0], &runs[3]].map(|run| simulate(run).unwrap().memory);
+        assert!(early.iter().all(|state| *state == 0.0) && late.iter().any(|s| s.abs() > 0.01));
+    }
+}
+
+#[test]
 fn lanes_have_the_bits_of_single_runs() {
     for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4] {
         let mut base = smooth(0.25);

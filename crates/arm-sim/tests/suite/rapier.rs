@@ -201,6 +201,14 @@ fn effects_with_states_and_over_two_joints_agree() {
     assert!(memory < 5e-5, "states differ by {memory}");
 }
 
+#[test]
+fn a_late_reflex_agrees() {
+    let mut experiment = free_swing();
+    let reflex = Effect::new(Kind::StretchReflex, 1).with(&[0.5, 0.5, 0.0, 0.04]);
+    experiment.effects = vec![Effect::new(Kind::Viscous, 0).with(&[0.2]), reflex];
+    assert_below(difference(&experiment, 0.25e-3), [5e-5, 5e-4, 1e-12]);
+}
+
 /// Friction under load changes the force that makes it: both engines must find the same balance, also where it is strong.
 #[test]
 fn friction_under_load_agrees() {

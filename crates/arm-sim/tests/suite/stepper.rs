@@ -16,6 +16,9 @@ fn rig() -> Experiment<3> {
     let mut experiment = models::reference().unwrap();
     experiment.duration = 0.6;
     experiment.output_interval = None;
+    // One with several states.
+    let reflex = Effect::new(Kind::StretchReflex, 1).with(&[0.3, 0.2, 0.0, 0.04]);
+    experiment.effects.push(reflex);
     experiment
 }
 
@@ -60,7 +63,11 @@ fn both_ports_have_the_bits_of_a_run() {
             let end = arm.snapshot();
             assert_eq!(bits(end.q.as_slice()), bits(&run.q[3 * last..]));
             assert_eq!(bits(end.qd.as_slice()), bits(&run.qd[3 * last..]));
-            assert_eq!(end.memory, run.memory[end.memory.len() * last..]);
+            let states = end.memory.iter().zip(&run.effects);
+            let states: Vec<f64> = states
+                .flat_map(|(own, (kind, _))| own[..kind.info().states.max(1)].to_vec())
+                .collect();
+            assert_eq!(states, run.memory[run.memories() * last..]);
             assert_eq!(end.work[2], run.work.resisted[last]);
             assert_eq!(arm.time(), run.time[last]);
             let energy = arm.energy(&outside);
