@@ -150,7 +150,7 @@ def _of_muscle(kind: str, j: int, size: float, signed: float, fitted: list[tuple
         case "stretch_reflex":
             threshold, late = within(random, 0.15, 0.35), within(random, 0.03, 0.05)
             direction = math.copysign(1.0, signed)
-            parameters = {"gain": (size, False), "threshold": (threshold, False), "direction": (direction, False)}
+            parameters = {"gain": (size, False), "threshold": (threshold, False), "direction": (direction, False), "latency": (late, False)}
             return Hidden(kind, parameters, j, motor=lambda _: Reflex(j, size, threshold, direction, late))
         case "tremor":
             hertz = within(random, 4.0, 8.0)

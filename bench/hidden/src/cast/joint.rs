@@ -117,7 +117,8 @@ fn muscle(
             let (direction, latency) = (random.sign(), random.within(0.03, 0.05));
             let values = Values::about("gain", size)
                 .and_about("threshold", threshold)
-                .and_about("direction", direction);
+                .and_about("direction", direction)
+                .and_about("latency", latency);
             (
                 Muscle::Reflex([size, threshold, direction, latency]),
                 values,

@@ -138,6 +138,8 @@ fn allowed(kind: &str, exact: bool) -> f64 {
         "coulomb" | "load_friction" => 0.2,
         "contact_damping" => 0.05,
         "tremor" => f64::INFINITY,
+        // An exact delay here, its approximant there.
+        "stretch_reflex" => 0.02,
         _ if exact => 0.02,
         _ => 0.5,
     }
