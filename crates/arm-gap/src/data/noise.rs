@@ -11,7 +11,7 @@ use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
 
 /// Highest order of the autoregressions.
-const ORDER: usize = 4;
+pub(crate) const ORDER: usize = 4;
 /// White noise of this share of a channel's range is always believed in: the path between samples, quantisation and the
 /// model's own simplifications are no better, however smooth the noise of the sensors is.
 const LEAST: f64 = 5e-4;

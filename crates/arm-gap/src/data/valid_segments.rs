@@ -5,12 +5,15 @@ use std::sync::Arc;
 use arm_core::Plane;
 use arm_ident::regression::trial::Trial;
 
+use crate::data::noise;
 use crate::measurement_model::prediction::{Channels, Course, away_from_gaps, margin};
 
 /// Samples kept for each period of the cutoff.
 const SAMPLES_PER_PERIOD: f64 = 2.5;
 /// Periods of the cutoff around rest, where dry friction holds a joint, that count as rest.
 const NEAR_REST: f64 = 0.6;
+/// Fewest samples that stand together: as many as the noise is remembered for. Fewer lie at the edge of rest on both sides.
+const SHORTEST: usize = noise::ORDER;
 /// Fewest samples of a trial that is compared.
 const FEWEST: usize = 8;
 
@@ -54,8 +57,11 @@ impl ValidSegments {
         let n = trial.len();
         let usable = |i: usize| sound[i] && left_out.get(i) != Some(&true);
         // On one grid for all trials, so that repeats have the same samples.
+        let grid: Vec<usize> = (0..n).step_by(step).collect();
+        let pieces = grid.chunk_by(|&a, &b| usable(a) == usable(b));
+        let long = pieces.filter(|piece| usable(piece[0]) && piece.len() >= SHORTEST);
         Self {
-            samples: (0..n).step_by(step).filter(|&i| usable(i)).collect(),
+            samples: long.flatten().copied().collect(),
             step,
             observable,
         }

@@ -118,7 +118,7 @@ fn a_disturbance_is_left_out_from_a_fifth_before_to_half_a_second_after() {
 }
 
 #[test]
-fn between_gaps_a_sample_counts_that_filters_reach_from_neither() {
+fn between_gaps_four_samples_count_that_filters_reach_from_neither() {
     // Between two gaps of one sample; filters reach 1.5 periods of 5 Hz, 15 samples, and every fourth sample is compared.
     let kept = |between: usize| {
         let mut session = quiet();
@@ -128,8 +128,8 @@ fn between_gaps_a_sample_counts_that_filters_reach_from_neither() {
         let inside = |i: &usize| (41..41 + between).contains(i);
         prepared.valid_segments[0].samples().filter(inside).count()
     };
-    assert_eq!(kept(2 * 15), 0);
-    assert_eq!(kept(2 * 15 + 4), 1);
+    assert_eq!(kept(2 * 15 + 4 * 3), 0);
+    assert_eq!(kept(2 * 15 + 4 * 4), 4);
     assert_eq!(kept(2 * 15 + 4 * 8), 8);
 }
 
