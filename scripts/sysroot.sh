@@ -9,7 +9,9 @@ rustc=/usr/bin/rustc
 source=$($rustc --print sysroot)/lib/rustlib/src/rust/library
 out=$root/lib/rustlib/$target/lib
 stamp=$root/made-by
-made_by="$($rustc --version) $*"
+crates=std,panic_abort made_by="$($rustc --version) $*"
+# Programs of tests run there, too.
+case $target in *-windows-*) crates+=,test made_by+=" with test" ;; esac
 [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$made_by" ] && exit 0
 rm -rf "$root"
 mkdir -p "$out"
@@ -31,7 +33,7 @@ case $target in
   printf '[package]\nname = "empty"\nversion = "0.0.0"\nedition = "2021"\n' >"$work/Cargo.toml"
   touch "$work/src/lib.rs"
   (cd "$work" && PATH=/usr/bin:/bin CARGO_HOME=$work/home CARGO_TARGET_DIR=$work/target cargo build --quiet --release --offline \
-    -Zbuild-std=std,panic_abort --target "$target" \
+    -Zbuild-std=$crates --target "$target" \
     --config 'source.crates-io.replace-with="vendored"' --config "source.vendored.directory=\"$source/vendor\"")
   cp "$work/target/$target/release/deps/"*.rlib "$out/"
   case $target in

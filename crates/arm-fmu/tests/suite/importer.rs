@@ -62,8 +62,10 @@ impl Resources {
 
     /// An instance of FMI 2.0, without any callbacks.
     pub fn two(&self) -> Handle {
-        let encoded: String = self.folder.to_str().unwrap().bytes().map(encode).collect();
-        let uri = CString::new(format!("file://{encoded}")).unwrap();
+        // On Windows a path begins with a drive: C:\a is file:///C:/a.
+        let path = self.folder.to_str().unwrap().replace('\\', "/");
+        let encoded: String = path.trim_start_matches('/').bytes().map(encode).collect();
+        let uri = CString::new(format!("file:///{encoded}")).unwrap();
         unsafe {
             fmi2::fmi2Instantiate(
                 c"arm".as_ptr(),
