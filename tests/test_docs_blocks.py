@@ -53,14 +53,15 @@ def commands(page: Path) -> Iterator[list[str]]:
 
 
 def test_own_data_in_five_commands(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """And the clinician's page after them, with the norms that the page shows."""
+    """From a German spreadsheet that was saved as text; and the clinician's page after them, with the norms that the page shows."""
     session = demo.measure_two_speeds(demo.true_model())
     (folder / "recordings").mkdir()
     for number, trial in enumerate(session.trials):
-        names = "Time (s),Shoulder (deg),Elbow (deg),Fy (N),Fz (N)"
-        values = np.column_stack([trial.t, np.degrees(trial.q), -trial.force_on_arm])
+        names = "Zeit [ms];Ellbogen [°];Schulter [°];Kraft z [N];Kraft y [N];Bemerkung"
+        values = np.column_stack([1e3 * trial.t, np.degrees(trial.q[:, ::-1]), -trial.force_on_arm[:, ::-1]])
+        lines = [";".join(f"{x:.6f}".replace(".", ",") for x in row) + (";Start" if k == 0 else ";") for k, row in enumerate(values)]
         file = folder / "recordings" / f"{trial.configuration}_{number}.csv"
-        np.savetxt(file, values, delimiter=",", header=names, comments="", fmt="%.6f")
+        file.write_bytes("\r\n".join([names, *lines, ""]).encode("cp1252"))
     for language, name, content in blocks(DOCS / "own-data.md"):
         if language == "toml":
             (folder / name).write_text(content, encoding="utf-8")
