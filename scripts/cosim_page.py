@@ -22,13 +22,14 @@ def page() -> str:
     blocks = [
         "# Variables of the arm as a slave",
         "Generated from the core by `scripts/cosim_page.py`, for an arm of two joints with dry friction in both. "
-        "The same names and value references stand in FMI 2.0, in FMI 3.0 and in `armrs.cosim.Slave`; value references are those of one "
-        "arm and port, so take them from its description. [Co-simulation](cosim.md) says how they are used.",
-        "## Behind both ports",
+        "FMI 2.0, FMI 3.0 and `armrs.cosim.Slave` use the same names and value references. Value references depend on arm and port; "
+        "the model description of the FMU lists them. [Co-simulation](cosim.md) explains the use of the variables. "
+        '"Goes on with" a derivative means: extrapolated with it until the variable is set again.',
+        "## Both ports",
         table(v for name, v in force.items() if name in motion),
-        "## Behind the force port alone",
+        "## Force port only",
         table(v for name, v in force.items() if name not in motion),
-        "## Behind the motion port alone",
+        "## Motion port only",
         table(v for name, v in motion.items() if name not in force),
     ]
     return "\n\n".join(blocks) + "\n"
