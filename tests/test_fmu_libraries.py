@@ -58,7 +58,7 @@ def test_fmi_2_leaves_out_what_it_has_no_folder_for(
     assert cli.main(["fmu", "export", str(ARM), "--fmi", "2", "--library", str(folder)]) == 0
     places = sorted(name.split("/")[1] for name in inside(tmp_path / "arm.fmu") if name.startswith("binaries/"))
     assert places == ["darwin64", "linux64", "win64"]
-    assert "left out: aarch64-darwin, aarch64-linux, which FMI 2.0 has no folder for" in capsys.readouterr().err
+    assert "left out: aarch64-darwin, aarch64-linux, because FMI 2.0 has no folder for them" in capsys.readouterr().err
 
 
 def test_this_machine_s_own_library_is_always_there(folder: Path, tmp_path: Path) -> None:

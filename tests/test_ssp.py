@@ -153,7 +153,7 @@ def test_the_verbs(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
     assert cli.main(["fmu", "run", "verb.ssp", "-o", "out", "--duration", "0.1", "--no-estimate"]) == 0
     assert (folder / "out" / "coupled.csv").exists()
     assert cli.main(["fmu", "run", "arms.toml", "--step", "0.1"]) == 2
-    assert "step_s and duration_s in it" in capsys.readouterr().err
+    assert "step_s and duration_s in [system]" in capsys.readouterr().err
 
 
 def test_a_wall_has_no_place_in_an_archive(tmp_path: Path) -> None:
@@ -276,7 +276,7 @@ def test_what_is_not_taken_is_named(folder: Path, old: str, new: str, words: str
 
 
 def test_a_step_is_asked_for(folder: Path) -> None:
-    with pytest.raises(BadInput, match="SSP files have none of their own"):
+    with pytest.raises(BadInput, match="no annotation baseStepSize"):
         load_ssp(nested(folder))
 
 

@@ -17,14 +17,15 @@ if TYPE_CHECKING:
     from ..cosim.system import System
 
 Libraries = Annotated[
-    Path | None, typer.Option("--library", metavar="DIR", help="Libraries for several machines, such as DIR/x86_64-windows/arm_fmu.dll.")
+    Path | None,
+    typer.Option("--library", metavar="DIR", help="Libraries of several platforms, such as DIR/x86_64-windows/arm_fmu.dll."),
 ]
 Step = Annotated[float | None, typer.Option("--step", metavar="S", help="Communication step of an SSP system [s].")]
 Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Length of the run of an SSP system [s].")]
 
 File = Annotated[Path, typer.Argument(metavar="FILE.fmu", help="Any FMU of FMI 2.0 or 3.0.")]
 
-app = typer.Typer(name="fmu", help="Functional mock-up units: export the arm, look at a file, check it, couple several.")
+app = typer.Typer(name="fmu", help="Functional mock-up units (FMUs): export an arm; describe, check and couple FMUs of any tool.")
 
 
 class Port(str, enum.Enum):
@@ -41,21 +42,21 @@ class Fmi(str, enum.Enum):
     three = "3"
 
 
-@app.command("export", short_help="Export an arm as a unit for co-simulation.")
+@app.command("export", short_help="Export an arm as an FMU.")
 def fmu_export(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml")],
     out: OutFile = None,
     version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard: FMI 2.0 or 3.0.")] = Fmi.three,
-    port: Annotated[Port, typer.Option(help="Force on the arm in, or motion of the robot's handle in.")] = Port.force,
-    start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; zero when absent.")] = "",
+    port: Annotated[Port, typer.Option(help="Input: force on the arm [N], or motion of the robot's handle [m, m/s].")] = Port.force,
+    start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; 0 when absent.")] = "",
     rest: Annotated[bool, typer.Option("--rest", help="Start in equilibrium near these angles.")] = False,
     dt: Annotated[float, typer.Option(help="Inner step [s], above 0.")] = 0.25e-3,
     library: Libraries = None,
     json: JsonFile = None,
 ) -> None:
-    """Export an arm as a functional mock-up unit for co-simulation and Model Exchange: no compiler is needed.
+    """Export an arm as a functional mock-up unit (FMU) for co-simulation and Model Exchange; no compiler is needed.
 
-    The same model gives the same bytes. Personal values travel inside and are protected by the token of the description.
+    Exports of the same model are equal to the byte. The FMU contains the parameters of the arm, unencrypted; its token detects edits.
     """
     from ..cosim.slave import Slave
     from ..fmu.export import export_fmu
@@ -72,9 +73,9 @@ def fmu_export(
     written = export_fmu(slave, target, fmi=int(version.value), libraries=library)
     binaries, _, without = collected(int(version.value), library)
     if without:
-        console.warn([f"left out: {', '.join(without)}, which FMI 2.0 has no folder for; export with --fmi 3"])
+        console.warn([f"left out: {', '.join(without)}, because FMI 2.0 has no folder for them; export with --fmi 3"])
     if slave.left_out:
-        console.warn([f"left out, since they are in the sensors or the contact and not behind this port: {', '.join(slave.left_out)}"])
+        console.warn([f"left out, because they act in sensors or contact, outside this port: {', '.join(slave.left_out)}"])
     data = {
         "verb": "fmu export",
         "file": written,
@@ -87,12 +88,12 @@ def fmu_export(
     present(lambda: data, json, lambda: print(written))
 
 
-@app.command("info", short_help="Print what a unit says of itself.")
+@app.command("info", short_help="Print capabilities, variables and units of an FMU.")
 def fmu_info(
     file: File,
     json: JsonFile = None,
 ) -> None:
-    """Print what an FMU says of itself: capabilities, variables, units."""
+    """Print what the description of an FMU declares: capabilities, variables, units."""
     from ..fmu.info import about, info_words
 
     writable(None, json)
@@ -100,17 +101,17 @@ def fmu_info(
     present(lambda: data, json, lambda: info_words(data))
 
 
-@app.command("check", short_help="Check file, description and library of a unit.")
+@app.command("check", short_help="Check file, description and library of an FMU.")
 def fmu_check(
     file: File,
-    library: Annotated[bool, typer.Option(help="Try the library, which runs its native code with your rights.")] = True,
+    library: Annotated[bool, typer.Option(help="Load and try the library, which runs its native code with your rights.")] = True,
     json: JsonFile = None,
 ) -> int:
     """Check an FMU: file, description and library against the standard and against one another.
 
-    The library is loaded and tried in a process of its own, with limits of memory, output and time; on Linux it may write only to a
-    temporary folder. It is native code all the same: check files from strangers with --no-library first. Exit status 1 when something is
-    wrong.
+    The library runs in a separate process with limits on memory, output and time. On Linux 5.13 and later it may write only to its
+    temporary folder and to devices; it may read your files and use the network. Check files from strangers with --no-library first.
+    Exit status 1 if an error is found.
     """
     import dataclasses
 
@@ -130,7 +131,7 @@ def fmu_check(
     return 1 if wrong else 0
 
 
-@app.command("run", short_help="Couple arms, units of any tool, and walls.")
+@app.command("run", short_help="Couple arms, FMUs of any tool, and walls.")
 def fmu_run(
     context: typer.Context,
     system: Annotated[Path, typer.Argument(metavar="SYSTEM", help="SYSTEM.toml, or .ssp or .ssd of SSP 1.0: slaves, connections, step.")],
@@ -138,17 +139,17 @@ def fmu_run(
     step: Step = None,
     duration: Duration = None,
     to: SamplesFormat = None,
-    estimate: Annotated[bool, typer.Option(help="Run once more with half the step, and estimate the error.")] = True,
+    estimate: Annotated[bool, typer.Option(help="Estimate the error from a second run with half the step.")] = True,
     json: JsonFile = None,
 ) -> int:
-    """Couple arms, FMUs of any tool and walls, and say whether the numbers may be believed.
+    """Couple arms, FMUs of any tool and walls, and estimate the error of the coupling.
 
-    FMUs run their native code with your rights, each in a process of its own with limits of memory, output and time.
+    FMUs run their native code with your rights, each in a separate process with limits on memory, output and time.
 
-    The run is made again with half the step; it is good when the estimated error of everything that is connected, and of the angles of
-    arms, is within the accuracy. Exit status 1 when the run is no result: it is not accurate, diverged, the coupling creates energy, the
-    iteration did not converge, or a unit failed. Then only the diagnosis is written, and no samples. Also 1, with samples, when a unit
-    asks to end the run before its time, or the error cannot be estimated.
+    The error is estimated from a second run with half the step. A run is good if the estimated error of every connected output and of
+    every arm's angles is within the accuracy. Exit status 1, without samples, if the run is no result: it is not accurate, is not
+    resolved, or diverged; the coupling created energy; the iteration did not converge; or a slave failed. Exit status 1, with samples,
+    if a slave ended the run early or the error could not be estimated.
     """
     from ..cosim.accuracy import run_checked
     from ..cosim.master import RESULTS, run_system
@@ -179,17 +180,17 @@ def fmu_run(
     return 0 if run.verdict == "good" or (run.verdict == "stable" and not estimate) else 1
 
 
-@app.command("ssp", short_help="Write a system as an archive of SSP 1.0.")
+@app.command("ssp", short_help="Write a coupled system as an SSP 1.0 archive.")
 def fmu_ssp(
     system: Annotated[Path, typer.Argument(metavar="SYSTEM.toml", help="Slaves, connections, algorithm, step and duration.")],
     out: ArchiveFile = None,
-    version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard of exported arms.")] = Fmi.two,
+    version: Annotated[Fmi, typer.Option("--fmi", help="FMI version of the exported arms: 2.0 or 3.0.")] = Fmi.two,
     library: Libraries = None,
     json: JsonFile = None,
 ) -> None:
     """Write a system as an .ssp archive of SSP 1.0, for OMSimulator, libcosim, ecos, FMPy and others.
 
-    Arms are exported as FMUs, FMUs are taken along as they are; walls, signals and controllers have no place there and are refused.
+    Arms are exported as FMUs, FMUs are copied. Walls, signals and controllers are refused, because no other tool could run them.
     """
     from ..cosim.ssp_export import export_ssp
 
@@ -214,7 +215,7 @@ def _loaded(path: Path, step: float | None, duration: float | None) -> System:
     if path.suffix.lower() in (".ssp", ".ssd"):
         return load_ssp(path, step=step, duration=duration)
     if step is not None or duration is not None:
-        raise BadInput("--step, --duration", Text("with a TOML file"), "step_s and duration_s in it")
+        raise BadInput("--step, --duration", Text("with a TOML file"), "step_s and duration_s in [system]")
     return load_system(path)
 
 

@@ -46,26 +46,30 @@ class Side(str, enum.Enum):
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the data set; made when it does not exist.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the data set; created if it does not exist.")],
     body_mass: Annotated[float, typer.Option("--body-mass-kg", help="Body mass [kg].")],
     height: Annotated[float, typer.Option("--height-m", help="Height [m].")],
-    sex: Annotated[Sex, typer.Option(help="As the tables of the literature distinguish it.")],
+    sex: Annotated[Sex, typer.Option(help="Which table of the literature is used.")],
     lengths: Annotated[
         str,
         typer.Option(
-            "--lengths-m", metavar="L,L[,L]", help="Measured lengths of upper arm, forearm and hand [m]; ? is scaled with height."
+            "--lengths-m",
+            metavar="L,L[,L]",
+            help="Lengths of upper arm, forearm and hand [m], or of upper arm and elbow to handle; ? is scaled with height.",
         ),
     ] = "?,?,?",
     handle: Annotated[float, typer.Option("--handle-kg", help="Mass of the handle in the hand [kg].")] = 0.0,
     orthosis: Annotated[
-        str, typer.Option(metavar="SEGMENT:KG[@M],…", help="Masses worn on segments: number, mass [kg], place from the joint [m].")
+        str,
+        typer.Option(metavar="SEGMENT:KG[@M],…", help="Masses worn on segments: number, mass [kg], distance from its joint [m]."),
     ] = "",
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
     json: JsonFile = None,
 ) -> None:
     """Write a commented data set and model of a person from body mass, height, sex and lengths.
 
-    Masses, centres of mass and inertias come from the literature (de Leva 1996). Joint laws are left unknown: identify and gap find them.
+    Masses, centres of mass and inertias come from the literature (de Leva 1996). The model has no joint laws: identify and gap
+    determine stiffness, damping and friction.
     """
     from ..workflows.initialise import Worn, initialise
 
@@ -91,7 +95,7 @@ def _length(text: str) -> float | None:
     try:
         return float(text)
     except ValueError:
-        raise BadInput("--lengths-m", text, "a length in metres, or ? for one that is scaled with height") from None
+        raise BadInput("--lengths-m", text, "a length [m], or ? for a length scaled with body height") from None
 
 
 def _worn(text: str) -> Worn:
@@ -102,27 +106,29 @@ def _worn(text: str) -> Worn:
     try:
         return Worn(int(segment), float(mass), float(place) if at else None)
     except ValueError:
-        raise BadInput("--orthosis", text, "SEGMENT:KG or SEGMENT:KG@M, such as 2:0.35@0.12") from None
+        raise BadInput("--orthosis", text, "SEGMENT:KG or SEGMENT:KG@M in kg and m, such as 2:0.35@0.12") from None
 
 
 def import_(
-    sources: Annotated[list[Path], typer.Argument(metavar="RAW…", help="Recordings, folders of them, or one import.toml.")],
+    sources: Annotated[list[Path], typer.Argument(metavar="RAW…", help="Recordings, folders of recordings, or one import.toml.")],
     model: Annotated[Path, typer.Option(metavar="MODEL", help="model.toml of the arm, as armrs init writes it.")],
     out: OutFolder,
     columns: Annotated[
-        str, typer.Option("--map", metavar="t=NAME,q1=NAME,Fy=-NAME,…", help="Columns whose names do not say it; a minus turns the sign.")
+        str,
+        typer.Option("--map", metavar="t=NAME,q1=NAME,Fy=-NAME,…", help="Columns not recognised by name; a minus reverses the sign."),
     ] = "",
-    angles: Annotated[Reference | None, typer.Option(help="Angles against the segment before, or a fixed direction.")] = None,
-    zero: Annotated[Zero | None, typer.Option(help="Where the first segment points at zero.")] = None,
+    angles: Annotated[Reference | None, typer.Option(help="Angles relative to the previous segment, or to a fixed direction.")] = None,
+    zero: Annotated[Zero | None, typer.Option(help="Direction of the first segment at angle zero.")] = None,
     clockwise: Annotated[str | None, typer.Option(metavar="1,2,…|none", help="Joints whose angle is clockwise positive.")] = None,
-    force_on: Annotated[Side | None, typer.Option("--force-on", help="What the recorded force acts on.")] = None,
-    points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle.")] = "",
+    force_on: Annotated[Side | None, typer.Option("--force-on", help="Body on which the recorded force acts.")] = None,
+    points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the midpoint.")] = "",
     json: JsonFile = None,
 ) -> None:
-    """Turn own recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO, exports of Vicon, Qualisys, OptiTrack) into a data set.
+    """Convert recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO, exports of Vicon, Qualisys, OptiTrack) into a data set.
 
-    Separators, decimal commas, encodings, units and columns are recognised. How angles are counted and what the force acts on are read off
-    the balance of the arm, unless you say them. Every decision is printed and kept in import.toml, which repeats the import.
+    Separators, decimal commas, encodings, units and columns are recognised. The angle convention and the body on which the force acts
+    are inferred from the balance of the arm, unless options state them. Every decision is printed and saved in import.toml, which
+    repeats the import.
     """
     from ..io.dataset import load_dataset
     from ..report.recording import write_recording
@@ -148,17 +154,17 @@ def import_(
     def human() -> None:
         for note in done.notes:
             print(f"  {note}")
-        print("  (t is time, q1 … are the angles of the joints from the base on, Fy and Fz the force forward and upward)")
+        print("  (t: time; q1 …: joint angles, from the base on; Fy, Fz: force forward and upward)")
         count = len(done.recipe.trials)
         print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}.")
-        print(f"Look at {picture}: does the arm stand as it stood, and does the force carry it? Next: armrs check {done.folder}")
+        print(f"Look at {picture}: does the arm stand as in the laboratory, and does the force support it? Next: armrs check {done.folder}")
 
     present(done.to_dict, json, human)
 
 
 def _joint(text: str) -> int:
     if not text.isdigit():
-        raise BadInput("--clockwise", text, "numbers of joints, or none")
+        raise BadInput("--clockwise", text, "joint numbers such as 1,2, or none")
     return int(text)
 
 
@@ -189,9 +195,9 @@ def _asked(error: BadInput) -> str:
 
 
 def check(dataset: Source, json: JsonFile = None) -> int:
-    """Find every problem of a data set at once, and say what each verb will be able to tell.
+    """List every problem of a data set at once, and what each verb can determine from it.
 
-    Ends with 1 when something must be mended before a verb can use the data.
+    Exit status 1 if a problem prevents a verb from using the data.
     """
     from ..workflows.checking import check_dataset
 

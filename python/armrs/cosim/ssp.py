@@ -343,9 +343,9 @@ def _settings(root: ElementTree.Element, asked: tuple[float | None, float | None
         if step is None and base is not None:
             step = _number(base, "baseStepSize", None)
     if step is None:
-        raise BadInput("step", Text("nothing"), "a communication step: SSP files have none of their own, give --step")
+        raise BadInput("step", Text("nothing"), "a communication step: the file has no annotation baseStepSize, give --step")
     if duration is None:
-        raise BadInput("duration", Text("nothing"), "a length of the run: the file has no stopTime, give --duration")
+        raise BadInput("duration", Text("nothing"), "a duration: the file has no stopTime, give --duration")
     return found | {"step": step, "duration": duration}
 
 

@@ -173,11 +173,11 @@ def _is_led(dataset: Dataset) -> bool:
 
 def _abilities(dataset: Dataset, blocked: bool) -> tuple[Ability, ...]:
     if blocked:
-        return tuple(Ability(verb, False, "mend the errors above first") for verb in ("identify", "passive", "gap"))
+        return tuple(Ability(verb, False, "correct the errors above first") for verb in ("identify", "passive", "gap"))
     efforts = [t for t in dataset.fit_trials if t.force_on_arm is not None or t.tau is not None]
     slow = sorted({t.configuration for t in efforts if _speed(t) <= _SLOW})
     repeats = len(dataset.fit_trials) > len({t.configuration for t in dataset.fit_trials})
-    lacking = [] if repeats else ["repeats to read the noise off"]
+    lacking = [] if repeats else ["repeats to estimate the noise from"]
     lacking += [] if dataset.test_trials else ['trials with role = "test" to measure the gap on']
     how = _how_gap(dataset)
     return (

@@ -73,8 +73,8 @@ def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) 
     found = [Shift(float(s), _explained(float(s), grid, features, clock, values)) for s in shifts]
     best = max(found, key=lambda shift: shift.explained, default=Shift(0.0, 0.0))
     if best.explained < _EXPLAINED:
-        said = Text(f"forces of which the movement explains {100 * best.explained:.0f} % at best")
-        raise BadInput("clock of the forces", said, "forces of the same trial")
+        said = Text(f"{100 * best.explained:.0f} % of the forces explained by the movement at the best offset")
+        raise BadInput("clock of the forces", said, f"at least {100 * _EXPLAINED:.0f} %", hint="do the forces belong to this trial?")
     share = np.array([shift.explained for shift in found])
     around = np.pad(share, 1, constant_values=-np.inf)
     peaks = np.flatnonzero((share >= around[:-2]) & (share > around[2:]) & (1.0 - share <= _ALIKE * (1.0 - best.explained)))

@@ -183,7 +183,7 @@ def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequen
     if dimension == "angle":
         most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
         in_degrees = most > _DEGREES_FROM
-        reason = f"no unit stated; up to {most:.3g}, so in {'degrees' if in_degrees else 'radians'}"
+        reason = f"no unit stated; values up to {most:.3g}, so in {'degrees' if in_degrees else 'radians'}"
         return Channel(symbol, column.name, "deg" if in_degrees else "rad", sign, f"{why}; {reason}")
     return Channel(symbol, column.name, _DEFAULT_UNIT[dimension], sign, f"{why}; no unit stated, so {_DEFAULT_UNIT[dimension]}")
 

@@ -109,9 +109,10 @@ def decide(
     rivals = [b for b in ranked if b is not best and not _equivalent(b.convention, best.convention, motion)]
     if best.unexplained > _UNEXPLAINED:
         said = Text(f"{100 * best.unexplained:.0f} % of the contact torques unexplained by the best convention ({best.convention.words()})")
-        problems.append(BadInput("angles and forces", said, "an arm that balances", hint="lengths, units, axes of the force?"))
+        allowed = f"at most {100 * _UNEXPLAINED:.0f} %"
+        problems.append(BadInput("angles and forces", said, allowed, hint="wrong lengths, units or force axes?"))
     elif rivals and best is not usual and rivals[0].unexplained < _CLEAR * best.unexplained:
-        both = Text(f"two conventions that balance the arm alike: {best.convention.words()}; or {rivals[0].convention.words()}")
+        both = Text(f"two conventions that explain the forces equally well: {best.convention.words()}; or {rivals[0].convention.words()}")
         problems.append(BadInput("angles and forces", both, "one; state it with --angles, --zero, --clockwise or --force-on"))
     c = best.convention
     next_best = f", the next best {100 * rivals[0].unexplained:.0f} %" if rivals else ""

@@ -204,14 +204,19 @@ def _decided(
         left = [t for t in left if t.markers is None]
     elif not tables and not problems:
         problems.append(
-            BadInput("file", Text("what belongs to another recording"), "the recording of the movement beside it", file=paths[0])
+            BadInput(
+                "file",
+                Text("only a file that accompanies another recording"),
+                "the recording of the movement in the same folder",
+                file=paths[0],
+            )
         )
     elif not named and not problems:
         found = Text(f"columns {', '.join(repr(c.name) for c in tables[0].columns[:12])}")
         problems.append(BadInput("columns", found, "an angle of every joint", file=tables[0].path, hint="--map q1=COLUMN,q2=COLUMN"))
     if not named:
         raise BadInputs.of(problems)
-    problems += [BadInput("file", Text("neither angles nor forces of a trial"), "a recording", file=t.path) for t in left]
+    problems += [BadInput("file", Text("neither joint angles nor forces"), "columns of one of them", file=t.path) for t in left]
     channels = columns.guess([n.table for n in named], _present(mapped, named[0].table), problems)
     force_tables = [n.forces for n in named if n.forces is not None]
     if force_tables:
@@ -232,7 +237,7 @@ def _decided(
         convention = conventions.decide(model, together, given, problems)
     else:
         signs = given.get("signs", (1,) * model.n_joints)
-        why = "no contact force: nothing tells how angles are counted, so they are taken as armrs counts them"
+        why = "no contact force, so the balance cannot be used: the angles are taken in the convention of armrs"
         convention = Convention(str(given.get("reference", "relative")), str(given.get("zero", "horizontal")), signs, None, why)  # type: ignore[arg-type]
     if problems:
         raise BadInputs.of(problems)
