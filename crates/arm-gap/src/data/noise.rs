@@ -7,11 +7,11 @@
 use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
 
 use crate::GapError;
-use crate::data::valid_segments::ValidSegments;
+use crate::data::valid_segments::{SHORTEST, ValidSegments};
 use crate::measurement_model::prediction::Channels;
 
-/// Highest order of the autoregressions.
-pub(crate) const ORDER: usize = 4;
+/// Highest order of the autoregressions: every segment has as many samples.
+const ORDER: usize = SHORTEST;
 /// White noise of this share of a channel's range is always believed in: the path between samples, quantisation and the
 /// model's own simplifications are no better, however smooth the noise of the sensors is.
 const LEAST: f64 = 5e-4;

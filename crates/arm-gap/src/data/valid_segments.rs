@@ -5,15 +5,14 @@ use std::sync::Arc;
 use arm_core::Plane;
 use arm_ident::regression::trial::Trial;
 
-use crate::data::noise;
 use crate::measurement_model::prediction::{Channels, Course, away_from_gaps, margin};
 
 /// Samples kept for each period of the cutoff.
 const SAMPLES_PER_PERIOD: f64 = 2.5;
 /// Periods of the cutoff around rest, where dry friction holds a joint, that count as rest.
 const NEAR_REST: f64 = 0.6;
-/// Fewest samples that stand together: as many as the noise is remembered for. Fewer lie at the edge of rest on both sides.
-const SHORTEST: usize = noise::ORDER;
+/// Fewest samples of a segment: the highest order of the noise's autoregressions. Fewer lie at the edge of rest on both sides.
+pub(crate) const SHORTEST: usize = 4;
 /// Fewest samples of a trial that is compared.
 const FEWEST: usize = 8;
 
