@@ -274,16 +274,19 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         gain: f64,
     ) -> Vec<Alternative> {
         let all = rivals.into_iter().map(|r| r.alternative);
-        all.filter(|a| a.worse <= self.tie(own, gain)).collect()
+        all.filter(|a| a.worse <= self.tie([own, &a.candidate], gain))
+            .collect()
     }
 
-    /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
+    /// How much worse one of two effects may explain the data and still be an alternative to the other, when one gained so much.
     ///
-    /// Without repeats nothing tells a law that is not exact from another one: what its kind may miss of what it shows decides nothing.
-    fn tie(&self, own: &Candidate, gain: f64) -> f64 {
+    /// Without repeats nothing tells a law that is not exact from another one: what either kind may miss of what it shows decides
+    /// nothing. Both count, or two laws would take each other's place in turn.
+    fn tie(&self, both: [&Candidate; 2], gain: f64) -> f64 {
+        let missed = both.map(|c| c.kind().probe().missed);
         match self.repeated {
             true => TIE,
-            false => TIE.max(own.kind().probe().missed * gain),
+            false => TIE.max(f64::max(missed[0], missed[1]) * gain),
         }
     }
 
@@ -309,9 +312,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 f64::max(shapes(own) - shapes(&rival.candidate), bent)
             }
             _ if self.repeated => shapes(own) - shapes(&rival.candidate),
-            Ordering::Less => self.tie(own, gain),
+            Ordering::Less => self.tie([own, &rival.candidate], gain),
             Ordering::Equal => 0.0,
-            Ordering::Greater => -self.tie(own, gain),
+            Ordering::Greater => -self.tie([own, &rival.candidate], gain),
         };
         rival.worse < handicap - BETTER
     }
