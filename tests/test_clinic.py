@@ -74,6 +74,11 @@ def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> Non
         "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° than in the session before.",
     ]
     assert clinic.unusual(clinic.lines_of(result(history=[]))) == []
+    left = [{"verb": "gap", "verdict": verdict} for verdict in ("explained", "unexplained")]
+    assert clinic.unusual([], left[:1]) == []
+    assert clinic.unusual([], left) == [
+        "Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it."
+    ]
     assert len(clinic.notes([result(warnings=list("abcdef"))])) == clinic.MOST_NOTES + 1
 
 

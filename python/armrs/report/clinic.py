@@ -190,7 +190,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "measured": measured(results),
             "lines": lines,
             "words": [words_of(line) for line in lines],
-            "unusual": unusual(lines),
+            "unusual": unusual(lines, results),
             "notes": notes(results),
             "since": max((c["dates"][-2] for r in results for c in r.get("history", ()) if len(c["dates"]) > 1), default=None),
             "not_measured": not_measured(results, lines),
@@ -369,9 +369,11 @@ def words_of(line: Line) -> list[str]:
     return [line.joint, f"{line.quantity.title} [{line.quantity.unit}]", value, between, usual, line.trend or ""]
 
 
-def unusual(lines: Sequence[Line]) -> list[str]:
-    """Return what is outside of what is usual, and what changed, in plain words."""
+def unusual(lines: Sequence[Line], results: Sequence[Mapping[str, Any]] = ()) -> list[str]:
+    """Return what is outside of what is usual, what changed, and whether something acts that has no name, in plain words."""
     said = []
+    if any(result.get("verb") == "gap" and result.get("verdict") == "unexplained" for result in results):
+        said.append("Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it.")
     for line in lines:
         title = f"{line.joint}: {line.quantity.title.lower()}"
         if line.beside_norm in ("below", "above"):

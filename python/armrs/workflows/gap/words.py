@@ -122,7 +122,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
     for which, words in (("calibrated", "The calibrated model"), ("amended", "The model with the named effects")):
         lack = result["lack_of_fit"][which]
         if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
-            verdict = "more than noise" if lack["z"] >= MISFIT else "what noise does"
+            verdict = f"{'more' if lack['z'] >= MISFIT else 'no more'} than noise may leave, {MISFIT:g} standard deviations"
             lines.append(
                 f"{words} leaves {digits(lack['ratio'])} times the square of what repeats differ by ({_deviations(lack['z'])} "
                 f"standard deviations): {verdict}."

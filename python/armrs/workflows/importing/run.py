@@ -25,6 +25,8 @@ _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "N
 _FORWARD_AND_UP = {("x", "y"): ("x", "y"), ("x", "z"): ("x", "z"), ("y", "z"): ("y", "z"), ("x", "y", "z"): ("y", "z")}
 """Axes of a force sensor -> the one forward and the one up. Of three, the first is taken to point sideways."""
 _AXES = ("Fx", "Fy", "Fz")
+_NAMED = 8
+"""Columns that a line names at most."""
 
 
 @dataclass(frozen=True)
@@ -245,9 +247,18 @@ def _decided(
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points)
     notes = [*dict.fromkeys(note for t in tables for note in t.notes), *axes]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
+    notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
     shifted = [f"{r.trial.force_file}: forces shifted by {r.trial.force_shift:+.3f} s" for r in reads if r.trial.force_file]
     return recipe, reads, [*notes, *shifted]
+
+
+def _unused(tables: Sequence[RawTable], channels: Sequence[Channel]) -> list[str]:
+    """Return a line that names the columns of which nothing is read; none where there are none."""
+    used = {channel.column for channel in channels}
+    names = list(dict.fromkeys(c.name for table in tables for c in table.columns if c.name not in used))
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return [f"not used: {', '.join(repr(name) for name in names[:_NAMED])}{more}"] if names else []
 
 
 def _renamed(table: RawTable, mapped: Mapping[str, tuple[str, int]]) -> RawTable:
