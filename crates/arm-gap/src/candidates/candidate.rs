@@ -60,6 +60,15 @@ impl Candidate {
         self.free.len() + usize::from(self.rest.is_some())
     }
 
+    /// Refines no shape, and leaves those of which only an expected value is known, as a latency, at the default of the catalogue.
+    fn keep_shapes(&mut self, question: &Question) {
+        self.refined.clear();
+        for &(p, _) in question.expected {
+            self.effect.parameters[p] = self.effect.kind.info().parameters[p].default;
+            self.expected.retain(|e| e.parameter != p);
+        }
+    }
+
     /// Number of shapes that a fit refines: of two explanations that are as good, the one with fewer is meant.
     pub fn shapes(&self) -> f64 {
         (usize::from(self.rest.is_some()) + self.refined.len()) as f64
@@ -294,7 +303,7 @@ impl Library {
                     let mut own = ask(prepared.session, &motions, plain, asked, waves);
                     // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
                     if !prepared.repeated && kind.probe().nature != Nature::Periodic {
-                        own.iter_mut().for_each(|c| c.refined.clear());
+                        own.iter_mut().for_each(|c| c.keep_shapes(asked.1));
                     }
                     candidates.extend(own);
                 }

@@ -274,19 +274,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         gain: f64,
     ) -> Vec<Alternative> {
         let all = rivals.into_iter().map(|r| r.alternative);
-        all.filter(|a| a.worse <= self.tie([own, &a.candidate], gain))
-            .collect()
+        all.filter(|a| a.worse <= self.tie(own, gain)).collect()
     }
 
-    /// How much worse one of two effects may explain the data and still be an alternative to the other, when one gained so much.
+    /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
     ///
-    /// Without repeats nothing tells a law that is not exact from another one: what either kind may miss of what it shows decides
-    /// nothing. Both count, or two laws would take each other's place in turn.
-    fn tie(&self, both: [&Candidate; 2], gain: f64) -> f64 {
-        let missed = both.map(|c| c.kind().probe().missed);
+    /// Without repeats nothing tells a law that is not exact from another one: what its kind may miss of what it shows decides nothing.
+    fn tie(&self, own: &Candidate, gain: f64) -> f64 {
         match self.repeated {
             true => TIE,
-            false => TIE.max(f64::max(missed[0], missed[1]) * gain),
+            false => TIE.max(own.kind().probe().missed * gain),
         }
     }
 
@@ -312,9 +309,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 f64::max(shapes(own) - shapes(&rival.candidate), bent)
             }
             _ if self.repeated => shapes(own) - shapes(&rival.candidate),
-            Ordering::Less => self.tie([own, &rival.candidate], gain),
+            Ordering::Less => self.tie(own, gain),
             Ordering::Equal => 0.0,
-            Ordering::Greater => -self.tie([own, &rival.candidate], gain),
+            Ordering::Greater => -self.tie(own, gain),
         };
         rival.worse < handicap - BETTER
     }
