@@ -544,16 +544,12 @@ fn ask<const N: usize>(
             Values::Lowest => vec![low],
             Values::Middle => vec![0.5 * (low + high)],
         };
-        shapes = shapes
-            .iter()
-            .flat_map(|shape| {
-                values.iter().map(|&value| {
-                    let mut shape = *shape;
-                    shape.parameters[*p] = value;
-                    shape
-                })
-            })
-            .collect();
+        let shaped = |mut shape: Effect<f64>, value: f64| {
+            shape.parameters[*p] = value;
+            shape
+        };
+        let each = |&shape| values.iter().map(move |&value| shaped(shape, value));
+        shapes = shapes.iter().flat_map(each).collect();
     }
     let tried = shapes.len();
     let candidate = |effect: Effect<f64>| {
