@@ -1,6 +1,6 @@
 //! The gap workflow: trials in, what the model lacks out.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use arm_core::Chain;
 use arm_core::effect::Effect;
@@ -124,7 +124,7 @@ pub fn play<'py>(
         let given = session.given();
         let plays = (0..session.trials.len())
             .map(|i| {
-                let course = session.course(i).map_err(gap)?;
+                let course = Arc::new(session.course(i).map_err(gap)?);
                 // What cannot be simulated is told of below, with its trial.
                 let believed = match own {
                     true => py.detach(|| session.in_trial((&given, &[]), &course)).ok(),

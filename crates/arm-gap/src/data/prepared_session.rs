@@ -1,6 +1,6 @@
 //! A session made ready: every trial's course, which trials repeat each other, and the noise.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use crate::GapError;
 use crate::data::noise::Noise;
@@ -9,6 +9,7 @@ use crate::data::session::Session;
 use crate::data::valid_segments::{ObservableForce, ValidSegments};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::Course;
+use crate::sensitivity::linearized_run::Linear;
 use crate::threads;
 
 /// What rest takes from the comparison of a movement.
@@ -50,7 +51,12 @@ pub struct PreparedSession<'a, const N: usize> {
     pub(crate) start: Option<Hypothesis<N>>,
     /// Threads.
     pub threads: usize,
+    /// The runs of the hypotheses that were simulated last: a search comes back to what it has tried.
+    pub(crate) simulated: Mutex<Vec<SimulatedRuns<'a, N>>>,
 }
+
+/// A hypothesis, and its run on the reference of each group.
+pub(crate) type SimulatedRuns<'a, const N: usize> = (Hypothesis<N>, Arc<Vec<Linear<'a, N>>>);
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Makes a session ready; the noise is read off the repeats of the fit trials against the model as given.
@@ -115,6 +121,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             dropped: session.base.iter().map(|law| !law.likely).collect(),
             start: None,
             threads,
+            simulated: Mutex::default(),
         })
     }
 

@@ -4,16 +4,19 @@
 //! whatever its role and whatever hypothesis is shown: two numbers each for the handle, as far as what is declared of it lets them
 //! go, and one for a rhythm.
 
+use std::sync::Arc;
+
 use arm_core::effect::{Effect, Nature};
 use arm_sim::SimulationError;
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
-use crate::data::session::{FURTHEST, Session};
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course, difference};
+use crate::data::session::{ComparisonMode, FURTHEST, Session};
+use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
 use crate::sensitivity::linearization_point::slope;
+use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::normal_equations::solve;
 use crate::trial_specific::component::SLOW;
 use crate::trial_specific::component::shapes_of;
@@ -38,7 +41,7 @@ impl<const N: usize> Session<N> {
     pub fn in_trial(
         &self,
         (hypothesis, rhythms): (&Hypothesis<N>, &[Effect<f64>]),
-        course: &Course<N>,
+        course: &Arc<Course<N>>,
     ) -> Result<Hypothesis<N>, SimulationError> {
         let mut own = hypothesis.clone();
         let mut rhythms = rhythms.to_vec();
@@ -47,21 +50,24 @@ impl<const N: usize> Session<N> {
         if placed.is_empty() && rhythms.is_empty() {
             return Ok(own);
         }
-        let base = self.shown(&own, course)?;
-        let change = |changed: &Hypothesis<N>| self.shown(changed, course);
+        let trial = ShownTrial::of(self, &own, course)?;
         let mut columns = Vec::new();
         for c in &placed {
             let moved = own.clone().with(c.target, own.get(c.target) + c.step);
-            columns.push(slope(&change(&moved)?, &base, c.step));
+            let reach = (
+                self.is_sensing(&own, c.target),
+                matches!(c.target, Target::Shift(_)),
+            );
+            columns.push(trial.response(&moved, c.step, reach)?);
         }
         for rhythm in &rhythms {
             for phase in [0.0, 0.5 * core::f64::consts::PI] {
                 let mut swinging = own.clone();
                 swinging.named.push(with_phase(rhythm, phase));
-                columns.push(difference(&change(&swinging)?, &base));
+                columns.push(trial.response(&swinging, 1.0, (false, false))?);
             }
         }
-        let left = difference(&course.seen, &base);
+        let left = difference(&course.seen, &trial.shown);
         let sd: Vec<Option<f64>> = (0..columns.len())
             .map(|i| placed.get(i)?.prior.map(|(_, sd)| sd))
             .collect();
@@ -79,14 +85,58 @@ impl<const N: usize> Session<N> {
         }
         Ok(own)
     }
+}
 
-    fn shown(
-        &self,
+/// What the sensors would read of one trial under a hypothesis, in the common band, and the run along which small changes of it are told.
+struct ShownTrial<'a, const N: usize> {
+    session: &'a Session<N>,
+    course: &'a Arc<Course<N>>,
+    /// Nothing where torques are compared.
+    line: Option<Linear<'a, N>>,
+    shown: Channels,
+}
+
+impl<'a, const N: usize> ShownTrial<'a, N> {
+    fn of(
+        session: &'a Session<N>,
         hypothesis: &Hypothesis<N>,
-        course: &Course<N>,
+        course: &'a Arc<Course<N>>,
+    ) -> Result<Self, SimulationError> {
+        let line = match session.comparison {
+            ComparisonMode::Led => Some(Linear::along(session, hypothesis, course)?),
+            ComparisonMode::Torque => None,
+        };
+        let mut trial = Self {
+            session,
+            course,
+            line,
+            shown: Vec::new(),
+        };
+        trial.shown = match &trial.line {
+            Some(line) => line.shown()?,
+            None => trial.torques(hypothesis)?,
+        };
+        Ok(trial)
+    }
+
+    /// What the sensors would read more, for one unit of a change.
+    ///
+    /// * `reach` - whether the change reaches the sensors alone, and whether it moves the handle's path
+    fn response(
+        &self,
+        changed: &Hypothesis<N>,
+        size: f64,
+        reach: (bool, bool),
     ) -> Result<Channels, SimulationError> {
-        let run = self.run(hypothesis, course)?;
-        self.read(hypothesis, course, &run)
+        match &self.line {
+            Some(line) => line.response(changed, size, reach),
+            None => Ok(slope(&self.torques(changed)?, &self.shown, size)),
+        }
+    }
+
+    fn torques(&self, hypothesis: &Hypothesis<N>) -> Result<Channels, SimulationError> {
+        let raw = self.session.torques(hypothesis, self.course)?;
+        smooth(&raw, self.course.band, self.course.rate).map_err(|_| ASTRAY)
     }
 }
 

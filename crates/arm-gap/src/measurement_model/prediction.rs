@@ -27,7 +27,7 @@ const BAND: f64 = 5.0;
 /// keep its whole swing, or its forces are missed by newtons.
 const HANDLE_BAND: f64 = 4.0;
 /// Steps that are tried, longest first \[s\]; the last one is taken even where dry friction would like it shorter.
-pub(crate) const STEPS: [f64; 3] = [1e-3, 5e-4, 2.5e-4];
+pub(crate) const STEPS: [f64; 4] = [2e-3, 1e-3, 5e-4, 2.5e-4];
 /// Samples at the start whose mean tells where the arm was at rest.
 const START: usize = 5;
 /// Time at the start over which forces are averaged \[s\].

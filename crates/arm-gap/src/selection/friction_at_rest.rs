@@ -76,10 +76,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         };
         let mut best = simulated(fitted.hypothesis.clone()).unwrap_or_else(|| fitted.clone());
         for &law in laws {
-            let present = best.hypothesis.get(law);
-            for smoothing in SMOOTHING.into_iter().filter(|&s| s != present) {
-                let other = simulated(best.hypothesis.clone().with(law, smoothing));
-                best = cheaper(best, other);
+            // From speed to speed, up or down, as long as that costs less: the misfit has one minimum along them.
+            for upwards in [true, false] {
+                while let Some(next) = next_smoothing(best.hypothesis.get(law), upwards)
+                    && let Some(other) = simulated(best.hypothesis.clone().with(law, next))
+                    && is_cheaper(&other, &best)
+                {
+                    best = other;
+                }
             }
         }
         best
@@ -94,17 +98,24 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         let question = sticking.asked[slot].clone().at_rest_as(named);
         sticking.asked[slot] = question;
-        let refitted = self.settle(sticking.hypothesis, sticking.asked);
-        cheaper(fitted, refitted.ok().map(|(refitted, _)| refitted))
+        match self.settle(sticking.hypothesis, sticking.asked) {
+            Ok((refitted, _)) if is_cheaper(&refitted, &fitted) => refitted,
+            _ => fitted,
+        }
     }
 }
 
-/// Another fit, where it costs less by more than nothing.
-fn cheaper<const N: usize>(present: Fitted<N>, other: Option<Fitted<N>>) -> Fitted<N> {
-    let least = present.cost;
-    other
-        .filter(|o| o.cost + o.enough() < least)
-        .unwrap_or(present)
+/// The next of [`SMOOTHING`] above or below a speed.
+fn next_smoothing(present: f64, upwards: bool) -> Option<f64> {
+    match upwards {
+        true => SMOOTHING.into_iter().find(|&s| s > present),
+        false => SMOOTHING.into_iter().rfind(|&s| s < present),
+    }
+}
+
+/// Whether another fit costs less by more than nothing.
+fn is_cheaper<const N: usize>(other: &Fitted<N>, present: &Fitted<N>) -> bool {
+    other.cost + other.enough() < present.cost
 }
 
 /// The places of named dry laws that creep at rest.

@@ -4,7 +4,7 @@
 //! One trial of each movement is simulated. Repeats follow it along their own handle's path, other hypotheses follow it
 //! as changes; both cost a hundredth of a simulation.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use arm_sim::SimulationError;
 
@@ -46,6 +46,8 @@ pub struct LinearizationPoint<'a, const N: usize> {
     pub own: Vec<Response>,
     /// Rows of the nuisances.
     pub rows: Rows,
+    /// The hypothesis whose residuals were asked last, with what the sensors would read of it: its responses are asked next.
+    followed: Mutex<Option<(Hypothesis<N>, Vec<Channels>)>>,
 }
 
 impl<const N: usize> LinearizationPoint<'_, N> {
@@ -64,6 +66,7 @@ impl<const N: usize> LinearizationPoint<'_, N> {
             coordinates,
             own: self.own.clone(),
             rows: self.rows.without(&columns),
+            followed: Mutex::default(),
         }
     }
 }
@@ -79,25 +82,18 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ) -> Result<LinearizationPoint<'a, N>, GapError> {
         let failed = |trial: usize| move |source| GapError::Simulation { trial, source };
         let lines = match self.session.comparison {
-            ComparisonMode::Torque => Vec::new(),
-            ComparisonMode::Led => {
-                let one = |group: usize| {
-                    let trial = self.references[group];
-                    Linear::along(self.session, hypothesis, &self.courses[trial])
-                        .map_err(failed(trial))
-                };
-                let lines = self.parallel(self.references.len(), one);
-                lines.into_iter().collect::<Result<Vec<_>, _>>()?
-            }
+            ComparisonMode::Torque => Arc::default(),
+            ComparisonMode::Led => self.simulated(hypothesis)?,
         };
         let mut point = LinearizationPoint {
             hypothesis: hypothesis.clone(),
-            lines: Arc::new(lines),
+            lines,
             shown: Vec::new(),
             residuals: Vec::new(),
             coordinates: self.nuisances(),
             own: Vec::new(),
             rows: Rows::default(),
+            followed: Mutex::default(),
         };
         point.shown = self.shown(&point, hypothesis)?;
         let one = |i: usize| {
@@ -114,6 +110,31 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         point.own = responses.split_off(point.coordinates.len());
         point.rows = Rows::new(self, &responses, &point.own);
         Ok(point)
+    }
+
+    /// The run of a hypothesis on the reference of each group.
+    fn simulated(&self, hypothesis: &Hypothesis<N>) -> Result<Arc<Vec<Linear<'a, N>>>, GapError> {
+        /// Hypotheses whose runs are kept.
+        const KEPT: usize = 6;
+        let kept = || {
+            self.simulated
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
+        if let Some((_, lines)) = kept().iter().find(|(h, _)| h == hypothesis) {
+            return Ok(Arc::clone(lines));
+        }
+        let one = |group: usize| {
+            let trial = self.references[group];
+            Linear::along(self.session, hypothesis, &self.courses[trial])
+                .map_err(|source| GapError::Simulation { trial, source })
+        };
+        let lines = self.parallel(self.references.len(), one);
+        let lines = Arc::new(lines.into_iter().collect::<Result<Vec<_>, _>>()?);
+        let mut kept = kept();
+        kept.truncate(KEPT - 1);
+        kept.insert(0, (hypothesis.clone(), Arc::clone(&lines)));
+        Ok(lines)
     }
 
     /// What the sensors would read on a trial of a group, in the common band.
@@ -175,9 +196,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             .map(|(now, then)| difference(now, then))
             .collect();
         let one = |(residual, &trial)| difference(residual, &changes[self.group_of[trial]]);
-        Ok(std::iter::zip(&point.residuals, &self.fitted)
-            .map(one)
-            .collect())
+        let residuals = std::iter::zip(&point.residuals, &self.fitted).map(one);
+        let residuals = residuals.collect();
+        *point
+            .followed
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = Some((hypothesis.clone(), shown));
+        Ok(residuals)
     }
 
     /// How changes of the anchor's hypothesis change what the channels of each group's reference read, for one unit.
@@ -253,7 +278,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if *hypothesis == point.hypothesis || coordinates.is_empty() {
             return self.responses_to(point, coordinates);
         }
-        let base = self.shown(point, hypothesis)?;
+        let last = point.followed.lock();
+        let last = last.unwrap_or_else(PoisonError::into_inner).take();
+        let base = match last {
+            Some((followed, shown)) if followed == *hypothesis => shown,
+            _ => self.shown(point, hypothesis)?,
+        };
         let one = |c: &Coordinate| {
             let change = self.nudged(hypothesis, c);
             let shown = self.shown(point, &change.changed)?;

@@ -158,6 +158,14 @@ impl<'a, const N: usize> Linear<'a, N> {
         Ok(linear)
     }
 
+    /// What the sensors would read of the run itself, in the common band.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a channel that is not finite.
+    pub fn shown(&self) -> Result<Channels, SimulationError> {
+        smooth(&self.base, self.course.band, self.course.rate).map_err(|_| ASTRAY)
+    }
+
     /// Angles \[rad\], speeds \[rad/s\] and accelerations \[rad/s²\] of the joints at a sample of the trial.
     pub fn state(&self, sample: usize) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
         let last = self.records.len().saturating_sub(1);
