@@ -2,6 +2,12 @@ use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
 use super::probe::{Family, Probe, Question, Values};
 use crate::Scalar;
 
+/// Position of the ratio among the parameters.
+const RATIO: usize = 1;
+/// What a search assumes of it, and the standard deviation of that: a muscle pulls with about the same arm at both joints. With springs in
+/// both joints no movement tells it: three stiffnesses of two joints follow from four numbers.
+const EXPECTED_RATIO: [f64; 2] = [1.0, 0.3];
+
 /// A spring over two adjacent joints, as of a muscle that crosses both; its joint is the distal one.
 ///
 /// With the energy ½ · stiffness · (q + ratio · q_proximal − rest)² it resists in the joint before by `ratio` times the same
@@ -25,7 +31,8 @@ impl Law for Biarticular {
     const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
         .shaped(&[(1, Values::Each(&[1.0, 0.5]))])
         .resting(2)
-        .refining(&[1])]).in_family(Family::TwoJoints).typically(1.0);
+        .refining(&[1])
+        .expecting(&[(RATIO, EXPECTED_RATIO)])]).in_family(Family::TwoJoints).typically(1.0);
     const CROSSES: bool = true;
 
     #[inline]

@@ -23,7 +23,7 @@ const FLOOR_UNREPEATED: f64 = 0.03;
 /// The same of what is left when all are named: a name for a small part of what cannot be explained would be a guess.
 const OF_WHAT_IS_LEFT: f64 = 0.2;
 /// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
-const TIE: f64 = 10.0;
+pub(crate) const TIE: f64 = 10.0;
 /// Alternatives that are converged by simulation for each named effect.
 const RIVALS: usize = 5;
 /// Share of what a named effect gains that another must gain to first order to be converged in its place.

@@ -1,6 +1,6 @@
 //! Disturbances of single trials: a burst of torque, a sensor that slips.
 
-use arm_core::effect::{Effect, KINDS, Nature};
+use arm_core::effect::{Effect, KINDS, Kind, Nature};
 
 use crate::candidates::candidate::price;
 use crate::data::noise::dot;
@@ -8,8 +8,12 @@ use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::{Channels, smooth};
 use crate::selection::lack_of_fit::{orthogonal, project_off};
+use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
+
+/// Amplitude of a burst that is asked for \[N m\].
+const UNIT: f64 = 1e-2;
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// The clearest disturbance of a single trial; `None` when no trial stands out.
@@ -27,61 +31,110 @@ impl<const N: usize> PreparedSession<'_, N> {
         let price = price(1, tried, self.rows_of_references());
         let mut best: Option<TrialSpecific> = None;
         for suspect in &compared {
-            let trial = self.fitted[suspect.place];
-            let see = |(effect, response): (Effect<f64>, Channels)| {
-                let mut row = self.noise.whiten(&response, &suspect.samples);
-                project_off(&mut row, &suspect.usual);
-                let square = dot(&row, &row);
-                (square > 0.0).then_some(Asked {
-                    effect,
-                    row,
-                    square,
-                })
+            let explained = self.explained(point, suspect, scale);
+            let Some(first) = explained.first() else {
+                continue;
             };
-            let asked: Vec<Asked> = self
-                .shapes_in(point, trial)
-                .into_iter()
-                .filter_map(see)
-                .collect();
-            let shrink = shrunk(suspect.others.len());
-            for one in &asked {
-                let along = dot(&one.row, &suspect.deviation);
-                // Of two repeats both deviate alike: the disturbed one is further from the model.
-                let own = dot(&one.row, &suspect.own).abs();
-                let further = suspect
-                    .others
-                    .iter()
-                    .all(|other| own > dot(&one.row, other).abs());
-                let size = along / one.square;
-                // A sensor that moves within what the calibration promises of it is no finding.
-                let promised = match one.effect.kind.probe().promise {
-                    Some(_) => self.session.tolerance.angle_offset,
-                    None => 0.0,
-                };
-                let gain = along * size / scale;
-                let least = best.as_ref().map_or(price, |b| b.gain);
-                if !further || size.abs() <= promised || gain <= least {
-                    continue;
-                }
-                let scatter = scatter_elsewhere(one, &asked, &suspect.deviations());
-                let gain = gain / scatter;
-                if gain > least {
-                    let mut effect = one.effect;
-                    effect.parameters[0] = size / shrink;
-                    best = Some(TrialSpecific {
-                        effect,
-                        sd: libm::sqrt(scale * scatter / one.square) / shrink,
-                        trial: Some(trial),
-                        gain,
-                        rivals: Vec::new(),
-                        locked: false,
-                        columns: Vec::new(),
-                        sizes: Vec::new(),
-                    });
-                }
+            if first.gain <= best.as_ref().map_or(price, |b| b.gain) {
+                continue;
             }
+            let shrink = shrunk(suspect.others.len());
+            best = Some(TrialSpecific {
+                effect: first.effect(shrink),
+                sd: libm::sqrt(scale * first.scatter / first.asked.square) / shrink,
+                trial: Some(self.fitted[suspect.place]),
+                gain: first.gain,
+                rivals: explained[1..]
+                    .iter()
+                    .map(|other| (other.effect(shrink), first.gain - other.gain))
+                    .filter(|(_, worse)| *worse <= TIE)
+                    .collect(),
+                locked: false,
+                columns: Vec::new(),
+                sizes: Vec::new(),
+            });
         }
         best
+    }
+
+    /// What each kind in each place explains of how a trial differs from its repeats, where and as long as it explains most; the best first.
+    fn explained(
+        &self,
+        point: &LinearizationPoint<N>,
+        suspect: &Compared,
+        scale: f64,
+    ) -> Vec<Explained> {
+        /// Share of what explains most on the grid of times below which a time of its own helps no more.
+        const NEAR: f64 = 0.5;
+        let trial = self.fitted[suspect.place];
+        let see = |(effect, response): (Effect<f64>, Channels)| {
+            let mut row = self.noise.whiten(&response, &suspect.samples);
+            project_off(&mut row, &suspect.usual);
+            let square = dot(&row, &row);
+            (square > 0.0).then_some(Asked {
+                effect,
+                row,
+                square,
+            })
+        };
+        let shapes = self.shapes_in(point, trial);
+        let asked: Vec<Asked> = shapes.into_iter().filter_map(see).collect();
+        let mut clearest: Vec<(f64, &Asked)> = Vec::new();
+        for one in asked.iter().filter(|one| self.is_finding(one, suspect)) {
+            let gain = one.gain(&suspect.deviation) / scale;
+            let same = |(_, c): &&mut (f64, &Asked)| c.place() == one.place();
+            match clearest.iter_mut().find(same) {
+                Some(known) if known.0 >= gain => (),
+                Some(known) => *known = (gain, one),
+                None => clearest.push((gain, one)),
+            }
+        }
+        let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
+        let near = clearest.into_iter().filter(|(gain, _)| *gain > NEAR * most);
+        let mut explained: Vec<Explained> = near
+            .map(|(_, one)| {
+                let scatter = scatter_elsewhere(one, &asked, &suspect.deviations());
+                let answer = |effect| see((effect, self.answer_in(point, trial, effect)?));
+                let asked = timed(one.clone(), &suspect.deviation, answer);
+                let size = asked.along(&suspect.deviation) / asked.square;
+                let gain = asked.gain(&suspect.deviation) / scale / scatter;
+                Explained {
+                    asked,
+                    size,
+                    scatter,
+                    gain,
+                }
+            })
+            .collect();
+        explained.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        explained
+    }
+
+    /// Whether what is asked is a finding in a trial, whatever its size: of two repeats both deviate alike, and the disturbed one is further
+    /// from the model; a sensor that moves within what the calibration promises of it is none.
+    fn is_finding(&self, one: &Asked, suspect: &Compared) -> bool {
+        let own = dot(&one.row, &suspect.own).abs();
+        let further = |other: &Vec<f64>| own > dot(&one.row, other).abs();
+        let promised = match one.effect.kind.probe().promise {
+            Some(_) => self.session.tolerance.angle_offset,
+            None => 0.0,
+        };
+        let size = one.along(&suspect.deviation) / one.square;
+        size.abs() > promised && suspect.others.iter().all(further)
+    }
+
+    /// What the channels of a trial's movement would show of a burst, for one unit of it.
+    fn answer_in(
+        &self,
+        point: &LinearizationPoint<N>,
+        trial: usize,
+        mut burst: Effect<f64>,
+    ) -> Option<Channels> {
+        let line = point.lines.get(self.group_of[trial])?;
+        let mut changed = point.hypothesis.clone();
+        burst.parameters[0] = UNIT;
+        changed.named.push(burst);
+        line.response(&changed, UNIT, (false, false)).ok()
     }
 
     /// A fitted trial beside its repeats; `None` where it has none.
@@ -160,13 +213,12 @@ impl<const N: usize> PreparedSession<'_, N> {
     ) -> Vec<(Effect<f64>, Channels)> {
         const EVERY: f64 = 0.1;
         const LONG: [f64; 3] = [0.3, 0.6, 1.2];
-        const UNIT: f64 = 1e-2;
         let course = &self.courses[self.references[self.group_of[trial]]];
         let end = course.raw[0].len() as f64 / course.rate;
         let starts = (end / EVERY) as usize;
-        let Some(line) = point.lines.get(self.group_of[trial]) else {
+        if point.lines.is_empty() {
             return Vec::new();
-        };
+        }
         let bursts: Vec<Effect<f64>> = KINDS
             .iter()
             .filter(|k| k.probe().nature == Nature::Burst)
@@ -180,11 +232,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 })
             })
             .collect();
-        let answered = self.parallel(bursts.len(), |i| {
-            let mut changed = point.hypothesis.clone();
-            changed.named.push(bursts[i]);
-            line.response(&changed, UNIT, (false, false)).ok()
-        });
+        let answered = self.parallel(bursts.len(), |i| self.answer_in(point, trial, bursts[i]));
         let mut list: Vec<(Effect<f64>, Channels)> = std::iter::zip(bursts, answered)
             .filter_map(|(effect, response)| Some((effect, response?)))
             .collect();
@@ -262,11 +310,89 @@ fn shrunk(repeats: usize) -> f64 {
 }
 
 /// A disturbance that is asked for, with what it would show.
+#[derive(Clone)]
 struct Asked {
     effect: Effect<f64>,
     /// Whitened, without what is usual.
     row: Vec<f64>,
     square: f64,
+}
+
+impl Asked {
+    fn place(&self) -> (Kind, usize) {
+        (self.effect.kind, self.effect.index)
+    }
+
+    /// Product of what it would show and what a trial differs from its repeats by.
+    fn along(&self, deviation: &[f64]) -> f64 {
+        dot(&self.row, deviation)
+    }
+
+    /// What it explains of that difference.
+    fn gain(&self, deviation: &[f64]) -> f64 {
+        let along = self.along(deviation);
+        along * along / self.square
+    }
+}
+
+/// A disturbance at the time at which it explains most.
+struct Explained {
+    asked: Asked,
+    size: f64,
+    /// See [`scatter_elsewhere`].
+    scatter: f64,
+    gain: f64,
+}
+
+impl Explained {
+    /// The effect in the size that it has.
+    ///
+    /// * `shrink` - see [`shrunk`]
+    fn effect(&self, shrink: f64) -> Effect<f64> {
+        let mut effect = self.asked.effect;
+        effect.parameters[0] = self.size / shrink;
+        effect
+    }
+}
+
+/// A burst with the start and the duration with which it explains most: those of the grid decide neither its size nor its joint.
+///
+/// * `deviation` - what the trial differs from its repeats by
+/// * `answer` - what a burst would show
+fn timed(
+    mut best: Asked,
+    deviation: &[f64],
+    answer: impl Fn(Effect<f64>) -> Option<Asked>,
+) -> Asked {
+    /// First and last change of the start \[s\].
+    const STEPS: (f64, f64) = (0.05, 0.01);
+    /// Changes of the duration, in changes of the start.
+    const LONGER: f64 = 2.0;
+    /// Shortest and longest burst \[s\].
+    const DURATION: (f64, f64) = (0.1, 3.0);
+    if best.effect.kind.probe().nature != Nature::Burst {
+        return best;
+    }
+    let mut step = STEPS.0;
+    while step > STEPS.1 {
+        let longer = LONGER * step;
+        // A burst that lasts longer about its middle starts earlier.
+        let moves = [(step, 0.0), (-step, 0.0), (-step, longer), (step, -longer)];
+        let moved = moves.into_iter().find_map(|(start, duration)| {
+            let mut effect = best.effect;
+            effect.parameters[1] += start;
+            effect.parameters[2] += duration;
+            let within = effect.parameters[1] >= 0.0
+                && (DURATION.0..=DURATION.1).contains(&effect.parameters[2]);
+            let moved = answer(effect).filter(|_| within)?;
+            (moved.gain(deviation) > best.gain(deviation)).then_some(moved)
+        });
+        match moved {
+            Some(moved) => best = moved,
+            None => step *= 0.5,
+        }
+    }
+    best
 }
 
 /// How much more than noise the shape of a burst finds at other times of its movement, as a ratio of variances; at least one.
@@ -363,6 +489,39 @@ mod tests {
         let always = vec![9.0; 95];
         let scatter = scatter_elsewhere(&asked[45], &asked, &[once, always]);
         assert!((scatter - 81.0 / 2.706).abs() < 1e-12, "{scatter}");
+    }
+
+    #[test]
+    fn a_burst_is_timed_between_the_points_of_the_grid() {
+        // A bump over 10 s, a hundred samples a second.
+        let answer = |effect: Effect<f64>| {
+            let [_, start, duration, ..] = effect.parameters;
+            let at = |i: usize| {
+                let s = (0.01 * i as f64 - start) / duration;
+                let inside = (0.0..=1.0).contains(&s);
+                if inside { (s * (1.0 - s)).powi(3) } else { 0.0 }
+            };
+            let row: Vec<f64> = (0..1000).map(at).collect();
+            let square = dot(&row, &row);
+            Some(Asked {
+                effect,
+                row,
+                square,
+            })
+        };
+        let burst =
+            |start, duration| Effect::new(Kind::Voluntary, 0).with(&[1e-2, start, duration]);
+        let seen = answer(burst(4.28, 0.5)).expect("a row").row;
+        let coarse = answer(burst(4.4, 0.3)).expect("a row");
+        let part = coarse.gain(&seen) / dot(&seen, &seen);
+        assert!(part < 0.9, "{part}");
+        let found = timed(coarse, &seen, answer);
+        let [_, start, duration, ..] = found.effect.parameters;
+        assert!(
+            (start - 4.28).abs() < 0.03 && (duration - 0.5).abs() < 0.05,
+            "{start} {duration}"
+        );
+        assert!(found.gain(&seen) > 0.99 * dot(&seen, &seen));
     }
 
     #[test]

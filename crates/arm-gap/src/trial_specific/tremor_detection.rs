@@ -10,6 +10,7 @@ use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::repeats::same_rate;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
+use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::sensitivity::normal_equations::factor;
 use crate::trial_specific::component::{TrialSpecific, shapes_of};
@@ -38,8 +39,6 @@ const PLAIN: f64 = 60.0;
 pub(crate) const UNSTEADY: f64 = 0.05;
 /// Share of what is left in some channel that a rhythm must be.
 const SEEN: f64 = 0.05;
-/// Gain in which two explanations of a rhythm count as equal.
-const TIE: f64 = 10.0;
 /// Coherence of the phases of trials above which a rhythm is locked to their start.
 const LOCKED: f64 = 0.8;
 
