@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import CoupledError
 from .master import Coupled, run_system
-from .system import System
+from .system import System, family
 
 _SHARE = 4.0 / 3.0
 """Error of a run in units of its difference from one with half the step, for a coupling of second order; 2 for the first order, and 1 for
@@ -28,15 +28,27 @@ class Estimate:
         Slave and variable.
     unit : str
     error : float
-        Estimate of the largest error over the run.
+        Estimate of the largest error over the run, at the communication points or between them.
     allowed : float
         The accuracy of the system times the largest change of the variable in the run.
+    at : float, optional
+        When the variable goes beyond its values at the communication points by this error [s]; None where the error is one at these points.
     """
 
     name: str
     unit: str
     error: float
     allowed: float
+    at: float | None = None
+
+    @property
+    def text(self) -> str:
+        """What is off, and by how much, for people."""
+        size = f"{self.error:.3g} {self.unit}".strip()
+        allowed = f"allowed is {self.allowed:.3g} {self.unit}".strip()
+        if self.at is None:
+            return f"{self.name} is off by about {size}, {allowed}"
+        return f"{self.name} goes {size} beyond its values at the communication points at {self.at:.6g} s, {allowed}"
 
 
 def run_checked(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
@@ -44,7 +56,8 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
 
     The second run has half the steps inside of arms, too; steps that an FMU makes inside are its own affair.
     The error of every output that is connected, and of the angles of every arm, is estimated as 4/3 of the difference between the two
-    runs. Where it is too large and the system allows it, the step is halved further.
+    runs. In the second run slaves make each step in parts no longer than the resolution of the system, so that a pulse of a partner
+    between the communication points is seen. Where an error is too large and the system allows it, the step is halved further.
 
     Parameters
     ----------
@@ -72,24 +85,25 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
         slaves = {name: slave.finer() for name, slave in run.system.slaves.items()}
         finer = dataclasses.replace(run.system, step=0.5 * run.system.step, slaves=slaves, warnings=())
         try:
-            again = run_system(finer, progress=lambda _: None)
+            again = run_system(finer, resolution=system.resolution)
         except CoupledError as error:
             raise _refused(run, f"with half the step, {finer.step:g} s, the run is {error}") from None
         if reason := _differs_at_the_start(run, again):
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
-        run = dataclasses.replace(run, estimates=estimates(run, again))
+        run = dataclasses.replace(run, estimates=estimates(run, again), resolution=again.resolution)
         worst = max(run.estimates, key=lambda e: e.error / e.allowed, default=None)
         if worst is None:
-            reason = "nothing is connected, and there is no arm whose angles could be compared"
+            reason = "no floating point number is connected, and there is no arm whose angles could be compared"
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
-        text = f"{worst.name} is off by about {worst.error:.3g} {worst.unit}, allowed is {worst.allowed:.3g} {worst.unit}"
         if worst.error <= worst.allowed:
             if halvings:
                 text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
                 run = dataclasses.replace(run, warnings=(*system.warnings, *run.warnings, text_of_step))
-            return dataclasses.replace(run, verdict="good", why=f"the estimated errors are within the accuracy; at most {text}")
+            return dataclasses.replace(
+                run, verdict="good", why=f"the estimated errors are within the accuracy; at most {worst.text}{_looked(run)}"
+            )
         if halvings == system.refine:
-            raise _refused(run, f"{text}; take a shorter step")
+            raise _refused(run, f"{worst.text}; take a shorter step")
         run = again
     raise AssertionError
 
@@ -106,8 +120,11 @@ def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
         described = run.system.slaves[slave].variable(variable)
         coarse, fine = run.columns[name], np.interp(run.t, finer.t, finer.columns[name])
         change = max(float(np.max(np.abs(fine - fine[0]))), _LITTLE * abs(described.nominal))
-        error = _SHARE * float(np.max(np.abs(coarse - fine)))
-        found.append(Estimate(name, described.unit or "", error, run.system.accuracy * change))
+        # Where a whole number or a truth value changes is a matter of a step, whatever the step.
+        error = _SHARE * float(np.max(np.abs(coarse - fine))) if family(described) == "Float" else 0.0
+        most, at = finer.beyond.get(name, (0.0, 0.0))
+        if family(described) == "Float" or most:
+            found.append(Estimate(name, described.unit or "", max(error, most), run.system.accuracy * change, at if most > error else None))
     return tuple(found)
 
 
@@ -125,6 +142,11 @@ def _differs_at_the_start(run: Coupled, again: Coupled) -> str:
         if name in again.columns and values[0] != again.columns[name][0]:
             return f"{name} does not come back to its start when the slave is reset"
     return ""
+
+
+def _looked(run: Coupled) -> str:
+    """Say which events were not looked for."""
+    return f"; an event of a partner shorter than {1e3 * run.resolution:.3g} ms can be missed" if run.resolution else ""
 
 
 def _refused(run: Coupled, why: str) -> CoupledError:

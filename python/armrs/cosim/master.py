@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
+from .between import Between
 from .partner import Partner, Status
-from .system import Connection, System
+from .slave import Slave
+from .system import Connection, System, family
 
 MOST_CREATED = 0.02
 """Largest magnitude of the energy that the coupling may have created, against the largest that went through, before a run is unstable."""
@@ -65,7 +67,7 @@ class Coupled:
     t : ndarray, shape (n,)
         Communication points [s].
     columns : dict of str to ndarray, shape (n,)
-        Every output, by slave and variable.
+        Every output that is a number or a truth value, by slave and variable.
     used, residual : ndarray, shape (n - 1, connections)
         Inputs that were held in each step, and what they were off.
     created : ndarray, shape (n, connections)
@@ -74,6 +76,10 @@ class Coupled:
     evaluations : float
         Steps of all slaves together for each communication step.
     warnings : tuple of str
+    beyond : dict of str to (float, float)
+        How far connected outputs go beyond their values at the communication points, and when [s]; of those alone that do.
+    resolution : float, optional
+        Longest time for which no slave was looked at [s]; a shorter event may not be seen. None where the error was not estimated.
     estimates : tuple of `armrs.cosim.accuracy.Estimate`
         Estimated errors; empty where they were not estimated.
     """
@@ -89,15 +95,20 @@ class Coupled:
     connections: tuple[ConnectionReport, ...] = field(repr=False)
     evaluations: float
     warnings: tuple[str, ...]
+    beyond: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False)
+    resolution: float | None = None
     estimates: tuple[Any, ...] = field(default=(), repr=False)
 
 
-def run_system(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
+def run_system(system: System, *, resolution: float = np.inf, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
     """Run a system from zero to its duration, without an estimate of its error: `armrs.cosim.accuracy.run_checked` has one.
 
     Parameters
     ----------
     system : System
+    resolution : float
+        Slaves make their steps in parts no longer than this [s], where they can, so that what goes on between the communication points is
+        seen.
     progress : callable, optional
         Called with the number of communication steps made since the last call.
 
@@ -115,7 +126,7 @@ def run_system(system: System, *, progress: Callable[[int], None] = lambda steps
     SlaveError
         When a slave refuses a call.
     """
-    run = _Run(system)
+    run = _Run(system, resolution)
     run.initialize()
     # Numbers beyond all bounds are looked for, and said in words.
     with np.errstate(all="ignore"):
@@ -139,8 +150,9 @@ class _Ended(Exception):
 class _Run:
     """One run: what the slaves are given, what they give, and what is kept of it."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, resolution: float) -> None:
         self.system = system
+        self.between = Between(len(system.connections), resolution)
         self.slaves: list[Partner] = list(system.slaves.values())
         order = {name: i for i, name in enumerate(system.slaves)}
         connections = system.connections
@@ -158,7 +170,7 @@ class _Run:
         self.dual_of = [k for k, c in enumerate(connections) if c.dual is not None]
         # What goes back from a later slave to an earlier one, or to itself: only there the iteration has something to find.
         self.torn = np.flatnonzero((self.source >= self.target) & (self.within != "start"))
-        self.y = np.zeros(len(connections))
+        self.y, self.raw = np.zeros(len(connections)), np.zeros(len(connections))
         self.before = self.y.copy()
         self.jacobian: np.ndarray | None = None
         self.evaluations = 0
@@ -169,7 +181,7 @@ class _Run:
         self.used: list[np.ndarray] = []
         self.stopped: tuple[str, str] | None = None
         self.recorded = [
-            [name for v in s.variables.values() if v.causality == "output" and v.type == "Float64" for name in v.elements]
+            [name for v in s.variables.values() if v.causality == "output" and family(v) is not None for name in v.elements]
             for s in self.slaves
         ]
         self._check()
@@ -227,7 +239,7 @@ class _Run:
             time = k * system.step
             # Products, so that time does not drift; the last step is cut to the end.
             end = min((k + 1) * system.step, system.duration)
-            start = self.y.copy()
+            start, raw = self.y.copy(), self.raw.copy()
             try:
                 self.used.append(make(time, end - time))
             except _Failed as failed:
@@ -245,6 +257,7 @@ class _Run:
                 self.used.pop()
                 return
             self.before = start
+            self.between.end(self.out_of, raw, self.raw)
             self._record(end)
             if self.stopped is not None:
                 return
@@ -354,10 +367,18 @@ class _Run:
     def _take(self, i: int) -> None:
         if self.output_names[i]:
             places = self.out_of[i]
-            self.y[places] = self.factor[places] * self.slaves[i].get(self.output_names[i]) + self.offset[places]
+            self.raw[places] = self.slaves[i].get(self.output_names[i])
+            self.y[places] = self.factor[places] * self.raw[places] + self.offset[places]
 
     def _advance(self, i: int, time: float, step: float) -> None:
         self.evaluations += 1
+        n = self.between.begin(i, self.slaves[i], step) if self.output_names[i] else 1
+        for k in range(n):
+            self._make(i, time + k * (step / n), step / n)
+            if k + 1 < n:
+                self.between.see(i, time + (k + 1) * (step / n), self.slaves[i].get(self.output_names[i]))
+
+    def _make(self, i: int, time: float, step: float) -> None:
         try:
             done = self.slaves[i].do_step(time, step)
         except SlaveError as error:
@@ -414,6 +435,12 @@ class _Run:
             connections=tuple(self._report(k, residual, created, exchanged) for k in range(count)),
             evaluations=self.evaluations / max(n, 1),
             warnings=(*self.system.warnings, *warnings),
+            beyond={
+                ".".join(c.source): (float(most), float(at))
+                for c, most, at in zip(self.system.connections, self.between.most, self.between.at, strict=True)
+                if most > 0.0
+            },
+            resolution=self.between.longest or None,
         )
 
     def _judge(self, created: np.ndarray, exchanged: np.ndarray, outputs: np.ndarray) -> tuple[str, str, list[str]]:
@@ -432,7 +459,7 @@ class _Run:
             text = f"the coupling creates {most:.3g} J at {self.slaves[i].name}, through which {through:.3g} J go"
             # A coupling far beyond its limit throws energy about in both directions: then the sum over steps tells.
             if most > MOST_CREATED * through or steps_made > MOST_IN_STEPS * max(steps_went, _LITTLE):
-                return "unstable", f"{text}; take a shorter step, the iterated algorithm, or the motion port", []
+                return "unstable", f"{text}; take {self._stabler(i)}", []
             if most > WORTH_A_WARNING * through:
                 warnings.append(text)
             inside = self._received(i, outputs)
@@ -448,6 +475,19 @@ class _Run:
             if off > WORTH_A_WARNING * through:
                 warnings.append(text)
         return "stable", "the energy that the coupling creates is small", warnings
+
+    def _stabler(self, i: int) -> str:
+        """Say what may keep the coupling at a slave from creating energy, of what the partners can do."""
+        found = ["a shorter step"]
+        iterating = [self.slaves[k] for k in range(len(self.slaves))[self._loop]] if len(self.torn) else []
+        stuck = [slave.name for slave in iterating if not slave.can_rollback]
+        if iterating and not stuck and self.system.algorithm != "iterated":
+            found.append("the iterated algorithm")
+        slave = self.slaves[i]
+        if isinstance(slave, Slave) and slave.port == "force":
+            found.append(f"the motion port of {slave.name} for a contact that is a spring and a damper")
+        cannot = f" ({' and '.join(stuck)} cannot go back to a state, so that nothing can be iterated)" if stuck else ""
+        return f"{' or '.join(found)}{cannot}"
 
     def _input(self, k: int) -> str:
         """Name of the input at the end of a connection."""

@@ -45,7 +45,8 @@ def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[st
             for report in run.connections
         ],
         "accuracy": system.accuracy,
-        "errors": [{"name": e.name, "unit": e.unit, "estimated_error": e.error, "allowed": e.allowed} for e in run.estimates],
+        "resolution_s": run.resolution,
+        "errors": [{"name": e.name, "unit": e.unit, "estimated_error": e.error, "allowed": e.allowed, "at_s": e.at} for e in run.estimates],
         "not_connected": system.unconnected,
         "warnings": list(run.warnings),
         "made_by": plain.origin(command),

@@ -25,6 +25,9 @@ ALGORITHMS = ("jacobi", "gauss-seidel", "iterated")
 KINDS = ("model", "fmu", "wall", "signal", "pid", "impedance")
 """What a slave of SYSTEM.toml can be."""
 WITHIN = ("start", "mean", "end")
+_OPTIONAL = ("algorithm", "tolerance", "accuracy", "refine", "resolution_s")
+RESOLUTION = 0.25e-3
+"""Shortest event of a partner that a good run must not miss, where nothing is said [s]: the inner step of arms."""
 _POWER = (1, 2, -3)
 _MOST_STEPS = 10_000_000
 """Most communication steps of a run: every one of them is kept."""
@@ -84,6 +87,8 @@ class System:
         Error that a good run may have at the interface and in the angles of arms, relative to the largest change of each variable.
     refine : int
         How often the step may be halved to reach it.
+    resolution : float
+        Shortest event of a partner that a good run must not miss [s].
     warnings : tuple of str
     """
 
@@ -96,6 +101,7 @@ class System:
     tolerance: float = 1e-6
     accuracy: float = 0.01
     refine: int = 0
+    resolution: float = RESOLUTION
     warnings: tuple[str, ...] = ()
 
     @property
@@ -130,6 +136,7 @@ def couple(
     tolerance: float = 1e-6,
     accuracy: float = 0.01,
     refine: int = 0,
+    resolution: float = RESOLUTION,
     starts: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> System:
     """Make a system of slaves and connections, and check that they fit together.
@@ -141,7 +148,7 @@ def couple(
     connections : iterable
         Pairs `("robot.F", "arm.handle.F")`, or tables with the keys of `[[connection]]`. A name without index stands for all of its
         indices.
-    algorithm, step, duration, tolerance, accuracy, refine
+    algorithm, step, duration, tolerance, accuracy, refine, resolution
         As in `System`.
     starts : mapping, optional
         Values to be set before the initialization, by slave and variable.
@@ -188,6 +195,7 @@ def couple(
         tolerance=checks.number("[system], tolerance", tolerance, above=0.0, most=0.1),
         accuracy=checks.number("[system], accuracy", accuracy, above=0.0, most=1.0),
         refine=checks.whole("[system], refine", refine, least=0, most=10),
+        resolution=checks.number("[system], resolution_s", resolution, least=1e-6, unit="s"),
         warnings=tuple(warnings),
     )
 
@@ -208,7 +216,7 @@ def _system(document: dict[str, Any], path: Path) -> System:
     try:
         checks.keys("", document, required=["system", "slave"], optional=["connection"])
         settings = checks.table("[system]", document["system"])
-        checks.keys("[system]", settings, required=["step_s", "duration_s"], optional=["algorithm", "tolerance", "accuracy", "refine"])
+        checks.keys("[system]", settings, required=["step_s", "duration_s"], optional=_OPTIONAL)
         starts = {}
         for number, table in enumerate(checks.tables("slave", document["slave"]), start=1):
             try:
@@ -309,9 +317,9 @@ def _connection(
     if given.causality != "input":
         raise BadInput("to", Text(f"{'.'.join(target)}, {given.causality}"), "an input")
     for end, variable in zip(ends, (output, given), strict=True):
-        if _family(variable) is None:
+        if family(variable) is None:
             raise BadInput("from, to", Text(f"{'.'.join(end)}, {variable.type}"), "numbers or truth values")
-    if _family(output) != _family(given):
+    if family(output) != family(given):
         raise BadInput("from, to", Text(f"{output.type} and {given.type}"), "the same sort of value at both ends")
     label = f"{'.'.join(source)} -> {'.'.join(target)}"
     if output.exponents is None or given.exponents is None:
@@ -322,7 +330,7 @@ def _connection(
     dual, sign = _dual(table.get("dual"), target, slaves)
     factor, offset = checks.number("factor", table.get("factor", 1.0)), checks.number("offset", table.get("offset", 0.0))
     within = table.get("within")
-    if _family(given) != "Float":
+    if family(given) != "Float":
         if (factor, offset) != (1.0, 0.0):
             raise BadInput("factor, offset", Text(f"with {output.type}"), "neither, but between floating point numbers")
         # Between whole numbers there is nothing to hold.
@@ -331,11 +339,11 @@ def _connection(
     return Connection(source, target, within, dual, sign, factor * output.scale / given.scale, offset)
 
 
-def _family(variable: Variable) -> str | None:
-    """Return the sort of value that may be connected: floating point, whole number, or truth value."""
-    for family in ("Float", "UInt", "Int", "Boolean"):
-        if variable.type.startswith(family):
-            return "Int" if family == "UInt" else family
+def family(variable: Variable) -> str | None:
+    """Return the sort of value that may be connected: "Float", "Int", or "Boolean"; None for others."""
+    for word in ("Float", "UInt", "Int", "Boolean"):
+        if variable.type.startswith(word):
+            return "Int" if word == "UInt" else word
     return None
 
 

@@ -1,0 +1,179 @@
+"""What a partner does between the communication points of a run and of its second run: no such run is good."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armrs.cosim import Slave
+from armrs.cosim.accuracy import run_checked
+from armrs.cosim.between import parts
+from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.master import Coupled, run_system
+from armrs.cosim.partner import Partner
+from armrs.cosim.ready import Ready, Wave
+from armrs.cosim.system import System, couple
+from armrs.cosim.wall import Wall
+from armrs.errors import BadInput, CoupledError
+from armrs.model import load_model
+
+ARM = Path(__file__).parents[1] / "examples" / "cosim" / "arm.toml"
+NEAR = np.radians([-60.0, 50.0])
+PULSE = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+
+class Pulse(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.time, self.at, self.width = 0.0, 0.1001, 0.0008
+        tunable = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
+        self.register_variable(Real("at", start=0.1001, **tunable))
+        self.register_variable(Real("width", start=0.0008, **tunable))
+        on = lambda: 40.0 if self.at <= self.time < self.at + self.width else 0.0
+        self.register_variable(Real("F", causality=Fmi2Causality.output, getter=on))
+
+    def do_step(self, current_time, step_size):
+        self.time = current_time + step_size
+        return True
+"""
+
+
+@pytest.fixture(scope="module")
+def pulse(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A partner that pushes for a moment, made by PythonFMU."""
+    pytest.importorskip("pythonfmu")
+    folder = tmp_path_factory.mktemp("pulse")
+    (folder / "pulse.py").write_text(PULSE, encoding="utf-8")
+    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "pulse.py"], check=True, cwd=folder, capture_output=True)
+    return folder / "Pulse.fmu"
+
+
+def pushed(partner: Partner, step: float, **settings: float) -> System:
+    arm = Slave(load_model(ARM), start=NEAR, rest=True, name="arm")
+    [output] = [v.name for v in partner.variables.values() if v.causality == "output"]
+    return couple([partner, arm], [(f"{partner.name}.{output}", "arm.handle.F[1]")], step=step, duration=0.2, **settings)
+
+
+def smooth() -> Wave:
+    return Wave("sine", amplitude=2.0, frequency=1.5, unit="N", name="wave")
+
+
+def refused(system: System) -> Coupled:
+    with pytest.raises(CoupledError) as error:
+        run_checked(system)
+    run: Coupled = error.value.run
+    return run
+
+
+@pytest.mark.parametrize(("at", "width"), [(0.1001, 0.0008), (0.1503, 0.0004), (0.02055, 0.0003)])
+@pytest.mark.parametrize("step", [0.002, 0.01, 1.0 / 60.0])
+def test_a_pulse_between_the_points_of_both_runs_is_seen(at: float, width: float, step: float, pulse: Path) -> None:
+    with ImportedSlave(pulse, name="pulse") as partner:
+        partner.set(["at", "width"], [at, width])
+        partner.reset = lambda: None  # type: ignore[method-assign]  (it would take the parameters back, too)
+        run = refused(pushed(partner, step))
+    assert run.verdict == "not accurate"
+    [found] = [e for e in run.estimates if e.at is not None]
+    assert (found.name, found.error) == ("pulse.F", 40.0)
+    assert at <= found.at < at + width
+    assert run.why.startswith(f"pulse.F goes 40 beyond its values at the communication points at {found.at:.6g} s")
+
+
+def test_a_pulse_shorter_than_the_resolution_is_seen_with_a_finer_one(pulse: Path) -> None:
+    """By default an event of less than 0.25 ms may be missed, and the verdict says so."""
+    with ImportedSlave(pulse, name="pulse") as partner:
+        partner.set(["at", "width"], [0.10005, 0.0001])
+        partner.reset = lambda: None  # type: ignore[method-assign]
+        run = run_checked(pushed(partner, 0.002))
+        assert run.verdict == "good"
+        assert run.why.endswith("an event of a partner shorter than 0.25 ms can be missed")
+        assert run.resolution == pytest.approx(0.25e-3)
+        assert refused(pushed(partner, 0.002, resolution=0.05e-3)).verdict == "not accurate"
+
+
+class Shaking(Ready):
+    """A sine that both runs see at its zeros alone."""
+
+    def __init__(self) -> None:
+        super().__init__("shaking", (), [("F", "N")])
+
+    def outputs(self) -> dict[str, float]:
+        return {"F": 5.0 * np.sin(2e3 * np.pi * self.time)}
+
+
+def test_a_vibration_that_looks_like_rest_is_seen() -> None:
+    run = refused(pushed(Shaking(), 0.002))
+    [found] = [e for e in run.estimates if e.at is not None]
+    assert found.error == pytest.approx(5.0, rel=1e-3)
+
+
+def test_a_smooth_force_is_good_as_before() -> None:
+    run = run_checked(pushed(smooth(), 0.002))
+    assert run.verdict == "good"
+    # Between the communication points a sine has its peak.
+    assert max(e.error for e in run.estimates if e.name == "wave.y") < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("inner", "varies", "step", "expected"),
+    [
+        (None, True, 1e-3, 4),
+        (None, True, 0.2e-3, 1),
+        (None, True, 1.1e-3, 5),
+        (0.125e-3, True, 1e-3, 4),  # eight inner steps: two in a part
+        (0.25e-3, False, 1e-3, 4),
+        (0.5e-3, False, 1e-3, 2),  # no part is shorter than the inner step
+        (1e-3, False, 1e-3, 1),
+        (0.1e-3, False, 0.7e-3, 7),  # seven inner steps have no other equal parts
+        (0.3e-3, False, 1e-3, 1),
+        (0.3e-3, True, 1e-3, 4),
+    ],
+)
+def test_parts_of_a_step_are_made_of_inner_steps(inner: float | None, varies: bool, step: float, expected: int) -> None:
+    slave = Wall("y", 0.0, 1.0)
+    slave.internal_step, slave.can_vary_step = inner, varies
+    assert parts(slave, step, 0.25e-3) == expected
+
+
+def test_looking_leaves_a_run_as_it_is() -> None:
+    """Parts of whole inner steps give the same bits."""
+    runs = [run_system(pushed(smooth(), 0.002), resolution=r) for r in (np.inf, 0.25e-3)]
+    assert runs[0].columns["arm.q[1]"].tobytes() == runs[1].columns["arm.q[1]"].tobytes()
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-9, -1.0, float("nan")])
+def test_a_resolution_that_is_none_is_refused(value: float) -> None:
+    with pytest.raises(BadInput, match="resolution_s: found"):
+        pushed(Shaking(), 0.002, resolution=value)
+
+
+# ---- what an unstable run is advised to do
+class Stiff(Ready):
+    """A spring from where the hand begins."""
+
+    def __init__(self, *, can_rollback: bool) -> None:
+        super().__init__("spring", [("r", "m")], [("F", "N")])
+        self.can_rollback, self.anchor = can_rollback, float(Slave(load_model(ARM), start=NEAR).get("handle.r[1]")[0]) + 0.01
+
+    def outputs(self) -> dict[str, float]:
+        return {"F": 1e4 * (self.anchor - self.inputs["r"])}
+
+
+@pytest.mark.parametrize("can_rollback", [True, False])
+def test_the_advice_names_what_the_partners_can_do(can_rollback: bool) -> None:
+    arm = Slave(load_model(ARM), start=NEAR, name="arm")
+    lines = [("arm.handle.r[1]", "spring.r"), ("spring.F", "arm.handle.F[1]")]
+    with pytest.raises(CoupledError, match="unstable") as error:
+        run_system(couple([arm, Stiff(can_rollback=can_rollback)], lines, step=0.005, duration=1.0))
+    advice = "the motion port of arm for a contact that is a spring and a damper"
+    if can_rollback:
+        assert str(error.value).endswith(f"take a shorter step or the iterated algorithm or {advice}")
+    else:
+        assert str(error.value).endswith(
+            f"take a shorter step or {advice} (spring cannot go back to a state, so that nothing can be iterated)"
+        )
