@@ -1,6 +1,6 @@
 /* A small FMU of FMI 3.0 that does what its description promises, unless a macro breaks one promise. It integrates its input.
    Variables: 0 time, 1 x (input), 2 k (tunable parameter), 3 s (output, state), 4 z = k x (output), 5 n (Int32), 6 b (Boolean),
-   7 label (String), 8 der(s), 9 size (UInt64, structural parameter), 10 blob (Binary). The functions that it does not have are added as stubs by the test. */
+   7 label (String), 8 der(s), 9 size (UInt64, structural parameter), 10 blob (Binary); clocks: 11 tick (constant), 12 go (triggered), 13 later (countdown), 14 rang (output). The functions that it does not have are added as stubs by the test. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -11,7 +11,8 @@
 
 typedef uint32_t VR;
 typedef void (*Update)(void *, double, bool, bool, bool, bool, bool *, double *);
-typedef struct { double t, x, k, s; int32_t n; bool b, stepping, early, inside; int instances; double first; Update update; } Model;
+typedef struct { double t, x, k, s; int32_t n; bool b, stepping, early, inside; int instances; double first; Update update;
+    void (*news)(void *), (*lock)(void), (*unlock)(void); } Model;
 static int alive;
 #ifdef SHARED
 static Model shared;
@@ -88,6 +89,64 @@ void *fmi3InstantiateModelExchange(const char *name, const char *token, const ch
     return NULL;
 #endif
     return make();
+}
+void *fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *path, bool visible, bool logging, void *e,
+                                        void *log, void (*news)(void *), void (*lock)(void), void (*unlock)(void)) {
+#ifdef SCHEDULED_REFUSED
+    return NULL;
+#endif
+    Model *m = make();
+    if (m) { m->news = news; m->lock = lock; m->unlock = unlock; }
+    return m;
+}
+int fmi3ActivateModelPartition(void *v, VR clock, double t) {
+    Model *m = v;
+#ifdef PARTITION_REFUSED
+    if (clock == 12) return 3;
+#endif
+#ifdef PARTITION_ABORTS
+    abort();
+#endif
+    m->lock();
+    m->s += 1;
+#ifdef PREEMPTION_LOCKED
+    if (clock != 11)
+#endif
+    m->unlock();
+    if (clock == 11) { m->inside = true; m->news(NULL); m->inside = false; }
+    return clock >= 11 && clock <= 13 ? 0 : 3;
+}
+int fmi3GetIntervalDecimal(void *v, const VR *r, size_t n, double *out, int *qualifiers) {
+    bool news = ((Model *)v)->inside;
+    if (n != 1 || r[0] != 13) return 3;
+#ifdef INTERVAL_REFUSED
+    return 3;
+#endif
+#ifdef CLOCK_UPDATE_FAILS
+    if (news) return 3;
+#endif
+    out[0] = 0.005;
+    qualifiers[0] = news ? 2 : 0;
+#ifdef INTERVAL_NEGATIVE
+    out[0] = -1; qualifiers[0] = 2;
+#endif
+#ifdef QUALIFIER_STRANGE
+    qualifiers[0] = 7;
+#endif
+    return 0;
+}
+int fmi3SetClock(void *v, const VR *r, size_t n, const bool *in) {
+#ifdef CLOCK_REFUSED
+    return 3;
+#endif
+    return r[0] == 11 || r[0] == 12 ? 0 : 3;
+}
+int fmi3GetClock(void *v, const VR *r, size_t n, bool *out) {
+#ifdef CLOCK_UNREADABLE
+    return 3;
+#endif
+    out[0] = true;
+    return r[0] == 14 ? 0 : 3;
 }
 void fmi3FreeInstance(void *v) {
     alive--;

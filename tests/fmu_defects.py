@@ -19,6 +19,7 @@ SMALL = """<?xml version="1.0" encoding="UTF-8"?>
   <CoSimulation modelIdentifier="small" canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="true"
     canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="1" hasEventMode="true" providesIntermediateUpdate="true"
     canReturnEarlyAfterIntermediateUpdate="true" providesAdjointDerivatives="true"/>
+  <ScheduledExecution modelIdentifier="small"/>
   <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
   <ModelVariables>
     <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
@@ -32,10 +33,15 @@ SMALL = """<?xml version="1.0" encoding="UTF-8"?>
     <Float64 name="der(s)" valueReference="8" causality="local" variability="continuous" initial="calculated" derivative="3"/>
     <UInt64 name="size" valueReference="9" causality="structuralParameter" variability="fixed" start="3"/>
     <Binary name="blob" valueReference="10" causality="input" variability="discrete"><Start value="C000FE"/></Binary>
+    <Clock name="tick" valueReference="11" causality="input" intervalVariability="constant" intervalDecimal="0.01" priority="1"/>
+    <Clock name="go" valueReference="12" causality="input" intervalVariability="triggered" priority="2"/>
+    <Clock name="later" valueReference="13" causality="input" intervalVariability="countdown" priority="3"/>
+    <Clock name="rang" valueReference="14" causality="output" intervalVariability="triggered" clocks="11"/>
   </ModelVariables>
   <ModelStructure>
     <Output valueReference="3" dependencies="3"/>
     <Output valueReference="4" dependencies="1" dependenciesKind="dependent"/>
+    <Output valueReference="14" dependencies="11"/>
     <ContinuousStateDerivative valueReference="8" dependencies="1"/>
     <InitialUnknown valueReference="4" dependencies="1 2"/>
     <InitialUnknown valueReference="8" dependencies="1"/>
@@ -74,6 +80,16 @@ LIBRARY = {
     "STATES_MISCOUNTED": "GetNumberOfContinuousStates",
     "RATES_REFUSED": "GetContinuousStateDerivatives",
     "NOMINAL_ZERO": "GetNominalsOfContinuousStates",
+    "CLOCK_REFUSED": "SetClock",
+    "CLOCK_UNREADABLE": "GetClock",
+    "INTERVAL_REFUSED": "GetIntervalDecimal",
+    "INTERVAL_NEGATIVE": "clock later: its interval is -1 s in the initialization",
+    "QUALIFIER_STRANGE": "clock later: its interval has the qualifier 7",
+    "SCHEDULED_REFUSED": "scheduled execution is refused",
+    "PARTITION_REFUSED": "clock go: its partition cannot be activated at 0 s",
+    "PARTITION_ABORTS": "is killed by signal 6 (SIGABRT) when activating the partitions",
+    "PREEMPTION_LOCKED": "clock tick: its partition returns with preemption locked 1 times more than unlocked",
+    "CLOCK_UPDATE_FAILS": "a clock update: GetIntervalDecimal",
     "TERMINATE_FAILS": "Terminate",
     "RESET_FAILS": "Reset",
     "RESET_KEEPS": "Reset",
@@ -258,6 +274,23 @@ TWO: dict[str, tuple[Change, str]] = {
     "structural parameter in FMI 2": (edit('(name="gravity".*?causality=)"parameter"', r'\1"structuralParameter"'), "structuralParameter"),
     "start of what is calculated": (edit(r'(name="handle.r\[1\]"(?s:.*?)<Real )', r'\1start="0.1" '), "allowed is none"),
 }
+
+
+CLOCKS: dict[str, tuple[Change, str]] = {
+    "clock without a kind": (edit(' intervalVariability="constant"', ""), "intervalVariability"),
+    "clock of an unknown kind": (edit('"countdown"', '"sometimes"'), "sometimes"),
+    "constant clock without an interval": (edit(' intervalDecimal="0.01"', ""), "clock tick: no interval"),
+    "interval of zero": (edit('intervalDecimal="0.01"', 'intervalDecimal="0"'), "clock tick: interval 0 s"),
+    "shift below zero": (edit('intervalDecimal="0.01"', 'intervalDecimal="0.01" shiftDecimal="-1"'), "clock tick: shift -1 s"),
+    "no priority in scheduled execution": (edit(' priority="2"', ""), "clock go: no priority"),
+    "priority of an output": (edit('name="rang"', 'name="rang" priority="4"'), "clock rang: priority 4 of an output clock"),
+    "output that ticks by time": (
+        edit('(name="rang".*?intervalVariability=)"triggered"', r'\1"countdown"'),
+        "causality output of a clock that ticks by time",
+    ),
+    "clocked by what is no clock": (edit('clocks="11"', 'clocks="3"'), "variable rang: clocks refers to 3"),
+}
+"""Edits of the small FMU's description, which has clocks."""
 
 
 def small(folder: Path, defect: str = "", description: str = SMALL) -> Path:

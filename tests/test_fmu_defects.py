@@ -49,6 +49,15 @@ def test_every_defect_of_a_description_is_found_and_named(fmi: int, defect: str,
 
 
 @NEEDS_COMPILER
+@pytest.mark.parametrize("defect", fmu_defects.CLOCKS)
+def test_every_defect_of_a_clock_is_found_and_named(defect: str, tmp_path: Path) -> None:
+    pytest.importorskip("fmpy")
+    change, words = fmu_defects.CLOCKS[defect]
+    found = errors(fmu_defects.small(tmp_path, description=change(fmu_defects.SMALL)), library=False)
+    assert any(words in text for text in found), found
+
+
+@NEEDS_COMPILER
 def test_the_small_fmu_is_good(tmp_path: Path) -> None:
     assert errors(fmu_defects.small(tmp_path)) == []
 
@@ -81,9 +90,17 @@ def test_wrong_dependencies_are_found(tmp_path: Path) -> None:
 @NEEDS_COMPILER
 @pytest.mark.parametrize("defect", ["", "EXCHANGE_REFUSED", "RATES_REFUSED", "STATES_MISCOUNTED"])
 def test_an_fmu_for_model_exchange_alone_is_tried(defect: str, tmp_path: Path) -> None:
-    description = re.sub(r"(?s)  <CoSimulation.*?/>\n", "", fmu_defects.SMALL)
+    description = re.sub(r"(?s)  <(CoSimulation|ScheduledExecution).*?/>\n", "", fmu_defects.SMALL)
     found = errors(fmu_defects.small(tmp_path, defect, description))
     assert [fmu_defects.LIBRARY[defect] in text for text in found] == [True] if defect else found == []
+
+
+@NEEDS_COMPILER
+@pytest.mark.parametrize("defect", ["", "SCHEDULED_REFUSED", "PREEMPTION_LOCKED"])
+def test_an_fmu_for_scheduled_execution_alone_is_tried(defect: str, tmp_path: Path) -> None:
+    description = re.sub(r"(?s)  <(CoSimulation|ModelExchange).*?/>\n", "", fmu_defects.SMALL)
+    found = errors(fmu_defects.small(tmp_path, defect, description))
+    assert [fmu_defects.LIBRARY[defect] in text for text in found][:1] == [True] if defect else found == []
 
 
 @NEEDS_COMPILER

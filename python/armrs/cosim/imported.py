@@ -111,13 +111,14 @@ class ImportedSlave(Partner):
     ) -> None:
         self.path = checks.path("path", path)
         self.description = read_description(path) if description is None else description
-        describe(self, self.path, self.description, name)
+        interface = "ScheduledExecution" if "scheduled" in mode else "CoSimulation"
+        describe(self, self.path, self.description, name, interface)
         unpacked = Path(tempfile.mkdtemp(prefix="armrs-fmu-")) if folder is None else folder
         remove = unpacked if folder is None else None
         try:
             if folder is None:
                 unpack(path, unpacked)
-            self.library = Library(library_path(unpacked, self.description, path), self.fmi)
+            self.library = Library(library_path(unpacked, self.description, path, interface), self.fmi)
             self._do_step = self.library.function("DoStep")
             resources = unpacked / "resources"
             resources.mkdir(exist_ok=True)
@@ -360,9 +361,9 @@ class ImportedSlave(Partner):
         return (ctypes.c_uint32 * len(names))(*(self.variables[name].reference for name in names))
 
 
-def describe(slave: Any, path: Path, description: Description, name: str | None) -> None:
+def describe(slave: Any, path: Path, description: Description, name: str | None, interface: str = "CoSimulation") -> None:
     """Give a slave the attributes of a `Partner` from the description of its FMU."""
-    if "CoSimulation" not in description.interfaces:
+    if interface not in description.interfaces:
         raise BadInput("modelDescription.xml", Text(f"{' and '.join(description.interfaces)} alone"), "an FMU for co-simulation", file=path)
     slave.name = path.stem if name is None else checks.text("name", name)
     slave.variables = {v.name: v for v in description.variables}

@@ -29,6 +29,8 @@ _LOG_3 = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 _LOG_2 = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_void_p)
 UPDATE_3 = ctypes.CFUNCTYPE(None, c_void_p, c_double, c_bool, c_bool, c_bool, c_bool, ctypes.POINTER(c_bool), ctypes.POINTER(c_double))
 """Intermediate update of FMI 3.0."""
+UPDATE_CLOCKS_3 = ctypes.CFUNCTYPE(None, c_void_p)
+"""Clock update of scheduled execution in FMI 3.0."""
 _C_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
@@ -88,7 +90,7 @@ class Library:
         return function
 
     def instantiate(self, name: str, token: str, resources: Path | None, *, logging: bool = False, **mode: Any) -> int | None:
-        """Return the handle of a new instance for co-simulation, or None when the FMU refuses.
+        """Return the handle of a new instance for co-simulation, or for scheduled execution, or None when the FMU refuses.
 
         Parameters
         ----------
@@ -97,9 +99,13 @@ class Library:
         logging : bool
         **mode
             FMI 3.0: `event_mode`, whether the event mode is used; `early`, whether a step may return early; `intermediate`, the callback
-            of the intermediate update; `required`, the value references that are read and set in it.
+            of the intermediate update; `required`, the value references that are read and set in it; `scheduled`, for an instance for
+            scheduled execution instead, the callbacks for updates of clocks, and for what must not be interrupted.
         """
         text = [c_char_p(part.encode()) for part in (name, token)]
+        if "scheduled" in mode:
+            make = self.function("InstantiateScheduledExecution", c_void_p)
+            return make(*text, _folder(resources), c_bool(False), c_bool(logging), None, self._log_3, *mode["scheduled"])
         if self.fmi == 3:
             make = self.function("InstantiateCoSimulation", c_void_p)
             modes = [c_bool(mode.get(word, False)) for word in ("event_mode", "early")]

@@ -12,14 +12,11 @@ from typing import Any
 
 from ..cosim.imported import ImportedSlave
 from ..cosim.library import Library, library_path
-from ..cosim.partner import Status, Variable
+from ..cosim.partner import Status
 from ..errors import ArmrsError, SlaveError
-from . import names, promises
+from . import names, promises, values
 from .description import Description, parse
-from .trial import MOST_SHOWN, Trial, same
-
-_ROUNDED = 1e-12
-"""Relative difference of a start value that a decimal number with 15 digits may cause."""
+from .trial import MOST_SHOWN, Trial
 
 
 def run(path: Path, folder: Path, send: Callable[[dict[str, Any]], None], part: int | None = None) -> None:
@@ -33,8 +30,6 @@ def run(path: Path, folder: Path, send: Callable[[dict[str, Any]], None], part: 
             for promise in tried if part is None else tried[part : part + 1]:
                 if not trial.needs_tool:
                     _guarded(trial, promise)
-            if "ScheduledExecution" in description.interfaces:
-                trial.find("ScheduledExecution", "not tried", level="note")
     except ArmrsError as refused:
         trial.find("library", str(refused))
     trial.step("end")
@@ -98,15 +93,15 @@ def _life(trial: Trial) -> None:
         trial.find("library, instantiate", f"refused with the {token} {trial.description.token!r}: {error}")
         return
     trial.step("setting values before the initialization")
-    _set_all(trial, slave, _settable_at_start(trial), "before the initialization")
+    values.set_all(trial, slave, values.settable_at_start(trial), "before the initialization")
     trial.step("initializing")
     slave.enter_initialization_mode(trial.start)
     trial.step("comparing start values")
-    _starts(trial, slave)
+    values.starts(trial, slave)
     for promise in promises.IN_INITIALIZATION:
         _guarded(trial, partial(promise, slave=slave))
     slave.exit_initialization_mode()
-    _reads(trial, slave)
+    values.reads(trial, slave)
     first = _steps(trial, slave)
     _second_instance(trial, slave)
     _tunables(trial, slave)
@@ -124,61 +119,6 @@ def _made_with_events(trial: Trial) -> bool:
     except SlaveError:
         return False
     return True
-
-
-def _settable_at_start(trial: Trial) -> list[Variable]:
-    """Return inputs and parameters with start values; structural parameters need the configuration mode."""
-    return [v for v in trial.readable("input", "parameter") if v.start is not None]
-
-
-def _set_all(trial: Trial, slave: ImportedSlave, variables: list[Variable], when: str) -> None:
-    for v in variables:
-        try:
-            slave.set(v.name, _given(v))
-        except SlaveError as error:  # noqa: PERF203 (every variable is tried)
-            trial.find(f"variable {v.name}", f"its own start value cannot be set {when}: {error}", sort=f"set {when}")
-
-
-def _given(v: Variable) -> Any:
-    """Return the start value in the shape that `set` takes; one value may stand for a whole array."""
-    if not v.dimensions:
-        return v.start
-    return list(v.start) * (v.size if len(v.start) == 1 else 1)
-
-
-def _starts(trial: Trial, slave: ImportedSlave) -> None:
-    """Compare what the library holds with what the description says."""
-    exact = [v for v in trial.readable() if v.start is not None and v.causality != "independent" and initial_of(v) == "exact"]
-    for v in exact:
-        try:
-            found, said = slave.values(v.name), v.start if v.dimensions else (v.start,)
-        except SlaveError as error:
-            trial.find(f"variable {v.name}", f"cannot be read: {error}", sort="unreadable")
-            continue
-        if len(said) == 1:
-            said = said * len(found)
-        if len(said) != len(found):
-            trial.find(f"variable {v.name}", f"start has {len(said)} values, its dimensions say {len(found)}", sort="start size")
-        elif not all(_as_said(v, a, b) for a, b in zip(found, said, strict=True)):
-            shown = (v.start, found) if v.dimensions else (v.start, found[0])
-            trial.find(f"variable {v.name}", f"start is {shown[0]!r} in the description and {shown[1]!r} in the library", sort="start")
-
-
-def _as_said(v: Variable, found: Any, said: Any) -> bool:
-    if not v.type.startswith("Float"):
-        return bool(found == said)
-    if v.type == "Float32":
-        return bool(ctypes.c_float(said).value == found) or math.isclose(found, said, rel_tol=1e-6)
-    return same(found, said) or math.isclose(found, said, rel_tol=_ROUNDED)
-
-
-def _reads(trial: Trial, slave: ImportedSlave) -> None:
-    trial.step("reading every variable")
-    for v in trial.readable():
-        try:
-            slave.values(v.name)
-        except SlaveError as error:  # noqa: PERF203
-            trial.find(f"variable {v.name}", f"cannot be read after the initialization: {error}", sort="unreadable")
 
 
 def _steps(trial: Trial, slave: ImportedSlave) -> dict[str, list[Any]]:
@@ -279,7 +219,7 @@ def _tunables(trial: Trial, slave: ImportedSlave) -> None:
     trial.step("setting inputs and tunable parameters between steps")
     inputs = [v for v in trial.readable("input") if v.start is not None]
     tunable = [v for v in trial.readable("parameter") if v.variability == "tunable" and v.start is not None]
-    _set_all(trial, slave, [*inputs, *tunable], "between steps")
+    values.set_all(trial, slave, [*inputs, *tunable], "between steps")
 
 
 def _second_instance(trial: Trial, slave: ImportedSlave) -> None:
@@ -295,7 +235,7 @@ def _second_instance(trial: Trial, slave: ImportedSlave) -> None:
         return
     trial.step("initializing a second instance")
     other.enter_initialization_mode(trial.start)
-    _starts(trial, other)
+    values.starts(trial, other)
     other.exit_initialization_mode()
     other.do_step(trial.start, trial.size)
     trial.compare("library, instantiate", before, trial.outputs(slave), "after a second instance made one")
@@ -307,11 +247,3 @@ def _reset(trial: Trial, slave: ImportedSlave, first: dict[str, list[Any]]) -> N
     slave.reset()
     trial.begin(slave)
     trial.compare("library, Reset", first, _advance(trial, slave, trial.start, trial.size), "after a reset")
-
-
-def initial_of(v: Variable) -> str:
-    """Return where a start value comes from, with what the standards take where nothing is said."""
-    if v.initial is not None:
-        return v.initial
-    exact = v.causality in ("input", "parameter", "structuralParameter") or v.variability == "constant"
-    return "exact" if exact else "calculated"

@@ -10,6 +10,7 @@ from ..cosim.imported import ImportedSlave
 from ..cosim.library import Library, library_path
 from ..cosim.partner import Variable
 from ..errors import ArmrsError, SlaveError
+from . import clocks
 from .intermediate import early_return, intermediate_update
 from .trial import Trial
 
@@ -136,8 +137,12 @@ def event_mode(trial: Trial) -> None:
         trial.find("CoSimulation, hasEventMode", f"an instance that uses the event mode is refused: {error}")
         return
     trial.step("going through the event mode")
-    trial.begin(slave)
+    slave.enter_initialization_mode(trial.start)
+    clocks.intervals(trial, slave.call, "in the initialization")
+    slave.exit_initialization_mode()
+    clocks.tick(trial, slave.call)
     _discrete(trial, slave)
+    clocks.intervals(trial, slave.call, "in the event mode", ("countdown",))
     slave.call("EnterStepMode")
     done = slave.do_step(trial.start, trial.size)
     if done.event:
@@ -190,6 +195,7 @@ def _exchanged(trial: Trial, library: Library, call: Callable[..., None]) -> Non
     known = (truth(False), c_double(0.0), start, truth(False), c_double(0.0))
     if trial.fmi == 3:
         call("EnterInitializationMode", *known)
+        clocks.intervals(trial, call, "in the initialization")
     else:
         call("SetupExperiment", *known)
         call("EnterInitializationMode")
@@ -202,6 +208,7 @@ def _exchanged(trial: Trial, library: Library, call: Callable[..., None]) -> Non
         if number.value != said:
             trial.find("library, GetNumberOfContinuousStates", f"{number.value}, ModelStructure lists {said} derivatives")
             return
+        clocks.tick(trial, call)
         _events(call)
     else:
         _events_of_2(call)
@@ -254,7 +261,14 @@ def _moved(v: Variable) -> float:
     return start + size if v.max is None or start + size <= v.max else start - size
 
 
-ALL: tuple[Callable[[Trial], None], ...] = (configuration, event_mode, intermediate_update, early_return, model_exchange)
+ALL: tuple[Callable[[Trial], None], ...] = (
+    configuration,
+    event_mode,
+    intermediate_update,
+    early_return,
+    model_exchange,
+    clocks.scheduled_execution,
+)
 """Promises that need an instance of their own."""
 IN_INITIALIZATION = (binaries, dependencies, directional_derivatives, adjoint_derivatives)
 """Promises that are tried while an instance is initialized."""

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from ..cosim.partner import Variable
 from ..errors import nearest
-from . import names, structure
+from . import clocks, names, structure
 from .description import Description, Unit, finite
 
 Broken = tuple[str, str]
@@ -48,6 +48,7 @@ def broken(description: Description) -> Iterator[Broken]:
             yield f"variable {variable.name}", text
     yield from _references(description)
     yield from structure.broken(description)
+    yield from clocks.broken(description)
 
 
 def _top(description: Description) -> Iterator[Broken]:

@@ -1,0 +1,236 @@
+"""Clocks of FMI 3.0 (sections 2.2.8 and 2.4): rules on their descriptions, and what a library does with them, tried.
+
+Clocks tick in the event mode of co-simulation and Model Exchange, and activate the partitions of a model in scheduled execution.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from ctypes import byref, c_bool, c_double, c_int, c_size_t
+from dataclasses import dataclass, field
+
+from ..cosim.imported import ImportedSlave
+from ..cosim.library import UPDATE_CLOCKS_3
+from ..errors import SlaveError
+from . import values
+from .description import Description, finite
+from .trial import Trial
+
+Broken = tuple[str, str]
+Call = Callable[..., None]
+"""Calls a function of the standard on an instance, named without its prefix; raises `SlaveError`."""
+
+_PERIODIC = ("constant", "fixed", "tunable")
+_CHANGED = 2
+_MOST_TICKS = 100
+_SHORTEST = 1e-9
+"""Intervals below this are no period [s]."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock of a description.
+
+    Attributes
+    ----------
+    name : str
+    reference : int
+    causality : str
+    kind : str
+        Its `intervalVariability`.
+    interval, shift : float, optional
+        Interval and first tick [s] as the description has them.
+    priority : str, optional
+    """
+
+    name: str
+    reference: int
+    causality: str
+    kind: str
+    interval: float | None
+    shift: float | None
+    priority: str | None
+
+    @property
+    def asked(self) -> bool:
+        """Whether the library alone knows the interval."""
+        return self.kind in ("changing", "countdown") or (self.kind in _PERIODIC and self.interval is None)
+
+
+def clocks(description: Description) -> list[Clock]:
+    """Return the clocks of a description; what a variable does not say its declared type may."""
+    types = {t.get("name"): t for t in description.root.iterfind("TypeDefinitions/ClockType")}
+    found = []
+    for element in description.root.iterfind("ModelVariables/Clock"):
+        declared = types.get(element.get("declaredType"))
+        said = {**({} if declared is None else declared.attrib), **element.attrib}
+        interval, shift = finite(said.get("intervalDecimal")), finite(said.get("shiftDecimal"))
+        resolution = finite(said.get("resolution"))
+        if resolution:
+            interval = finite(said["intervalCounter"]) / resolution if finite(said.get("intervalCounter")) else interval  # type: ignore[operator]
+            shift = finite(said["shiftCounter"]) / resolution if finite(said.get("shiftCounter")) else shift  # type: ignore[operator]
+        reference = said.get("valueReference", "").strip()
+        found.append(
+            Clock(
+                said.get("name", ""),
+                int(reference) if reference.isdigit() else -1,
+                said.get("causality", "local"),
+                said.get("intervalVariability", ""),
+                interval,
+                shift,
+                said.get("priority"),
+            )
+        )
+    return found
+
+
+def broken(description: Description) -> Iterator[Broken]:
+    """Give every rule that the clocks of a description break."""
+    known = clocks(description)
+    for clock in known:
+        place = f"clock {clock.name}"
+        if clock.kind != "triggered" and clock.causality != "input":
+            yield place, f"causality {clock.causality} of a clock that ticks by time, allowed is input"
+        if clock.kind == "constant" and clock.interval is None:
+            yield place, "no interval; a constant clock has one"
+        if clock.interval is not None and not clock.interval > 0.0:
+            yield place, f"interval {clock.interval:g} s, allowed is a positive number"
+        if clock.shift is not None and clock.shift < 0.0:
+            yield place, f"shift {clock.shift:g} s, allowed is a number from 0"
+        if "ScheduledExecution" in description.interfaces and clock.causality == "input" and clock.priority is None:
+            yield place, "no priority; an input clock has one in scheduled execution"
+        if clock.causality == "output" and clock.priority is not None:
+            yield place, f"priority {clock.priority} of an output clock, allowed is none"
+    references = {str(clock.reference) for clock in known}
+    for element in description.root.iterfind("ModelVariables/*"):
+        for reference in (element.get("clocks") or "").split():
+            if reference not in references:
+                yield f"variable {element.get('name')}", f"clocks refers to {reference}, which is no clock"
+
+
+def intervals(trial: Trial, call: Call, when: str, kinds: tuple[str, ...] = (*_PERIODIC, "changing", "countdown")) -> dict[str, float]:
+    """Ask for the intervals that the library alone knows; return those that it has."""
+    found = {}
+    for clock in clocks(trial.description):
+        if clock.kind not in kinds or not clock.asked:
+            continue
+        interval, qualifier = c_double(), c_int(-1)
+        call("GetIntervalDecimal", _references(clock), c_size_t(1), byref(interval), byref(qualifier))
+        if qualifier.value not in (0, 1, _CHANGED):
+            trial.find(
+                f"clock {clock.name}", f"its interval has the qualifier {qualifier.value} {when}, allowed is 0, 1 or 2", sort="clocks"
+            )
+        elif qualifier.value == _CHANGED and not (math.isfinite(interval.value) and interval.value >= 0.0):
+            trial.find(f"clock {clock.name}", f"its interval is {interval.value:g} s {when}, allowed is a number from 0", sort="clocks")
+        elif qualifier.value == _CHANGED:
+            found[clock.name] = interval.value
+    return found
+
+
+def tick(trial: Trial, call: Call) -> None:
+    """Activate, in the event mode at the start, the clocks that tick then, and ask which clocks of the FMU do."""
+    for clock in clocks(trial.description):
+        if clock.causality == "input" and (clock.kind == "triggered" or (clock.kind in _PERIODIC and clock.interval and not clock.shift)):
+            call("SetClock", _references(clock), c_size_t(1), byref(c_bool(True)))
+    ticking(trial, call)
+
+
+def ticking(trial: Trial, call: Call) -> None:
+    """Ask which clocks of the FMU tick."""
+    for clock in clocks(trial.description):
+        if clock.causality == "output":
+            call("GetClock", _references(clock), c_size_t(1), byref(c_bool()))
+
+
+@dataclass
+class _Scheduler:
+    """The importer's end of scheduled execution."""
+
+    trial: Trial
+    slave: ImportedSlave | None = None
+    locked: int = 0
+    countdown: dict[str, float] = field(default_factory=dict)
+
+    def update(self, _: object) -> None:
+        """Take news of clocks; what is wrong is a finding, because nothing can be raised through foreign code."""
+        if self.slave is None:
+            return
+        try:
+            ticking(self.trial, self.slave.call)
+            self.countdown |= intervals(self.trial, self.slave.call, "in a clock update", ("countdown",))
+        except SlaveError as error:
+            self.trial.find("ScheduledExecution", f"a clock update: {error}", sort="clock update")
+
+    def lock(self) -> None:
+        """Begin what must not be interrupted."""
+        self.locked += 1
+
+    def unlock(self) -> None:
+        """End it."""
+        self.locked -= 1
+
+
+def scheduled_execution(trial: Trial) -> None:
+    """Initialize an instance for scheduled execution, and activate its partitions when their clocks tick."""
+    flags = trial.description.interfaces.get("ScheduledExecution")
+    if flags is None or flags.get("needsExecutionTool") in ("true", "1"):
+        return
+    trial.step("making an instance for scheduled execution")
+    scheduler = _Scheduler(trial)
+    without = ctypes.CFUNCTYPE(None)
+    callbacks = (UPDATE_CLOCKS_3(scheduler.update), without(scheduler.lock), without(scheduler.unlock))
+    try:
+        slave = trial.make(scheduled=callbacks)
+    except SlaveError as error:
+        trial.find("library, instantiate", f"scheduled execution is refused: {error}")
+        return
+    values.set_all(trial, slave, values.settable_at_start(trial), "before the initialization")
+    trial.step("initializing for scheduled execution")
+    slave.enter_initialization_mode(trial.start)
+    values.starts(trial, slave)
+    known = intervals(trial, slave.call, "in the initialization")
+    slave.exit_initialization_mode()
+    scheduler.slave = slave
+    trial.step("activating the partitions of scheduled execution")
+    for time, clock in _schedule(trial, known):
+        _activate(trial, scheduler, time, clock)
+    for clock in clocks(trial.description):
+        if (wait := scheduler.countdown.get(clock.name)) is not None:
+            _activate(trial, scheduler, trial.start + 2.0 * trial.size + wait, clock)
+    values.reads(trial, slave)
+    slave.terminate()
+    slave.free()
+
+
+def _schedule(trial: Trial, known: dict[str, float]) -> list[tuple[float, Clock]]:
+    """Return the ticks of input clocks within two steps, in the order of times and priorities."""
+    ticks = []
+    end = trial.start + 2.0 * trial.size
+    for clock in clocks(trial.description):
+        if clock.causality != "input" or (clock.kind in ("changing", "countdown") and clock.name not in known):
+            continue
+        interval = known.get(clock.name, clock.interval)
+        first = known[clock.name] if clock.kind in ("changing", "countdown") else clock.shift or 0.0
+        periodic = clock.kind in _PERIODIC and interval is not None and interval > _SHORTEST
+        times = itertools.count(trial.start + first, interval) if periodic and interval else iter([trial.start + first])
+        ticks += [(time, clock) for time in itertools.islice(itertools.takewhile(lambda t: t <= end, times), _MOST_TICKS)]
+    return sorted(ticks, key=lambda pair: (pair[0], int(pair[1].priority or 0)))
+
+
+def _activate(trial: Trial, scheduler: _Scheduler, time: float, clock: Clock) -> None:
+    assert scheduler.slave is not None
+    scheduler.locked = 0
+    try:
+        scheduler.slave.call("ActivateModelPartition", ctypes.c_uint32(clock.reference), c_double(time))
+    except SlaveError as error:
+        trial.find(f"clock {clock.name}", f"its partition cannot be activated at {time:g} s: {error}", sort="partition")
+    if scheduler.locked:
+        text = f"its partition returns with preemption locked {scheduler.locked} times more than unlocked"
+        trial.find(f"clock {clock.name}", text, sort="preemption")
+
+
+def _references(clock: Clock) -> ctypes.Array[ctypes.c_uint32]:
+    return (ctypes.c_uint32 * 1)(clock.reference)
