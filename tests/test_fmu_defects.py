@@ -352,3 +352,8 @@ def test_a_partner_that_dies_ends_a_run_with_a_finding(
     assert how in capsys.readouterr().err
     assert Path("out/coupled.json").exists()
     assert not Path("out/coupled.csv").exists()
+
+
+def test_an_fmu_of_another_version_is_refused_in_one_line(good: dict[int, Path], tmp_path: Path) -> None:
+    path = fmu_defects.edited(good[2], tmp_path / "one.fmu", lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"'))
+    assert errors(path) == ["error: modelDescription.xml, fmiVersion: found 1.0, allowed 2.0 or 3.0"]

@@ -8,14 +8,12 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import CoupledError
-from .master import Coupled, run_system
+from .master import LITTLE, Coupled, run_system
 from .system import System, family
 
 _SHARE = 4.0 / 3.0
 """Error of a run in units of its difference from one with half the step, for a coupling of second order; 2 for the first order, and 1 for
 very high ones, so that this is within a factor of 1.5 of either."""
-_LITTLE = 1e-3
-"""Least change of a variable that errors are compared with, in units of its nominal value."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +81,8 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
         if reason := _cannot_halve(run.system):
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
         slaves = {name: slave.finer() for name, slave in run.system.slaves.items()}
-        finer = dataclasses.replace(run.system, step=0.5 * run.system.step, slaves=slaves, warnings=())
+        grid = _halved(run.t) if run.system.varies else ()
+        finer = dataclasses.replace(run.system, step=0.5 * run.system.step, grid=grid, slaves=slaves, warnings=())
         try:
             again = run_system(finer, resolution=system.resolution)
         except CoupledError as error:
@@ -119,7 +118,7 @@ def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
         slave, _, variable = name.partition(".")
         described = run.system.slaves[slave].variable(variable)
         coarse, fine = run.columns[name], np.interp(run.t, finer.t, finer.columns[name])
-        change = max(float(np.max(np.abs(fine - fine[0]))), _LITTLE * abs(described.nominal))
+        change = max(float(np.max(np.abs(fine - fine[0]))), LITTLE * abs(described.nominal))
         # Where a whole number or a truth value changes is a matter of a step, whatever the step.
         error = _SHARE * float(np.max(np.abs(coarse - fine))) if family(described) == "Float" else 0.0
         most, at = finer.beyond.get(name, (0.0, 0.0))
@@ -128,10 +127,16 @@ def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
     return tuple(found)
 
 
+def _halved(t: np.ndarray) -> tuple[float, ...]:
+    """Return times with their middles."""
+    return tuple(np.sort(np.append(t, 0.5 * (t[1:] + t[:-1]))).tolist())
+
+
 def _cannot_halve(system: System) -> str:
+    shortest = system.step if system.shortest_step is None else system.shortest_step
     for slave in system.slaves.values():
         inner = slave.internal_step
-        if inner is not None and not slave.can_vary_step and 0.5 * system.step < inner * (1.0 - 1e-9):
+        if inner is not None and not slave.can_vary_step and 0.5 * shortest < inner * (1.0 - 1e-9):
             return f"half the step is less than the inner step of {slave.name}, {inner:g} s"
     return ""
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
 from .between import Between
+from .pace import Pace
 from .partner import Partner, Status
 from .slave import Slave
 from .system import Connection, System, family
@@ -25,6 +26,8 @@ _PORT_INPUTS = ("handle.F[", "robot.v[")
 _LITTLE = 1e-6
 """Energy below which a share says nothing [J]."""
 _ITERATIONS = 25
+LITTLE = 1e-3
+"""Least change of a variable that errors are compared with, in units of its nominal value."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +174,8 @@ class _Run:
         # What goes back from a later slave to an earlier one, or to itself: only there the iteration has something to find.
         self.torn = np.flatnonzero((self.source >= self.target) & (self.within != "start"))
         self.y, self.raw = np.zeros(len(connections)), np.zeros(len(connections))
-        self.before = self.y.copy()
+        self.before, self.last = self.y.copy(), 0.0
+        self.span = LITTLE * self.nominal
         self.jacobian: np.ndarray | None = None
         self.evaluations = 0
         self.times: list[float] = []
@@ -233,36 +237,77 @@ class _Run:
 
     def steps(self, progress: Callable[[int], None]) -> None:
         """Make every step, or stop where one cannot be made."""
-        system = self.system
-        make = {"jacobi": self._jacobi, "gauss-seidel": self._gauss_seidel, "iterated": self._iterated}[system.algorithm]
-        for k in range(system.count):
-            time = k * system.step
-            # Products, so that time does not drift; the last step is cut to the end.
-            end = min((k + 1) * system.step, system.duration)
-            start, raw = self.y.copy(), self.raw.copy()
-            try:
-                self.used.append(make(time, end - time))
-            except _Failed as failed:
-                self.stopped = ("diverged", str(failed))
+        pace = Pace(self.system)
+        while (end := pace.end) is not None:
+            begin, start, raw = pace.begin, self.y.copy(), self.raw.copy()
+            kept = self._keep() if pace.repeats else None
+            self._step(begin, end)
+            error = np.inf if self.stopped else self._error(start, end - begin)
+            if kept is not None and self._verdict != "failed":
+                again = self._verdict != "ended" and pace.shorten(error)
+                self._let_go(kept, back=again)
+                if again:
+                    continue
+            if self._verdict not in ("", "not converged"):
                 return
-            except _Ended as ended:
-                self.stopped = ("ended", str(ended))
-                return
-            except SlaveError as error:
-                self.stopped = ("failed", str(error))
-                return
-            if not np.isfinite(self.y).all():
-                bad = system.connections[int(np.flatnonzero(~np.isfinite(self.y))[0])].label
-                self.stopped = ("diverged", f"{bad} is not finite at {end:.6g} s")
-                self.used.pop()
-                return
-            self.before = start
+            self.before, self.last = start, end - begin
             self.between.end(self.out_of, raw, self.raw)
             self._record(end)
             if self.stopped is not None:
                 return
-            progress(1)
+            progress(pace.go_on(error))
         self._terminate()
+
+    def _step(self, begin: float, end: float) -> None:
+        """Make a step, or say why it cannot be made."""
+        make = {"jacobi": self._jacobi, "gauss-seidel": self._gauss_seidel, "iterated": self._iterated}[self.system.algorithm]
+        try:
+            used = make(begin, end - begin)
+        except _Failed as failed:
+            self.stopped = ("diverged", str(failed))
+        except _Ended as ended:
+            self.stopped = ("ended", str(ended))
+        except SlaveError as error:
+            self.stopped = ("failed", str(error))
+        else:
+            if np.isfinite(self.y).all():
+                self.used.append(used)
+                return
+            bad = self.system.connections[int(np.flatnonzero(~np.isfinite(self.y))[0])].label
+            self.stopped = ("diverged", f"{bad} is not finite at {end:.6g} s")
+
+    def _error(self, start: np.ndarray, step: float) -> float:
+        """Return the largest error of what was held in the last step, in units of what is allowed."""
+        if self.system.shortest_step is None or not len(start):
+            return 0.0
+        bend = self.y - start - (start - self.before) * (step / (self.last or step))
+        held = np.where(self.within == "start", 0.0, self.used[-1] - 0.5 * (start + self.y))
+        self.span = np.maximum(self.span, np.abs(self.y - self.rows[0]))
+        # What bends leaves an eighth of its second difference between its ends.
+        off = np.maximum(np.abs(bend) / 8.0, np.abs(held)) / (self.system.accuracy * self.span)
+        return float(np.max(off))
+
+    @property
+    def _verdict(self) -> str:
+        """Verdict of a run that stopped; nothing while it goes on."""
+        return "" if self.stopped is None else self.stopped[0]
+
+    def _keep(self) -> tuple[list[Any], tuple[np.ndarray, ...], np.ndarray | None]:
+        arrays = (self.y.copy(), self.raw.copy(), self.span.copy())
+        return [slave.get_state() for slave in self.slaves], arrays, self.jacobian
+
+    def _let_go(self, kept: tuple[list[Any], tuple[np.ndarray, ...], np.ndarray | None], *, back: bool) -> None:
+        """Free what was kept of the beginning of a step, after going back to it or not."""
+        states, arrays, jacobian = kept
+        if back:
+            # A row of `used` for each step that was made, one less than of times.
+            del self.used[len(self.times) - 1 :]
+            self.stopped, self.jacobian = None, jacobian
+            self.y, self.raw, self.span = arrays
+        for slave, state in zip(self.slaves, states, strict=True):
+            if back:
+                slave.set_state(state)
+            slave.free_state(state)
 
     def _terminate(self) -> None:
         for slave in self.slaves:
@@ -306,7 +351,8 @@ class _Run:
 
         try:
             if len(self.torn):
-                self._solve(residual, 2.0 * start[self.torn] - self.before[self.torn], time)
+                ratio = step / self.last if self.system.varies and self.last else 1.0
+                self._solve(residual, (1.0 + ratio) * start[self.torn] - ratio * self.before[self.torn], time)
         finally:
             for i, state in zip(loop, states, strict=True):
                 self.slaves[i].free_state(state)

@@ -23,6 +23,7 @@ def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[st
         "why": run.why,
         "algorithm": system.algorithm,
         "step_s": system.step,
+        "shortest_step_s": system.shortest_step,
         "duration_s": float(run.t[-1]),
         "asked_s": system.duration,
         "samples": len(run.t),

@@ -336,7 +336,7 @@ def _settings(root: ElementTree.Element, asked: tuple[float | None, float | None
         own = experiment.find(f"ssd:Annotations/ssc:Annotation[@type='{ANNOTATION}']/armrs:Run", NAMESPACES)
         if own is not None:
             found |= {key: own.attrib[key] for key in ("algorithm",) if key in own.attrib}
-            found |= {key: _number(own, key, None) for key in ("tolerance", "accuracy", "resolution") if key in own.attrib}
+            found |= {key: _number(own, key, None) for key in ("tolerance", "accuracy", "resolution", "shortest_step") if key in own.attrib}
             if "refine" in own.attrib:
                 found["refine"] = int(_number(own, "refine", None))
         base = experiment.find(".//osp:FixedStepAlgorithm", NAMESPACES)

@@ -89,7 +89,8 @@ def _description(system: System, name: str) -> bytes:
     annotations = _element(experiment, "ssd:Annotations")
     algorithm = _element(_element(annotations, "ssc:Annotation", type="com.opensimulationplatform"), "osp:Algorithm")
     _element(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(system.step))
-    settings = {key: str(getattr(system, key)) for key in ("algorithm", "tolerance", "accuracy", "refine", "resolution")}
+    keys = ("algorithm", "tolerance", "accuracy", "refine", "resolution", *(["shortest_step"] if system.varies else []))
+    settings = {key: str(getattr(system, key)) for key in keys}
     _element(_element(annotations, "ssc:Annotation", type=ANNOTATION), "armrs:Run", **settings)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"

@@ -25,7 +25,7 @@ ALGORITHMS = ("jacobi", "gauss-seidel", "iterated")
 KINDS = ("model", "fmu", "wall", "signal", "pid", "impedance")
 """What a slave of SYSTEM.toml can be."""
 WITHIN = ("start", "mean", "end")
-_OPTIONAL = ("algorithm", "tolerance", "accuracy", "refine", "resolution_s")
+_OPTIONAL = ("algorithm", "tolerance", "accuracy", "refine", "resolution_s", "shortest_step_s")
 RESOLUTION = 0.25e-3
 """Shortest event of a partner that a good run must not miss, where nothing is said [s]: the inner step of arms."""
 _POWER = (1, 2, -3)
@@ -81,6 +81,10 @@ class System:
     algorithm : {"jacobi", "gauss-seidel", "iterated"}
     step, duration : float
         Communication step and length of the run [s].
+    shortest_step : float, optional
+        With it, steps between this and `step` are chosen so that their errors stay within the accuracy [s].
+    grid : tuple of float
+        Communication points that are given [s]; none where they follow from the steps.
     tolerance : float
         What the iteration may leave at the interface, relative to the larger of nominal and present value.
     accuracy : float
@@ -102,7 +106,14 @@ class System:
     accuracy: float = 0.01
     refine: int = 0
     resolution: float = RESOLUTION
+    shortest_step: float | None = None
+    grid: tuple[float, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    @property
+    def varies(self) -> bool:
+        """Whether steps may have different lengths."""
+        return self.shortest_step is not None
 
     @property
     def unconnected(self) -> list[str]:
@@ -137,6 +148,7 @@ def couple(
     accuracy: float = 0.01,
     refine: int = 0,
     resolution: float = RESOLUTION,
+    shortest_step: float | None = None,
     starts: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> System:
     """Make a system of slaves and connections, and check that they fit together.
@@ -148,7 +160,7 @@ def couple(
     connections : iterable
         Pairs `("robot.F", "arm.handle.F")`, or tables with the keys of `[[connection]]`. A name without index stands for all of its
         indices.
-    algorithm, step, duration, tolerance, accuracy, refine, resolution
+    algorithm, step, duration, tolerance, accuracy, refine, resolution, shortest_step
         As in `System`.
     starts : mapping, optional
         Values to be set before the initialization, by slave and variable.
@@ -178,8 +190,13 @@ def couple(
         seen.add(connection.target)
     step = checks.number("[system], step_s", step, above=0.0, unit="s")
     duration = checks.number("[system], duration_s", duration, least=step, unit="s", hint="at least one step")
-    if duration / step > _MOST_STEPS:
-        raise BadInput("[system], duration_s", duration, f"at most {_MOST_STEPS} steps of {step:g} s")
+    if shortest_step is not None:
+        shortest_step = checks.number("[system], shortest_step_s", shortest_step, above=0.0, most=step, unit="s")
+        for fixed in (slave.name for slave in named.values() if not slave.can_vary_step):
+            raise BadInput("[system], shortest_step_s", shortest_step, f"none, for {fixed} cannot vary its step")
+    shortest = shortest_step or step
+    if duration / shortest > _MOST_STEPS:
+        raise BadInput("[system], duration_s", duration, f"at most {_MOST_STEPS} steps of {shortest:g} s")
     for name, values in (starts or {}).items():
         if name not in named:
             raise unknown_name("start", name, named, what="slave")
@@ -196,6 +213,7 @@ def couple(
         accuracy=checks.number("[system], accuracy", accuracy, above=0.0, most=1.0),
         refine=checks.whole("[system], refine", refine, least=0, most=10),
         resolution=checks.number("[system], resolution_s", resolution, least=1e-6, unit="s"),
+        shortest_step=shortest_step,
         warnings=tuple(warnings),
     )
 

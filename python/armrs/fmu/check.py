@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 import zipfile
@@ -102,7 +103,11 @@ def _schemas(files: zipfile.ZipFile, content: bytes, path: str | os.PathLike[str
         yield Finding("note", DESCRIPTION, text)
         return
     head = content[: content.find(b">", content.find(b"<fmiModelDescription")) + 1]
-    fmi = 2 if b'fmiVersion="2' in head or b"fmiVersion='2" in head else 3
+    version = re.search(rb"""fmiVersion\s*=\s*["']\s*(\d+)""", head)
+    if version and version[1] not in (b"2", b"3"):
+        # It is refused for its version; the schema of another one has nothing to say.
+        return
+    fmi = int(version[1]) if version else 3
     for name in sorted({name for _, name in schema.SCHEMAS} & set(files.namelist())):
         try:
             data = content if name == DESCRIPTION else read_xml(files, name, path)
