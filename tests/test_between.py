@@ -11,7 +11,7 @@ import pytest
 
 from armrs.cosim import Slave
 from armrs.cosim.accuracy import run_checked
-from armrs.cosim.between import parts
+from armrs.cosim.between import outliers, parts
 from armrs.cosim.imported import ImportedSlave
 from armrs.cosim.master import Coupled, run_system
 from armrs.cosim.partner import Partner
@@ -117,6 +117,71 @@ def test_a_smooth_force_is_good_as_before() -> None:
     assert run.verdict == "good"
     # Between the communication points a sine has its peak.
     assert max(e.error for e in run.estimates if e.name == "wave.y") < 1e-3
+
+
+class Edges(Ready):
+    """A force between two times, with a spring to the hand or without."""
+
+    def __init__(self, begin: float, end: float, *, spring: bool) -> None:
+        super().__init__("edges", [("r", "m")] if spring else (), [("F", "N")])
+        self.begin, self.until = begin, end
+
+    def outputs(self) -> dict[str, float]:
+        return {"F": (5.0 if self.begin <= self.time < self.until else 0.0) - 100.0 * self.inputs.get("r", 0.0)}
+
+
+def with_edges(begin: float, end: float, step: float, *, spring: bool, **settings: float) -> System:
+    arm = Slave(load_model(ARM), start=NEAR, rest=True, name="arm")
+    lines = [("edges.F", "arm.handle.F[1]"), *([("arm.handle.r[1]", "edges.r")] if spring else [])]
+    algorithm = "iterated" if spring else "gauss-seidel"
+    return couple([Edges(begin, end, spring=spring), arm], lines, step=step, duration=0.2, algorithm=algorithm, accuracy=0.05, **settings)
+
+
+@pytest.mark.parametrize("spring", [False, True])
+def test_jumps_within_a_communication_step_are_told(spring: bool) -> None:
+    """A force of 2.27 ms counts as 2 ms in the run with 1 ms and in that with 0.5 ms: their difference tells nothing."""
+    run = run_checked(with_edges(0.10039, 0.12266, 0.001, spring=spring))
+    assert run.verdict == "stable"
+    assert run.estimates == ()
+    [text] = [w for w in run.warnings if "not estimated" in w]
+    assert text.startswith("the error is not estimated: edges.F jumps by 5 N within the communication step at 0.1")
+
+
+@pytest.mark.parametrize("spring", [False, True])
+def test_jumps_at_communication_points_are_no_harm(spring: bool) -> None:
+    assert run_checked(with_edges(0.1, 0.15, 0.001, spring=spring)).verdict == "good"
+
+
+def test_two_jumps_near_communication_points_are_known_to_within_the_resolution() -> None:
+    """A force from 0.0998 to 0.1029 s counts as 3 ms in both runs, and lasts 3.1 ms."""
+    run = run_checked(with_edges(0.0998, 0.1029, 0.001, spring=False))
+    assert run.verdict == "stable"
+    assert any("edges.F jumps, and stays from 0.1 to 0.103 s, known to within 0.25 ms" in text for text in run.warnings), run.warnings
+    # A finer look shows that they are not at the points.
+    run = run_checked(with_edges(0.0998, 0.1029, 0.001, spring=False, resolution=0.05e-3))
+    assert any("within the communication step" in text for text in run.warnings), run.warnings
+
+
+def test_refinement_puts_a_communication_point_at_a_jump() -> None:
+    run = run_checked(with_edges(0.1005, 0.1505, 0.001, spring=False, refine=1))
+    assert run.verdict == "good"
+    assert run.system.step == 0.0005
+
+
+def test_what_is_a_jump() -> None:
+    t = np.linspace(0.0, 1.0, 21)
+    smooth, kink, jump, pulse = np.sin(3.0 * t), np.abs(t - 0.5), t + (t > 0.42), 1.0 * (np.abs(t - 0.5) < 0.01)
+    found = outliers(np.diff(np.column_stack([smooth, kink, jump, pulse]), axis=0))
+    assert np.flatnonzero(found.any(axis=0)).tolist() == [2]  # a pulse of one row is seen as what goes beyond both ends
+    assert np.flatnonzero(found[:, 2]).tolist() == [8]
+    assert outliers(np.array([[1.0]])).tolist() == [[0.0]]
+
+
+def test_a_jump_where_a_step_begins_is_told_from_what_the_inputs_do() -> None:
+    """0.1 ms after a communication point, of a partner whose spring follows the hand at once."""
+    run = run_checked(with_edges(0.1001, 0.1601, 0.001, spring=True))
+    assert run.verdict == "stable"
+    assert any("edges.F jumps by" in text for text in run.warnings), run.warnings
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from .partner import Partner
+
+_JUMP = 4.0
+"""Ratio of a change to those before and after it from which it is a jump."""
+_FEWEST = 3
+"""Parts of a step of a slave with inputs: the first shows what the inputs do, and the change in another is compared with one beside it."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A jump of an output.
+
+    Attributes
+    ----------
+    time : float
+        End of the part of a step in which it is [s].
+    size : float
+    at_point : bool
+        Whether a communication point of the first run is at this end, so that the jump may be there.
+    """
+
+    time: float
+    size: float
+    at_point: bool
 
 
 def parts(slave: Partner, step: float, resolution: float) -> int:
@@ -22,11 +46,26 @@ def parts(slave: Partner, step: float, resolution: float) -> int:
     return next((n for n in range(wanted, whole) if whole % n == 0), whole)
 
 
+def outliers(changes: np.ndarray) -> np.ndarray:
+    """Return the sizes of changes, shape (n, k), that are far larger than those before and after, and zero elsewhere."""
+    sizes = np.abs(changes)
+    if len(sizes) < 2:
+        return np.zeros_like(sizes)
+    none = np.zeros((1, sizes.shape[1]))
+    beside = np.maximum(np.concatenate([none, sizes[:-1]]), np.concatenate([sizes[1:], none]))
+    return np.where(sizes > _JUMP * beside, sizes, 0.0)
+
+
 class Between:
-    """How far outputs go beyond their values at the communication points, between them.
+    """What connected outputs do between the communication points of a run, seen in its second run with two steps for each.
 
     Parameters
     ----------
+    out_of : sequence of ndarray
+        Places of the outputs of each slave among all.
+    driven : sequence of bool
+        Whether a slave has inputs that are connected. Its outputs may follow them at once where a step begins: such a change is compared
+        with those where the steps before and after begin.
     count : int
         Number of outputs.
     resolution : float
@@ -34,22 +73,32 @@ class Between:
 
     Attributes
     ----------
-    most, at : ndarray, shape (count,)
-        Largest distance from the range of the values at the beginning and the end of a step, and when that was [s].
+    beyond : ndarray, shape (2, count)
+        Largest distance of an output from the range of its values at both ends of a step, and when that was [s].
+    jumps : list of list of Jump
+        Jumps of each output.
     longest : float
         Longest time between two looks in fact [s].
     """
 
-    def __init__(self, count: int, resolution: float) -> None:
-        self.resolution = resolution
-        self.most, self.at = np.zeros(count), np.zeros(count)
+    def __init__(self, out_of: Sequence[np.ndarray], driven: Sequence[bool], count: int, resolution: float) -> None:
+        self._out_of, self._driven, self.resolution = out_of, driven, resolution
+        self.beyond: np.ndarray = np.zeros((2, count))
+        self.jumps: list[list[Jump]] = [[] for _ in range(count)]
         self.longest = 0.0
         self._seen: dict[int, list[tuple[float, np.ndarray]]] = {}
+        # Of slaves without inputs: everything that was seen, with whether a communication point of the run follows.
+        self._series: dict[int, list[tuple[float, np.ndarray, bool]]] = {}
+        # Of the others: what changes where a step begins.
+        self._first: dict[int, list[tuple[float, np.ndarray]]] = {}
+        self._is_second = False
 
     def begin(self, i: int, slave: Partner, step: float) -> int:
         """Return in how many parts a slave, the i-th, makes its step, and forget the last."""
-        n = parts(slave, step, self.resolution)
         self._seen[i] = []
+        if math.isinf(self.resolution):
+            return 1
+        n = parts(slave, step, min(self.resolution, step / _FEWEST) if self._driven[i] else self.resolution)
         self.longest = max(self.longest, step / n)
         return n
 
@@ -57,18 +106,48 @@ class Between:
         """Take the outputs of a slave within its step."""
         self._seen[i].append((time, values))
 
-    def end(self, out_of: Sequence[np.ndarray], start: np.ndarray, end: np.ndarray) -> None:
-        """Compare what was seen with all outputs at both ends of the step; `out_of` has the places of those of each slave."""
+    def end(self, start: np.ndarray, time: float, end: np.ndarray) -> None:
+        """Compare what was seen with all outputs at both ends of the step, which ends at a time [s]."""
         for i, seen in self._seen.items():
-            if not seen:
+            if math.isinf(self.resolution):
                 continue
-            places = out_of[i]
-            values = np.array([row for _, row in seen])
-            both = np.stack([start[places], end[places]])
-            beyond = np.maximum(values - both.max(axis=0), both.min(axis=0) - values)
-            beyond[~np.isfinite(values)] = np.inf
-            row = np.argmax(beyond, axis=0)
-            most = beyond[row, np.arange(len(places))]
-            more = most > self.most[places]
-            self.most[places[more]] = most[more]
-            self.at[places[more]] = np.array([time for time, _ in seen])[row[more]]
+            places = self._out_of[i]
+            rows = np.array([row for _, row in seen]).reshape(len(seen), len(places))
+            times = np.array([at for at, _ in seen])
+            if seen:
+                both = np.stack([start[places], end[places]])
+                beyond = np.maximum(rows - both.max(axis=0), both.min(axis=0) - rows)
+                beyond[~np.isfinite(rows)] = np.inf
+                self._keep_most(places, beyond, times)
+            if self._driven[i]:
+                rows, times = np.vstack([rows, end[places]]), np.append(times, time)
+                self._first.setdefault(i, []).append((times[0], rows[0] - start[places]))
+                at_point = [False] * (len(seen) - 1) + [self._is_second]
+                self._list(places, outliers(np.diff(rows, axis=0)), times[1:], at_point)
+            else:
+                series = self._series.setdefault(i, [(time, start[places], True)])
+                series += [(at, row, False) for at, row in seen]
+                series.append((time, end[places], self._is_second))
+        self._is_second = not self._is_second
+
+    def close(self) -> None:
+        """Look for jumps in what was seen in several steps."""
+        for i, series in self._series.items():
+            found = outliers(np.diff([row for _, row, _ in series], axis=0))
+            self._list(self._out_of[i], found, [at for at, _, _ in series[1:]], [at_point for _, _, at_point in series[1:]])
+        for i, first in self._first.items():
+            found = outliers(np.array([change for _, change in first]))
+            self._list(self._out_of[i], found, [at for at, _ in first], [False] * len(first))
+        for found_of in self.jumps:
+            found_of.sort(key=lambda jump: jump.time)
+
+    def _list(self, places: np.ndarray, found: np.ndarray, times: Sequence[float] | np.ndarray, at_point: Sequence[bool]) -> None:
+        for row, column in np.argwhere(found):
+            self.jumps[places[column]].append(Jump(float(times[row]), float(found[row, column]), at_point[row]))
+
+    def _keep_most(self, places: np.ndarray, beyond: np.ndarray, times: np.ndarray) -> None:
+        row = np.argmax(beyond, axis=0)
+        most = beyond[row, np.arange(len(places))]
+        more = most > self.beyond[0, places]
+        self.beyond[0, places[more]] = most[more]
+        self.beyond[1, places[more]] = times[row[more]]

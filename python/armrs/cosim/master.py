@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
-from .between import Between
+from .between import Between, Jump
 from .pace import Pace
 from .partner import Partner, Status
 from .slave import Slave
@@ -80,7 +80,9 @@ class Coupled:
         Steps of all slaves together for each communication step.
     warnings : tuple of str
     beyond : dict of str to (float, float)
-        How far connected outputs go beyond their values at the communication points, and when [s]; of those alone that do.
+        How far connected outputs go beyond their values at both ends of a step, and when [s]; of those alone that do.
+    jumps : dict of str to list of Jump
+        Jumps of connected outputs, of those alone that do.
     resolution : float, optional
         Longest time for which no slave was looked at [s]; a shorter event may not be seen. None where the error was not estimated.
     estimates : tuple of `armrs.cosim.accuracy.Estimate`
@@ -99,6 +101,7 @@ class Coupled:
     evaluations: float
     warnings: tuple[str, ...]
     beyond: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False)
+    jumps: dict[str, list[Jump]] = field(default_factory=dict, repr=False)
     resolution: float | None = None
     estimates: tuple[Any, ...] = field(default=(), repr=False)
 
@@ -155,7 +158,6 @@ class _Run:
 
     def __init__(self, system: System, resolution: float) -> None:
         self.system = system
-        self.between = Between(len(system.connections), resolution)
         self.slaves: list[Partner] = list(system.slaves.values())
         order = {name: i for i, name in enumerate(system.slaves)}
         connections = system.connections
@@ -168,6 +170,7 @@ class _Run:
         self.within = np.array([c.within for c in connections])
         self.into = [np.flatnonzero(self.target == i) for i in range(len(self.slaves))]
         self.out_of = [np.flatnonzero(self.source == i) for i in range(len(self.slaves))]
+        self.between = Between(self.out_of, [len(places) > 0 for places in self.into], len(connections), resolution)
         self.input_names = [[connections[k].target[1] for k in places] for places in self.into]
         self.output_names = [[connections[k].source[1] for k in places] for places in self.out_of]
         self.dual_of = [k for k, c in enumerate(connections) if c.dual is not None]
@@ -251,7 +254,7 @@ class _Run:
             if self._verdict not in ("", "not converged"):
                 return
             self.before, self.last = start, end - begin
-            self.between.end(self.out_of, raw, self.raw)
+            self.between.end(raw, end, self.raw)
             self._record(end)
             if self.stopped is not None:
                 return
@@ -467,6 +470,8 @@ class _Run:
             created[:, k] = np.append(0.0, np.cumsum((used[:, k] - mean[:, k]) * dual))
             exchanged[:, k] = np.append(0.0, np.cumsum(mean[:, k] * dual))
         outputs = np.array(self.outputs)[: n + 1]
+        self.between.close()
+        sources = [".".join(c.source) for c in self.system.connections]
         verdict, why, warnings = self._judge(created, exchanged, outputs)
         names = [f"{s.name}.{name}" for s, listing in zip(self.slaves, self.recorded, strict=True) for name in listing]
         return Coupled(
@@ -481,11 +486,8 @@ class _Run:
             connections=tuple(self._report(k, residual, created, exchanged) for k in range(count)),
             evaluations=self.evaluations / max(n, 1),
             warnings=(*self.system.warnings, *warnings),
-            beyond={
-                ".".join(c.source): (float(most), float(at))
-                for c, most, at in zip(self.system.connections, self.between.most, self.between.at, strict=True)
-                if most > 0.0
-            },
+            beyond={s: (size, at) for s, size, at in zip(sources, *self.between.beyond.tolist(), strict=True) if size > 0.0},
+            jumps={s: found for s, found in zip(sources, self.between.jumps, strict=True) if found},
             resolution=self.between.longest or None,
         )
 

@@ -47,7 +47,10 @@ def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[st
         ],
         "accuracy": system.accuracy,
         "resolution_s": run.resolution,
-        "errors": [{"name": e.name, "unit": e.unit, "estimated_error": e.error, "allowed": e.allowed, "at_s": e.at} for e in run.estimates],
+        "errors": [
+            {"name": e.name, "unit": e.unit, "estimated_error": e.error, "largest_error": e.most, "allowed": e.allowed, "at_s": e.at}
+            for e in run.estimates
+        ],
         "not_connected": system.unconnected,
         "warnings": list(run.warnings),
         "made_by": plain.origin(command),

@@ -192,8 +192,8 @@ def connections(data: Mapping[str, Any]) -> Table:
 
 def coupling_errors(data: Mapping[str, Any]) -> Table:
     """Return how far each variable at an interface, and each angle, is estimated to be off; empty where that was not estimated."""
-    rows = [[e["name"], e["estimated_error"], e["allowed"], e["unit"]] for e in data["errors"]]
-    return Table(["variable", "estimated error", "allowed", "unit"], rows, left=1)
+    rows = [[e["name"], e["estimated_error"], e["largest_error"], e["allowed"], e["unit"]] for e in data["errors"]]
+    return Table(["variable", "estimated error", "at most", "allowed", "unit"], rows, left=1)
 
 
 def online(data: Mapping[str, Any]) -> Table:
