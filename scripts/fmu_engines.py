@@ -6,6 +6,7 @@ fmu-manipulation-toolbox`, and `LD_LIBRARY_PATH` with the library tbb for ecos; 
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from armrs.workflows.demo import true_model
 
 NAMES = ["q[1]", "q[2]", "energy"]
 START = np.radians([-60.0, 50.0])
+FMUTOOL = shutil.which("fmutool", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
 DURATION = 2.0
 
 
@@ -121,7 +123,7 @@ def main() -> int:
                     different += found != expected
                     word = "the same" if found == expected else f"DIFFERENT {' '.join(found)}"
                     print(f"{1e3 * step:5.0f} ms  {engine.__name__:9} FMI {fmi}  {word}")
-    if shutil.which("fmutool"):
+    if FMUTOOL:
         different += validators()
     else:
         print("fmutool: left out (it is not installed)")
@@ -134,7 +136,7 @@ def validators() -> int:
     with tempfile.TemporaryDirectory() as folder:
         for fmi, port in ((fmi, port) for fmi in (2, 3) for port in ("force", "motion")):
             path = export_fmu(true_model(), Path(folder) / "arm.fmu", fmi=fmi, port=port, start=START)
-            done = subprocess.run(["fmutool", "-input", str(path), "-check"], capture_output=True, text=True, check=False)
+            done = subprocess.run([FMUTOOL, "-input", str(path), "-check"], capture_output=True, text=True, check=False)
             found += done.returncode != 0
             print(f"fmutool  FMI {fmi}, {port} port: {'nothing found' if done.returncode == 0 else done.stdout + done.stderr}")
     return found

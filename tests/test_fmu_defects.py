@@ -268,75 +268,7 @@ def test_names_that_no_file_has_are_findings(name: str, good: dict[int, Path], t
         assert "\n" not in str(error)
 
 
-# ---- good FMUs of other tools
-SLAVE_2 = """
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Integer, Real, String
-
-
-class Small(Fmi2Slave):
-    author, description = "armrs", "every type, and an output"
-
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.k, self.x, self.f, self.n, self.on, self.label = 4.0, 0.0, 0.0, 3, True, "text"
-        self.register_variable(Real("k", causality=Fmi2Causality.parameter, variability=Fmi2Variability.fixed, start=4.0))
-        self.register_variable(Real("x", causality=Fmi2Causality.input, start=0.0))
-        tunable = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
-        self.register_variable(Integer("n", start=3, **tunable))
-        self.register_variable(Boolean("on", start=True, **tunable))
-        self.register_variable(String("label", start="text", **tunable))
-        self.register_variable(Real("f", causality=Fmi2Causality.output, initial=Fmi2Initial.exact, start=0.0))
-
-    def do_step(self, current_time, step_size):
-        self.f = -self.k * self.x
-        return True
-"""
-SLAVE_3 = """
-from pythonfmu3 import Float64, Fmi3Causality, Fmi3Initial, Fmi3Slave, Fmi3Variability
-
-
-class Small(Fmi3Slave):
-    author, description = "armrs", "a spring"
-
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.time, self.k, self.x, self.f = 0.0, 4.0, 0.0, 0.0
-        continuous = Fmi3Variability.continuous
-        self.register_variable(Float64("time", causality=Fmi3Causality.independent, variability=continuous))
-        self.register_variable(Float64("k", causality=Fmi3Causality.parameter, variability=Fmi3Variability.fixed, start=4.0))
-        self.register_variable(Float64("x", causality=Fmi3Causality.input, variability=continuous, start=0.0))
-        self.register_variable(Float64("f", causality=Fmi3Causality.output, variability=continuous, initial=Fmi3Initial.calculated))
-
-    def do_step(self, current_time, step_size):
-        self.time, self.f = current_time + step_size, -self.k * self.x
-        return True
-"""
-
-
-@pytest.mark.parametrize("state", [[], ["--handle-state"]])
-@pytest.mark.parametrize(("module", "source"), [("pythonfmu", SLAVE_2), ("pythonfmu3", SLAVE_3)])
-def test_nothing_is_found_in_a_good_fmu_of_another_tool(module: str, source: str, state: list[str], tmp_path: Path) -> None:
-    pytest.importorskip(module)
-    (tmp_path / "small.py").write_text(source, encoding="utf-8")
-    command = [sys.executable, "-m", module, "build", "-f", "small.py", *state]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert (tmp_path / "Small.fmu").exists(), done.stderr
-    assert errors(tmp_path / "Small.fmu") == []
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_nothing_is_found_in_a_container_of_another_tool(fmi: int, tmp_path: Path) -> None:
-    pytest.importorskip("pythonfmu3")
-    pytest.importorskip("fmu_manipulation_toolbox")
-    (tmp_path / "small.py").write_text(SLAVE_3, encoding="utf-8")
-    (tmp_path / "container.json").write_text('{"name": "container.fmu", "fmu": ["Small.fmu"], "step_size": 0.01}', encoding="utf-8")
-    program = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
-    for command in (["-m", "pythonfmu3", "build", "-f", "small.py"], ["-c", program, "-container", "container.json", "-fmi", str(fmi)]):
-        done = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False, cwd=tmp_path)
-        assert done.returncode == 0, done.stdout + done.stderr
-    assert errors(tmp_path / "container.fmu") == []
-
-
+# ---- partners that die
 @NEEDS_COMPILER
 @pytest.mark.parametrize(
     ("defect", "how"), [("EXITS", "ends the process with status 0"), ("ABORTS", "signal 6"), ("HANGS", "does not return within 2 s")]
