@@ -456,3 +456,34 @@ def test_arrays_are_connected_whole(line: dict[str, Any], words: str) -> None:
     three.variables["u"] = dataclasses.replace(three.variables["u"], dimensions=(3,))
     with pytest.raises(BadInput, match=words):
         couple([Vector("one"), Vector("two"), three], [line], step=0.1, duration=0.2)
+
+
+def test_start_values_of_arrays_are_lists_row_by_row() -> None:
+    values = [1.0, 2.0, 3.0, 4.0]
+    system = couple([Vector("one")], [], step=0.1, duration=0.2, starts={"one": {"u": values}})
+    assert system.starts == {"one": {"u": values}}
+    for wrong, words in (
+        ([1.0], r"u: found \[1.0\], allowed a list of 4 values, row by row"),
+        (3.0, "allowed a list of 4"),
+        ([1.0, 2.0, "a", 4.0], r"u\[3\]: found 'a'"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            couple([Vector("one")], [], step=0.1, duration=0.2, starts={"one": {"u": wrong}})
+
+
+def test_units_are_asked_of_floating_point_numbers_alone() -> None:
+    one, two = Vector("one"), Vector("two")
+    for slave in (one, two):
+        for name, variable in slave.variables.items():
+            slave.variables[name] = dataclasses.replace(variable, type="Int32", unit=None, exponents=None)
+    assert couple([one, two], [("one.Y", "two.u")], step=0.1, duration=0.2).warnings == ()
+
+
+def test_steps_inside_of_a_partner_that_stay_as_they_are_are_not_estimated() -> None:
+    """An FMU that may be stepped at will and has steps of 0.1 s inside: halving the step tells nothing about these."""
+    wall = Wall("y", 10.0, 1.0)
+    wall.internal_step = 0.1
+    arm = load_system(EXAMPLES / "cosim" / "wall.toml").slaves["arm"]
+    run = run_checked(couple([arm, wall], [("arm.handle.r", "wall.r"), ("wall.F", "arm.handle.F")], step=0.01, duration=0.1))
+    assert run.verdict == "stable"
+    assert "the error is not estimated: half the step is less than the inner step of wall, 0.1 s" in run.warnings

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import CoupledError
 from .master import LITTLE, Coupled, run_system
+from .slave import Slave
 from .system import System, family
 
 _SHARE = 4.0 / 3.0
@@ -135,7 +136,15 @@ def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
         if name in connected:
             most, at = max(finer.beyond.get(name, (0.0, 0.0)), _beyond(run.t, finer.t, finer.columns[name]))
         if family(described) == "Float" or most:
-            found.append(Estimate(name, described.unit or "", max(error, most), run.system.accuracy * change, at if most > error else None))
+            found.append(
+                Estimate(
+                    name,
+                    described.unit if described.unit not in (None, "1") else "",
+                    max(error, most),
+                    run.system.accuracy * change,
+                    at if most > error else None,
+                )
+            )
     return tuple(found)
 
 
@@ -179,7 +188,8 @@ def _cannot_halve(system: System) -> str:
     shortest = system.step if system.shortest_step is None else system.shortest_step
     for slave in system.slaves.values():
         inner = slave.internal_step
-        if inner is not None and not slave.can_vary_step and 0.5 * shortest < inner * (1.0 - 1e-9):
+        # Arms make shorter steps inside in the second run.
+        if inner is not None and not isinstance(slave, Slave) and 0.5 * shortest < inner * (1.0 - 1e-9):
             return f"half the step is less than the inner step of {slave.name}, {inner:g} s"
     return ""
 

@@ -116,6 +116,8 @@ def _component(parent: ElementTree.Element, source: str, slave: Partner, needs: 
         listing = _element(values, "ssv:Parameters")
         for name, value in starts.items():
             v = slave.variables[name]
+            if v.dimensions:
+                raise BadInput(f"{slave.name}, [slave.start], {name}", Text("an array"), "scalars: SSP 1.0 has no arrays")
             text = str(value).lower() if isinstance(value, bool) else str(value) if isinstance(value, str) else repr(value)
             unit = {"unit": v.unit} if v.unit and _kind(v) == "Real" else {}
             _element(_element(listing, "ssv:Parameter", name=name), f"ssv:{_kind(v)}", value=text, **unit)

@@ -255,22 +255,34 @@ def _check_start(slave: Partner, name: str, value: object) -> None:
     place = f"{slave.name}, [slave.start]"
     if name not in slave.variables:
         raise unknown_name(place, name, slave.variables, what="variable")
-    kind = slave.variables[name].type
+    variable = slave.variables[name]
+    if not variable.dimensions:
+        _check_value(f"{place}, {name}", variable, value)
+    elif not isinstance(value, list) or len(value) != variable.size:
+        raise BadInput(f"{place}, {name}", value, f"a list of {variable.size} values, row by row")
+    else:
+        for element, item in zip(variable.elements, value, strict=True):
+            _check_value(f"{place}, {element}", variable, item)
+
+
+def _check_value(place: str, variable: Variable, value: object) -> None:
+    """Refuse a value of another kind than a variable."""
+    kind = variable.type
     if kind in ("Binary", "Clock"):
-        raise BadInput(f"{place}, {name}", Text(f"a variable of type {kind}"), "numbers, truth values and texts")
-    if slave.variables[name].causality == "structuralParameter":
-        raise BadInput(f"{place}, {name}", Text("a structural parameter"), "variables that change no size of an array")
+        raise BadInput(place, Text(f"a variable of type {kind}"), "numbers, truth values and texts")
+    if variable.causality == "structuralParameter":
+        raise BadInput(place, Text("a structural parameter"), "variables that change no size of an array")
     if kind == "String":
         if not isinstance(value, str):
-            raise BadInput(f"{place}, {name}", value, "a text")
+            raise BadInput(place, value, "a text")
     elif kind == "Boolean":
-        checks.flag(f"{place}, {name}", value)
+        checks.flag(place, value)
     elif kind.startswith(("Int", "UInt")):
         bits, signed = int(kind.lstrip("UInt")), kind.startswith("Int")
         least = -(2 ** (bits - 1)) if signed else 0
-        checks.whole(f"{place}, {name}", value, least=least, most=least + 2**bits - 1)
+        checks.whole(place, value, least=least, most=least + 2**bits - 1)
     else:
-        checks.number(f"{place}, {name}", value)
+        checks.number(place, value)
 
 
 def _slave(table: dict[str, Any], folder: Path) -> Partner:
@@ -340,10 +352,14 @@ def _connection(
     if family(output) != family(given):
         raise BadInput("from, to", Text(f"{output.type} and {given.type}"), "the same sort of value at both ends")
     label = f"{'.'.join(source)} -> {'.'.join(target)}"
-    if output.exponents is None or given.exponents is None:
+    if family(given) == "Float" and (output.exponents is None or given.exponents is None):
         warnings.append(f"{label}: units not checked, one of them is not described")
     # Not every tool counts the radian as a base unit.
-    elif (*output.exponents[:3], *output.exponents[4:]) != (*given.exponents[:3], *given.exponents[4:]):
+    elif (
+        output.exponents
+        and given.exponents
+        and (*output.exponents[:3], *output.exponents[4:]) != (*given.exponents[:3], *given.exponents[4:])
+    ):
         raise BadInput("from, to", Text(f"{label}, in {output.unit} and {given.unit}"), "the same dimension at both ends")
     dual, sign = _dual(table.get("dual"), target, slaves)
     factor, offset = checks.number("factor", table.get("factor", 1.0)), checks.number("offset", table.get("offset", 0.0))
