@@ -146,10 +146,10 @@ def fmu_run(
 
     FMUs run their native code with your rights, each in a separate process with limits on memory, output and time.
 
-    The error is estimated from a second run with half the step. A run is good if the estimated error of every connected output and of
-    every arm's angles is within the accuracy. Exit status 1, without samples, if the run is no result: it is not accurate, is not
-    resolved, or diverged; the coupling created energy; the iteration did not converge; or a slave failed. Exit status 1, with samples,
-    if a slave ended the run early or the error could not be estimated.
+    The error is estimated from a second run with half the step, which also looks at the partners between the communication points. A run
+    is good if the error of every connected output and of every arm's angles is within the accuracy. Exit status 1, without samples, if
+    the run is no result: it is not accurate, is not resolved, or diverged; the coupling created energy; the iteration did not converge;
+    or a slave failed. Exit status 1, with samples, if a slave ended the run early or the error could not be estimated.
     """
     from ..cosim.accuracy import run_checked
     from ..cosim.master import RESULTS, run_system
