@@ -235,10 +235,17 @@ def test_the_advice_names_what_the_partners_can_do(can_rollback: bool) -> None:
     lines = [("arm.handle.r[1]", "spring.r"), ("spring.F", "arm.handle.F[1]")]
     with pytest.raises(CoupledError, match="unstable") as error:
         run_system(couple([arm, Stiff(can_rollback=can_rollback)], lines, step=0.005, duration=1.0))
-    advice = "the motion port of arm for a contact that is a spring and a damper"
+    advice = "for a contact that is a spring and a damper, the motion port of arm"
     if can_rollback:
-        assert str(error.value).endswith(f"take a shorter step or the iterated algorithm or {advice}")
+        assert str(error.value).endswith(f"take a shorter step, the iterated algorithm or {advice}")
     else:
         assert str(error.value).endswith(
             f"take a shorter step or {advice} (spring cannot go back to a state, so that nothing can be iterated)"
         )
+
+
+def test_an_arm_that_pushes_has_its_contact_inside_already() -> None:
+    arms = [Slave(load_model(ARM), port=port, start=NEAR, rest=True, name=name) for name, port in (("led", "force"), ("leading", "motion"))]
+    lines = [("led.handle.r", "leading.robot.r"), ("led.handle.v", "leading.robot.v"), ("leading.contact.F", "led.handle.F")]
+    with pytest.raises(CoupledError, match=r"take a shorter step or the iterated algorithm$"):
+        run_system(couple(arms, lines, step=0.001, duration=0.5))

@@ -96,6 +96,22 @@ def test_an_fmu_for_model_exchange_alone_is_tried(defect: str, tmp_path: Path) -
 
 
 @NEEDS_COMPILER
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('priority="1"', 'priority="first"'),
+        ('"0.01" priority', '"1e-300" priority'),
+        ('intervalDecimal="0.01"', 'intervalCounter="1" resolution="0"'),
+    ],
+)
+def test_clocks_that_make_no_sense_are_findings(old: str, new: str, tmp_path: Path) -> None:
+    pytest.importorskip("fmpy")
+    found = errors(fmu_defects.small(tmp_path, description=fmu_defects.SMALL.replace(old, new)))
+    assert not any("Traceback" in text or "status 1" in text for text in found), found
+    assert bool(found) == ("1e-300" not in new)
+
+
+@NEEDS_COMPILER
 @pytest.mark.parametrize("defect", ["", "SCHEDULED_REFUSED", "PREEMPTION_LOCKED"])
 def test_an_fmu_for_scheduled_execution_alone_is_tried(defect: str, tmp_path: Path) -> None:
     description = re.sub(r"(?s)  <(CoSimulation|ModelExchange).*?/>\n", "", fmu_defects.SMALL)

@@ -275,6 +275,14 @@ def test_what_is_not_taken_is_named(folder: Path, old: str, new: str, words: str
         load_ssp(nested(folder, old, new, name="broken.ssd"), step=0.5).free()
 
 
+def test_a_mapping_from_nothing_maps_nothing(folder: Path) -> None:
+    entry = '<ssm:MappingEntry source="whole" target="nothing"/>'
+    system = load_ssp(nested(folder, entry, entry.replace("whole", ""), name="empty.ssd"), step=0.5)
+    assert system.starts["first"] == {"u": 2.0, "n": 3}
+    assert not [w for w in system.warnings if "nothing" in w]
+    system.free()
+
+
 def test_a_step_is_asked_for(folder: Path) -> None:
     with pytest.raises(BadInput, match="no annotation baseStepSize"):
         load_ssp(nested(folder))

@@ -94,7 +94,8 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
         try:
             again = run_system(finer, resolution=system.resolution)
         except CoupledError as error:
-            raise _refused(run, f"with half the step, {finer.step:g} s, the run is {error}") from None
+            parts = f"in parts of at most {1e3 * system.resolution:g} ms (resolution_s)"
+            raise _refused(run, f"with half the step, {finer.step:g} s, {parts}, the run is {error}") from None
         if reason := _differs_at_the_start(run, again):
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
         run = dataclasses.replace(run, estimates=estimates(run, again), resolution=again.resolution)

@@ -531,11 +531,13 @@ class _Run:
         stuck = [slave.name for slave in iterating if not slave.can_rollback]
         if iterating and not stuck and self.system.algorithm != "iterated":
             found.append("the iterated algorithm")
-        slave = self.slaves[i]
-        if isinstance(slave, Slave) and slave.port == "force":
-            found.append(f"the motion port of {slave.name} for a contact that is a spring and a damper")
+        slave, givers = self.slaves[i], {int(self.source[k]) for k in self.into[i]}
+        # An arm that pushes has its contact inside already.
+        if isinstance(slave, Slave) and slave.port == "force" and not any(isinstance(self.slaves[k], Slave) for k in givers):
+            found.append(f"for a contact that is a spring and a damper, the motion port of {slave.name}")
+        listing = " or ".join([", ".join(found[:-1]), found[-1]]) if len(found) > 1 else found[0]
         cannot = f" ({' and '.join(stuck)} cannot go back to a state, so that nothing can be iterated)" if stuck else ""
-        return f"{' or '.join(found)}{cannot}"
+        return f"{listing}{cannot}"
 
     def _input(self, k: int) -> str:
         """Name of the input at the end of a connection."""

@@ -283,6 +283,9 @@ def _mapped(
     own: dict[str, tuple[Any, str | None]], mapping: ElementTree.Element, place: str
 ) -> Iterator[tuple[str, tuple[Any, str | None]]]:
     for entry in mapping.iterfind("ssm:MappingEntry", NAMESPACES):
+        if entry.get("source") == "":
+            # Some tools list every parameter, and leave empty what is not mapped.
+            continue
         source, target = _attribute(entry, "source"), _attribute(entry, "target")
         if source not in own:
             raise BadInput(f"{place}, ParameterMapping", source, "a parameter of the binding")

@@ -67,11 +67,6 @@ def clocks(description: Description) -> list[Clock]:
     for element in description.root.iterfind("ModelVariables/Clock"):
         declared = types.get(element.get("declaredType"))
         said = {**({} if declared is None else declared.attrib), **element.attrib}
-        interval, shift = finite(said.get("intervalDecimal")), finite(said.get("shiftDecimal"))
-        resolution = finite(said.get("resolution"))
-        if resolution:
-            interval = finite(said["intervalCounter"]) / resolution if finite(said.get("intervalCounter")) else interval  # type: ignore[operator]
-            shift = finite(said["shiftCounter"]) / resolution if finite(said.get("shiftCounter")) else shift  # type: ignore[operator]
         reference = said.get("valueReference", "").strip()
         found.append(
             Clock(
@@ -79,12 +74,18 @@ def clocks(description: Description) -> list[Clock]:
                 int(reference) if reference.isdigit() else -1,
                 said.get("causality", "local"),
                 said.get("intervalVariability", ""),
-                interval,
-                shift,
+                _time(said, "interval"),
+                _time(said, "shift"),
                 said.get("priority"),
             )
         )
     return found
+
+
+def _time(said: dict[str, str], word: str) -> float | None:
+    """Return an interval or a shift [s], given as a number or as a fraction."""
+    counter, resolution = finite(said.get(f"{word}Counter")), finite(said.get("resolution"))
+    return finite(said.get(f"{word}Decimal")) if counter is None or not resolution else counter / resolution
 
 
 def broken(description: Description) -> Iterator[Broken]:
@@ -217,7 +218,8 @@ def _schedule(trial: Trial, known: dict[str, float]) -> list[tuple[float, Clock]
         periodic = clock.kind in _PERIODIC and interval is not None and interval > _SHORTEST
         times = itertools.count(trial.start + first, interval) if periodic and interval else iter([trial.start + first])
         ticks += [(time, clock) for time in itertools.islice(itertools.takewhile(lambda t: t <= end, times), _MOST_TICKS)]
-    return sorted(ticks, key=lambda pair: (pair[0], int(pair[1].priority or 0)))
+    # What is no number is a finding of the schema.
+    return sorted(ticks, key=lambda pair: (pair[0], finite(pair[1].priority) or 0.0))
 
 
 def _activate(trial: Trial, scheduler: _Scheduler, time: float, clock: Clock) -> None:
