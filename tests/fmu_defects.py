@@ -158,7 +158,6 @@ def swap(first: str, second: str) -> Change:
 
 BOTH: dict[str, tuple[Change, str]] = {
     "no model name": (edit(r' modelName="[^"]*"', ""), "modelName"),
-    "empty token": (edit(r'((?:instantiationToken|guid)=)"[^"]*"', r'\1""'), "missing"),
     "no token": (edit(r' (?:instantiationToken|guid)="[^"]*"', ""), "required but missing"),
     "unknown element at the top": (edit(r"  <UnitDefinitions>", "  <Units/>\n  <UnitDefinitions>"), "Units"),
     "unknown element among the variables": (edit(r"  <ModelVariables>\n", "  <ModelVariables>\n    <Complex/>\n"), "Complex"),

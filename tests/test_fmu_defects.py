@@ -174,6 +174,23 @@ def test_aliases_of_fmi_2_have_one_unit(unit: str, variability: str, level: str,
     assert [f.startswith(level) and words in f for f in found] == ([True] if level else [])
 
 
+@pytest.mark.parametrize(("starts", "count"), [(("2.0", "2.0"), 0), (("2.0", "3.0"), 1)])
+def test_aliases_of_fmi_2_that_are_constants_have_one_start(
+    starts: tuple[str, str], count: int, good: dict[int, Path], tmp_path: Path
+) -> None:
+    constant = (
+        '<ScalarVariable name="{}" valueReference="99999" variability="constant" causality="local"><Real start="{}"/></ScalarVariable>'
+    )
+
+    def add(text: str) -> str:
+        both = "".join(constant.format(name, start) for name, start in zip(("one", "other"), starts, strict=True))
+        return text.replace("</ModelVariables>", f"{both}</ModelVariables>")
+
+    found = [str(f) for f in check_fmu(fmu_defects.edited(good[2], tmp_path / "edited.fmu", add), library=False) if "one, other" in f.place]
+    assert len(found) == count, found
+    assert all("are constants with different start values" in text for text in found)
+
+
 def test_there_are_more_than_120_of_them() -> None:
     assert len(CASES) + len(fmu_defects.LIBRARY) + 1 >= 120
 
@@ -300,6 +317,18 @@ def test_a_partner_that_dies_ends_a_run_with_a_finding(
     assert how in capsys.readouterr().err
     assert Path("out/coupled.json").exists()
     assert not Path("out/coupled.csv").exists()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_empty_token_is_no_defect(fmi: int, good: dict[int, Path], tmp_path: Path) -> None:
+    """The standard says what the token is for, and not what it looks like."""
+
+    def empty(text: str) -> str:
+        return re.sub(r'(instantiationToken|guid)="[^"]*"', r'\1=""', text, count=1)
+
+    found = [str(f) for f in check_fmu(fmu_defects.edited(good[fmi], tmp_path / "empty.fmu", empty), library=False)]
+    assert not any(f.startswith("error") for f in found), found
+    assert any("empty: nothing ties the description to the library" in f for f in found)
 
 
 def test_an_fmu_of_another_version_is_refused_in_one_line(good: dict[int, Path], tmp_path: Path) -> None:

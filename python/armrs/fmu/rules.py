@@ -55,8 +55,9 @@ def _top(description: Description) -> Iterator[Broken]:
     fmi = description.fmi
     if fmi == 3 and not re.fullmatch(r"3\.\d+(\.\d+)?(-\w+)?", description.version):
         yield "fmiVersion", f"{description.version!r}, allowed is 3.0"
-    if not description.token:
-        yield ("instantiationToken" if fmi == 3 else "guid"), "missing"
+    token = _token(description)
+    if token not in description.root.attrib:
+        yield token, "missing"
     if not description.model_name:
         yield "modelName", "missing"
     for kind, attributes in description.interfaces.items():
@@ -74,6 +75,10 @@ def _top(description: Description) -> Iterator[Broken]:
     if fmi == 2 and len(independent) > 1:
         yield "ModelVariables", f"{len(independent)} independent variables, allowed is one at most"
     yield from _attributes(description)
+
+
+def _token(description: Description) -> str:
+    return "instantiationToken" if description.fmi == 3 else "guid"
 
 
 def _flags(description: Description) -> Iterator[Broken]:
@@ -175,6 +180,8 @@ def _attributes(description: Description) -> Iterator[Broken]:
 
 def worth_knowing(description: Description) -> Iterator[Broken]:
     """Give what is no error, and not what the standard has either: attributes that no importer knows."""
+    if not description.token and _token(description) in description.root.attrib:
+        yield _token(description), "empty: nothing ties the description to the library"
     known = names.CO_SIMULATION[description.fmi]
     for key in description.flags:
         if key not in known and ":" not in key and not key.startswith("{") and nearest(key, known) is None:
@@ -232,12 +239,15 @@ def _uniqueness(description: Description) -> Iterator[Broken]:
             continue
         listing = ", ".join(v.name for v in group)
         # In FMI 2.0 these are aliases of one value: at most one may be set, and they have one unit or none (section 2.2.7).
-        settable = [v.name for v in group if v.causality in ("input", "parameter") or v.start is not None]
+        settable = [v.name for v in group if v.causality in ("input", "parameter") or (v.start is not None and v.variability != "constant")]
+        constants = {v.start for v in group if v.variability == "constant"}
         units = {v.unit for v in group}
         if description.fmi == 3:
             yield f"variables {listing}", f"share the value reference {reference}, allowed is one variable for each"
         elif len(settable) > 1:
             yield f"variables {listing}", f"share the value reference {reference}, and {len(settable)} of them have a start or can be set"
+        elif len(constants) > 1:
+            yield f"variables {listing}", f"share the value reference {reference}, and are constants with different start values"
         elif len(units) > 1:
             shown = ", ".join(sorted(repr(u) if u else "none" for u in units))
             yield f"variables {listing}", f"share the value reference {reference} with different units: {shown}"
