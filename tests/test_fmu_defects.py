@@ -16,8 +16,9 @@ import pytest
 
 import fmu_defects
 from armrs import cli
+from armrs.cosim.imported import ImportedSlave
 from armrs.cosim.library import platform_folder
-from armrs.errors import BadInput
+from armrs.errors import BadInput, SlaveError
 from armrs.fmu.check import check_fmu
 from armrs.fmu.export import export_fmu
 from armrs.workflows.demo import true_model
@@ -74,6 +75,8 @@ def test_every_broken_promise_is_found_and_named(defect: str, tmp_path: Path) ->
 @NEEDS_COMPILER
 def test_an_fmu_that_wants_the_event_mode_is_no_defect(tmp_path: Path) -> None:
     found = [str(f) for f in check_fmu(fmu_defects.small(tmp_path, "EVENT_MODE_ASKED"))]
+    with pytest.raises(SlaveError, match="armrs couples FMUs without their event mode"):
+        ImportedSlave(fmu_defects.small(tmp_path, "EVENT_MODE_ASKED"))
     assert any(
         text.startswith("note: CoSimulation, hasEventMode: an instance that does not use the event mode is refused") for text in found
     )

@@ -161,7 +161,7 @@ def fmu_run(
     folder = writable(out, json)
     loaded = _loaded(system, step, duration)
     try:
-        with console.progress("coupling", total=loaded.count) as advance:
+        with console.progress("coupling", total=loaded.count * (3 if estimate else 1)) as advance:
             run = run_checked(loaded, progress=advance) if estimate else run_system(loaded, progress=advance)
     except CoupledError as error:
         run = error.run

@@ -69,7 +69,7 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
     ----------
     system : System
     progress : callable, optional
-        Called with the number of communication steps made since the last call, in units of the system's own step.
+        Called with the number of communication steps made since the last call; the second run makes two for each of the first.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
         grid = _halved(run.t) if run.system.varies else ()
         finer = dataclasses.replace(run.system, step=0.5 * run.system.step, grid=grid, slaves=slaves, warnings=())
         try:
-            again = run_system(finer, resolution=system.resolution)
+            again = run_system(finer, resolution=system.resolution, progress=progress)
         except CoupledError as error:
             parts = f"in parts of at most {1e3 * system.resolution:g} ms (resolution_s)"
             raise _refused(run, f"with half the step, {finer.step:g} s, {parts}, the run is {error}") from None

@@ -124,7 +124,8 @@ class ImportedSlave(Partner):
             resources.mkdir(exist_ok=True)
             handle = self.library.instantiate(self.name, self.description.token, resources, logging=logging, **mode)
             if not handle:
-                raise SlaveError("instantiate", Status.ERROR, f"{self.path.name}: {self.library.last_message()}")
+                hint = "" if mode or not self.description.flag("hasEventMode") else "; armrs couples FMUs without their event mode"
+                raise SlaveError("instantiate", Status.ERROR, f"{self.path.name}: {self.library.last_message()}{hint}")
         except BaseException:
             if remove is not None:
                 shutil.rmtree(remove, ignore_errors=True)

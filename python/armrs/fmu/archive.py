@@ -42,7 +42,7 @@ def archive(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
         raise
     except (OSError, ValueError, NotImplementedError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or str(error) or "a name no file can have"
-        raise BadInput("file", Text(reason), "an FMU that can be read", file=path) from None
+        raise BadInput("file", Text(reason), "a file that can be read", file=path) from None
     with files:
         if len(files.infolist()) > MOST_FILES:
             raise BadInput("archive", Text(f"{len(files.infolist())} files"), f"at most {MOST_FILES}", file=path)
