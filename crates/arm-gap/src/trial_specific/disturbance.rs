@@ -499,7 +499,8 @@ mod tests {
             let at = |i: usize| {
                 let s = (0.01 * i as f64 - start) / duration;
                 let inside = (0.0..=1.0).contains(&s);
-                if inside { (s * (1.0 - s)).powi(3) } else { 0.0 }
+                let bump = s * (1.0 - s);
+                if inside { bump * bump * bump } else { 0.0 }
             };
             let row: Vec<f64> = (0..1000).map(at).collect();
             let square = dot(&row, &row);
