@@ -36,7 +36,8 @@ def entry(kind: Kind) -> str:
     """Return the section of one kind."""
     rows = [f"| `{p.name}` | {p.unit} | {'0 or ' if p.or_zero else ''}{p.min:g} to {p.max:g} | {p.default:g} |" for p in kind.parameters]
     table = "\n".join(["| parameter | unit | allowed | default |", "| --- | --- | --- | --- |", *rows])
-    head = f"### `{kind.kind}`\n{kind.summary}; at: {ADDRESS[kind.address]}."
+    unasked = "" if kind.searched else " `armrs gap` does not ask for it: put it into the model, or name it to `identify --with`."
+    head = f"### `{kind.kind}`\n{kind.summary}; at: {ADDRESS[kind.address]}.{unasked}"
     return f"{head}\n\n    {kind.formula}\n\nSource: {kind.reference}.\n\n{table}"
 
 

@@ -184,6 +184,9 @@ impl Probe {
         }
     }
 
+    /// No question: the kind can be simulated and identified where a model has it, and no search asks for it.
+    pub const UNASKED: Self = Self::lasting(&[]);
+
     /// Whether its first parameter is there.
     pub const FIRST: Self = Self::lasting(&[Question::of(&[0])]);
 

@@ -8,6 +8,10 @@ use crate::Scalar;
 /// start, and all equal to the excess once that is constant. The first of them is the delayed excess \[rad/s\]; just after an onset it
 /// swings a little below zero. A latency below 5 ms, shorter than that of any arm muscle, counts as none: the reflex acts at once.
 ///
+/// Short of the tonic angle the threshold rises by `slope` for each radian: a muscle that is short needs a faster stretch, and one at
+/// its tonic angle resists from `threshold` on. With a slope of zero, the threshold is the same everywhere. A reflex that is stronger in
+/// one direction is two of them, one for each.
+///
 /// * `direction` - 1: motion with growing angle is resisted; −1: with falling angle; 0: both (rounded to the nearest of them)
 pub struct StretchReflex;
 
@@ -16,13 +20,15 @@ impl Law for StretchReflex {
         kind: "stretch_reflex",
         place: Place::Joint,
         summary: "resistance to motion faster than a threshold, after a latency",
-        formula: "R(t + latency) = gain · max(0, ±q̇(t) − threshold), against the motion; the delay is its Padé approximant of order (2, 3)",
+        formula: "R(t + latency) = gain · max(0, ±q̇(t) − threshold − slope · max(0, ±(tonic − q(t)))), against the motion; the delay is its Padé approximant of order (2, 3)",
         reference: "Lance 1980; Powers, Campbell, Rymer 1989; threshold as in Levin, Feldman 1994; latency of 20 to 50 ms: Pruszynski, Scott 2012",
         parameters: &[
             Parameter::linear("gain", "N m s/rad", 0.0, 100.0, 0.0),
             Parameter::shape("threshold", "rad/s", 0.0, 20.0, 0.3),
             Parameter::shape("direction", "1", -1.0, 1.0, 1.0),
             Parameter::shape("latency", "s", 0.0, 0.2, 0.0),
+            Parameter::shape("tonic", "rad", -7.0, 7.0, 0.0),
+            Parameter::shape("slope", "1/s", 0.0, 100.0, 0.0),
         ],
         states: 3,
     };
@@ -43,11 +49,19 @@ impl Law for StretchReflex {
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
         let [up, down] = excesses(p, at);
-        let moving =
-            T::if_less(T::ZERO, up, T::ONE, T::ZERO) - T::if_less(T::ZERO, down, T::ONE, T::ZERO);
+        let is = |excess: T| T::if_less(T::ZERO, excess, p[0], T::ZERO);
+        let (rising, falling) = (is(up), is(down));
+        let short = p[TONIC] - at.q;
+        let (of_up, of_down) = (short.max(T::ZERO), (-short).max(T::ZERO));
+        let moved = T::if_less(T::ZERO, short, rising, falling);
+        let given = |now: T| if_late(p, T::ZERO, now);
         leading([
             if_late(p, at.memory[0], up - down),
-            if_late(p, T::ZERO, -p[0] * moving),
+            given(falling - rising),
+            T::ZERO,
+            T::ZERO,
+            given(-(p[SLOPE] * moved)),
+            given(falling * of_down - rising * of_up),
         ])
     }
 
@@ -71,6 +85,10 @@ impl Law for StretchReflex {
 
 /// Position of the latency among the parameters.
 const LATENCY: usize = 3;
+/// Position of the tonic angle among the parameters.
+const TONIC: usize = 4;
+/// Position of the slope of the threshold among the parameters.
+const SLOPE: usize = 5;
 /// Shortest latency that is one \[s\]: the states of a shorter one would be too quick for the steps of a simulation.
 const SHORTEST: f64 = 0.005;
 /// What a search expects of it and the standard deviation of that \[s\]: short- and medium-latency responses of arm muscles start 20 to
@@ -93,9 +111,12 @@ fn excess<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
 /// Speed above the threshold with growing and with falling angle, zero where the direction is not resisted.
 #[inline]
 fn excesses<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> [T; 2] {
-    let half = T::of(0.5);
+    let (half, short) = (T::of(0.5), p[TONIC] - at.q);
+    let excess = |speed: T, short: T| {
+        (speed - p[1] - p[SLOPE] * short.max(T::ZERO)).max(T::ZERO)
+    };
     [
-        T::if_less(p[2], -half, T::ZERO, (at.qd - p[1]).max(T::ZERO)),
-        T::if_less(half, p[2], T::ZERO, (-at.qd - p[1]).max(T::ZERO)),
+        T::if_less(p[2], -half, T::ZERO, excess(at.qd, short)),
+        T::if_less(half, p[2], T::ZERO, excess(-at.qd, -short)),
     ]
 }
