@@ -73,6 +73,11 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
         Ok(Self { rotor, ..self })
     }
 
+    /// The same arm under another acceleration of gravity \[m/s²\]: on a base that accelerates by a, what it feels is g − a.
+    pub fn with_gravity(self, gravity: Plane<T>) -> Self {
+        Self { gravity, ..self }
+    }
+
     /// The same arm in another number: single precision, or the same in every lane.
     pub fn cast<S: Scalar>(&self) -> Chain<S, N>
     where

@@ -202,6 +202,7 @@ fn measured(run: &Recording<2>, session: &Session, random: &mut ChaCha8Rng) -> T
         moment_on_arm: None,
         torque: None,
         handle: Some(Vec::with_capacity(n)),
+        base: None,
         valid: vec![true; n],
     };
     for i in 0..n {

@@ -35,6 +35,9 @@ pub enum IdentError {
         /// Largest difference allowed \[rad\].
         allowed: f64,
     },
+    /// A measured path of the first joint, which simulated motion does not follow.
+    #[error("the first joint moves: its path is taken into account along measured motion alone")]
+    MovingBase,
     /// Something about one trial.
     #[error("trial {number}: {error}")]
     InTrial {

@@ -29,6 +29,7 @@ pub struct Columns<'py> {
     moment_on_arm: Option<PyReadonlyArray1<'py, f64>>,
     tau: Option<PyReadonlyArray2<'py, f64>>,
     robot_q: Option<PyReadonlyArray2<'py, f64>>,
+    base: Option<PyReadonlyArray2<'py, f64>>,
     valid: PyReadonlyArray1<'py, bool>,
 }
 
@@ -86,6 +87,7 @@ fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
         ),
         _ => None,
     };
+    let base = c.base.as_ref().map(|b| rows::<2>("base", b)).transpose()?;
     let trial = Trial {
         role: if c.role == "test" {
             Role::Test
@@ -104,6 +106,7 @@ fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
         moment_on_arm: c.moment_on_arm.as_ref().map(|m| m.as_array().to_vec()),
         torque: c.tau.as_ref().map(|t| joints("tau", t)).transpose()?,
         handle,
+        base,
         valid: c.valid.as_array().to_vec(),
     };
     let n = trial.len();
@@ -113,6 +116,7 @@ fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
         ("moment_on_arm", trial.moment_on_arm.as_ref().map(Vec::len)),
         ("tau", trial.torque.as_ref().map(Vec::len)),
         ("robot_q", trial.handle.as_ref().map(Vec::len)),
+        ("base", trial.base.as_ref().map(Vec::len)),
         ("valid", Some(trial.valid.len())),
     ];
     for (name, found) in lengths {

@@ -53,6 +53,7 @@ fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
         torque: None,
         valid: vec![true; handle.len()],
         handle: Some(handle),
+        base: None,
     };
     Ok((trial, lead))
 }

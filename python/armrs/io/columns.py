@@ -15,6 +15,7 @@ _SPEED = {"rad_s": 1.0, "mrad_s": 1e-3, "deg_s": _DEGREE}
 _FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 _MOMENT = {"Nm": 1.0, "mNm": 1e-3, "kNm": 1e3, "Nmm": 1e-3}
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+_LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
 
 _NUMBERED = re.compile(r"(q|qr|dq|tau)([1-9][0-9]?)")
 
@@ -43,10 +44,11 @@ ANGLE = Quantity(_ANGLE, 8 * math.pi, "looks like degrees")  # an arm does not w
 SPEED = Quantity(_SPEED, 1e4, "looks like degrees per second")
 FORCE = Quantity(_FORCE, 1e4, "looks like millinewtons")
 MOMENT = Quantity(_MOMENT, 1e4, "looks like newton millimetres")
+LENGTH = Quantity(_LENGTH, 100.0, "looks like millimetres")
 ACTIVITY = Quantity({"": 1.0}, 1e12, "a number that no amplifier gives")
 
 _QUANTITIES = {
-    "t": TIME, "q": ANGLE, "qr": ANGLE, "dq": SPEED, "tau": MOMENT, "Fy": FORCE, "Fz": FORCE, "Mx": MOMENT,
+    "t": TIME, "q": ANGLE, "qr": ANGLE, "dq": SPEED, "tau": MOMENT, "Fy": FORCE, "Fz": FORCE, "Mx": MOMENT, "by": LENGTH, "bz": LENGTH,
 }  # fmt: skip
 
 
@@ -129,7 +131,7 @@ def _parse_one(name: str, n_joints: int) -> Column:
 def _known(n_joints: int) -> list[str]:
     joints = range(1, n_joints + 1)
     return [
-        "t_s", "Fy_N", "Fz_N", "Mx_Nm", "qr1_rad", "qr2_rad", "emg_NAME",
+        "t_s", "Fy_N", "Fz_N", "Mx_Nm", "qr1_rad", "qr2_rad", "by_m", "bz_m", "emg_NAME",
         *(f"{symbol}{j}_{unit}" for j in joints for symbol, unit in (("q", "rad"), ("q", "deg"), ("dq", "rad_s"), ("tau", "Nm"))),
     ]  # fmt: skip
 
@@ -148,6 +150,7 @@ def _complete(seen: dict[str, str], n_joints: int, *, loads: bool) -> None:
     group([f"dq{j}" for j in joints], required=False, why="a speed for every joint or for none")
     torque = group([f"tau{j}" for j in joints], required=False, why="a torque for every joint or for none")
     group(["qr1", "qr2"], required=False, why="both angles of the robot or none")
+    group(["by", "bz"], required=False, why="both coordinates of the first joint or none")
     force = group(["Fy", "Fz"], required="Mx" in seen, why="both Fy and Fz or none of Fy, Fz, Mx")
     if loads and not force and not torque:
         raise BadInput("header", Text("neither forces nor torques"), "Fy_N and Fz_N, or tau1_Nm …, or both")

@@ -19,7 +19,7 @@ from ..model import AddedMass, Description, Model, Subject, Tolerance, TrialEntr
 from . import files
 from .muscle_activity import comparable, mark_activity
 from .samples import SUFFIXES, write_samples
-from .trial import FEWEST_SAMPLES, Reading, Trial, read_trial, still_angles
+from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
 FILE = "dataset.toml"
 
@@ -184,7 +184,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         tolerance=description.tolerance,
         folder=folder,
         model_path=model_path,
-        warnings=(*warnings, *still_angles(tuple(trials))),
+        warnings=(*warnings, *still_angles(tuple(trials)), *moving_bases(trials)),
         synthetic=description.synthetic,
         added=description.added,
     )
@@ -335,5 +335,7 @@ def trial_columns(trial: Trial, force_on: str | None) -> dict[str, np.ndarray]:
         table["Mx_Nm"] = sign * trial.moment_on_arm
     add("qr{}_rad", trial.robot_q)
     add("tau{}_Nm", trial.tau)
+    if trial.base is not None:
+        table["by_m"], table["bz_m"] = trial.base.T
     table.update(trial.emg)
     return {name: np.where(trial.filled_columns[name], np.nan, v) if name in trial.filled_columns else v for name, v in table.items()}

@@ -59,13 +59,13 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
     good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
     if not good.any():
         return
-    q, robot_q = trial.q[good], trial.robot_q[good]
+    q, robot_q, base = trial.q[good], trial.robot_q[good], _displacement(model, trial)[good]
     reach = sum(s.length for s in model.segments)
-    handle = handle_path(robot, robot_q)
+    handle = handle_path(robot, robot_q) - base
     gap = _tip(model, q) - handle
     own = _rms(gap)
     if own > _SUSPECT * reach:
-        best, reading = _other_reading(model, robot, q, robot_q)
+        best, reading = _other_reading(model, robot, q, robot_q, base)
         if best >= min(_MEETS * own, 0.1 * reach):
             best, reading = _other_zero(model, q, handle)
         if reading is not None and best < min(_MEETS * own, 0.1 * reach):
@@ -85,13 +85,13 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
         raise BadInput("q1 …, qr1, qr2", found, allowed, file=trial.file)
 
 
-def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray) -> tuple[float, Reading | None]:
+def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray, base: np.ndarray) -> tuple[float, Reading | None]:
     """Return what the angles of arm or robot may be instead, and how far apart hand and handle are then [m]."""
-    handle = handle_path(robot, robot_q)
+    handle = handle_path(robot, robot_q) - base
     found: list[tuple[float, Reading | None]] = [
         (_rms(_tip(model, reading.angles(q)) - handle), reading) for reading in readings.of_angles(q.shape[1])
     ]
-    tip = _tip(model, q)
+    tip = _tip(model, q) + base
     found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
     return min(found, key=lambda item: item[0])
 
@@ -126,10 +126,15 @@ def hand_meets_handle(dataset: Dataset) -> bool:
             return False
         good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
         if good.any():
-            gap = _tip(model, trial.q[good]) - handle_path(robot, trial.robot_q[good])
+            gap = _tip(model, trial.q[good]) + _displacement(model, trial)[good] - handle_path(robot, trial.robot_q[good])
             if _rms(gap) > _SUSPECT * sum(s.length for s in model.segments):
                 return False
     return True
+
+
+def _displacement(model: Model, trial: Trial) -> np.ndarray:
+    """Return how far the first joint is from where the model has it, (n, 2) [m]."""
+    return np.zeros((len(trial), 2)) if trial.base is None else trial.base - np.array(model.base)
 
 
 def handle_path(robot: Robot, q: np.ndarray) -> np.ndarray:

@@ -64,7 +64,7 @@ class Trial:
     emg : mapping of str to ndarray, shape (n,)
         Muscle activity by column name, in the unit of the file.
     valid : ndarray of bool, shape (n,)
-        False where any angle, force, torque or robot angle is NaN, and where muscles are active.
+        False where any angle, force, torque, robot angle or coordinate of the first joint is NaN, and where muscles are active.
     active : ndarray of bool, shape (n,)
         Where muscles are active in this trial, as `armrs.io.muscle_activity` marks it.
     filled_columns : mapping of str to ndarray of bool, shape (n,)
@@ -77,6 +77,8 @@ class Trial:
         Columns before resampling, by their names in SI units, with the signs of the file; NaN where missing.
     resampled : bool
         Whether the time stamps were uneven. Otherwise `t` is `original_t`.
+    base : ndarray, shape (n, 2), or None
+        Measured path of the first joint, y and z [m]; None where it rests at the model's `base`.
     """
 
     file: str
@@ -98,6 +100,7 @@ class Trial:
     original_t: np.ndarray = field(default_factory=lambda: np.empty(0))
     original: Mapping[str, np.ndarray] = field(default_factory=dict)
     resampled: bool = False
+    base: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("file", "configuration"):
@@ -110,12 +113,13 @@ class Trial:
         joints = checks.samples("q", self.q, "rad", shape=(n, None)).shape[1]
         shapes: dict[str, tuple[int, ...]] = {
             "force_on_arm": (n, 2), "moment_on_arm": (n,), "robot_q": (n, 2), "tau": (n, joints), "dq": (n, joints),
+            "base": (n, 2),
         }  # fmt: skip
         for name, shape in {"t": (n,), "q": (n, joints), **shapes}.items():
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, checks.samples(name, getattr(self, name), shape=shape))
         if self.valid.size == 0:
-            measured = [a for a in (self.q, self.force_on_arm, self.moment_on_arm, self.robot_q, self.tau) if a is not None]
+            measured = [a for a in (self.q, self.force_on_arm, self.moment_on_arm, self.robot_q, self.tau, self.base) if a is not None]
             rows = [np.isfinite(a).reshape(len(a), -1).all(axis=1) for a in measured]
             object.__setattr__(self, "valid", np.logical_and.reduce(rows))
         if self.active.size == 0:
@@ -132,7 +136,7 @@ class Trial:
         return len(self.t)
 
     def __repr__(self) -> str:
-        held = [n for n in ("force_on_arm", "moment_on_arm", "robot_q", "tau", "dq") if getattr(self, n) is not None]
+        held = [n for n in ("force_on_arm", "moment_on_arm", "robot_q", "tau", "dq", "base") if getattr(self, n) is not None]
         size = f"{len(self)} samples at {self.rate:.6g} Hz, {self.q.shape[1]} joints"
         return f"Trial({self.file!r}, {self.configuration!r} repeat {self.repeat}, {self.role}: {size}; {', '.join(['q', *held])})"
 
@@ -167,6 +171,34 @@ class Trial:
     def pieces(self) -> list[slice]:
         """Return the stretches of valid samples, in order."""
         return resample.complete_pieces(self.valid)
+
+
+def refuse_moving_base(trials: Sequence[Trial]) -> None:
+    """Refuse a measured path of the first joint: whatever simulates the arm, or runs on a device, has it at rest."""
+    for trial in trials:
+        if trial.base is not None:
+            found, allowed = (
+                Text("a first joint that moves"),
+                "none: identify, passive and spasticity alone follow a first joint that moves",
+            )
+            raise BadInput("columns by, bz", found, allowed, file=trial.file)
+
+
+MOVED = 5e-3
+"""Movement of the first joint that is said [m]: as much of a shoulder in a strapped trunk is skin."""
+
+
+def moving_bases(trials: Sequence[Trial]) -> list[str]:
+    """Return the trials in which the first joint moves noticeably, a line each."""
+    lines = []
+    for trial in trials:
+        if trial.base is not None:
+            moved = float(np.linalg.norm(np.ptp(trial.base[np.isfinite(trial.base).all(axis=1)], axis=0)))
+            if moved > MOVED:
+                lines.append(
+                    f"{trial.file}: the first joint, and so the trunk, moves by {1e3 * moved:.2g} mm; its path is taken into account"
+                )
+    return lines
 
 
 @dataclass(frozen=True)
@@ -223,7 +255,6 @@ def read_trial(
         return None
     if samples.n_rows < FEWEST_SAMPLES:
         raise BadInput("file", Text(f"{samples.n_rows} samples"), f"at least {FEWEST_SAMPLES} samples")
-
     warnings: list[str] = []
     original = _in_si(header, samples, warnings)
     t = original.pop("t_s")
@@ -247,6 +278,7 @@ def read_trial(
         robot_q=_together(on_grid, ["qr1_rad", "qr2_rad"]) if "qr1_rad" in on_grid else None,
         tau=_together(on_grid, [f"tau{j}_Nm" for j in range(1, n_joints + 1)]) if "tau1_Nm" in on_grid else None,
         dq=_together(on_grid, [f"dq{j}_rad_s" for j in range(1, n_joints + 1)]) if "dq1_rad_s" in on_grid else None,
+        base=_together(on_grid, ["by_m", "bz_m"]) if "by_m" in on_grid else None,
         emg={name: values for name, values in on_grid.items() if name.startswith("emg_")},
         filled_columns={name: c.bridged for name, c in channels.items() if c.bridged.any()},
         gaps=gaps,

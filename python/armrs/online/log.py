@@ -150,6 +150,8 @@ def _read(source: Path, n_joints: int, force_on: str | None) -> Log:
     if samples.n_rows < 2:
         raise BadInput("file", Text(f"{samples.n_rows} samples"), "two or more")
     found = {c.symbol: values * c.factor for c, values in zip(header, samples.values, strict=True)}
+    if "by" in found:
+        raise BadInput("columns by, bz", Text("a first joint that moves"), "none: a device has its first joint at rest")
     has_force = "Fy" in found
     if has_force and force_on is None:
         raise BadInput("force_on", Text("nothing, beside forces"), '"arm" or "robot": what the forces act on')

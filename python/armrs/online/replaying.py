@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..errors import BadInput, Text
-from ..io.trial import Trial
+from ..io.trial import Trial, refuse_moving_base
 from ..model import Model, load_model
 from ..tabular import Labelled, Series, Tidy
 from .estimator import STATUSES, Estimator, OnlineEstimate
@@ -207,6 +207,7 @@ def _log(log: Log | Trial | str | os.PathLike[str], model: Model, force_on: str 
         raise BadInput("force_on", force_on, "a file of forces beside it: a log or trial has forces on the arm")
     if isinstance(log, Log):
         return log
+    refuse_moving_base([log])
     return Log(log.t, log.q, log.force_on_arm, log.moment_on_arm, log.tau)
 
 

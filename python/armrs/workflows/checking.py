@@ -15,7 +15,7 @@ from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
 from ..io.dataset import Dataset, describe, name_of, read_entry
-from ..io.trial import Trial, still_angles
+from ..io.trial import Trial, moving_bases, still_angles
 from ..model import Description, Model, load_model
 from . import setup
 from .gap import suspicion
@@ -110,7 +110,7 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
         return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
     problems += [Problem("warning", line) for line in model.warnings]
     dataset = Dataset(name_of(path, description), model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
-    problems += [Problem("warning", line) for line in still_angles(dataset.trials)]
+    problems += [Problem("warning", line) for line in (*still_angles(dataset.trials), *moving_bases(dataset.trials))]
     _plausible(dataset, problems)
     _balanced(dataset, problems)
     blocked = any(p.level == "error" for p in problems)

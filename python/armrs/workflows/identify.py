@@ -15,7 +15,7 @@ from ..catalogue import catalogue
 from ..errors import BadInput, IdentificationError, Text, unknown_name
 from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_added
 from ..io.plausibility import hand_meets_handle, refuse_implausible
-from ..io.trial import Trial
+from ..io.trial import Trial, refuse_moving_base
 from ..model import Effect, Model, Segment, Tolerance
 from ..tabular import SYMBOLS, Tabular, Tidy
 from .setup import refuse_wrong_setup
@@ -259,6 +259,8 @@ def _checked(
         raise BadInput("cutoff", Text(f"{cutoff:g} Hz"), f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
     if method == "cascade":
         cascade_can(kinds, motion)
+    if method == "cascade" or motion == "simulated":
+        refuse_moving_base(dataset.trials)
     for trial in dataset.trials:
         if trial.force_on_arm is None and trial.tau is None:
             raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
@@ -547,6 +549,7 @@ def core_columns(trial: Trial) -> dict[str, Any]:
         "moment_on_arm": whole(trial.moment_on_arm),
         "tau": whole(trial.tau),
         "robot_q": whole(trial.robot_q),
+        "base": whole(trial.base),
         "valid": np.array(trial.valid),
     }
 

@@ -15,7 +15,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import BadInput, SimulationError, Text
-from ..io.trial import Trial
+from ..io.trial import Trial, refuse_moving_base
 from ..model import Model, load_model
 from ..tabular import Labelled, Series, Tidy
 from .accuracy import energy_balance
@@ -446,6 +446,8 @@ def _asked(
     checks.choice("engine", engine, ("native", "rapier"))
     integrator = _integrator(integrator, engine)
     checks.instance("drive", drive, Movement, Trial, type(None))
+    if isinstance(drive, Trial):
+        refuse_moving_base([drive])
     checks.number("dt", dt, above=0.0, unit="s")
     checks.number("rate", rate, above=0.0, unit="Hz")
     steps = 1.0 / (rate * dt)

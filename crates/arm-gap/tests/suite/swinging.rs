@@ -40,6 +40,7 @@ fn swinging(seconds: f64) -> Session<2> {
         moment_on_arm: None,
         torque: Some(vec![Joints::zeros(); q.len()]),
         handle: None,
+        base: None,
         valid: vec![true; q.len()],
         q,
     };

@@ -77,6 +77,7 @@ impl<'a, const N: usize> Building<'a, N> {
                 q,
                 qd: rest.clone(),
                 qdd: rest,
+                base: None,
             },
             moving: moving_at(trial, cutoff)?,
             speed,
@@ -225,6 +226,7 @@ fn moving_at<const N: usize>(trial: &Trial<N>, cutoff: f64) -> Result<Kinematics
         q: vec![Joints::zeros(); trial.len()],
         qd: vec![Joints::zeros(); trial.len()],
         qdd: vec![Joints::zeros(); trial.len()],
+        base: None,
     };
     for j in 0..N {
         let angles: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();

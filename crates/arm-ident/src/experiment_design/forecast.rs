@@ -301,6 +301,7 @@ impl<const N: usize> Seen<N> {
             moment_on_arm: None,
             torque: None,
             handle: None,
+            base: None,
             speed: None,
             valid: vec![true; q.len()],
             q,

@@ -345,6 +345,9 @@ impl<const N: usize> Task<'_, N> {
 
 /// Whether the robot's angles alone tell how a trial moved: its path is known, and nothing else drives the arm.
 fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
+    if trial.base.is_some() {
+        return false;
+    }
     let moment = trial.moment_on_arm.iter().flatten().any(|&m| m != 0.0);
     let torque = trial
         .torque

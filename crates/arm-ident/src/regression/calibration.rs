@@ -72,7 +72,7 @@ impl<const N: usize> Prediction<N> {
         let pose = Pose::new(q);
         let seen = Motion::new(i as f64 / trial.rate, *q, *qd);
         self.memory.advance(&seen, 1.0 / trial.rate);
-        let torque = inverse_dynamics(&model.chain, &pose, qd, qdd)
+        let torque = inverse_dynamics(&motion.felt(&model.chain, i), &pose, qd, qdd)
             + resisting_torque(&model.fitted, &seen, &self.memory.fitted)
             + resisting_torque(&model.held, &seen, &self.memory.held)
             - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i])
@@ -147,14 +147,15 @@ fn angle_offset<const N: usize>(
     joint: usize,
 ) -> Joints<f64, N> {
     const STEP: f64 = 1e-5;
+    let chain = motion.felt(&model.chain, i);
     let row = |shift: f64| {
         let mut q = motion.q[i];
         q[joint] += shift;
         let (pose, moving) = (Pose::new(&q), Motion::new(time, q, motion.qd[i]));
-        inverse_dynamics(&model.chain, &pose, &motion.qd[i], &motion.qdd[i])
+        inverse_dynamics(&chain, &pose, &motion.qd[i], &motion.qdd[i])
             + resisting_torque(&model.fitted, &moving, &memory.fitted)
             + resisting_torque(&model.held, &moving, &memory.held)
-            - static_torque(&model.chain, &pose, force, 0.0)
+            - static_torque(&chain, &pose, force, 0.0)
     };
     (row(-STEP) - row(STEP)) / (2.0 * STEP)
 }

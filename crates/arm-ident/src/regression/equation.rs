@@ -66,17 +66,18 @@ impl<'a, const N: usize> Building<'a, N> {
         let i = rows.samples[k];
         let here = k * N..(k + 1) * N;
         let (qd, qdd) = (&motion.qd[i], &motion.qdd[i]);
-        let at = Sample::new(model, trial, (&motion.q[i], qd, qdd), i);
+        let chain = motion.felt(&model.chain, i);
+        let at = Sample::new(&chain, trial, (&motion.q[i], qd, qdd), i);
         self.memory.advance(&at.motion, 1.0 / trial.rate);
         let memory = &self.memory;
         let predicted = self.prediction.as_mut();
         let predicted = predicted.map_or_else(Nearby::default, |p| p.next(model, trial, motion));
         let measured = at.measured - resisting_torque(&model.held, &at.motion, &memory.held);
         rows.rhs[here.clone()].copy_from_slice(measured.as_slice());
-        let y = regressor(&model.chain, &at.pose, qd, qdd);
-        let fixed = inverse_dynamics(&model.chain, &at.pose, qd, qdd);
+        let y = regressor(&chain, &at.pose, qd, qdd);
+        let fixed = inverse_dynamics(&chain, &at.pose, qd, qdd);
         let inertial: [[Joints<f64, N>; 4]; N] =
-            core::array::from_fn(|s| y.segment_columns(&model.chain, s));
+            core::array::from_fn(|s| y.segment_columns(&chain, s));
         let mut explained = Joints::<f64, N>::zeros();
         for (unknown, values) in unknowns.iter().zip(&mut rows.columns) {
             let column = match unknown.source {
@@ -92,7 +93,7 @@ impl<'a, const N: usize> Building<'a, N> {
                 }
             };
             if let Source::Segment(s, moment) = unknown.source {
-                explained += column * value_of(&model.chain, s, moment);
+                explained += column * value_of(&chain, s, moment);
             }
             values[here.clone()].copy_from_slice(column.as_slice());
         }
@@ -184,7 +185,7 @@ pub(crate) struct Sample<const N: usize> {
 
 impl<const N: usize> Sample<N> {
     pub(crate) fn new(
-        model: &Model<N>,
+        chain: &Chain<f64, N>,
         trial: &Trial<N>,
         (q, qd, qdd): (&Joints<f64, N>, &Joints<f64, N>, &Joints<f64, N>),
         i: usize,
@@ -193,13 +194,13 @@ impl<const N: usize> Sample<N> {
         let force = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let torque = trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i]);
-        let joint = joint_force(&model.chain, &pose, (qd, qdd), force);
+        let joint = joint_force(chain, &pose, (qd, qdd), force);
         let mut seen = Motion::new(i as f64 / trial.rate, *q, *qd).with_joint_force(&joint);
         seen.qdd = *qdd;
         Self {
             pose,
             motion: seen,
-            measured: torque + static_torque(&model.chain, &pose, force, moment),
+            measured: torque + static_torque(chain, &pose, force, moment),
         }
     }
 }

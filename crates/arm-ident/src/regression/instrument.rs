@@ -67,7 +67,7 @@ impl<'a, const N: usize> Instrument<'a, N> {
         }
         for (left, &i) in rows.rhs.chunks_exact_mut(N).zip(&rows.samples) {
             let (qd, qdd) = (&motion.qd[i], &motion.qdd[i]);
-            let at = Sample::new(model, trial, (&trial.q[i], qd, qdd), i);
+            let at = Sample::new(&model.chain, trial, (&trial.q[i], qd, qdd), i);
             self.memory.advance(&at.motion, 1.0 / trial.rate);
             let delayed = self.course.change_by_delay(self.delay, i);
             let rest = at.measured

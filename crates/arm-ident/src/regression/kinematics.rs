@@ -1,8 +1,8 @@
-//! Joint motion at the samples of a trial.
+//! Motion at the samples of a trial.
 
-use arm_core::Joints;
+use arm_core::{Chain, Joints, Plane};
 
-/// Joint motion at the samples of a trial.
+/// Motion at the samples of a trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kinematics<const N: usize> {
     /// Angles \[rad\].
@@ -11,4 +11,14 @@ pub struct Kinematics<const N: usize> {
     pub qd: Vec<Joints<f64, N>>,
     /// Accelerations \[rad/s²\].
     pub qdd: Vec<Joints<f64, N>>,
+    /// Acceleration of the first joint \[m/s²\], where its path was measured; else it rests.
+    pub base: Option<Vec<Plane<f64>>>,
+}
+
+impl<const N: usize> Kinematics<N> {
+    /// The arm at a sample as its first joint moves: what it feels of gravity is less that joint's acceleration.
+    pub(crate) fn felt(&self, chain: &Chain<f64, N>, i: usize) -> Chain<f64, N> {
+        let ([gy, gz], base) = (chain.gravity(), self.base.as_ref());
+        base.map_or(*chain, |a| chain.with_gravity([gy - a[i][0], gz - a[i][1]]))
+    }
 }

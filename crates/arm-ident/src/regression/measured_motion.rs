@@ -5,8 +5,8 @@
 //! they misread dry friction, and the motion has to be simulated instead (`simulated`), or the cutoff lowered
 //! ([`relative_speed_noise`]).
 
-use arm_core::Joints;
 use arm_core::effect::Effect;
+use arm_core::{Joints, Plane};
 
 use crate::error::IdentError;
 use crate::regression::kinematics::Kinematics;
@@ -57,6 +57,7 @@ pub fn measured<const N: usize>(
         q: trial.q.clone(),
         qd: vec![Joints::zeros(); trial.len()],
         qdd: vec![Joints::zeros(); trial.len()],
+        base: base_acceleration(trial, &filter)?,
     };
     for j in 0..N {
         let qd = speed(trial, j, &filter)?;
@@ -88,6 +89,28 @@ pub(crate) fn speed<const N: usize>(
             1.0 / trial.rate,
         )?),
     }
+}
+
+/// Acceleration of the first joint \[m/s²\], from its low-passed path where that was measured.
+///
+/// # Errors
+/// [`IdentError`] for a trial too short for the filter.
+pub(crate) fn base_acceleration<const N: usize>(
+    trial: &Trial<N>,
+    filter: &Butterworth,
+) -> Result<Option<Vec<Plane<f64>>>, IdentError> {
+    let Some(path) = &trial.base else {
+        return Ok(None);
+    };
+    let axis = |a: usize| -> Result<Vec<f64>, IdentError> {
+        let along: Vec<f64> = path.iter().map(|p| p[a]).collect();
+        Ok(derivative::second(
+            &filter.both_ways(&along)?,
+            1.0 / trial.rate,
+        )?)
+    };
+    let (y, z) = (axis(0)?, axis(1)?);
+    Ok(Some(y.into_iter().zip(z).map(|(y, z)| [y, z]).collect()))
 }
 
 /// One joint's values.

@@ -71,6 +71,7 @@ impl<const N: usize> Course<N> {
             q: joints(&recording.q),
             qd: joints(&recording.qd),
             qdd: joints(&recording.qdd),
+            base: None,
         };
         let fine = Trial {
             role: Role::Fit,
@@ -82,6 +83,7 @@ impl<const N: usize> Course<N> {
             moment_on_arm: None,
             torque: None,
             handle: None,
+            base: None,
             valid: vec![true; motion.q.len()],
         };
         Self {
@@ -98,6 +100,7 @@ impl<const N: usize> Course<N> {
             q: pick(&self.motion.q),
             qd: pick(&self.motion.qd),
             qdd: pick(&self.motion.qdd),
+            base: None,
         }
     }
 

@@ -38,6 +38,9 @@ pub(crate) fn simulated<const N: usize>(
     trial: &Trial<N>,
     cutoff: f64,
 ) -> Result<Course<N>, IdentError> {
+    if trial.base.is_some() {
+        return Err(IdentError::MovingBase);
+    }
     let Some(handle) = &trial.handle else {
         return Err(IdentError::Numerics(NumericsError::TooFew {
             name: "robot angles in every trial",

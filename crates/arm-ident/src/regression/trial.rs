@@ -33,6 +33,8 @@ pub struct Trial<const N: usize> {
     pub torque: Option<Vec<Joints<f64, N>>>,
     /// Position of the robot's handle \[m\], where the robot's angles are known.
     pub handle: Option<Vec<Plane<f64>>>,
+    /// Position of the first joint \[m\], where its path was measured; else it rests where the model says.
+    pub base: Option<Vec<Plane<f64>>>,
     /// False where a sample was missing and filled in.
     pub valid: Vec<bool>,
 }

@@ -160,6 +160,7 @@ fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
         torque: None,
         valid: vec![true; handle.len()],
         handle: Some(handle),
+        base: None,
         speed: None,
     };
     let heavy = truth.segments().map(|s| Segment {
@@ -396,6 +397,7 @@ fn dfki() -> Option<(Model<2>, Trial<2>)> {
         moment_on_arm: None,
         torque: Some(pair(5)),
         handle: None,
+        base: None,
         speed: None,
         valid: vec![true; even.len()],
     };

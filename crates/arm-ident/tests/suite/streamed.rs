@@ -35,6 +35,7 @@ fn raw(samples: usize) -> (Rows, Trial<2>) {
         moment_on_arm: None,
         torque: None,
         handle: None,
+        base: None,
         valid: (0..samples).map(|i| i % 7000 != 3500).collect(),
     };
     (rows, trial)

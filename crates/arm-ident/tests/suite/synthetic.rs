@@ -117,6 +117,7 @@ impl<const N: usize> Recipe<N> {
             moment_on_arm: None,
             torque: None,
             handle: None,
+            base: None,
             valid: vec![true; self.samples()],
         }
     }

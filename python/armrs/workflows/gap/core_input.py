@@ -8,12 +8,14 @@ from typing import Any
 
 from ... import checks
 from ...io.dataset import Dataset, refuse_added
+from ...io.trial import refuse_moving_base
 from ..identify import core_columns
 
 
 def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
     """Return the trials for the core."""
     refuse_added(dataset)
+    refuse_moving_base(dataset.trials)
     configurations = sorted({t.configuration for t in dataset.trials})
     return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
 
