@@ -21,7 +21,8 @@ import numpy as np
 
 import armrs
 from armrs import Dataset, Effect, Joint, Model, Movement, Sensors, Simulated, Subject, Tolerance, Trial
-from armrs.analysis.joint_coupling import Course, fit, together
+from armrs.analysis.double_exponential import Course
+from armrs.analysis.joint_coupling import fit, together
 from armrs.anthropometry import literature_arm
 from armrs.model import AddedMass, Contact, Robot
 from armrs.workflows import passive

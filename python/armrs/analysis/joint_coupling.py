@@ -1,4 +1,4 @@
-"""How a passive moment depends on its own and on the adjacent angle: double exponential, slope and coupling, with intervals and a test."""
+"""How a passive moment depends on its own and on the adjacent angle, with intervals and tests."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from .double_exponential import NAMES, UNITS, Course, Problem, Shape, columns
+
 LEAST_HELD = np.radians(5.0)
 """The adjacent angle must differ by this much between configurations before a dependence on it can be told [rad]."""
-STEEPNESS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 20.0])
-"""Steepnesses of the exponentials that are tried [1/rad]: its bounds and its grid."""
-_NEEDED = 0.01
-"""Share of the residual that exponentials must take away to be needed."""
 _SHARED = 5.0
 """Degrees of freedom with which the scatter of all configurations speaks for that of each: its own are few."""
 
@@ -39,39 +37,43 @@ class Coefficient:
 
 @dataclass(frozen=True, eq=False)
 class Dependence:
-    """The elastic moment of one joint as a function of its angle q and the adjacent angle q_adj.
+    """The elastic moment of one joint as a function of its angle q and the adjacent angle, a from its mean.
 
-    `R = upper·exp(k (q − q_hi)) − lower·exp(−k (q − q_lo)) + stiffness·(q − q_mid) + coupling·(q_adj − q_adj_mean) + moment`
+    `R = upper·exp(k_u (q + r_u a − q_hi)) − lower·exp(−k_l (q + r_l a − q_lo)) + stiffness·(q − q_mid) + coupling·a + moment`
 
     Attributes
     ----------
     joint, adjacent : int
         From 1.
     coefficients : tuple of Coefficient
-        upper and lower (at least 0), stiffness, coupling, moment.
-    steepness : float
-        k [1/rad]; 0 where no exponential is needed.
+        upper and lower (at least 0), stiffness, upper_steepness and lower_steepness (k), upper_ratio and lower_ratio (r), coupling, moment.
+        An exponential that is not needed has zeros; the ratios are zero where the linear law is enough.
+    linear_p_value : float
+        Of the linear law, in which both ratios are zero, against one in which they are not.
+    mean_coupling : Coefficient
+        The coupling of the linear law: the slope of the moment against the adjacent angle, on average over what was measured.
     range : (float, float)
         q_lo and q_hi: the angles that were measured [rad].
     adjacent_mean : float
         [rad]
     trials : int
     p_value : float
-        Of the coupling, against a model without it.
+        Of the mean coupling, against a model without it.
     level : float
-        Probability of the intervals; 1 − level is the level of the test.
+        Probability of the intervals; 1 − level is the level of the tests.
     residual_rms : float
         Within trials [N m].
     trial_std : float
         Of what differs from trial to trial [N m].
     freedom : float
-        Degrees of freedom of the coupling's deviation.
+        Degrees of freedom of the mean coupling's deviation.
     """
 
     joint: int
     adjacent: int
     coefficients: tuple[Coefficient, ...]
-    steepness: float
+    linear_p_value: float
+    mean_coupling: Coefficient
     range: tuple[float, float]
     adjacent_mean: float
     trials: int
@@ -86,15 +88,19 @@ class Dependence:
 
     @property
     def coupled(self) -> bool:
-        """Whether the moment depends on the adjacent angle."""
+        """Whether the moment depends on the adjacent angle on average."""
         return self.p_value < 1.0 - self.level
+
+    @property
+    def linear(self) -> bool:
+        """Whether the linear law is enough: the shape of the moment does not depend on the adjacent angle."""
+        return self.linear_p_value >= 1.0 - self.level
 
     def at(self, q: np.ndarray, adjacent: np.ndarray | float) -> np.ndarray:
         """Return the moment that was fitted [N m]."""
-        columns = _columns(np.asarray(q), self.steepness, self.range)
-        values = [self[name].value for name in ("upper", "lower", "stiffness")]
-        own = columns @ np.array(values)
-        return own + self["coupling"].value * (np.asarray(adjacent) - self.adjacent_mean) + self["moment"].value
+        values, away = np.array([self[name].value for name in NAMES]), np.asarray(adjacent) - self.adjacent_mean
+        own = columns(np.asarray(q), away, values, self.range) @ values[:3]
+        return np.asarray(own + self["coupling"].value * away + self["moment"].value)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with units in the names."""
@@ -102,7 +108,9 @@ class Dependence:
             "joint": self.joint,
             "adjacent": self.adjacent,
             "coefficients": [dict(vars(c)) for c in self.coefficients],
-            "steepness_1_rad": self.steepness,
+            "linear_p_value": self.linear_p_value,
+            "linear": self.linear,
+            "mean_coupling": dict(vars(self.mean_coupling)),
             "range_deg": np.degrees(self.range),
             "adjacent_mean_deg": float(np.degrees(self.adjacent_mean)),
             "trials": self.trials,
@@ -114,30 +122,11 @@ class Dependence:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """The elastic moment of one trial against the angle.
-
-    Attributes
-    ----------
-    angle, moment : ndarray, shape (k,)
-        [rad, N m]
-    adjacent : float
-        Mean of the adjacent angle [rad].
-    configuration : str
-        Trials of one configuration hold the adjacent angle alike, and scatter alike.
-    """
-
-    angle: np.ndarray
-    moment: np.ndarray
-    adjacent: float
-    configuration: str
-
-
-@dataclass(frozen=True, eq=False)
 class Coupling:
     """How much the elastic moments of two joints depend on the angle of the other, from both.
 
-    Elastic moments come from an energy, so that ∂R_1/∂q_2 = ∂R_2/∂q_1: both joints measure the same number.
+    Elastic moments come from an energy, so that ∂R_1/∂q_2 = ∂R_2/∂q_1: both joints measure the same number, on average over what was
+    measured.
 
     Attributes
     ----------
@@ -196,70 +185,77 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     Notes
     -----
     What differs from trial to trial (tone, the day) shifts whole courses and is far larger than the noise within one.
-    So the shape is fitted within trials, each with a level of its own, under bounds; its intervals come from the scatter of the trials'
-    scores. The coupling is the slope of those levels against the adjacent angle, over trials, each configuration weighted by its scatter;
-    Student's t tells it from the model without coupling, where it is zero.
+    So the shape is fitted within trials, each with a level of its own (`double_exponential`). The coupling is the slope of those levels
+    against the adjacent angle, over trials, each configuration weighted by its scatter; Student's t tells it from the model without
+    coupling, where it is zero. Ratios are fitted where the test refuses the linear law.
     """
-    from scipy.optimize import lsq_linear
-    from scipy.stats import t as student
-
     held = np.array([c.adjacent for c in courses])
     if len(courses) < 4 or np.ptp(held) < LEAST_HELD:
         return None
-    ends = (min(float(c.angle.min()) for c in courses), max(float(c.angle.max()) for c in courses))
-    target = np.concatenate([c.moment - c.moment.mean() for c in courses])
-
-    def shape(k: float) -> tuple[np.ndarray, np.ndarray, float]:
-        columns = np.concatenate([_within(_columns(c.angle, k, ends)) for c in courses])
-        used = [0, 1, 2] if k > 0.0 else [2]
-        low = np.array([0.0, 0.0, -np.inf])[used]
-        solved = lsq_linear(columns[:, used], target, bounds=(low, np.inf), method="bvls")
-        x = np.zeros(3)
-        x[used] = solved.x
-        return columns, x, 2.0 * float(solved.cost)
-
-    plain = shape(0.0)
-    tried = [(float(k), *shape(float(k))) for k in STEEPNESS]
-    best = min(tried, key=lambda item: item[3])
-    # An exponential that takes nothing away is not there: its steepness would be noise.
-    k, columns, x, cost = best if best[3] < (1.0 - _NEEDED) * plain[2] else (0.0, *plain)
-    residual = target - columns @ x
-    stds = _shape_deviations(courses, columns, residual, (x, k))
-    quantile = float(student.ppf(0.5 + 0.5 * level, len(courses) - 1))
-    coefficients = [
-        Coefficient(name, float(value), float(std), _interval(value, quantile * std, 0.0 if name != "stiffness" else None), unit)
-        for name, value, std, unit in zip(("upper", "lower", "stiffness"), x, stds, ("N m", "N m", "N m/rad"), strict=True)
-    ]
-    levels = np.array([np.mean(c.moment - _columns(c.angle, k, ends) @ x) for c in courses])
-    mean = float(held.mean())
-    line = _line(held - mean, levels, [c.configuration for c in courses])
-    edge = float(student.ppf(0.5 + 0.5 * level, line.freedom))
-    coefficients += [
-        Coefficient(name, value, std, (value - edge * std, value + edge * std), unit)
-        for name, value, std, unit in (("coupling", line.slope, line.slope_std, "N m/rad"), ("moment", line.level, line.level_std, "N m"))
-    ]
+    problem = Problem(courses)
+    plain = problem.fit(ratios=False)
+    linear_p_value = problem.linear_law_p_value(plain)
+    mean = _levels(problem, courses, plain)
+    shape = plain if linear_p_value >= 1.0 - level else problem.fit(ratios=True)
+    line = mean if shape is plain else _levels(problem, courses, shape)
     return Dependence(
         joint=joint,
         adjacent=adjacent,
-        coefficients=tuple(coefficients),
-        steepness=k,
-        range=ends,
-        adjacent_mean=mean,
+        coefficients=(*_coefficients(shape, len(courses), level), _coupling(line, level), _level(line, level)),
+        linear_p_value=linear_p_value,
+        mean_coupling=_coupling(mean, level),
+        range=problem.ends,
+        adjacent_mean=problem.mean,
         trials=len(courses),
-        p_value=_chance(line.slope, line.slope_std, line.freedom),
+        p_value=_chance(mean.slope, mean.slope_std, mean.freedom),
         level=level,
-        residual_rms=float(np.sqrt(cost / len(target))),
+        residual_rms=float(np.sqrt(shape.squares / len(problem.q))),
         trial_std=line.spread,
-        freedom=line.freedom,
+        freedom=mean.freedom,
     )
+
+
+def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:
+    """Return the line of what a shape leaves of whole trials, against the adjacent angle."""
+    away = np.array([c.adjacent for c in courses]) - problem.mean
+    own = [c.moment - columns(c.angle, a, shape.values, problem.ends) @ shape.values[:3] for c, a in zip(courses, away, strict=True)]
+    return _line(away, np.array([np.mean(values) for values in own]), [c.configuration for c in courses])
+
+
+def _coefficients(shape: Shape, count: int, level: float) -> list[Coefficient]:
+    """Return the numbers of a shape; of a steepness, the deviation is that of its logarithm times it."""
+    from scipy.stats import t as student
+
+    quantile = float(student.ppf(0.5 + 0.5 * level, max(count - np.count_nonzero(shape.stds), 1)))
+    stds = shape.stds * np.where(np.char.endswith(NAMES, "steepness"), shape.values, 1.0)
+    return [
+        Coefficient(name, float(value), float(std), shape.interval(number, quantile), unit)
+        for number, (name, value, std, unit) in enumerate(zip(NAMES, shape.values, stds, UNITS, strict=True))
+    ]
+
+
+def _coupling(line: _Line, level: float) -> Coefficient:
+    return _of_line("coupling", line.slope, line.slope_std, "N m/rad", (line.freedom, level))
+
+
+def _level(line: _Line, level: float) -> Coefficient:
+    return _of_line("moment", line.level, line.level_std, "N m", (line.freedom, level))
+
+
+def _of_line(name: str, value: float, std: float, unit: str, known: tuple[float, float]) -> Coefficient:
+    """Return a number of a line, `known` being its degrees of freedom and the probability of its interval."""
+    from scipy.stats import t as student
+
+    half = float(student.ppf(0.5 + 0.5 * known[1], known[0])) * std
+    return Coefficient(name, value, std, (value - half, value + half), unit)
 
 
 def together(first: Dependence, second: Dependence) -> Coupling:
     """Return the coupling of two joints that were each moved while the other was held at different angles."""
     from scipy.stats import t as student
 
-    stds = np.array([first["coupling"].std, second["coupling"].std])
-    values = np.array([first["coupling"].value, second["coupling"].value])
+    stds = np.array([first.mean_coupling.std, second.mean_coupling.std])
+    values = np.array([first.mean_coupling.value, second.mean_coupling.value])
     known = (stds == 0.0).astype(float) if not stds.all() else stds**-2
     weights = known / known.sum()
     shares = (weights * stds) ** 2
@@ -275,32 +271,6 @@ def _chance(value: float, std: float, freedom: float) -> float:
     from scipy.stats import t as student
 
     return float(2.0 * student.sf(abs(value) / std, freedom)) if std > 0.0 else float(value == 0.0)
-
-
-def _columns(q: np.ndarray, k: float, ends: tuple[float, float]) -> np.ndarray:
-    """Return the columns of upper, lower and stiffness, shape (n, 3)."""
-    low, high = ends
-    rises = (np.exp(k * (q - high)), -np.exp(-k * (q - low))) if k > 0.0 else (np.zeros_like(q), np.zeros_like(q))
-    return np.stack([*rises, q - 0.5 * (low + high)], axis=-1)
-
-
-def _within(columns: np.ndarray) -> np.ndarray:
-    return columns - columns.mean(axis=0)
-
-
-def _shape_deviations(courses: Sequence[Course], columns: np.ndarray, residual: np.ndarray, fitted: tuple[np.ndarray, float]) -> np.ndarray:
-    """Return deviations of the shape from the scores of the trials; those at a bound count as held."""
-    x, k = fitted
-    free = [j for j in range(3) if x[j] > 0.0 or j == 2] if k > 0.0 else [2]
-    used = columns[:, free]
-    bread = np.linalg.pinv(used.T @ used)
-    parts = np.split(np.arange(len(residual)), np.cumsum([len(c.angle) for c in courses])[:-1])
-    scores = np.array([used[p].T @ residual[p] for p in parts])
-    count = len(courses)
-    covariance = bread @ (scores.T @ scores) @ bread * count / max(count - len(free), 1)
-    stds = np.zeros(3)
-    stds[free] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return stds
 
 
 @dataclass(frozen=True)
@@ -342,8 +312,3 @@ def _line(x: np.ndarray, y: np.ndarray, configurations: Sequence[str]) -> _Line:
     level_variance = 1.0 / float(weights.sum()) + centre**2 * slope_variance
     freedom = min(1.0 / float(np.sum(relative**2 / (_SHARED + counts - 1))), float(len(x) - 2))
     return _Line(slope, float(np.sqrt(slope_variance)), level, float(np.sqrt(level_variance)), float(np.sqrt(common)), freedom)
-
-
-def _interval(value: float, half: float, least: float | None) -> tuple[float, float]:
-    low = value - half
-    return (low if least is None else max(low, least), value + half)

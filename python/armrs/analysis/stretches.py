@@ -3,8 +3,8 @@
 `R = offset + k1 x + … + k5 x⁵ + b q̇ + c sign(q̇) + ΔI q̈ + s·gain·max(0, s q̇(t−L) − threshold − slope·max(0, s (tonic − q(t−L))))`,
 x the angle from its mean, s = ±1 the direction of the stretch, with an offset of its own in every trial, as tone drifts. The law is that of
 the effect `stretch_reflex` (Lance 1980; Levin and Feldman 1994). For given threshold, latency, tonic angle and slope the rest is linear:
-variable projection (Golub and Pereyra 1973). Intervals are from leaving out one trial at a time (jackknife, Efron 1982), linearised at the
-optimum, so that neither the colour of the noise nor what differs from trial to trial has to be modelled.
+variable projection (Golub and Pereyra 1973). Intervals are from the scatter of the trials (`cluster_robust`), linearised at the optimum, so
+that neither the colour of the noise nor what differs from trial to trial has to be modelled.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from .cluster_robust import deviations
 
 LONGEST = 0.2
 """Longest latency that is asked for [s]."""
@@ -223,17 +225,12 @@ class _Problem:
         return np.column_stack([self.column(direction, shape), *slopes, self.linear])
 
     def _deviations(self, direction: int, shape: np.ndarray, free: int) -> np.ndarray:
-        """Return standard deviations of gain, shape, viscosity and dry friction: the jackknife over trials, linearised at the optimum."""
+        """Return deviations and degrees of freedom of gain, shape, viscosity and dry friction, (2, 7), linearised at the optimum."""
         jacobian = self.jacobian(direction, shape, self.gain(direction, shape)[0], free)
-        scale = np.linalg.norm(jacobian, axis=0) + 1e-300
-        jacobian = jacobian / scale
-        left = np.split(self.residual(direction, shape), self.ends)
-        parts = np.split(jacobian, self.ends)
-        whole = jacobian.T @ jacobian
-        away = np.array([-np.linalg.pinv(whole - j.T @ j, hermitian=True) @ (j.T @ r) for j, r in zip(parts, left, strict=True)])
-        n = len(parts)
-        std = np.sqrt((n - 1) / n * np.sum((away - away.mean(axis=0)) ** 2, axis=0)) / scale
-        return np.concatenate([std[: 1 + free], np.zeros(4 - free), std[1 + free + ELASTIC : 3 + free + ELASTIC]])
+        found = deviations(np.split(jacobian, self.ends), np.split(self.residual(direction, shape), self.ends))
+        none = np.array([0.0, 1.0])[:, None] * np.ones(4 - free)
+        known = np.array(found)
+        return np.concatenate([known[:, : 1 + free], none, known[:, 1 + free + ELASTIC : 3 + free + ELASTIC]], axis=1)
 
     def result(self, direction: int, shape: np.ndarray, free: int) -> Reflex:
         """Return what was found."""
@@ -243,8 +240,8 @@ class _Problem:
         column = self.column(direction, shape)
         linear = np.linalg.lstsq(self.linear, self.moment - gain * column, rcond=None)[0]
         values = np.array([gain, *shape, *linear[ELASTIC : ELASTIC + 2]])
-        std = self._deviations(direction, shape, free)
-        half = student.ppf(0.5 + 0.5 * LEVEL, len(self.stretches) - 1) * std
+        std, freedom = self._deviations(direction, shape, free)
+        half = student.ppf(0.5 + 0.5 * LEVEL, freedom) * std
         least = np.array([0.0, 0.0, 0.0, -np.inf, 0.0, -np.inf, -np.inf])
         names, units = ("gain", *SHAPES), (*UNITS.values(), "N m s/rad", "N m")
         numbers = [

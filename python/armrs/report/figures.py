@@ -387,7 +387,7 @@ def _dependence(result: PassiveMoments, fitted: Dependence, names: Sequence[str]
         ax.plot(np.degrees(curve.angle), fitted.at(curve.angle, held), "-", color=colour)
     ax.set(title=names[fitted.joint - 1], xlabel="joint angle [°]", ylabel="elastic moment [N m]")
     ax.legend(fontsize="small")
-    text = "Points are elastic means over the repeats of each configuration, lines the fitted double exponential with slope and coupling."
+    text = "Points are elastic means over the repeats of each configuration, lines the fitted law."
     return Drawn(f"dependence-{fitted.joint}", f"{names[fitted.joint - 1]}: own and adjacent angle", text, figure)
 
 

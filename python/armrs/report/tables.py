@@ -241,32 +241,29 @@ def passive(data: Mapping[str, Any]) -> Table:
 
 
 def dependence(data: Mapping[str, Any]) -> Table:
-    """Return how passive moments depend on the adjacent angle."""
-    rows = []
-    for d in data["dependence"]:
-        by_name = {c["name"]: c for c in d["coefficients"]}
-        rows.append(
-            [
-                f"{d['joint']} {d['joint_name']}",
-                f"{d['adjacent']} {d['adjacent_name']}",
-                *(f"{by_name[n]['value']:.3g} ± {by_name[n]['std']:.2g}" for n in ("upper", "lower", "stiffness", "coupling")),
-                f"{d['steepness_1_rad']:g}",
-                probability(d["p_value"]),
-                "yes" if d["coupled"] else "no",
-            ]
-        )
-    head = [
-        "joint",
-        "adjacent",
-        "upper [N m]",
-        "lower [N m]",
-        "stiffness [N m/rad]",
-        "coupling [N m/rad]",
-        "steepness [1/rad]",
-        "p",
-        "coupled",
+    """Return how passive moments depend on the adjacent angle, a quantity a row and a joint a column."""
+    found = data["dependence"]
+    by_name = [{c["name"]: c for c in d["coefficients"]} for d in found]
+    rows: list[list[object]] = [
+        [name.replace("_", " ") + ("" if own["unit"] == "1" else f" [{unit(own['unit'])}]"), *(_with_interval(c[name]) for c in by_name)]
+        for name, own in by_name[0].items()
+        if any(c[name]["value"] != 0.0 for c in by_name)
     ]
-    return Table(head, rows, left=2)
+    rows.append(["mean coupling [N m/rad]", *(_with_interval(d["mean_coupling"]) for d in found)])
+    rows.append(["coupled on average", *(f"{'yes' if d['coupled'] else 'no'} (p {_chance(d['p_value'])})" for d in found)])
+    rows.append(["linear law enough", *(f"{'yes' if d['linear'] else 'no'} (p {_chance(d['linear_p_value'])})" for d in found)])
+    return Table(["", *(f"{d['joint_name']}, {d['adjacent_name']} held" for d in found)], rows)
+
+
+def _chance(p: float) -> str:
+    """Write a probability behind its symbol."""
+    text = probability(p)
+    return text if text.startswith("<") else f"= {text}"
+
+
+def _with_interval(found: Mapping[str, Any]) -> str:
+    low, high = found["interval"]
+    return f"{found['value']:.3g} ({low:.3g} to {high:.3g})" if found["value"] != 0.0 or low != high else "0"
 
 
 def course_label(course: Mapping[str, Any]) -> str:

@@ -26,7 +26,9 @@ PASSIVE_MEANING = (
 
 DEPENDENCE_MEANING = (
     "The elastic moment of a joint as a double exponential of its angle (upper and lower: its size at both ends of what was measured), "
-    "a slope, and a coupling: how much it changes with the adjacent angle. The coupling is tested against a model without it, over trials."
+    "a slope, and a coupling: how much it changes with the adjacent angle. Where this linear law is not enough, each end moves with the "
+    "adjacent angle as well: by minus its ratio for each degree of it. The mean coupling is that of the linear law; it is tested against a "
+    "model without it, over trials."
 )
 
 WRONG_MASS = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _armrs, checks
-from ..analysis import joint_coupling, passivity_checks, uncertainty
+from ..analysis import double_exponential, joint_coupling, passivity_checks, preconditioning, uncertainty
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
@@ -292,8 +293,9 @@ def passive_moments(
     cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
     refuse_implausible(dataset, robot_matters=False)
     trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
+    trials, conditioned = _without_preconditioning(trials)
     wrong = find_wrong_setup(dataset)
-    curves, warnings = [], [] if wrong is None else [str(wrong)]
+    curves, warnings = [], [*([] if wrong is None else [str(wrong)]), *conditioned]
     for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
         repeats = [m for m in trials if m.trial.configuration == configuration]
         lost = []
@@ -323,6 +325,25 @@ def passive_moments(
     return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, both, fitted, assumptions)
 
 
+def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[TrialMoments, ...], list[str]]:
+    """Return trials in which first cycles that resist more than later ones tell no direction, and a line for each."""
+    kept, lines = list(trials), []
+    for configuration in dict.fromkeys(m.trial.configuration for m in trials):
+        own = [k for k, m in enumerate(trials) if m.trial.configuration == configuration]
+        for joint in range(trials[0].q.shape[1]):
+            courses = [(trials[k].q[:, joint], trials[k].moment[:, joint], trials[k].direction[:, joint]) for k in own]
+            for found in preconditioning.find(courses):
+                k = own[found.course]
+                direction = kept[k].direction.copy()
+                direction[found.samples, joint] = 0
+                kept[k] = dataclasses.replace(kept[k], direction=direction)
+                lines.append(
+                    f"{trials[k].trial.file}: the first {'cycle' if found.cycles == 1 else f'{found.cycles} cycles'} of joint {joint + 1} "
+                    f"dissipate {100 * found.more:.0f} % more than later ones: left out as preconditioning"
+                )
+    return tuple(kept), lines
+
+
 def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments:
     """Return the moments with which the joints resist in one trial, low-passed at a cutoff [Hz].
 
@@ -333,7 +354,8 @@ def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments
     """
     if trial.force_on_arm is None and trial.tau is None:
         raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
-    chain, n = _armrs.Arm.from_model(dataset.model_of(trial.configuration)), dataset.model.n_joints
+    model, n = dataset.model_of(trial.configuration), dataset.model.n_joints
+    chain, unit = _armrs.Arm.from_model(model), _armrs.Arm.from_model(model.replace(gravity=1.0))
     q, qd, moment, inertial, sign = (np.full((len(trial), n), np.nan) for _ in range(5))
     seen = None if trial.force_on_arm is None else np.full((len(trial), 2), np.nan)
     for piece in trial.pieces():
@@ -352,11 +374,22 @@ def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments
         if trial.tau is not None:
             torque = torque + _armrs.smooth(np.ascontiguousarray(trial.tau[piece]), trial.rate, cutoff)[0]
         inertial[piece] = chain.inverse_dynamics(angle, speed, acceleration) - gravity
+        if trial.base is not None:
+            inertial[piece] += _carried(unit, angle, _armrs.smooth(np.ascontiguousarray(trial.base[piece]), trial.rate, cutoff)[2])
         q[piece], qd[piece], moment[piece] = angle, speed, torque - inertial[piece]
         usual = RESTING * np.percentile(np.abs(speed), 90.0, axis=0)
         moving = np.where(np.abs(speed) > usual, np.sign(speed), 0.0)
         sign[piece] = _armrs.smooth(np.ascontiguousarray(moving), trial.rate, cutoff)[0]
     return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)), seen, sign)
+
+
+def _carried(unit: _armrs.Arm, q: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """Return the torques of a first joint that accelerates, (n, 2) [m/s²], from the weight of the arm under 1 m/s².
+
+    What accelerates the arm acts as a weight against it, and weight along −y is weight along −z, everything turned by a right angle.
+    """
+    turned = q + np.eye(1, q.shape[1]) * np.pi / 2.0
+    return np.asarray(acceleration[:, :1] * unit.gravity(turned) + acceleration[:, 1:] * unit.gravity(q))
 
 
 def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
@@ -464,7 +497,7 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependen
                 there = np.isfinite(elastic)
                 if there.sum() >= 4:
                     courses.append(
-                        joint_coupling.Course(curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration)
+                        double_exponential.Course(curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration)
                     )
         fitted = joint_coupling.fit(courses, joint, adjacent, LEVEL)
         if fitted is not None:
