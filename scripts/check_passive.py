@@ -14,6 +14,7 @@ know it (93.0 to 97.0 %).
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import sys
 from collections.abc import Iterator
 
@@ -38,10 +39,15 @@ WORN = ((1, 0.200, 0.231), (2, 0.191, 0.066))
 """The orthosis: segment, mass [kg], distance from the segment's proximal joint [m]; the upper part is 0.091 m above the elbow."""
 
 
-def subject(coupling: float) -> Model:
-    """Return the subject of the thesis with passive joints; `coupling` is that of a spring over both [N m/rad]."""
+def subject(coupling: float, ratio: float = 0.0) -> Model:
+    """Return the subject of the thesis with passive joints.
+
+    `coupling` is that of a spring over both [N m/rad]; the ends of the elbow's range move by `ratio` with the shoulder, from its middle on.
+    """
     segments, _ = literature_arm(Subject(77.0, 1.80, "male"), [0.322, 0.30])
-    effects = [Effect("end_range", 2, parameters={"upper_moment": 1.2, "lower_moment": 0.8, "steepness": 4.0, "upper": 1.5, "lower": 0.4})]
+    moved = ratio * float(np.radians(np.mean(SHOULDER_HELD)))
+    ends = {"upper_moment": 1.2, "lower_moment": 0.8, "steepness": 4.0, "upper": 1.5 + moved, "lower": 0.4 + moved}
+    effects = [Effect("biarticular_end_range", 2, parameters=ends | {"ratio": ratio}) if ratio else Effect("end_range", 2, parameters=ends)]
     if coupling:
         effects.append(Effect("biarticular", 2, parameters={"stiffness": coupling, "ratio": 1.0, "rest": 0.7}))
     return Model(
@@ -64,9 +70,9 @@ class Configuration:
     run: Simulated
 
 
-def configurations(coupling: float) -> list[Configuration]:
+def configurations(coupling: float, ratio: float = 0.0) -> list[Configuration]:
     """Simulate the ten configurations, in those of the shoulder with the orthosis on."""
-    arm, found = subject(coupling), []
+    arm, found = subject(coupling, ratio), []
     worn = arm
     for segment, mass, at in WORN:
         worn = worn.with_mass(segment, mass, at)
@@ -152,6 +158,33 @@ def coupled(coupling: float, runs: int) -> dict[str, tuple[float, np.ndarray]]:
     return shares | {"both": (float(np.mean([c.coupled for c in both])), np.array([c.value for c in both]))}
 
 
+def adjacent_part(moments: np.ndarray) -> np.ndarray:
+    """Return what of the shapes of moments, (n_configurations, n_angles), depends on the adjacent angle."""
+    shapes = moments - moments.mean(axis=1, keepdims=True)
+    return np.asarray(shapes - shapes.mean(axis=0))
+
+
+def ends_moved(coupling: float, ratio: float, runs: int, scatter: float, joint: int = 2) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return how often the linear law is called insufficient at a joint, and of each run two errors, as shares of root mean squares.
+
+    They are those of the elastic moment of all configurations, and of the part of its shape that depends on the other joint.
+    """
+    known = [c for c in configurations(coupling, ratio) if c.joint == joint]
+    refused, errors = [], []
+    for seed in range(runs):
+        found = passive.passive_moments(session(known, 20_000 + seed, scatter, coupling))
+        law = next(d for d in found.dependence if d.joint == joint)
+        curves = [next(k for k in found.curves if k.configuration == c.name and k.joint == joint) for c in known]
+        there = np.logical_and.reduce([np.isfinite(k.elastic) for k in curves])
+        true = np.array([true_curve(c, k)[0][there] for c, k in zip(known, curves, strict=True)])
+        seen = np.array([law.at(k.angle[there], float(k.held[:, law.adjacent - 1].mean())) for k in curves])
+        refused.append(not law.linear)
+        parts = ((seen, true), (adjacent_part(seen), adjacent_part(true)))
+        errors.append([np.sqrt(np.mean((a - b) ** 2) / max(np.mean(b**2), 1e-12)) for a, b in parts])
+    whole, part = np.array(errors).T
+    return float(np.mean(refused)), whole, part
+
+
 def over_trials(coupling: float, runs: int) -> int:
     """Return in how many of the runs a coupling [N m/rad] is found from plain courses that scatter from trial to trial as in the tables."""
     draw = np.random.default_rng(2)
@@ -186,6 +219,11 @@ def main() -> None:
             print(
                 f"coupling {coupling:g} N m/rad, {name}: called so in {100 * share:.1f} %; {values.mean():.3f} ± {values.std():.3f} N m/rad"
             )
+    for ratio, scatter, joint in itertools.product((0.0, 0.4), (0.0, 1.0), (1, 2)):
+        refused, whole, part = ends_moved(1.0, ratio, runs, scatter, joint)
+        errors = [f"{100 * np.median(e):.1f} % (95 % of runs below {100 * np.quantile(e, 0.95):.1f} %)" for e in (whole, part)]
+        case = f"joint {joint}, ends that move by {ratio:g}, tone {scatter:g}"
+        print(f"{case}: linear law refused in {100 * refused:.1f} %; errors {' and '.join(errors)}")
     for coupling in (0.0, 1.0):
         share = 100 * over_trials(coupling, 3 * runs) / (3 * runs)
         print(f"coupling {coupling:g} N m/rad, courses alone: called so in {share:.1f} % of {3 * runs}")

@@ -1,10 +1,13 @@
 """Virtual patients whose laws are written here anew: an elbow that a dynamometer stretches, with a reflex that acts late.
 
 Nothing of the catalogue or of the simulation is used but the rigid arm. The motion is given in closed form, so that its past is exact.
+The virtual laboratory records the same patients with the laws of the catalogue, led by a controlled robot (`recorded`).
 """
 
 from __future__ import annotations
 
+import dataclasses
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +18,8 @@ from armrs import _armrs
 from armrs.io.dataset import Dataset
 from armrs.io.trial import Trial
 from armrs.model import Joint, Model, Segment
+from armrs.workflows.experiment import load_experiment
+from armrs.workflows.record import measure
 
 SPEEDS = np.radians([15.0, 60.0, 110.0, 170.0, 230.0])
 """Largest speeds of the stretches [rad/s]."""
@@ -107,3 +112,67 @@ def written(data: Dataset, folder: Path) -> Path:
     """Write a session as a data set."""
     armrs.write_dataset(data, folder)
     return folder
+
+
+EXPERIMENT = """\
+name = "patient"
+seed = {seed}
+
+[subject]
+body_mass = 77.0
+height = 1.80
+sex = "male"
+lengths_m = [0.322, 0.30]
+spread = 0.3
+
+[[joint]]
+[[joint]]
+stiffness = {stiffness}
+rest = 1.2
+viscosity = {viscosity}
+coulomb = {dry}
+
+[[effect]]
+kind = "stretch_reflex"
+joint = 2
+gain = {gain}
+threshold = {threshold}
+latency = {latency}
+
+[handle]
+mass = 0.193
+
+[sensors]
+rate_Hz = 200
+emg = true
+
+[variation]
+moment_Nm = [0.3, {tone}]
+
+[safety]
+speed_rad_s = 20.0
+acceleration_rad_s2 = 400.0
+force_N = 100.0
+"""
+STRETCH = """
+[[movement]]
+configuration = "stretch {number}"
+waypoints_deg = [[-60, 30], [-60, 30.2], [-60, 110], [-60, 30], [-60, 30.2]]
+speed_rad_s = {speed}
+acceleration_rad_s2 = {acceleration}
+pause_s = 0.5
+shape = "smooth"
+repeats = 3
+"""
+LABORATORY_SPEEDS = (0.3, 1.0, 1.8, 2.7, 3.6)
+"""Speeds of the stretches in the laboratory [rad/s]."""
+
+
+def recorded(patient: Patient, seed: int) -> Dataset:
+    """Return a session of the virtual laboratory."""
+    said = EXPERIMENT.format(seed=seed, **dataclasses.asdict(patient))
+    said += "".join(STRETCH.format(number=k, speed=s, acceleration=max(4.0, 12.0 * s)) for k, s in enumerate(LABORATORY_SPEEDS))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "EXPERIMENT.toml"
+        file.write_text(said, encoding="utf-8")
+        return measure(load_experiment(file)).dataset

@@ -33,6 +33,17 @@ def test_threshold_gain_and_latency_are_recovered() -> None:
         assert value["latency"] == pytest.approx(patient.latency, abs=5e-3)
 
 
+def test_patients_of_the_virtual_laboratory_are_recovered() -> None:
+    """With a robot, cameras, tone and a wrong model of the arm; `bench/virtual_patients.py --laboratory` has two hundred of them."""
+    for number in range(3):
+        patient = Patient.drawn(np.random.default_rng(SEED + 50 + number))
+        found = next(j.reflex for j in armrs.spasticity(patients.recorded(patient, SEED + number)).joints if j.joint == 2)
+        value = {name: p.value for name, p in found.parameters.items()}
+        assert value["gain"] == pytest.approx(patient.gain, rel=0.1)
+        assert value["threshold"] == pytest.approx(patient.threshold, rel=0.1)
+        assert value["latency"] == pytest.approx(patient.latency, abs=5e-3)
+
+
 def test_without_a_reflex_none_is_found() -> None:
     found = armrs.spasticity(patients.session(dataclasses.replace(Patient(), gain=0.0), SEED))
     assert not found.joints[0].reflex.found and "no reflex" in found.warnings[0]

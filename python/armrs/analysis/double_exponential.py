@@ -8,7 +8,7 @@ Audu and Davy 1985. That the adjacent angle moves the limits is how Hatze 1997 d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -43,12 +43,16 @@ class Course:
         Mean of the adjacent angle [rad].
     configuration : str
         Trials of one configuration hold the adjacent angle alike, and scatter alike.
+    errors : ndarray, shape (k, n_errors)
+        What errors that all trials share do to the moment, each of the size of its standard deviation [N m]: a mass that is wrong has a
+        weight that depends on both angles, and would be taken for a coupling. None by default.
     """
 
     angle: np.ndarray
     moment: np.ndarray
     adjacent: float
     configuration: str
+    errors: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +82,27 @@ class Shape:
 
 
 class Problem:
-    """Moments of trials less their means, which differ from trial to trial and say nothing of the shape."""
+    """Moments of trials less their means, which differ from trial to trial and say nothing of the shape.
 
-    def __init__(self, courses: Sequence[Course]) -> None:
+    Where shared errors are asked, what they may do is taken out of moments and law alike: with `Z` what they do and `σ` the noise,
+    `‖W r‖² = min_b ‖r − Z b‖² + σ² ‖b‖²`.
+    """
+
+    def __init__(self, courses: Sequence[Course], *, with_errors: bool = False) -> None:
         self.q = np.concatenate([c.angle for c in courses])
         held = np.array([c.adjacent for c in courses])
         self.mean = float(held.mean())
         self.trial = np.repeat(np.arange(len(courses)), [len(c.angle) for c in courses])
         self.adjacent = (held - self.mean)[self.trial]
         self.ends = (float(self.q.min()), float(self.q.max()))
-        self.moment = self._within(np.concatenate([c.moment for c in courses]))
         self.count = len(courses)
+        self.seen = self._less_means(np.concatenate([c.moment for c in courses]))
+        self.shared = np.empty((len(self.q), 0)), np.empty(0)
+        if with_errors and all(c.errors.size for c in courses):
+            left, sizes, _ = np.linalg.svd(self._less_means(np.concatenate([c.errors for c in courses])), full_matrices=False)
+            noise = _noise(courses)
+            self.shared = left, 1.0 - noise / np.sqrt(sizes**2 + noise**2)
+        self.moment = self._within(self.seen)
 
     def fit(self, *, ratios: bool) -> Shape:
         """Fit the shape, with ratios or with both zero; without exponentials where these take too little away."""
@@ -200,7 +214,18 @@ class Problem:
             ], axis=1)
         )  # fmt: skip
 
+    def share(self, one: Shape, other: Shape) -> float:
+        """Return by how much two shapes differ beyond what shared errors may be, relative to the moments, both as root mean squares."""
+        first, second = (columns(self.q, self.adjacent, s.values, self.ends) @ s.values[:3] for s in (one, other))
+        return float(np.linalg.norm(self._within(first - second)) / max(float(np.linalg.norm(self.seen)), 1e-300))
+
     def _within(self, values: np.ndarray) -> np.ndarray:
+        """Return values, (n,) or (n, m), less their mean in each trial, and less what shared errors may be."""
+        table = self._less_means(values).reshape(len(values), -1)
+        left, shares = self.shared
+        return np.asarray((table - (left * shares) @ (left.T @ table)).reshape(values.shape))
+
+    def _less_means(self, values: np.ndarray) -> np.ndarray:
         """Return values, (n,) or (n, m), less their mean in each trial."""
         counts = np.bincount(self.trial)
         table = values.reshape(len(values), -1)
@@ -214,6 +239,19 @@ def columns(q: np.ndarray, adjacent: np.ndarray | float, values: np.ndarray, end
     rising = np.exp(k_u * (q + r_u * adjacent - high)) if k_u > 0.0 else np.zeros_like(q)
     falling = -np.exp(-k_l * (q + r_l * adjacent - low)) if k_l > 0.0 else np.zeros_like(q)
     return np.stack([rising, falling, q - 0.5 * (low + high)], axis=-1)
+
+
+def _noise(courses: Sequence[Course]) -> float:
+    """Return the noise of a moment [N m]: what a polynomial of degree 4 leaves in each configuration, each trial with its level."""
+    squares, freedom = 1e-300, 0
+    for name in dict.fromkeys(c.configuration for c in courses):
+        own = [c for c in courses if c.configuration == name]
+        powers = [np.vander(c.angle - own[0].angle.mean(), 5)[:, :4] for c in own]
+        design = np.concatenate([p - p.mean(axis=0) for p in powers])
+        target = np.concatenate([c.moment - c.moment.mean() for c in own])
+        rest = target - design @ np.linalg.lstsq(design, target, rcond=None)[0]
+        squares, freedom = squares + float(rest @ rest), freedom + len(target) - len(own) - 4
+    return float(np.sqrt(squares / max(freedom, 1)))
 
 
 def _natural(x: np.ndarray) -> np.ndarray:

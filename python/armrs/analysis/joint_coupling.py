@@ -12,6 +12,9 @@ from .double_exponential import NAMES, UNITS, Course, Problem, Shape, columns
 
 LEAST_HELD = np.radians(5.0)
 """The adjacent angle must differ by this much between configurations before a dependence on it can be told [rad]."""
+LEAST_SHARE = 0.005
+"""Share of the moment, as root mean squares within trials, that ratios must change before the linear law is called insufficient: the
+low-pass and the bins of angles leave up to 0.004 (virtual subjects of `scripts/check_passive.py`)."""
 _SHARED = 5.0
 """Degrees of freedom with which the scatter of all configurations speaks for that of each: its own are few."""
 
@@ -50,6 +53,8 @@ class Dependence:
         An exponential that is not needed has zeros; the ratios are zero where the linear law is enough.
     linear_p_value : float
         Of the linear law, in which both ratios are zero, against one in which they are not.
+    adjacent_share : float
+        By how much the law with ratios differs within trials, relative to the moment; 0 where the p value refuses nothing.
     mean_coupling : Coefficient
         The coupling of the linear law: the slope of the moment against the adjacent angle, on average over what was measured.
     range : (float, float)
@@ -73,6 +78,7 @@ class Dependence:
     adjacent: int
     coefficients: tuple[Coefficient, ...]
     linear_p_value: float
+    adjacent_share: float
     mean_coupling: Coefficient
     range: tuple[float, float]
     adjacent_mean: float
@@ -93,8 +99,8 @@ class Dependence:
 
     @property
     def linear(self) -> bool:
-        """Whether the linear law is enough: the shape of the moment does not depend on the adjacent angle."""
-        return self.linear_p_value >= 1.0 - self.level
+        """Whether the linear law is enough: the shape of the moment does not depend on the adjacent angle, or by less than 0.5 %."""
+        return self.linear_p_value >= 1.0 - self.level or self.adjacent_share < LEAST_SHARE
 
     def at(self, q: np.ndarray, adjacent: np.ndarray | float) -> np.ndarray:
         """Return the moment that was fitted [N m]."""
@@ -109,6 +115,7 @@ class Dependence:
             "adjacent": self.adjacent,
             "coefficients": [dict(vars(c)) for c in self.coefficients],
             "linear_p_value": self.linear_p_value,
+            "adjacent_share": self.adjacent_share,
             "linear": self.linear,
             "mean_coupling": dict(vars(self.mean_coupling)),
             "range_deg": np.degrees(self.range),
@@ -194,15 +201,16 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
         return None
     problem = Problem(courses)
     plain = problem.fit(ratios=False)
-    linear_p_value = problem.linear_law_p_value(plain)
+    linear_p_value, share = _linear_law(courses, level)
     mean = _levels(problem, courses, plain)
-    shape = plain if linear_p_value >= 1.0 - level else problem.fit(ratios=True)
+    shape = plain if share < LEAST_SHARE else problem.fit(ratios=True)
     line = mean if shape is plain else _levels(problem, courses, shape)
     return Dependence(
         joint=joint,
         adjacent=adjacent,
         coefficients=(*_coefficients(shape, len(courses), level), _coupling(line, level), _level(line, level)),
         linear_p_value=linear_p_value,
+        adjacent_share=share,
         mean_coupling=_coupling(mean, level),
         range=problem.ends,
         adjacent_mean=problem.mean,
@@ -213,6 +221,14 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
         trial_std=line.spread,
         freedom=mean.freedom,
     )
+
+
+def _linear_law(courses: Sequence[Course], level: float) -> tuple[float, float]:
+    """Return the p value of the law without ratios, and what ratios change where that refuses it, beside what shared errors may do."""
+    problem = Problem(courses, with_errors=True)
+    plain = problem.fit(ratios=False)
+    p_value = problem.linear_law_p_value(plain)
+    return p_value, 0.0 if p_value >= 1.0 - level else problem.share(problem.fit(ratios=True), plain)
 
 
 def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:

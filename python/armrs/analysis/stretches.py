@@ -275,6 +275,7 @@ def _from_start(values: np.ndarray) -> np.ndarray:
 
 def _columns(stretch: Stretch, middle: float) -> np.ndarray:
     """Return what the moment is linear in, besides offset and reflex."""
-    x = stretch.q - middle
-    sign = stretch.smooth(np.tanh(stretch.fine_qd / CREEP))
-    return np.column_stack([*(x**k for k in range(1, ELASTIC + 1)), stretch.qd, sign, stretch.qdd])
+    # What is not linear in the motion is computed before the low-pass, as joints do.
+    x = stretch.fine_q - middle
+    springs = (stretch.smooth(x**k) for k in range(1, ELASTIC + 1))
+    return np.column_stack([*springs, stretch.qd, stretch.smooth(np.tanh(stretch.fine_qd / CREEP)), stretch.qdd])

@@ -108,6 +108,8 @@ class PassiveCurve:
         Mean angle of every joint in every repeat [rad].
     elastic_systematic, half_width_systematic : ndarray
         Standard deviations from the declared uncertainty of masses, lengths, angles and forces, the same error in all repeats [N m].
+    elastic_errors : ndarray, shape (n_errors, k)
+        What each of these errors does to the elastic mean, of the size of its standard deviation [N m].
     """
 
     configuration: str
@@ -126,6 +128,7 @@ class PassiveCurve:
     held: np.ndarray = field(repr=False)
     elastic_systematic: np.ndarray
     half_width_systematic: np.ndarray
+    elastic_errors: np.ndarray = field(repr=False)
 
     def interval(self, part: str) -> tuple[float, float]:
         """Return the interval of the mean over angles of `elastic` or `half_width`, from the scatter of the repeats [N m].
@@ -455,17 +458,18 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
         elastic_repeats=elastic,
         half_width_repeats=half_width,
         held=np.array([_mean(m.q) for m in repeats]),
-        elastic_systematic=systematic[0],
-        half_width_systematic=systematic[1],
+        elastic_systematic=uncertainty.by_jacobian(systematic[0]),
+        half_width_systematic=uncertainty.by_jacobian(systematic[1]),
+        elastic_errors=systematic[0],
     )
 
 
 def _systematic(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return deviations of elastic mean and half width from errors that all samples of all repeats share; NaN where there are none."""
+    """Return what errors that all samples of all repeats share do to elastic mean and half width, each (n_errors, n_bins)."""
     deviations = uncertainty.Deviations.of(dataset)
     parts = [_shifts(dataset, m, joint, edges, deviations) for m in repeats]
     rising, falling = (np.array([_mean(np.array(errors)) for errors in zip(*(part[k] for part in parts), strict=True)]) for k in (0, 1))
-    return uncertainty.by_jacobian(0.5 * (rising + falling)), uncertainty.by_jacobian(0.5 * (rising - falling))
+    return 0.5 * (rising + falling), 0.5 * (rising - falling)
 
 
 def _shifts(
@@ -496,9 +500,9 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependen
             for elastic, held in zip(curve.elastic_repeats, curve.held, strict=True):
                 there = np.isfinite(elastic)
                 if there.sum() >= 4:
-                    courses.append(
-                        double_exponential.Course(curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration)
-                    )
+                    known = np.nan_to_num(curve.elastic_errors[:, there].T)
+                    course = (curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration, known)
+                    courses.append(double_exponential.Course(*course))
         fitted = joint_coupling.fit(courses, joint, adjacent, LEVEL)
         if fitted is not None:
             found.append(fitted)

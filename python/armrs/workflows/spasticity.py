@@ -188,7 +188,8 @@ def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEF
     refuse_implausible(dataset, robot_matters=False)
     # Activity of the muscles is what is looked for here: samples with it count.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
-    moments = [trial_moments(dataset, trial, cutoff) for trial in whole]
+    # Torques of the contact are products of forces with angles: the low-pass comes after them.
+    moments = [trial_moments(dataset, trial, min(FINER * cutoff, 0.4 * trial.rate)) for trial in whole]
     found, warnings = [], []
     for joint in range(dataset.model.n_joints):
         own = [(m, s) for m in moments if (s := _stretch(m, joint, cutoff)) is not None]
@@ -212,14 +213,13 @@ def _stretch(moments: TrialMoments, joint: int, cutoff: float) -> Stretch | None
     there = np.flatnonzero(np.isfinite(moments.moment[:, joint]))
     if there.size < 3 or there[-1] - there[0] + 1 != there.size:
         return None
-    t, q, qd = moments.trial.t[there], moments.q[there, joint], moments.qd[there, joint]
-    if np.ptp(q) < LEAST_RANGE:
+    t, fine_q, fine_qd = moments.trial.t[there], moments.q[there, joint], moments.qd[there, joint]
+    if np.ptp(fine_q) < LEAST_RANGE:
         return None
     rate = moments.trial.rate
-    qdd = np.gradient(qd, 1.0 / rate)
-    fine = _armrs.smooth(np.ascontiguousarray(moments.trial.q[there, joint, None]), rate, min(FINER * cutoff, 0.4 * rate))
+    q, qd, qdd = (values[:, 0] for values in _armrs.smooth(np.ascontiguousarray(moments.trial.q[there, joint, None]), rate, cutoff))
     every = max(1, int(rate / (FINEST * cutoff)))
-    moment, fine_q, fine_qd = moments.moment[there, joint], fine[0][:, 0], fine[1][:, 0]
+    moment = low_pass(rate, cutoff)(moments.moment[there, joint])
     t, q, qd, qdd, moment, fine_q, fine_qd = (values[::every] for values in (t, q, qd, qdd, moment, fine_q, fine_qd))
     return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, low_pass(rate / every, cutoff))
 

@@ -8,8 +8,8 @@ use arm_core::{Contact, Invalid, Joints, Pose, Reading, Setup, inverse_dynamics}
 use crate::common::Random;
 
 /// The stable names, as files and reports use them.
-const NAMES: &str = "viscous coulomb stribeck load_friction quadratic_drag elastic cubic_elastic \
-    relaxation thixotropy constant_moment end_range biarticular stretch_reflex tremor voluntary \
+const NAMES: &str = "viscous coulomb stribeck load_friction quadratic_drag angle_viscosity elastic cubic_elastic \
+    relaxation thixotropy constant_moment end_range biarticular biarticular_end_range stretch_reflex tremor voluntary \
     motor_inertia added_mass gravity_moment inertia segment_length gravity_tilt shoulder_motion \
     backlash contact_compliance contact_damping robot_ripple force_bias force_drift force_gain \
     force_misalignment angle_offset time_delay";
@@ -165,8 +165,8 @@ fn bounds_are_kept() {
 fn places_are_kept() {
     for &kind in KINDS {
         let at = |index| Effect::<f64>::new(kind, index).validate(2).is_ok();
-        let biarticular = kind.info().kind == "biarticular";
-        assert_eq!(at(0), !biarticular, "the first joint has none before it");
+        let crosses = kind.info().kind.starts_with("biarticular");
+        assert_eq!(at(0), !crosses, "the first joint has none before it");
         assert!(at(1));
         match kind.info().place {
             Place::Joint | Place::Segment | Place::AngleSensor => assert!(!at(2)),
