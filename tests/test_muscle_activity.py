@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs.io.muscle_activity import comparable, mark_activity
+from armrs.io.muscle_activity import co_contraction, comparable, mark_activity
 
 SEGMENTS = (armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165), armrs.Segment("forearm", 0.264, 1.264, 0.121, 0.0074))
 JOINTS = (armrs.Joint("shoulder", viscosity=0.25), armrs.Joint("elbow", viscosity=0.2, stiffness=0.5, rest=0.6))
@@ -68,6 +68,25 @@ def test_a_burst_is_marked_with_a_margin_and_left_out_of_all_repeats_where_they_
         assert not m.valid[during].any()
         assert m.valid[(m.t < 2.2) | (m.t > 3.7)].all()
     assert len(lines) == 1 and "slow_2.csv" in lines[0]
+
+
+def pair(flexor: np.ndarray, extensor: np.ndarray) -> armrs.Trial:
+    t = np.arange(len(flexor)) / 100.0
+    emg = {"emg_elbow_flexor_uV": flexor, "emg_elbow_extensor_uV": extensor, "emg_other": flexor}
+    return armrs.Trial("a.csv", "a", 1, "fit", t, np.zeros((len(t), 1)), emg=emg)
+
+
+def test_co_contraction_is_that_of_antagonists() -> None:
+    on = np.where((np.arange(1000) > 400) & (np.arange(1000) < 600), 5.0, 1.0)
+    off = np.ones(1000)
+    assert co_contraction([pair(on, on)], 0, 4.0, 6.0) == pytest.approx(1.0)
+    # Twice the gain of an amplifier changes nothing.
+    assert co_contraction([pair(on, 2.0 * on)], 0, 4.0, 6.0) == pytest.approx(1.0)
+    assert co_contraction([pair(on, off)], 0, 4.0, 6.0) == 0.0
+    assert co_contraction([pair(off, off)], 0, 4.0, 6.0) is None
+    assert co_contraction([trial(1, 11, True)], 0, 0.0, 5.0) is None
+    half = np.where((np.arange(1000) > 400) & (np.arange(1000) < 500), 5.0, 1.0)
+    assert co_contraction([pair(on, half)], 0, 4.0, 6.0) == pytest.approx(2.0 / 3.0, abs=0.01)
 
 
 def test_marks_take_most_of_what_a_burst_does_to_the_estimates() -> None:

@@ -8,7 +8,7 @@ activity and outlasts it, so the marks are widened.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -53,8 +53,7 @@ def mark_activity(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], list[str]
         together = np.concatenate([e[np.isfinite(e)] for e in envelopes])
         if together.size == 0 or np.ptp(together) == 0.0:
             continue
-        level = float(np.median(together))
-        threshold = level + DEVIATIONS * _TO_SIGMA * float(np.median(np.abs(together - level)))
+        _, threshold = _resting(together)
         marks = [_widened(np.nan_to_num(e, nan=0.0) > threshold, trial.dt) for e, trial in zip(envelopes, trials, strict=True)]
         share = float(np.mean(np.concatenate(marks)))
         if share > MOST:
@@ -88,6 +87,55 @@ def comparable(trials: Sequence[Trial]) -> tuple[Trial, ...]:
         valid = trial.valid & ~active
         shared.append(dataclasses.replace(trial, valid=valid) if active.any() and valid.any() else trial)
     return tuple(shared)
+
+
+def antagonists(names: Iterable[str]) -> list[tuple[str, str]]:
+    """Return the pairs of channels whose names differ by `flexor` and `extensor` alone, as `emg_elbow_flexor` and `emg_elbow_extensor`."""
+    found = list(names)
+    return [(name, other) for name in found if "flexor" in name and (other := name.replace("flexor", "extensor")) in found]
+
+
+def co_contraction(trials: Sequence[Trial], number: int, start: float, end: float) -> float | None:
+    """Return how much antagonists work against one another in a stretch of a trial: 0, one alone, to 1, both alike.
+
+    `2 ∫ min(a, b) dt / ∫ (a + b) dt` (Falconer and Winter 1985), a and b the envelopes above rest where they are active, each relative to
+    its largest in the session, as no maximal contraction is recorded. The largest over the pairs of the trial.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Of one session.
+    number : int
+        Which of them, from 0.
+    start, end : float
+        Of the stretch [s].
+
+    Returns
+    -------
+    float or None
+        None where no pair of antagonists is recorded, or none of them is active.
+    """
+    trial = trials[number]
+    during = (trial.t >= start) & (trial.t <= end)
+    indices = []
+    for pair in antagonists(trial.emg):
+        sizes = []
+        for name in pair:
+            envelopes = [_envelope(t, name) for t in trials]
+            together = np.concatenate(envelopes)
+            rest, threshold = _resting(together[np.isfinite(together)])
+            size = envelopes[number][during] - rest
+            sizes.append(np.where(size > threshold - rest, size, 0.0) / max(float(np.nanmax(together)) - rest, 1e-300))
+        whole = float(np.nansum(sizes[0] + sizes[1]))
+        if whole > 0.0:
+            indices.append(2.0 * float(np.nansum(np.minimum(*sizes))) / whole)
+    return max(indices, default=None)
+
+
+def _resting(envelope: np.ndarray) -> tuple[float, float]:
+    """Return the resting level of a channel in a session and the threshold of activity."""
+    level = float(np.median(envelope))
+    return level, level + DEVIATIONS * _TO_SIGMA * float(np.median(np.abs(envelope - level)))
 
 
 def _envelope(trial: Trial, name: str) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -15,8 +15,9 @@ from ..analysis import stretches
 from ..analysis.stretches import Reflex, Stretch
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
-from ..io.muscle_activity import onset
+from ..io.muscle_activity import co_contraction, onset
 from ..io.plausibility import refuse_implausible
+from ..io.trial import Trial
 from ..tabular import Tabular, Tidy
 from .identify import Estimate
 from .passive import LEAST_RANGE, TrialMoments, trial_moments
@@ -52,6 +53,8 @@ class StretchSeen:
         Time from the start of the stretch to the first activity of a muscle [s]; NaN without one.
     emg_latency : float
         Time from the speed's passing the threshold to that activity [s]; NaN as above.
+    co_contraction : float
+        How much antagonists work against one another, 0 to 1; NaN where no pair of them is recorded, see `armrs.io.muscle_activity`.
     """
 
     file: str
@@ -66,6 +69,7 @@ class StretchSeen:
     catch_speed: float
     emg_onset: float
     emg_latency: float
+    co_contraction: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +203,7 @@ def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEF
         fitted = stretches.fit([s for _, s in own])
         if fitted is None:
             continue
-        seen = [_seen(m, s, fitted, k) for k, (m, s) in enumerate(own)]
+        seen = [_seen(m, s, fitted, k, whole) for k, (m, s) in enumerate(own)]
         found.append(JointReflex(joint + 1, fitted, tuple(sorted(seen, key=lambda s: s.speed))))
         warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
     if not found:
@@ -229,8 +233,8 @@ def low_pass(rate: float, cutoff: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda values: _armrs.smooth(np.ascontiguousarray(values[:, None]), rate, cutoff)[0][:, 0]
 
 
-def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int) -> StretchSeen:
-    """Return what one stretch shows: from where the joint begins to move in the direction that is resisted, to its turn."""
+def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, session: Sequence[Trial]) -> StretchSeen:
+    """Return what one stretch of a session shows: from where the joint begins to move in the direction that is resisted, to its turn."""
     along = fitted.direction * stretch.qd
     peak = int(np.argmax(along))
     low = 0.02 * along[peak]
@@ -242,8 +246,9 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int) 
     felt = parts[2] > FELT * parts[2].max(initial=0.0)
     shape = fitted.parameters
     begun = first + int(np.argmax(felt)) if fitted.found and felt.any() else None
+    span_s = float(stretch.t[first]), float(stretch.t[last])
     emg = min(
-        (t for name in moments.trial.emg if (t := onset(moments.trial, name, stretch.t[first], stretch.t[last])) is not None),
+        (t for name in moments.trial.emg if (t := onset(moments.trial, name, *span_s)) is not None),
         default=np.nan,
     )
     over = along[span] > shape["threshold"].value
@@ -261,6 +266,7 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int) 
         catch_speed=np.nan if begun is None else float(along[begun]),
         emg_onset=float(emg - stretch.t[first]),
         emg_latency=float(emg - passed),
+        co_contraction=np.nan if (both := co_contraction(session, session.index(moments.trial), *span_s)) is None else both,
     )
 
 
