@@ -265,7 +265,11 @@ def couplings(result: Mapping[str, Any]) -> list[str]:
         f"{c['std_Nm_rad']:.2g} N m/rad from both (p = {c['p_value']:.2g})"
         for c in found
     ]
-    return [*lines, WRONG_MASS] if any(c["coupled"] for c in found) else lines
+    lines += [WRONG_MASS] * any(c["coupled"] for c in found)
+    moving = [d for d in result.get("dependence", ()) if not d["linear"]]
+    return lines + [
+        f"{d['joint_name']}: the linear law is not enough; the ends of its range move with the {d['adjacent_name']}" for d in moving
+    ]
 
 
 def show(title: str, table: tables.Table) -> None:
