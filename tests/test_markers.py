@@ -251,3 +251,19 @@ def test_a_damaged_c3d_neither_crashes_nor_hangs(data: Path, name: str, monkeypa
     monkeypatch.setattr(c3d, "LONGEST", 5.0)
     with pytest.raises(armrs.BadInput, match="a whole C3D file"):
         armrs.read_markers(data / "hostile" / name)
+
+
+def test_a_first_point_that_moves_is_said_and_its_path_comes_back() -> None:
+    t = np.arange(200) / 100.0
+    base = np.column_stack([np.zeros(200), 0.02 * np.sin(3.0 * t), 0.5 + 0.01 * t])
+    angles = np.column_stack([-0.5 + 0.3 * np.sin(2.0 * t), 1.0 + 0.4 * np.cos(2.0 * t)])
+    absolute = np.cumsum(angles, axis=1)
+    points = [base]
+    for length, angle in zip((0.3, 0.25), absolute.T, strict=True):
+        points.append(points[-1] + length * np.column_stack([np.zeros(200), np.cos(angle), np.sin(angle)]))
+    names = ("shoulder", "elbow", "hand")
+    for moved in (base, np.tile(base[0], (200, 1))):
+        markers = armrs.Markers(list(names), t, np.stack([p - base + moved for p in points], axis=1), up="z")
+        motion = armrs.planar_motion(markers, names, forward="y")
+        assert np.allclose(motion.base, moved[:, 1:], atol=1e-12)
+        assert any("so the trunk, moves by" in line for line in motion.warnings()) == (moved is base)

@@ -16,6 +16,7 @@ import numpy as np
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from . import c3d
+from .trial import MOVED
 
 METRES = {"mm": 1e-3, "m": 1.0, "cm": 1e-2}
 MARKER_SUFFIXES = (".c3d", ".trc")
@@ -95,6 +96,8 @@ class PlanarMotion:
         Angle between the plane and the vertical [rad].
     base_motion : float
         Root mean square motion of the first point [m].
+    base : ndarray, shape (n, 2)
+        Path of the first point, forward and up from the origin of the file [m]: the `base` of a trial whose shoulder moves.
     """
 
     t: np.ndarray
@@ -109,6 +112,7 @@ class PlanarMotion:
     out_of_plane_most: float
     tilt: float
     base_motion: float
+    base: np.ndarray
 
     @property
     def is_planar(self) -> bool:
@@ -151,6 +155,9 @@ class PlanarMotion:
             lines.append(
                 f"the plane leans {np.degrees(self.tilt):.3g}° from the vertical: gravity in it is {np.cos(self.tilt):.3g} of 9.81 m/s²"
             )
+        if self.base_motion > MOVED:
+            moved = f"{1e3 * self.base_motion:.2g} mm (rms)"
+            lines.append(f"the first point, and so the trunk, moves by {moved}: its path can be given as columns by_m and bz_m")
         if self.missing > 0.0:
             lines.append(f"markers are missing in {100 * self.missing:.2g} % of the samples: their cells stay empty")
         return lines
@@ -253,6 +260,7 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
         out_of_plane=float(np.sqrt(np.mean(lean**2))),
         out_of_plane_most=float(np.abs(lean).max()),
         tilt=float(np.arcsin(min(1.0, abs(float(normal @ vertical))))),
+        base=at[:, 0] @ np.column_stack([ahead, upward]),
         base_motion=float(np.sqrt(np.mean(np.sum((base - base.mean(axis=0)) ** 2, axis=1)))),
     )
 
