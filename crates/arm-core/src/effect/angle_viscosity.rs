@@ -12,7 +12,7 @@ impl Law for AngleViscosity {
         place: Place::Joint,
         summary: "viscosity that depends on the angle",
         formula: "R = (lower_viscosity · (1 − s) + upper_viscosity · s) · q̇, s = (q − lower)/range, limited to 0 to 1",
-        reference: "angle-dependent damping of human joints: Hatze 1997; Lin, Rymer 1991",
+        reference: "a straight line between two values, which only takes energy",
         parameters: &[
             Parameter::linear("lower_viscosity", "N m s/rad", 0.0, 100.0, 0.0),
             Parameter::linear("upper_viscosity", "N m s/rad", 0.0, 100.0, 0.0),
