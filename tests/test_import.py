@@ -54,6 +54,11 @@ def write_text(
     return path
 
 
+def repeated(values: np.ndarray, repeat: int) -> np.ndarray:
+    """Return samples as another repeat has them: with other noise on all channels."""
+    return values + 1e-4 * np.random.default_rng(repeat).standard_normal(values.shape) * [0, 1, 1, 1, 1]
+
+
 SI = ["t_s", "q1_rad", "q2_rad", "Fy_N", "Fz_N"]
 DEGREE = 180.0 / np.pi
 Writer = Callable[[Recording, Path], Path]
@@ -142,7 +147,7 @@ def motion_file(r: Recording, folder: Path) -> Path:
     return write_text(path, names, values, sep="\t", above=head)
 
 
-def saved_again(r: Recording, folder: Path) -> Path:
+def saved_repeated(r: Recording, folder: Path) -> Path:
     """A motion file that a spreadsheet program saved: commas between the cells, and after the lines of the header."""
     path = motion_file(r, folder)
     head, _, rows = path.read_text().partition("endheader\n")
@@ -258,11 +263,7 @@ def test_import_toml_repeats_an_import(recording: Recording, tmp_path: Path) -> 
 
 def test_the_last_of_three_repeats_is_kept_as_test(recording: Recording, tmp_path: Path) -> None:
     names, values = table(recording, names=SI)
-    noise = np.random.default_rng(7)
-    files = [
-        write_text(tmp_path / f"slow_{k}.csv", names, values + 1e-4 * noise.standard_normal(values.shape) * [0, 1, 1, 1, 1])
-        for k in (1, 2, 3)
-    ]
+    files = [write_text(tmp_path / f"slow_{k}.csv", names, repeated(values, k)) for k in (1, 2, 3)]
     done = armrs.import_recordings(files, tmp_path / "session", model=KNOWN)
     assert [(t.repeat, t.role) for t in done.recipe.trials] == [(1, "fit"), (2, "fit"), (3, "test")]
 
@@ -347,9 +348,9 @@ def test_sheets_of_a_workbook_are_trials_by_their_titles(recording: Recording, t
     book = openpyxl.Workbook()
     book.active.append(["subject 7, right arm"])
     names, values = table(recording, names=["Zeit [ms]", "Schulter [°]", "Ellbogen [°]", "Kraft y [N]", "Kraft z [N]"], t=1e3, angle=DEGREE)
-    for title in ("Schulter 1", "Schulter 2", "Ellbogen 1"):
+    for k, title in enumerate(("Schulter 1", "Schulter 2", "Ellbogen 1")):
         sheet = book.create_sheet(title)
-        for row in (names, *values.tolist()):
+        for row in (names, *repeated(values, k).tolist()):
             sheet.append(row)
     book.save(tmp_path / "Messung.xlsx")
     done = armrs.import_recordings([tmp_path / "Messung.xlsx"], tmp_path / "set", model=KNOWN)
@@ -374,7 +375,7 @@ def test_a_model_of_more_joints_than_were_recorded(recording: Recording, tmp_pat
 def test_repeats_that_are_counted_from_zero(recording: Recording, tmp_path: Path) -> None:
     """`slow_0` and `slow_1` were both written as the first repeat, and the data set refused."""
     names, values = table(recording, names=SI)
-    sources = [write_text(tmp_path / f"slow_{k}.csv", names, values + 1e-7 * k) for k in range(3)]
+    sources = [write_text(tmp_path / f"slow_{k}.csv", names, repeated(values, k)) for k in range(3)]
     made = armrs.import_recordings(sources, tmp_path / "set", model=KNOWN)
     assert [(t.repeat, t.role) for t in armrs.load_dataset(made.folder).trials] == [(1, "fit"), (2, "fit"), (3, "test")]
 
@@ -382,7 +383,7 @@ def test_repeats_that_are_counted_from_zero(recording: Recording, tmp_path: Path
 def test_an_import_replaces_a_former_one_whole_and_nothing_of_another_origin(recording: Recording, tmp_path: Path) -> None:
     """Trials of a former import stayed beside those of the next, and the model that `armrs init` had written was replaced."""
     names, values = table(recording, names=SI)
-    sources = [write_text(tmp_path / f"slow_{k}.csv", names, values + 1e-7 * k) for k in (1, 2, 3)]
+    sources = [write_text(tmp_path / f"slow_{k}.csv", names, repeated(values, k)) for k in (1, 2, 3)]
     armrs.import_recordings(sources, tmp_path / "set", model=KNOWN)
     armrs.import_recordings(sources[:1], tmp_path / "set", model=KNOWN)
     assert [path.name for path in (tmp_path / "set" / "trials").iterdir()] == ["slow_1.csv"]

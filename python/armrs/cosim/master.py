@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from .. import views
 from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
+from ..tabular import Labelled, Series, Tidy
 from .partner import Partner, Status
 from .system import Connection, System
 
@@ -51,7 +53,7 @@ class ConnectionReport:
 
 
 @dataclass(frozen=True, eq=False)
-class Coupled:
+class Coupled(Series):
     """A run of a system.
 
     Attributes
@@ -90,6 +92,28 @@ class Coupled:
     evaluations: float
     warnings: tuple[str, ...]
     estimates: tuple[Any, ...] = field(default=(), repr=False)
+
+    def __repr__(self) -> str:
+        return f"Coupled({', '.join(self.system.slaves)}: {self.verdict}, {self.t[-1]:g} s, {len(self.t)} points)"
+
+    def _units(self) -> dict[str, str]:
+        """Return the unit of each output."""
+        parted = {name: name.partition(".") for name in self.columns}
+        return {name: self.system.slaves[slave].variable(variable).unit for name, (slave, _, variable) in parted.items()}
+
+    def tidy(self) -> Tidy:
+        """Return every output at every communication point."""
+        return Tidy({"t": self.t, **self.columns}, {"t": "s"} | {name: unit for name, unit in self._units().items() if unit})
+
+    def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
+        """Return every output over time."""
+        units = self._units()
+        return {"time": self.t}, {name: Labelled(("time",), values, units[name]) for name, values in self.columns.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the run came to, as plain data."""
+        data: dict[str, Any] = views.of(self).data(self)
+        return data
 
 
 def run_system(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:

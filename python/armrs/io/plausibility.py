@@ -62,7 +62,7 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
     q, robot_q = trial.q[good], trial.robot_q[good]
     reach = sum(s.length for s in model.segments)
     handle = handle_path(robot, robot_q)
-    gap = _tip(model, q) - handle
+    gap = hand_path(model, q) - handle
     own = _rms(gap)
     if own > _SUSPECT * reach:
         best, reading = _other_reading(model, robot, q, robot_q)
@@ -89,9 +89,9 @@ def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarra
     """Return what the angles of arm or robot may be instead, and how far apart hand and handle are then [m]."""
     handle = handle_path(robot, robot_q)
     found: list[tuple[float, Reading | None]] = [
-        (_rms(_tip(model, reading.angles(q)) - handle), reading) for reading in readings.of_angles(q.shape[1])
+        (_rms(hand_path(model, reading.angles(q)) - handle), reading) for reading in readings.of_angles(q.shape[1])
     ]
-    tip = _tip(model, q)
+    tip = hand_path(model, q)
     found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
     return min(found, key=lambda item: item[0])
 
@@ -108,7 +108,7 @@ def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float,
             sizes = []
             for value in tried:
                 offset[j] = value
-                sizes.append(_rms(_tip(model, q[thin] + offset) - handle[thin]))
+                sizes.append(_rms(hand_path(model, q[thin] + offset) - handle[thin]))
             offset[j] = tried[int(np.argmin(sizes))]
         found.append((min(sizes), j + 1, float(offset[j])))
     nearest = min(found)[0]
@@ -126,7 +126,7 @@ def hand_meets_handle(dataset: Dataset) -> bool:
             return False
         good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
         if good.any():
-            gap = _tip(model, trial.q[good]) - handle_path(robot, trial.robot_q[good])
+            gap = hand_path(model, trial.q[good]) - handle_path(robot, trial.robot_q[good])
             if _rms(gap) > _SUSPECT * sum(s.length for s in model.segments):
                 return False
     return True
@@ -141,7 +141,8 @@ def handle_path(robot: Robot, q: np.ndarray) -> np.ndarray:
     )
 
 
-def _tip(model: Model, q: np.ndarray) -> np.ndarray:
+def hand_path(model: Model, q: np.ndarray) -> np.ndarray:
+    """Return where an arm with angles q, (n, n_joints) [rad], has its hand, (n, 2) [m]."""
     angles = np.cumsum(q, axis=1)
     lengths = np.array([s.length for s in model.segments])
     return np.column_stack([model.base[0] + np.cos(angles) @ lengths, model.base[1] + np.sin(angles) @ lengths])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,10 @@ import numpy as np
 from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
-from ..io.dataset import Dataset, describe, name_of, read_entry
+from ..io.dataset import Dataset, describe, described_model, name_of, read_entry
 from ..io.trial import Trial, still_angles
-from ..model import Description, Model, load_model
+from ..model import Description, Model
+from ..tabular import Tabular, Tidy
 from . import setup
 from .gap import suspicion
 
@@ -56,11 +57,20 @@ class Ability:
 
 
 @dataclass(frozen=True)
-class Checked:
-    """The result of `check_dataset`."""
+class Checked(Tabular):
+    """The result of `check_dataset`.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+    verbs : tuple of Ability
+    dataset : Dataset or None
+        What of it can be read; None where that is nothing.
+    """
 
     problems: tuple[Problem, ...]
     verbs: tuple[Ability, ...]
+    dataset: Dataset | None = field(default=None, repr=False, compare=False)
 
     @property
     def errors(self) -> tuple[Problem, ...]:
@@ -71,6 +81,10 @@ class Checked:
         warnings = len(self.problems) - len(self.errors)
         able = ", ".join(v.verb for v in self.verbs if v.able) or "no verb"
         return f"Checked({len(self.errors)} errors, {warnings} warnings; usable by {able})"
+
+    def tidy(self) -> Tidy:
+        """Return the problems, one a row."""
+        return Tidy({name: [getattr(p, name) for p in self.problems] for name in ("level", "text", "next_step")}, {})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data."""
@@ -103,7 +117,7 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
             tuple(problems), tuple(Ability(verb, False, "the data set cannot be read") for verb in ("identify", "passive", "gap"))
         )
     path, description = described
-    model = _caught(lambda: load_model(path.parent / description.model), problems)
+    model = _caught(lambda: described_model(path.parent, description), problems)
     trials = _trials(path.parent, description, model, problems)
     if model is None or not trials:
         why = "no model" if model is None else "no trial can be read"
@@ -114,7 +128,7 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
     _plausible(dataset, problems)
     _balanced(dataset, problems)
     blocked = any(p.level == "error" for p in problems)
-    return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked))
+    return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked), dataset)
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:

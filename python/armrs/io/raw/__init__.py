@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ...errors import BadInput, Text
 from . import matlab, motion, programs, text, workbook
+from .table import NoTable as NoTable
 from .table import RawColumn as RawColumn
 from .table import RawTable as RawTable
 

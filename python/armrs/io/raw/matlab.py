@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ArmrsError, BadInput, Text
-from .table import RawTable, column
+from .table import NoTable, RawTable, column
 
 SUFFIXES = (".mat",)
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -35,7 +35,7 @@ def read_matlab(path: Path) -> RawTable:
     tall = {name: (a if a.shape[0] >= a.shape[1] else a.T) for name, a in arrays.items()}
     long = max((len(a) for a in tall.values()), default=0)
     if long < _FEWEST:
-        raise BadInput("file", Text(f"no numeric vector of {_FEWEST} samples or more"), "vectors of equal length, one element a sample")
+        raise NoTable("file", Text(f"no numeric vector of {_FEWEST} samples or more"), "vectors of equal length, one element a sample")
     chosen = {name: a for name, a in tall.items() if len(a) == long}
     columns = []
     for name, a in chosen.items():

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from ...errors import BadInput
 from ..markers import Markers
 from .units import UNITS
 
 _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>]\s*$")
 _AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
 _AFTER_LAST = re.compile(r"^(?P<name>.*[^_\s/])[_\s/](?P<unit>[^_\s]+)$")
+
+
+class NoTable(BadInput):
+    """A file that can be read and holds no table of numbers, such as notes."""
+
+    def within(self, *, file: str | os.PathLike[str] | None = None, place: str | None = None) -> NoTable:
+        """Return this error with the file, or with the table that holds the place."""
+        seen = super().within(file=file, place=place)
+        return NoTable(seen.place, seen.found, seen.allowed, file=seen.file, hint=seen.hint)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import BadInput, Text
-from .table import RawColumn, RawTable, column
+from .table import NoTable, RawColumn, RawTable, column
 from .units import unit
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
@@ -62,7 +62,7 @@ def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
     lines = [line for index, line in enumerate(lines) if not (index and _is_comment(line))]
     layout = _layout(lines[:_PROBED])
     if layout is None:
-        raise BadInput("file", Text("no block of rows with at least two numbers each"), "a table with one row a sample")
+        raise NoTable("file", Text("no block of rows with at least two numbers each"), "a table with one row a sample")
     names, units = _header(lines, layout)
     columns, dropped = _columns(lines[layout.first :], names, units, layout)
     notes = [f"text in {encoding}, cells between {_SEPARATORS[layout.separator]}, decimal {'comma' if layout.decimal == ',' else 'point'}"]

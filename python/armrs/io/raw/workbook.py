@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ArmrsError, BadInput, Text
-from .table import RawTable, column
+from .table import NoTable, RawTable, column
 from .units import unit
 
 SUFFIXES = (".xlsx", ".xlsm")
@@ -38,7 +38,7 @@ def read_workbook(path: Path) -> list[RawTable]:
         raise BadInput("file", Text(f"no readable workbook ({error})"), "an Excel workbook (.xlsx)") from None
     tables = {title: table for title, rows in sheets.items() if (table := _table(path, rows)) is not None}
     if not tables:
-        raise BadInput("file", Text(f"no table of numbers in {', '.join(sheets)}"), "a sheet with one row a sample")
+        raise NoTable("file", Text(f"no table of numbers in {', '.join(sheets)}"), "a sheet with one row a sample")
     left = [repr(title) for title in sheets if title not in tables]
     said = f"{'sheets' if len(tables) > 1 else 'sheet'} {', '.join(map(repr, tables))}" + (
         f"; no table in {', '.join(left)}" if left else ""

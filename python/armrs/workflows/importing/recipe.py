@@ -109,6 +109,8 @@ class Recipe:
     convention: Convention
     trials: tuple[RawTrial, ...]
     points: tuple[str, ...] = ()
+    origin: tuple[float, float] | None = None
+    """Of the positions of the handle, seen from that of the model [m]; None where no angles of the robot are made of them."""
 
     def to_toml(self) -> str:
         """Return the text of `import.toml`."""
@@ -120,6 +122,7 @@ class Recipe:
             "signs": list(c.signs),
             "force_on": c.force_on,
             "points": list(self.points) or None,
+            "handle_origin": None if self.origin is None else list(self.origin),
         }
         blocks.append("\n".join([*_reason(c.why), "[convention]", *tomlfile.lines(angles)]))
         for channel in self.channels:
@@ -149,7 +152,7 @@ def load_recipe(path: Path) -> Recipe:
 def _recipe(document: Mapping[str, Any]) -> Recipe:
     checks.keys("", document, required=["convention", "channel", "trial"], optional=[])
     angles = checks.table("[convention]", document["convention"])
-    checks.keys("[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points"])
+    checks.keys("[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points", "handle_origin"])
     convention = Convention(
         checks.choice("[convention], reference", angles["reference"], REFERENCES),
         checks.choice("[convention], zero", angles["zero"], ZEROS),
@@ -158,7 +161,17 @@ def _recipe(document: Mapping[str, Any]) -> Recipe:
     )
     channels = tuple(_channel(f"[[channel]] {k}", table) for k, table in enumerate(checks.tables("channel", document["channel"]), 1))
     trials = tuple(_trial(f"[[trial]] {k}", table) for k, table in enumerate(checks.tables("trial", document["trial"]), 1))
-    return Recipe(channels, convention, trials, tuple(checks.instances("[convention], points", angles.get("points", []), str)))
+    points = tuple(checks.instances("[convention], points", angles.get("points", []), str))
+    return Recipe(channels, convention, trials, points, _origin(angles.get("handle_origin")))
+
+
+def _origin(value: object) -> tuple[float, float] | None:
+    place = "[convention], handle_origin"
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 2:
+        raise BadInput(place, value, "two numbers, forward and upward [m]")
+    return checks.number(place, value[0], unit="m"), checks.number(place, value[1], unit="m")
 
 
 def _sign(place: str, value: object) -> int:
