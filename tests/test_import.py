@@ -147,7 +147,7 @@ def motion_file(r: Recording, folder: Path) -> Path:
     return write_text(path, names, values, sep="\t", above=head)
 
 
-def saved_repeated(r: Recording, folder: Path) -> Path:
+def saved_again(r: Recording, folder: Path) -> Path:
     """A motion file that a spreadsheet program saved: commas between the cells, and after the lines of the header."""
     path = motion_file(r, folder)
     head, _, rows = path.read_text().partition("endheader\n")
@@ -268,25 +268,46 @@ def test_the_last_of_three_repeats_is_kept_as_test(recording: Recording, tmp_pat
     assert [(t.repeat, t.role) for t in done.recipe.trials] == [(1, "fit"), (2, "fit"), (3, "test")]
 
 
-HOPELESS: dict[str, tuple[Writer, str]] = {
-    "no angles": (text(names=["t_s", "a", "b", "Fy_N", "Fz_N"]), "an angle of every joint"),
-    "no time": (text(names=["frame", "q1_rad", "q2_rad", "Fy_N", "Fz_N"]), "no column for t"),
-    "one force": (text(names=["t_s", "q1_rad", "q2_rad", "Fy_N", "other"]), "no column for Fz"),
-    "an angle in newtons": (text(names=["t_s", "q1 [N]", "q2_rad", "Fy_N", "Fz_N"]), "a unit of angle for q1"),
-    "two shoulders": (text(names=["t_s", "shoulder_rad", "shoulder [rad]", "Fy_N", "Fz_N"]), "one column for q1"),
-    "markers without their names": (c3d_with_analogs, "shoulder to handle, of SHO, ELB, HAND"),
-    "words": (lambda r, folder: _written(folder / "slow_1.csv", b"hello\nworld\n"), "no block of rows"),
-    "a picture": (lambda r, folder: _written(folder / "slow_1.csv", b"\x89PNG\r\n\x1a\n\0\0\0" * 20), "binary data"),
-    "no workbook": (lambda r, folder: _written(folder / "slow_1.xlsx", b"PK\x03\x04 broken"), "no readable workbook"),
-    "damaged HDF5": (lambda r, folder: _damaged(matlab_7_3(r, folder)), "no readable MATLAB file"),
-    "no MATLAB file": (lambda r, folder: _written(folder / "slow_1.mat", b"MATLAB 5.0 " + b"x" * 600), "MATLAB"),
-    "forces of noise": (
-        lambda r, folder: write_text(
-            folder / "slow_1.csv", SI, np.column_stack([r.t, r.q, np.random.default_rng(3).standard_normal((len(r.t), 2))])
-        ),
-        "unexplained",
+NOISE = np.random.default_rng(3)
+HOPELESS: dict[str, tuple[Writer, tuple[str, ...]]] = {
+    "no angles": (text(names=["t_s", "a", "b", "Fy_N", "Fz_N"]), ("no column for q1", "no column for q2")),
+    "no names at all": (text(names=["a", "b", "c", "d", "e"]), tuple(f"no column for {s}" for s in ("t", "q1", "q2", "Fy", "Fz"))),
+    "no time and one force": (text(names=["frame", "q1_rad", "q2_rad", "Fy_N", "other"]), ("no column for t", "no column for Fz")),
+    "two angles in other units": (
+        text(names=["t_s", "q1 [N]", "q2 [mm]", "Fy_N", "Fz_N"]),
+        ("a unit of angle for q1", "a unit of angle for q2"),
     ),
+    "two shoulders and no elbow": (
+        text(names=["t_s", "shoulder_rad", "shoulder [rad]", "Fy_N", "Fz_N"]),
+        ("one column for q1", "found angles of 1 joint, allowed 2"),
+    ),
+    "frozen clock, force in metres": (
+        lambda r, folder: write_text(
+            folder / "slow_1.csv", ["t", "q1", "q2", "Fy [m]", "Fz"], np.column_stack([0.0 * r.t, r.q, r.force_on_robot])
+        ),
+        ("time that does not increase", "a unit of force for Fy"),
+    ),
+    "markers without their names": (c3d_with_analogs, ("shoulder to handle, of SHO, ELB, HAND",)),
+    "a picture, words and a table": (
+        lambda r, folder: _three_wrong(r, folder),
+        ("binary data", "no block of rows", "found angles of 1 joint,"),
+    ),
+    "no workbook": (lambda r, folder: _written(folder / "slow_1.xlsx", b"PK\x03\x04 broken"), ("no readable workbook",)),
+    "damaged HDF5": (lambda r, folder: _damaged(matlab_7_3(r, folder)), ("no readable MATLAB file",)),
+    "no MATLAB file": (lambda r, folder: _written(folder / "slow_1.mat", b"MATLAB 5.0 " + b"x" * 600), ("MATLAB",)),
+    "forces of noise": (
+        lambda r, folder: write_text(folder / "slow_1.csv", SI, np.column_stack([r.t, r.q, NOISE.standard_normal((len(r.t), 2))])),
+        ("unexplained",),
+    ),
+    "one angle and one force": (text(names=["t_s", "q1_rad", "b", "Fy_N", "c"]), ("no column for Fz", "found angles of 1 joint,")),
 }
+
+
+def _three_wrong(r: Recording, folder: Path) -> Path:
+    _written(folder / "a.csv", b"\x89PNG\r\n\x1a\n\0\0\0" * 20)
+    _written(folder / "b.csv", b"hello\nworld\n")
+    text(names=["t_s", "q1_rad", "elbow flex? [N]", "Fy_N", "Fz_N"])(r, folder)
+    return folder
 
 
 def _damaged(path: Path) -> Path:
@@ -311,11 +332,12 @@ def test_a_hopeless_recording_is_refused_and_nothing_written(case: str, recordin
         pytest.importorskip("openpyxl")
     write, words = HOPELESS[case]
     path = write(recording, tmp_path)
+    sources = sorted(path.iterdir()) if path.is_dir() else [path]
     with pytest.raises(BadInput) as refused:
-        armrs.import_recordings([path], tmp_path / "session", model=KNOWN)
-    listed = refused.value.problems if isinstance(refused.value, BadInputs) else (refused.value,)
-    assert any(words in str(problem) for problem in listed), [str(p) for p in listed]
-    assert all(str(path) in str(p) or "angles and forces" in str(p) for p in listed)
+        armrs.import_recordings(sources, tmp_path / "session", model=KNOWN)
+    listed = [str(p) for p in (refused.value.problems if isinstance(refused.value, BadInputs) else (refused.value,))]
+    assert [said for said in words if not any(said in line for line in listed)] == [], listed
+    assert all(str(path) in line or "angles and forces" in line for line in listed)
     assert not (tmp_path / "session").exists()
 
 

@@ -205,9 +205,13 @@ impl Description {
         let table = |value: Option<Value>| value.unwrap_or_else(|| Table::new().into());
         let subject = Subject::from_value("[subject]", table(fields.take("subject")))?;
         let model = fields.maybe_text("model")?;
-        if model.is_none() && let Some(lacking) = subject.lacks() {
-            let allowed = "the file of the model, or a [subject] with body_mass, height and sex";
-            return Err(Refused::new(fields.at("model"), "nothing", allowed).hint(format!("{lacking} is missing in [subject]")));
+        if model.is_none()
+            && let Some(lacking) = subject.lacks()
+        {
+            let allowed =
+                "the file of the model, or a [subject] with body_mass, height, sex and lengths_m";
+            return Err(Refused::new(fields.at("model"), "nothing", allowed)
+                .hint(format!("{lacking} is missing in [subject]")));
         }
         Ok(Self {
             name: fields.maybe_text("name")?,

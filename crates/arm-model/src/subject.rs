@@ -62,12 +62,13 @@ impl Subject {
         })
     }
 
-    /// What the literature needs to know, and is not said; none where all is.
+    /// What the arm by the literature needs, and is not said; none where all is.
     pub fn lacks(&self) -> Option<&'static str> {
         let said = [
             ("body_mass", self.body_mass.is_some()),
             ("height", self.height.is_some()),
             ("sex", self.sex.is_some()),
+            ("lengths_m", !self.lengths.is_empty()),
         ];
         said.into_iter().find(|(_, is)| !is).map(|(name, _)| name)
     }

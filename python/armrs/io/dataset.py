@@ -23,6 +23,7 @@ from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, read_trial, still_angles
 
 FILE = "dataset.toml"
+NO_MODEL = "no model is named: the arm is that of the subject by the literature (de Leva 1996)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +165,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     trials: list[Trial] = []
     warnings = list(model.warnings)
     if model_path is None:
-        warnings.append("no model is named: the arm is that of the subject by the literature (de Leva 1996)")
+        warnings.append(NO_MODEL)
     for entry in description.trials:
         trial_path = folder / entry.file
         reading = read_entry(trial_path, entry, model.n_joints, description)

@@ -5,6 +5,8 @@ It is asked before any physics, so that a wrong column is named as such and not 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..errors import BadInput, Text
@@ -38,19 +40,25 @@ def refuse_implausible(dataset: Dataset, *, robot_matters: bool = True) -> None:
     BadInput
         Names the trial's file and the column.
     """
-    for trial in dataset.trials:
-        if trial.force_on_arm is not None:
-            for name, values in zip(("Fy", "Fz"), trial.force_on_arm.T, strict=True):
-                level = constant(values)
-                if level is not None:
-                    found, allowed = Text(f"{level:g} N in every sample"), "a force that changes with the movement"
-                    raise BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
+    for dead in dead_forces(dataset):
+        raise dead
     if all(constant(angle) is not None for trial in dataset.trials for angle in trial.q.T):
         raise BadInput("angles", Text("none that changes in any trial"), "an arm that moves", hint="dead sensors?")
     if dataset.model.robot is not None:
         for trial in dataset.trials:
             if trial.robot_q is not None:
                 _refuse_apart(dataset.model, dataset.model.robot, trial, robot_matters)
+
+
+def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
+    """Give the force channels that never change."""
+    for trial in dataset.trials:
+        if trial.force_on_arm is not None:
+            for name, values in zip(("Fy", "Fz"), trial.force_on_arm.T, strict=True):
+                level = constant(values)
+                if level is not None:
+                    found, allowed = Text(f"{level:g} N in every sample"), "a force that changes with the movement"
+                    yield BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
 
 
 def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
-from ..io.dataset import Dataset, describe, described_model, name_of, read_entry
+from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, read_entry
 from ..io.trial import Trial, still_angles
 from ..model import Description, Model
 from ..tabular import Tabular, Tidy
@@ -122,9 +122,11 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
     if model is None or not trials:
         why = "no model" if model is None else "no trial can be read"
         return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
-    problems += [Problem("warning", line) for line in model.warnings]
+    problems += [_warned(line) for line in model.warnings]
+    if description.model is None:
+        problems.append(_warned(NO_MODEL))
     dataset = Dataset(name_of(path, description), model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
-    problems += [Problem("warning", line) for line in still_angles(dataset.trials)]
+    problems += [_warned(line) for line in still_angles(dataset.trials)]
     _plausible(dataset, problems)
     _balanced(dataset, problems)
     blocked = any(p.level == "error" for p in problems)
@@ -132,16 +134,69 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
-    """Return what `read` returns, or None with its refusal among the problems."""
+    """Return what `read` returns, or None with its refusal among the problems, each once."""
     try:
         return read()
     except BadInputs as error:
-        problems += [Problem("error", str(p)) for p in error.problems]
-    except BadInput as error:
-        problems.append(Problem("error", str(error)))
+        refused: Sequence[ArmrsError] = error.problems
     except ArmrsError as error:
-        problems.append(Problem("error", str(error)))
+        refused = [error]
+    known = {p.text for p in problems}
+    problems += [Problem("error", str(one), _remedy(one)) for one in refused if str(one) not in known]
     return None
+
+
+_FILES = {
+    "time": "write the unit of time in the name of the column (t_s, t_ms), or correct the time stamps",
+    "header": "rename or remove the column",
+    "samples": "leave the copy out of dataset.toml",
+    "force_on": "state what the forces act on: force_on in dataset.toml",
+    "file": "correct the file, or its name in dataset.toml",
+}
+"""By the place of an error, what to do about it."""
+
+
+def _remedy(error: ArmrsError) -> str:
+    """Return the next step about an error."""
+    if not isinstance(error, BadInput):
+        return "correct the file that it names"
+    place = error.place.rpartition(", ")[2]
+    for start, step in _FILES.items():
+        if place.startswith(start):
+            return step
+    if "dead sensor" in (error.hint or ""):
+        return "repair the sensor and record again, or leave the trial out of dataset.toml"
+    if "if read otherwise" in str(error.found):
+        return "import the recordings again and let armrs import find the convention, or correct the columns"
+    if place.startswith(("column", "line", "row", "Fy", "q", "angles")):
+        return "correct the column: its unit, its sign, or its values"
+    return "correct it in the file that it names"
+
+
+_WARNINGS = (
+    ("saturated", "record with a larger range of the sensor, or leave these trials out"),
+    ("no samples from", "fill the gap or record the movement again; where it was, nothing is compared"),
+    ("samples are missing", "record these repeats again, or leave them out"),
+    ("bridged", "look for lost samples in the recorder"),
+    ("whole turns", "nothing, if the joint did not turn round"),
+    ("the time stamps are used", "correct sample_rate in dataset.toml"),
+    ("one fit trial", "record repeats of each movement"),
+    ("no movement was repeated", "record repeats of each movement"),
+    ('role = "test"', 'set role = "test" for one repeat of each movement'),
+    ("hardly", "move the joint, or give its law in the model"),
+    ("what holds it cannot be told", "move the joint, or give its law in the model"),
+    ("a joint that is held", "nothing, if the joint was held; else repair its sensor"),
+    ("begin them at one", "cut the trials at a rest"),
+    ("at a higher rate", "record the robot at a higher rate, or let it start and stop smoothly"),
+    ("are compared by joint torques", "leave such trials out, or add what they lack"),
+    ("no model is named", "nothing, or name a model of your own: model = in dataset.toml"),
+)
+"""By words of a warning, what to do about it."""
+
+
+def _warned(text: str) -> Problem:
+    step = next((step for words, step in _WARNINGS if words in text), "look at the values in model.toml")
+    return Problem("warning", text, step)
 
 
 def _trials(folder: Path, description: Description, model: Model | None, problems: list[Problem]) -> list[Trial]:
@@ -151,7 +206,7 @@ def _trials(folder: Path, description: Description, model: Model | None, problem
         joints = model.n_joints if model is not None else 1
         reading = _caught(partial(read_entry, path, entry, joints, description), problems)
         if reading is not None and model is not None:
-            problems += [Problem("warning", f"{path}: {line}") for line in reading.warnings]
+            problems += [_warned(f"{path}: {line}") for line in reading.warnings]
             trials.append(reading.trial)
     return trials
 
@@ -160,14 +215,13 @@ def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
     """Ask each trial by itself, so that one dead sensor does not hide another."""
     for trial in dataset.trials:
         one = dataset.replace(trials=(trial,))
-        _caught(partial(plausibility.refuse_implausible, one), problems)
+        dead = list(plausibility.dead_forces(one))
+        problems += [Problem("error", str(error), _remedy(error)) for error in dead]
+        if not dead:
+            _caught(partial(plausibility.refuse_implausible, one), problems)
     led = _is_led(dataset)
-    try:
-        problems += [Problem("warning", line) for line in suspicion.examine(dataset, led)]
-    except BadInput as error:
-        text = str(error)
-        if all(p.text != text for p in problems):
-            problems.append(Problem("error", text))
+    for test in suspicion.tests():
+        problems += [_warned(line) for line in _caught(partial(test, dataset, led), problems) or ()]
 
 
 def _balanced(dataset: Dataset, problems: list[Problem]) -> None:

@@ -176,9 +176,9 @@ def _decided(
                 file=paths[0],
             )
         )
-    elif not named and not problems:
-        found = Text(f"columns {', '.join(repr(c.name) for c in tables[0].columns[:12])}")
-        problems.append(BadInput("columns", found, "an angle of every joint", file=tables[0].path, hint="--map q1=COLUMN,q2=COLUMN"))
+    elif not named:
+        for table in tables[:1]:
+            _complete(columns.guess([table], _present(mapped, table), problems), model.n_joints, table, problems)
     if not named:
         raise BadInputs.of(problems)
     for table in left:
@@ -314,7 +314,7 @@ def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, probl
     angles = [f"q{j}" for j in range(1, n_joints + 1)]
     there = [symbol for symbol in angles if symbol in symbols]
     if 0 < len(there) < n_joints and there == angles[: len(there)]:
-        found, allowed = Text(f"angles of {len(there)} joints"), f"{n_joints}, as the model has"
+        found, allowed = Text(f"angles of {len(there)} joint{'s' * (len(there) > 1)}"), f"{n_joints}, as the model has"
         hint = f"a model of {len(there)}: armrs init --lengths-m {','.join('?' * len(there))}; or --map {angles[len(there)]}=COLUMN"
         problems.append(BadInput("columns", found, allowed, file=table.path, hint=hint))
         angles = there
