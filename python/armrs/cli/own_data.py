@@ -124,6 +124,7 @@ def import_(
     clockwise: Annotated[str | None, typer.Option(metavar="1,2,…|none", help="Joints whose angle is clockwise positive.")] = None,
     force_on: Annotated[Side | None, typer.Option("--force-on", help="Body on which the recorded force acts.")] = None,
     points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the midpoint.")] = "",
+    rate_hz: Annotated[float | None, typer.Option(help="Sample rate of recordings without a column of time [Hz].")] = None,
     ask: Annotated[bool, typer.Option("--ask", help="Ask for each column on the terminal, with a guess and its reason.")] = False,
     json: JsonFile = None,
 ) -> None:
@@ -141,7 +142,7 @@ def import_(
     joints = None if clockwise is None else [_joint(part) for part in listed(clockwise) if part != "none"]
     options = {
         "angles": angles and angles.value, "zero": zero and zero.value, "clockwise": joints,
-        "force_on": force_on and force_on.value, "points": listed(points),
+        "force_on": force_on and force_on.value, "points": listed(points), "rate": rate_hz,
     }  # fmt: skip
     talking = sys.stdin.isatty() and sys.stderr.isatty()
     if ask and not talking:

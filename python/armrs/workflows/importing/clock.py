@@ -26,6 +26,8 @@ _ALIKE = 3.0
 """Shifts that leave at most this many times as much unexplained as the best are compared by the balance of the arm."""
 _MOST = 6
 """As many are compared at most."""
+_AS_GOOD = 1.2
+"""The clock of the file is kept where it leaves at most so many times what the best shift does."""
 _EXPLAINED = 0.6
 """Least share of the force's variance that the posture must explain: less is no match."""
 
@@ -81,7 +83,9 @@ def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) 
     return sorted((found[k] for k in peaks), key=lambda shift: -shift.explained)[:_MOST]
 
 
-def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray, near: float) -> float:
+def refine(
+    model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray, near: float, *, one_file: bool = False
+) -> float:
     """Return the shift near `near` [s] at which the equation of motion explains the torques of the contact force best.
 
     Parameters
@@ -94,6 +98,8 @@ def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, forc
         As in `align`.
     near : float
         What `align` found.
+    one_file : bool
+        Whether both stand in one file: their clocks are the same where that explains the torques about as well.
     """
     good, seen = np.isfinite(q).all(axis=1), np.isfinite(force_on_arm).all(axis=1)
     grid = np.arange(t[good][0], t[good][-1], 1.0 / _RATE)
@@ -119,6 +125,8 @@ def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, forc
 
     shifts = near + np.arange(-_NEAR, _NEAR + _FINE, _FINE)
     left = np.array([unexplained(float(shift)) for shift in shifts])
+    if one_file and abs(near) <= _NEAR and unexplained(0.0) <= _AS_GOOD * left.min():
+        return 0.0
     k = int(np.clip(np.argmin(left), 1, len(left) - 2))
     below, at, above = left[k - 1 : k + 2]
     curvature = below - 2.0 * at + above

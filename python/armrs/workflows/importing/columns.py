@@ -13,7 +13,7 @@ from ...io.raw import RawColumn, RawTable
 from ...io.raw.units import unit
 from .recipe import Channel
 
-_TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed"}
+_TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed", "xvalue"}
 _JOINTS = (
     {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral"},
     {"elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec"},
@@ -70,7 +70,7 @@ def symbol_of(column: RawColumn) -> str | None:
     if not tokens:
         return None
     joined = "".join(tokens)
-    if dimension in (None, "time") and (joined in _TIME or tokens[0] in _TIME):
+    if dimension in (None, "time") and (joined in _TIME or tokens[0] in _TIME or tokens[0].endswith("timestamp")):
         return "t"
     if tokens[0].startswith("emg") or _mentions(tokens, _MUSCLES) or dimension == "voltage":
         return "emg_" + "_".join(token for token in tokens if token != "emg") if len(tokens) > 1 or tokens[0] != "emg" else "emg_1"
@@ -190,18 +190,28 @@ def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequen
     values = [c.values for table in tables for c in table.columns if c.name == column.name]
     if symbol == "t":
         return _time(column, stated.text if stated else "", values[0], why, tables[0], problems)
+    most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
+    if stated is not None and stated.text == "rad" and most > _DEGREES_FROM:
+        return Channel(
+            symbol, column.name, "deg", sign, f"{why}; values up to {most:.3g}, so in degrees, although its header says {stated.text}"
+        )
     if stated is not None:
         return Channel(symbol, column.name, stated.text, sign, why)
     if dimension == "angle":
-        most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
         in_degrees = most > _DEGREES_FROM
         reason = f"no unit stated; values up to {most:.3g}, so in {'degrees' if in_degrees else 'radians'}"
         return Channel(symbol, column.name, "deg" if in_degrees else "rad", sign, f"{why}; {reason}")
     if dimension == "length":
-        most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
         text = "mm" if most > _MILLIMETRES_FROM else "m"
         return Channel(symbol, column.name, text, sign, f"{why}; no unit stated; values up to {most:.3g}, so in {text}")
     return Channel(symbol, column.name, _DEFAULT_UNIT[dimension], sign, f"{why}; no unit stated, so {_DEFAULT_UNIT[dimension]}")
+
+
+def went_back(name: str, values: np.ndarray, sample: int, table: RawTable) -> BadInput:
+    """Return the refusal of time stamps that do not increase after a sample."""
+    after = values[np.isfinite(values)][sample : sample + 2]
+    found = Text(f"{after[1]:g} after {after[0]:g} in sample {sample + 2}")
+    return BadInput(f"column {name!r}", found, "time stamps that increase", file=table.path, hint="two recordings in one file? divide it")
 
 
 def is_clock(values: np.ndarray, text: str) -> bool:
@@ -225,7 +235,11 @@ def _time(column: RawColumn, stated: str, values: np.ndarray, why: str, table: R
             BadInput(f"column {column.name!r}", Text("time that does not increase"), "time stamps that increase", file=table.path)
         )
         return None
-    plausible = [text for text in ("s", "ms", "µs") if is_clock(values, text)]
+    back = np.flatnonzero(np.diff(values[np.isfinite(values)]) <= 0.0)
+    if back.size:
+        problems.append(went_back(column.name, values, int(back[0]), table))
+        return None
+    plausible = [text for text in ("s", "ms", "µs", "ns") if is_clock(values, text)]
     if stated in plausible or (stated and not plausible):
         return Channel("t", column.name, stated, 1, f"{why}; in {stated} as stated")
     if not plausible:

@@ -90,6 +90,8 @@ class RawTrial:
         A further raw file, with the forces.
     force_shift : float
         Added to the time of the forces [s].
+    force_table : str, optional
+        Title of the table of forces in it; the first when absent.
     """
 
     file: str
@@ -99,6 +101,7 @@ class RawTrial:
     role: str
     force_file: str | None = None
     force_shift: float = 0.0
+    force_table: str | None = None
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,8 @@ class Recipe:
     points: tuple[str, ...] = ()
     origin: tuple[float, float] | None = None
     """Of the positions of the handle, seen from that of the model [m]; None where no angles of the robot are made of them."""
+    rate: float | None = None
+    """Sample rate of recordings without a column of time [Hz]."""
 
     def to_toml(self) -> str:
         """Return the text of `import.toml`."""
@@ -122,6 +127,7 @@ class Recipe:
             "signs": list(c.signs),
             "force_on": c.force_on,
             "points": list(self.points) or None,
+            "rate_Hz": self.rate,
             "handle_origin": None if self.origin is None else list(self.origin),
         }
         blocks.append("\n".join([*_reason(c.why), "[convention]", *tomlfile.lines(angles)]))
@@ -152,7 +158,9 @@ def load_recipe(path: Path) -> Recipe:
 def _recipe(document: Mapping[str, Any]) -> Recipe:
     checks.keys("", document, required=["convention", "channel", "trial"], optional=[])
     angles = checks.table("[convention]", document["convention"])
-    checks.keys("[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points", "handle_origin"])
+    checks.keys(
+        "[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points", "handle_origin", "rate_Hz"]
+    )
     convention = Convention(
         checks.choice("[convention], reference", angles["reference"], REFERENCES),
         checks.choice("[convention], zero", angles["zero"], ZEROS),
@@ -162,7 +170,9 @@ def _recipe(document: Mapping[str, Any]) -> Recipe:
     channels = tuple(_channel(f"[[channel]] {k}", table) for k, table in enumerate(checks.tables("channel", document["channel"]), 1))
     trials = tuple(_trial(f"[[trial]] {k}", table) for k, table in enumerate(checks.tables("trial", document["trial"]), 1))
     points = tuple(checks.instances("[convention], points", angles.get("points", []), str))
-    return Recipe(channels, convention, trials, points, _origin(angles.get("handle_origin")))
+    rate = angles.get("rate_Hz")
+    rate = None if rate is None else checks.number("[convention], rate_Hz", rate, above=0.0, most=1e6, unit="Hz")
+    return Recipe(channels, convention, trials, points, _origin(angles.get("handle_origin")), rate)
 
 
 def _origin(value: object) -> tuple[float, float] | None:
@@ -189,7 +199,9 @@ def _channel(place: str, table: Mapping[str, Any]) -> Channel:
 
 
 def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
-    checks.keys(place, table, required=["file", "table", "configuration", "repeat", "role"], optional=["force_file", "force_shift"])
+    checks.keys(
+        place, table, required=["file", "table", "configuration", "repeat", "role"], optional=["force_file", "force_shift", "force_table"]
+    )
     for key in ("file", "table", "configuration"):
         checks.text(f"{place}, {key}", table[key])
     return RawTrial(
@@ -200,4 +212,5 @@ def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
         checks.choice(f"{place}, role", table["role"], ("fit", "test")),
         table.get("force_file"),
         checks.number(f"{place}, force_shift", table.get("force_shift", 0.0), unit="s"),
+        table.get("force_table"),
     )

@@ -20,7 +20,9 @@ from ...model import Model, Robot, load_model
 from ...tabular import Tabular, Tidy
 from . import clock, columns, conventions, handle, trials
 from . import sources as raw
+from .columns import symbol_of
 from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
+from .samples import cleaned
 
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
 _FORWARD_AND_UP = {("x", "y"): ("x", "y"), ("x", "z"): ("x", "z"), ("y", "z"): ("y", "z"), ("x", "y", "z"): ("y", "z")}
@@ -87,6 +89,7 @@ def import_recordings(
     clockwise: Sequence[int] | None = None,
     force_on: str | None = None,
     points: Sequence[str] = (),
+    rate: float | None = None,
 ) -> Imported:
     """Turn own recordings into a data set.
 
@@ -110,6 +113,8 @@ def import_recordings(
         The four above are read off the data where they are not given.
     points : sequence of str
         Markers of the joints, shoulder to handle, for C3D and TRC files.
+    rate : float, optional
+        Sample rate of recordings without a column of time [Hz].
 
     Returns
     -------
@@ -124,6 +129,7 @@ def import_recordings(
     paths = [checks.path("sources", source) for source in sources]
     checks.instance("columns_map", columns_map, str)
     points = checks.instances("points", points, str)
+    rate = None if rate is None else checks.number("rate", rate, above=0.0, most=1e6, unit="Hz")
     if not paths:
         raise BadInput("sources", Text("nothing"), "one recording or more")
     loaded = model if isinstance(model, Model) else load_model(model)
@@ -133,7 +139,7 @@ def import_recordings(
         notes = [f"as {paths[0]} says"]
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
-        recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points))
+        recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
     folder = _write(files.output_folder(out), loaded, recipe, reads)
     return Imported(folder, recipe, tuple(notes))
 
@@ -154,13 +160,18 @@ def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None
 
 
 def _decided(
-    paths: Sequence[Path], model: Model, mapped: Mapping[str, tuple[str, int]], given: Mapping[str, object], points: tuple[str, ...]
+    paths: Sequence[Path],
+    model: Model,
+    mapped: Mapping[str, tuple[str, int]],
+    given: Mapping[str, object],
+    points: tuple[str, ...],
+    rate: float | None,
 ) -> tuple[Recipe, list[_Read], list[str]]:
     """Return what all files say together; every problem is collected before any is raised."""
     problems: list[BadInput] = []
     sources = raw.read_all(paths, points, problems)
     tables = sources.tables
-    mapped_tables = [_renamed(table, mapped) for table in tables]
+    mapped_tables = [part for table in tables for part in cleaned(_renamed(table, mapped), rate, sources.notes)]
     named, left, roles = trials.arrange(mapped_tables)
     seen = next((t for t in left if t.markers is not None), None)
     if seen is not None and seen.markers is not None and not points:
@@ -168,16 +179,10 @@ def _decided(
         problems.append(BadInput("--points", Text("nothing"), f"the markers of the joints, shoulder to handle, of {names}", file=seen.path))
         left = [t for t in left if t.markers is None]
     elif not tables and not problems:
-        problems.append(
-            BadInput(
-                "file",
-                Text("only a file that accompanies another recording"),
-                "the recording of the movement in the same folder",
-                file=paths[0],
-            )
-        )
+        found = Text("no recording of a movement" if sources.notes else "only a file that accompanies another recording")
+        problems.append(BadInput("file", found, "the recording of the movement", file=paths[0], hint="; ".join(sources.notes) or None))
     elif not named:
-        for table in tables[:1]:
+        for table in mapped_tables[:1]:
             _complete(columns.guess([table], _present(mapped, table), problems), model.n_joints, table, problems)
     if not named:
         raise BadInputs.of(problems)
@@ -214,7 +219,7 @@ def _decided(
         raise BadInputs.of(problems)
     reads = [_refined(read, channels, convention, model) for read in reads]
     origin = _origin(reads, channels, convention, model, axes)
-    recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin)
+    recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
     notes = [*sources.notes, *dict.fromkeys(note for t in tables for note in t.notes), *axes]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
@@ -238,6 +243,8 @@ def _alike(tables: Sequence[RawTable], channels: Sequence[Channel], problems: li
             if stated is not None and stated.text != channel.unit:
                 place, allowed = f"column {channel.column!r}", f"{channel.unit}, as in the first file"
                 problems.append(BadInput(place, there[channel.column].unit, allowed, file=table.path, hint="import it by itself"))
+            elif channel.symbol == "t" and (back := np.flatnonzero(np.diff(there[channel.column].values) <= 0.0)).size:
+                problems.append(columns.went_back(channel.column, there[channel.column].values, int(back[0]), table))
             elif channel.symbol == "t" and not columns.is_clock(there[channel.column].values, channel.unit):
                 place, allowed = f"column {channel.column!r}", f"time in {channel.unit}, as in the first file"
                 problems.append(BadInput(place, Text("time stamps that are not"), allowed, file=table.path, hint="import it by itself"))
@@ -310,6 +317,8 @@ def _plane(channels: list[Channel]) -> tuple[list[Channel], list[str]]:
 
 def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, problems: list[BadInput]) -> None:
     symbols = {c.symbol for c in channels}
+    # A column that was refused for its unit or its values is not missing.
+    refused = {symbol_of(c) for c in table.columns for p in problems if repr(c.name) in p.place}
     offered = ", ".join(repr(c.name) for c in table.columns)
     angles = [f"q{j}" for j in range(1, n_joints + 1)]
     there = [symbol for symbol in angles if symbol in symbols]
@@ -321,10 +330,12 @@ def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, probl
     needed = ["t", *angles]
     if symbols & {"Fy", "Fz"} or not any(s.startswith("tau") for s in symbols):
         needed += ["Fy", "Fz"]
-    for symbol in needed:
-        if symbol not in symbols and f"no column for {symbol}" not in [str(p.found) for p in problems]:
-            why = f"a column for it; there are {offered}"
-            problems.append(BadInput("columns", Text(f"no column for {symbol}"), why, file=table.path, hint=f"--map {symbol}=COLUMN"))
+    lacking = [symbol for symbol in needed if symbol not in symbols and symbol not in refused]
+    if lacking:
+        found = Text(f"no column for {', '.join(lacking)}")
+        even = ", or --rate-hz HZ for samples at a constant rate" if "t" in lacking else ""
+        hint = f"--map {','.join(f'{symbol}=COLUMN' for symbol in lacking)}{even}"
+        problems.append(BadInput("columns", found, f"columns for these; there are {offered}", file=table.path, hint=hint))
     for c in channels:
         number = c.symbol.removeprefix("q")
         if number.isdigit() and int(number) > n_joints:
@@ -341,7 +352,7 @@ def _aligned(
         return _Read(trial, named.table, None)
     q = np.column_stack([_values(named.table, c) for c in channels if c.symbol.startswith("q") and c.symbol[1:].isdigit()])
     force = np.column_stack([_values(named.forces, _by(channels, s)) for s in ("Fy", "Fz")])
-    trial = replace(trial, force_file=os.fspath(named.forces.path), force_shift=0.0)
+    trial = replace(trial, force_file=os.fspath(named.forces.path), force_table=named.forces.title, force_shift=0.0)
     try:
         shifts = clock.align(_values(named.table, _by(channels, "t")), q, _values(named.forces, _by(channels, "t of forces")), force)
     except BadInput as error:
@@ -371,7 +382,15 @@ def _refined(read: _Read, channels: Sequence[Channel], convention: Convention, m
     force = np.column_stack([_values(read.forces, _by(channels, s)) for s in ("Fy", "Fz")])
     on_arm = force if convention.force_on == "arm" else -force
     q = conventions.to_model_angles(raw, convention)
-    shift = clock.refine(model, t, q, _values(read.forces, _by(channels, "t of forces")), on_arm, read.trial.force_shift)
+    shift = clock.refine(
+        model,
+        t,
+        q,
+        _values(read.forces, _by(channels, "t of forces")),
+        on_arm,
+        read.trial.force_shift,
+        one_file=read.trial.force_file == read.trial.file,
+    )
     return replace(read, trial=replace(read.trial, force_shift=shift))
 
 
@@ -412,12 +431,19 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
     """Return the trials of a recipe with their tables."""
     problems: list[BadInput] = []
     reads = []
+    clocks = {c.symbol[:1]: (c.column, 1) for c in recipe.channels if c.symbol in ("t", "t of forces")}
+
+    def table_of(file: str, title: str | None, points: tuple[str, ...]) -> RawTable:
+        tables = [part for t in raw.read(folder / file, points) for part in cleaned(_renamed(t, clocks), recipe.rate, [])]
+        found = next((t for t in tables if title in (t.title, None)), None)
+        if found is None:
+            raise BadInput("table", title, "the title of a table in it", file=file)
+        return found
+
     for trial in recipe.trials:
         try:
-            table = next((t for t in raw.read(folder / trial.file, recipe.points) if t.title == trial.table), None)
-            if table is None:
-                raise BadInput("table", trial.table, "the title of a table in it", file=trial.file)
-            reads.append(_Read(trial, table, raw.read(folder / trial.force_file, ())[0] if trial.force_file else None))
+            table = table_of(trial.file, trial.table, recipe.points)
+            reads.append(_Read(trial, table, table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None))
         except BadInput as error:  # noqa: PERF203 (every file is asked)
             problems.append(error)
     if problems:
