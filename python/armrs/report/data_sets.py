@@ -43,9 +43,9 @@ def _count(number: int, what: str) -> str:
     return f"{number or 'no'} {what}{'s' * (number != 1)}"
 
 
-def problems(result: Mapping[str, Any]) -> Table:
-    """Return every problem and its next step."""
-    return Table(["", "problem", "next step"], [[p["level"], p["text"], p["next_step"]] for p in result["problems"]], 3)
+def problems(result: Mapping[str, Any]) -> list[str]:
+    """Return every problem and its next step, a line each."""
+    return [f"{p['level']}: {p['text']}" + (f". Next: {p['next_step']}" if p["next_step"] else "") for p in result["problems"]]
 
 
 def abilities(result: Mapping[str, Any]) -> Table:

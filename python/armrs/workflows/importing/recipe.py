@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -65,12 +65,16 @@ class Convention:
 
     def words(self) -> str:
         """Return the convention in words."""
-        flipped = [f"q{j}" for j, sign in enumerate(self.signs, start=1) if sign < 0]
+        return f"angles {self.angles()}" + ("" if self.force_on is None else f"; forces on the {self.force_on}")
+
+    def angles(self, joints: Sequence[str] = ()) -> str:
+        """Return how angles are counted, in words, with the names of the joints where they are given."""
+        names = joints or [f"q{j}" for j in range(1, len(self.signs) + 1)]
+        flipped = [name for name, sign in zip(names, self.signs, strict=True) if sign < 0]
         turn = "counter-clockwise positive" if not flipped else f"clockwise positive in {', '.join(flipped)}"
         zero = "zero pointing forward" if self.zero == "horizontal" else "zero hanging down"
         reference = "relative to the segment before" if self.reference == "relative" else "absolute"
-        force = "" if self.force_on is None else f"; forces on the {self.force_on}"
-        return f"angles {reference}, {zero}, {turn}{force}"
+        return f"{reference}, {zero}, {turn}"
 
 
 @dataclass(frozen=True)
