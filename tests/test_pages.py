@@ -125,6 +125,15 @@ def test_nothing_is_cut_on_a4(pages: Path, verb: str) -> None:
     check_paper(pages / verb / "report.html")
 
 
+def test_the_summary_of_all_analyses_is_one_page(pages: Path, tmp_path: Path) -> None:
+    sources = [str(pages / verb / f"{stem}.json") for verb, stem in (("identify", "identified"), ("passive", "passive"))]
+    assert cli.main(["report", *sources, "--summary", "-o", str(tmp_path / "clinic")]) == 0
+    margins = dict.fromkeys(("top", "bottom", "left", "right"), "1cm")
+    with opened(tmp_path / "clinic" / "summary.html") as seen:
+        paper = seen.page.pdf(format="A4", margin=margins, print_background=True)
+    assert re.search(rb"/Type /Pages\s[^>]*/Count 1\b|/Count 1\s[^>]*/Type /Pages", paper)
+
+
 @pytest.mark.parametrize("verb", EVERY)
 def test_pictures_say_what_is_seen_and_headings_are_listed(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html") as seen:

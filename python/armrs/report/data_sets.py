@@ -59,6 +59,12 @@ def channels(result: Mapping[str, Any]) -> Table:
     return Table(["symbol", "column", "unit", "sign", "why"], rows, 5)
 
 
+def decisions(result: Mapping[str, Any]) -> list[str]:
+    """Return what was decided beside the columns, which have a table."""
+    columns = {f"{c['symbol']}: column {c['column']!r}" for c in result["channels"]}
+    return [note for note in result["notes"] if note.partition(", ")[0] not in columns]
+
+
 def trials(result: Mapping[str, Any]) -> Table:
     """Return which file became which trial."""
     rows = [[t["file"], t["configuration"], t["repeat"], t["role"]] for t in result["trials"]]
