@@ -126,7 +126,7 @@ def identify(
         if history is not None and not result.is_sound:
             console.warn([f"{history}: not added to the history, since the result is not sound"])
         step = f"armrs gap {_quoted(dataset)} -o gap" if result.is_sound else f"armrs check {_quoted(dataset)}, and the warnings above"
-        present(lambda: plain, json, lambda: (words.identified(plain, written), console.next_step(step)))
+        present(lambda: plain, json, lambda: words.identified(plain, written), step)
     return 0 if result.is_sound else 1
 
 
@@ -173,7 +173,7 @@ def gap(
         written = write_gap(result, plain, folder) if folder else []
         console.warn([*data.warnings, *result.warnings])
         step = _after_gap(result.verdict, dataset, folder)
-        present(lambda: plain, json, lambda: (words.show(plain, written), console.next_step(step)))
+        present(lambda: plain, json, lambda: words.show(plain, written), step)
     return 1 if result.verdict == "unexplained" else 0
 
 

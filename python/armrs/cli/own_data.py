@@ -86,9 +86,8 @@ def init(
         print(f"Wrote {done.folder / 'model.toml'} and {done.folder / 'dataset.toml'}. Assumed:")
         for line in done.assumed:
             print(f"  {line}")
-        console.next_step(f"armrs import RAW… --model {shlex.quote(str(done.folder / 'model.toml'))} -o SESSION")
 
-    present(done.to_dict, json, human)
+    present(done.to_dict, json, human, f"armrs import RAW… --model {shlex.quote(str(done.folder / 'model.toml'))} -o SESSION")
 
 
 def _length(text: str) -> float | None:
@@ -169,9 +168,8 @@ def import_(
         count = len(done.recipe.trials)
         print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}.")
         print(f"Look at {picture}: does the arm stand as in the laboratory, and does the force support it?")
-        console.next_step(f"armrs check {shlex.quote(str(done.folder))}")
 
-    present(done.to_dict, json, human)
+    present(done.to_dict, json, human, f"armrs check {shlex.quote(str(done.folder))}")
 
 
 def _about_columns(error: BadInput) -> bool:
@@ -235,7 +233,6 @@ def check(dataset: Source, json: JsonFile = None) -> int:
         if done.problems:
             print()
         console.table(("verb", "can", "why"), [(v.verb, "yes" if v.able else "no", v.why) for v in done.verbs], left=3)
-        console.next_step(_after_check(done, dataset))
 
-    present(done.to_dict, json, human)
+    present(done.to_dict, json, human, _after_check(done, dataset))
     return 1 if done.errors else 0

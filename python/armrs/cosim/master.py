@@ -99,7 +99,7 @@ class Coupled(Series):
     def _units(self) -> dict[str, str]:
         """Return the unit of each output."""
         parted = {name: name.partition(".") for name in self.columns}
-        return {name: self.system.slaves[slave].variable(variable).unit for name, (slave, _, variable) in parted.items()}
+        return {name: self.system.slaves[slave].variable(variable).unit or "" for name, (slave, _, variable) in parted.items()}
 
     def tidy(self) -> Tidy:
         """Return every output at every communication point."""

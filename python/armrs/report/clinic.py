@@ -125,7 +125,7 @@ class Line:
 
     def norm_band(self) -> tuple[float, float] | None:
         """Return the usual range in the unit of the quantity."""
-        return None if self.norm is None else _between(self.norm.low, self.norm.high, self.quantity, self.counted)
+        return None if self.norm is None else _between((self.norm.low, self.norm.high), self.quantity, self.counted)
 
     @property
     def beside_norm(self) -> str | None:
@@ -233,7 +233,7 @@ def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = ()) -> list[Line
             if item is None:
                 continue
             known, own = item["decided_by"] != "prior", counted(result, j, quantity)
-            interval = _between(*item["interval"], quantity, own) if known else None
+            interval = _between(item["interval"], quantity, own) if known else None
             value = _in_unit(item["value"], quantity, own) if known else None
             trend = _trend(courses.get(key), quantity, own)
             at_limit = known and quantity.parameter not in ANGLES and item["interval"][0] <= 0.0
@@ -305,7 +305,7 @@ def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses:
             key = (quantity.kind, quantity.parameter, effect["joint"])
             own = counted(result, effect["joint"], quantity)
             joint = result["data"]["joints"][effect["joint"] - 1]
-            value, ends = _in_unit(found["value"], quantity, own), _between(*found["interval"], quantity, own)
+            value, ends = _in_unit(found["value"], quantity, own), _between(found["interval"], quantity, own)
             lines.append(Line(joint, quantity, value, ends, usual.get(key), _trend(courses.get(key), quantity, own), counted=own))
     return lines
 
@@ -326,9 +326,9 @@ def _in_unit(value: float, quantity: Quantity, own: tuple[float, float]) -> floa
     return own[0] * (quantity.factor * value - own[1])
 
 
-def _between(low: float, high: float, quantity: Quantity, own: tuple[float, float]) -> tuple[float, float]:
-    ends = sorted((_in_unit(low, quantity, own), _in_unit(high, quantity, own)))
-    return ends[0], ends[1]
+def _between(interval: Sequence[float], quantity: Quantity, own: tuple[float, float]) -> tuple[float, float]:
+    low, high = sorted(_in_unit(end, quantity, own) for end in interval)
+    return low, high
 
 
 def _trend(course: Mapping[str, Any] | None, quantity: Quantity, own: tuple[float, float] = AS_ARMRS) -> str | None:

@@ -13,11 +13,6 @@ def warn(lines: Iterable[str]) -> None:
         print(f"warning: {line}", file=sys.stderr)
 
 
-def next_step(text: str) -> None:
-    """Print what the user may do next, as the last line."""
-    print(f"Next: {text}")
-
-
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, left: int = 1) -> None:
     """Print a table of plain text that also reads well in a file or a pipe.
 
