@@ -223,12 +223,13 @@ def check(dataset: Source, json: JsonFile = None) -> int:
 
     Exit status 1 if a problem prevents a verb from using the data.
     """
-    from ..workflows.checking import check_dataset
+    from ..workflows.checking import check_dataset, grouped
 
-    done = check_dataset(dataset)
+    with console.progress("checking"):
+        done = check_dataset(dataset)
 
     def human() -> None:
-        for problem in done.problems:
+        for problem in grouped(done.problems):
             print(f"{problem.level}: {problem}")
         if done.problems:
             print()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,11 @@ from ..model import Description, Model
 from ..tabular import Tabular, Tidy
 from . import setup
 from .gap import suspicion
+from .importing.clock import lateness
 
+_LATE, _LATE_BY = 0.06, 2.0
+"""Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
+_SAME_RATE = 0.02
 _SLOW = 0.3
 """Joint speed up to which a movement counts as slow enough for passive moments [rad/s]."""
 
@@ -129,6 +133,7 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
     problems += [_warned(line) for line in still_angles(dataset.trials)]
     _plausible(dataset, problems)
     _balanced(dataset, problems)
+    problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
     return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked), dataset)
 
@@ -232,6 +237,45 @@ def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
         said = {p.text for p in problems}
         found = [str(one) for one in setup.wrong_trials(dataset.model, trials, met=met)]
         problems += [Problem("warning", text, "compare with the other trials") for text in found if text not in said]
+
+
+def _clocks(dataset: Dataset, errors: Sequence[str]) -> Iterator[Problem]:
+    """Give the trials whose forces are late or early against their angles by more than a calibration may leave.
+
+    Trials with errors, and all where angles are counted otherwise, are not asked.
+    """
+    if not dataset.model.gravity or any("if read otherwise" in text and " more: " in text for text in errors):
+        return
+    for trial in setup.balanced_trials(dataset):
+        if trial.force_on_arm is None or any(trial.file in text for text in errors):
+            continue
+        late, better = lateness(dataset.model, trial.t, np.where(trial.valid[:, None], trial.q, np.nan), trial.force_on_arm)
+        if abs(late) >= _LATE and better >= _LATE_BY:
+            said = f"{trial.file}: forces are about {abs(late):.2g} s {'late' if late > 0.0 else 'early'} against the angles"
+            yield Problem("warning", said, "bring both on one clock: armrs import does, of forces in a file of their own")
+
+
+def _rates(dataset: Dataset) -> Iterator[Problem]:
+    """Give the trials that are sampled at another rate than most."""
+    rates = np.array([trial.rate for trial in dataset.trials])
+    usual = float(np.median(rates))
+    for trial, rate in zip(dataset.trials, rates, strict=True):
+        if abs(rate / usual - 1.0) > _SAME_RATE:
+            said = f"{trial.file}: {rate:.4g} samples a second, where most trials have {usual:.4g}"
+            yield Problem("warning", said, "record all trials at one rate; lost samples?")
+
+
+def grouped(problems: Sequence[Problem]) -> list[Problem]:
+    """Return problems with those together that differ by their file alone."""
+    together: dict[tuple[str, str, str], list[str]] = {}
+    for p in problems:
+        file, colon, rest = p.text.partition(": ")
+        together.setdefault((p.level, rest if colon else p.text, p.next_step), []).append(file if colon else "")
+    lines = []
+    for (level, rest, step), files in together.items():
+        more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+        lines.append(Problem(level, f"{files[0]}{more}: {rest}" if files[0] else rest, step))
+    return lines
 
 
 def _is_led(dataset: Dataset) -> bool:

@@ -180,7 +180,7 @@ def _saturated(dataset: Dataset, led: bool) -> list[str]:
     """Return the channels that are cut off: at the extreme of all trials, for long, and hardly ever next to it."""
     together: dict[str, list[tuple[str, np.ndarray]]] = {}
     for trial in dataset.trials:
-        for name, values in _channels(trial, led):
+        for name, values in _efforts(trial):
             together.setdefault(name, []).append((trial.file, values[np.isfinite(values)]))
     lines = []
     for name, columns in together.items():
@@ -203,6 +203,11 @@ def _longest(flags: np.ndarray) -> int:
         run = run + 1 if flag else 0
         best = max(best, run)
     return best
+
+
+def _efforts(trial: Trial) -> list[tuple[str, np.ndarray]]:
+    """Return the channels of forces and torques that a trial has."""
+    return [] if trial.force_on_arm is None and trial.tau is None else _channels(trial, trial.force_on_arm is not None)
 
 
 def _channels(trial: Any, led: bool) -> list[tuple[str, np.ndarray]]:
