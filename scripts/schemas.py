@@ -103,6 +103,12 @@ def dataset() -> Any:
         "body_mass": number("[kg]", least=1.0, most=500.0),
         "height": number("[m]", least=0.3, most=3.0),
         "sex": {"enum": ["male", "female"]},
+        "lengths_m": {
+            "type": "array",
+            "items": {"type": "number", "exclusiveMinimum": 0.0, "maximum": 1.0},
+            "maxItems": 3,
+            "description": "measured lengths of the segments [m]",
+        },
     }
     tolerance = {
         "angle_offset_deg": number("one standard deviation [deg]", least=0.0, default=0.3),
@@ -120,7 +126,7 @@ def dataset() -> Any:
     return {"$schema": DRAFT, "title": "dataset.toml of armrs"} | table(
         {
             "name": {"type": "string"},
-            "model": {"type": "string", "description": "the model file, relative to this one"},
+            "model": {"type": "string", "description": "the model file, relative to this one; not needed beside a whole [subject]"},
             "force_on": {"enum": ["robot", "arm"], "description": "what the recorded force acts on"},
             "sample_rate": number("where time stamps are uneven [Hz]", above=0.0, most=1e6),
             "synthetic": {"type": "boolean"},
@@ -129,7 +135,7 @@ def dataset() -> Any:
             "added": {"type": "array", "items": table(added, ["segment", "mass", "at"])},
             "trial": {"type": "array", "items": table(trial, ["file", "configuration", "role"]), "minItems": 1},
         },
-        ["model", "trial"],
+        ["trial"],
     )
 
 

@@ -71,3 +71,43 @@ def _chromium() -> str:
 
 def _missing(what: str) -> Any:
     pytest.skip(f"no {what}")
+
+
+WIDER = "[...document.querySelectorAll('.wide')].filter(e => e.scrollWidth > e.clientWidth).map(e => e.innerText)"
+"""Tables that must be scrolled."""
+A4 = {"width": 718, "height": 1047}
+"""Within margins of 1 cm, in CSS pixels."""
+
+
+def violations(page: Any) -> list[str]:
+    """Return what axe-core finds in a page."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    return [f"{v['id']}: {[n['target'] for n in v['nodes']]}" for v in axe.run(page).response["violations"]]
+
+
+def check_screens(path: Path, *, fits_a_phone: bool = False) -> None:
+    """Ask axe-core at 1400 px in light and dark and at 390 px in dark; nothing may be wider than the window, no table than 1200 px."""
+    with opened(path, width=1400) as seen:
+        assert violations(seen.page) == []
+        seen.page.set_viewport_size({"width": 1200, "height": 800})
+        assert seen.page.evaluate(WIDER) == []
+        seen.page.emulate_media(color_scheme="dark")
+        assert violations(seen.page) == []
+        seen.page.set_viewport_size({"width": 390, "height": 800})
+        assert violations(seen.page) == []
+        assert seen.page.evaluate("document.documentElement.scrollWidth") <= 390
+        if fits_a_phone:
+            assert seen.page.evaluate(WIDER) == []
+
+
+def check_paper(path: Path) -> None:
+    """Nothing is cut on A4, and paper is light whatever the screen is."""
+    with opened(path) as seen:
+        seen.page.emulate_media(media="print", color_scheme="dark")
+        seen.page.set_viewport_size(A4)
+        assert seen.page.evaluate("getComputedStyle(document.body).color") == "rgb(29, 31, 35)"
+        assert seen.page.evaluate(WIDER) == []
+        assert seen.page.evaluate("document.documentElement.scrollWidth") <= A4["width"]
+        parts = "[...document.querySelectorAll('figure, tr, .panels svg')]"
+        assert seen.page.evaluate(f"{parts}.every(e => getComputedStyle(e.closest('figure, table, svg')).breakInside === 'avoid')")
+        assert seen.page.evaluate(f"Math.max(0, ...{parts}.map(e => e.getBoundingClientRect().height))") <= A4["height"]

@@ -67,6 +67,30 @@ def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic.Norm, ...]) 
     assert speed.value is None and clinic.words_of(speed)[2:4] == ["not measured", ""]
 
 
+def test_angles_are_counted_as_in_the_laboratory(norms: tuple[clinic.Norm, ...]) -> None:
+    """A laboratory with the arm hanging at zero and clockwise positive read our horizontal zero."""
+    as_there = {"signs": [-1, 1], "zero_deg": [-90.0, 0.0], "words": "as in the laboratory: hanging"}
+    found = result(data=result()["data"] | {"angles": as_there})
+    _, rest, *_ = clinic.lines_of(found, norms)
+    assert rest.value == pytest.approx(-(math.degrees(-1.0) + 90.0))
+    assert rest.interval == pytest.approx((-(math.degrees(-0.9) + 90.0), -(math.degrees(-1.1) + 90.0)))
+    said = clinic.measured([found])
+    assert "shoulder from −80° to −30°" in said[1] and said[2] == "Angles: as in the laboratory: hanging."
+    assert "from the horizontal" in clinic.measured([result()])[2]
+
+
+def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
+    """Identify and gap of one session had a line each for the stiffness of the shoulder."""
+    parameters = {"stiffness": {"value": 2.5, "interval": [2.4, 2.6]}, "rest": {"value": -1.0, "interval": [-1.1, -0.9]}}
+    gap = result(verb="gap", verdict="explained", effects=[{"kind": "elastic", "joint": 1, "parameters": parameters}], history=[])
+    for name, data in (("a", result()), ("b", gap)):
+        (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
+    text = clinic.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html").read_text(encoding="utf-8")
+    assert text.count("Stiffness [N m per 10°]") == 1 and ">0.314<" in text
+    assert "shoulder: stiffness differs between the analyses by more than both are uncertain." in text
+    assert "resting angle differs" not in text
+
+
 def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> None:
     said = clinic.unusual(clinic.lines_of(result(), norms))
     assert said == [

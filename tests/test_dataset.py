@@ -135,7 +135,12 @@ BROKEN_DESCRIPTION = {
     "unknown key of a trial": ("repeat = 1", "repetition = 1", "[[trial]] 1: found unknown key 'repetition'", "(nearest known: repeat)"),
     "unknown key of the subject": ("height", "hight", "[subject]: found unknown key 'hight'", "(nearest known: height)"),
     "unknown key of the tolerance": ("force_bias_N", "force_bias", "[tolerance]: found unknown key 'force_bias'", "force_bias_N)"),
-    "model not named": ('model = "model.toml"\n', "", "model: found nothing, allowed key model is required", ""),
+    "model not named": (
+        'model = "model.toml"\n',
+        "",
+        "model: found nothing, allowed the file of the model, or a [subject] with body_mass, height, sex and lengths_m (lengths_m is missing in [subject])",
+        "",
+    ),
     "force on whom": ('"robot"', '"handle"', 'force_on: found \'handle\', allowed "robot" or "arm"', ""),
     "role": ('"test"', '"train"', '[[trial]] 2, role: found \'train\', allowed "fit" or "test"', ""),
     "no fit trial": ('role = "fit"', 'role = "test"', '[[trial]]: found no trial with role = "fit", allowed at least one', ""),

@@ -10,6 +10,7 @@ import pytest
 
 import armrs
 from armrs import cli, demo
+from browser import check_paper, check_screens
 from markup import assert_escaped
 
 WITHIN = 5.0
@@ -130,3 +131,8 @@ def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
     assert last == str(tmp_path / "report.html")
     assert f"armrs identify {tmp_path / 'data'} --with coulomb" in go_on
     assert f"armrs gap {tmp_path / 'data'}" in go_on
+
+
+def test_the_page_is_read_on_every_screen_and_on_paper(folder: Path) -> None:
+    check_screens(folder / "report.html")
+    check_paper(folder / "report.html")

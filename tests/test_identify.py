@@ -274,6 +274,16 @@ def test_a_calibration_beyond_twice_its_tolerance_is_called_out(slow_arm: Path) 
     assert line.endswith("times the declared tolerance: what the model lacks may be in it")
 
 
+def test_a_spring_that_may_be_absent_has_no_rest_angle(slow_arm: Path) -> None:
+    """A rest angle was stated of joints whose stiffness may be zero: they rest anywhere."""
+    result = armrs.identify(slow_arm, with_effects="elastic,coulomb")
+    springs = {e.joint: e for e in result.parameters if (e.kind, e.name) == ("elastic", "stiffness")}
+    rests = [e.joint for e in result.parameters if (e.kind, e.name) == ("elastic", "rest")]
+    absent = [joint for joint, e in springs.items() if e.interval[0] <= 0.0 <= e.interval[1]]
+    assert absent and sorted([*rests, *absent]) == sorted(springs)
+    assert {e.joint for e in result.parameters if e.name == "stiffness*rest"} == set(springs)
+
+
 def test_a_calibration_far_beyond_its_tolerance_is_not_decided_by_the_model(slow_arm: Path) -> None:
     """Forces 60 ms early, and no friction in the model: a delay of 3.6 times its tolerance was said to be decided by prior."""
     data = armrs.load_dataset(slow_arm)

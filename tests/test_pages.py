@@ -13,16 +13,13 @@ import pytest
 
 import armrs
 import patients
-from armrs import cli
+from armrs import cli, online
 from armrs.report import series
-from armrs.workflows import demo
-from browser import opened
+from armrs.workflows import demo, history
+from browser import check_paper, check_screens, opened
 from test_cohort import population, table
 from test_docs import DOCS, ROOT, blocks
 from test_sweep import EXPERIMENT as ONE_ARM
-
-A4 = {"width": 718, "height": 1047}
-"""Within margins of 1 cm, in CSS pixels."""
 
 
 @pytest.fixture(scope="module")
@@ -49,12 +46,26 @@ def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (out / "spasticity").mkdir()
     reflexes = armrs.spasticity(patients.session(patients.Patient(), 7001, emg=True))
     reflexes.report(out / "spasticity" / "report.html")
+    for name in ("check", "import", "history", "replay"):
+        (out / name).mkdir()
+    recordings = [shutil.copy(path, out / "import") for path in sorted((slow_arm / "trials").glob("*.csv"))]
+    imported = armrs.import_recordings(recordings, out / "import" / "set", model=slow_arm / "model.toml")
+    imported.report(out / "import" / "report.html")
+    data = (imported.folder / "dataset.toml").read_text(encoding="utf-8")
+    (imported.folder / "dataset.toml").write_text(data.replace('role = "test"', 'role = "fit"'), encoding="utf-8")
+    checked = armrs.check_dataset(imported.folder)
+    checked.report(out / "check" / "report.html")
+    history.read(out / "history.sqlite").report(out / "history" / "report.html")
+    moved = armrs.simulate(demo.true_model(), duration=3.0, start=[-1.0, 0.6], rate=1000.0)
+    device = online.Log(moved.t, moved.q, moved.force_on_arm)
+    replayed = online.replay(device, demo.handed_over(demo.true_model()), every=10)
+    replayed.report(out / "replay" / "report.html")
     shutil.copytree(ROOT / "examples" / "cosim", out / "cosim")
     assert cli.main(["fmu", "run", str(out / "cosim" / "wall.toml"), "-o", str(out / "fmu")]) == 0
     result = armrs.find_gap(demo.measure_two_speeds(demo.true_model()), separate=False)
     (out / "gap").mkdir()
     result.report(out / "gap" / "report.html")
-    notebook(out / "notebook", [result, reflexes, armrs.identify(slow_arm), armrs.passive_moments(slow_arm)])
+    notebook(out / "notebook", [result, reflexes, armrs.identify(slow_arm), armrs.passive_moments(slow_arm), checked, imported, replayed])
     cli.main(["report", str(out / "identify" / "identified.json"), "--summary", "-o", str(out / "summary")])
     (out / "summary" / "summary.html").rename(out / "summary" / "report.html")
     both = [str(out / "simulate" / "simulated.json"), str(out / "record" / "record.json")]
@@ -70,7 +81,24 @@ def notebook(folder: Path, results: list[Any]) -> None:
     (folder / "report.html").write_text(f"{head}<body><main><h1>Results</h1>{shown}</main></body></html>", encoding="utf-8")
 
 
-EVERY = ["simulate", "identify", "passive", "record", "plan", "gap", "cohort", "fmu", "summary", "both", "sweep", "spasticity"]
+EVERY = [
+    "simulate",
+    "identify",
+    "passive",
+    "record",
+    "plan",
+    "gap",
+    "cohort",
+    "fmu",
+    "summary",
+    "both",
+    "sweep",
+    "spasticity",
+    "check",
+    "import",
+    "history",
+    "replay",
+]
 SWEEP = """\
 name = "small"
 cases = 3
@@ -85,41 +113,25 @@ key = "segment[2].com"
 range = [0.9, 1.1]
 apply = "scale"
 """
-WIDER = "[...document.querySelectorAll('.wide')].filter(e => e.scrollWidth > e.clientWidth).map(e => e.innerText)"
-"""Tables that must be scrolled."""
-
-
-def violations(page: Any) -> list[str]:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-    return [f"{v['id']}: {[n['target'] for n in v['nodes']]}" for v in axe.run(page).response["violations"]]
 
 
 @pytest.mark.parametrize("verb", [*EVERY, "notebook"])
 def test_axe_core_finds_nothing_and_nothing_is_wider_than_the_window(pages: Path, verb: str) -> None:
-    with opened(pages / verb / "report.html", width=1400) as seen:
-        assert violations(seen.page) == []
-        seen.page.set_viewport_size({"width": 1200, "height": 800})
-        assert seen.page.evaluate(WIDER) == []
-        seen.page.emulate_media(color_scheme="dark")
-        assert violations(seen.page) == []
-        seen.page.set_viewport_size({"width": 390, "height": 800})
-        assert violations(seen.page) == []
-        assert seen.page.evaluate("document.documentElement.scrollWidth") <= 390
-        if verb == "summary":
-            assert seen.page.evaluate(WIDER) == []
+    check_screens(pages / verb / "report.html", fits_a_phone=verb == "summary")
 
 
 @pytest.mark.parametrize("verb", EVERY)
 def test_nothing_is_cut_on_a4(pages: Path, verb: str) -> None:
-    with opened(pages / verb / "report.html") as seen:
-        seen.page.emulate_media(media="print", color_scheme="dark")
-        seen.page.set_viewport_size(A4)
-        assert seen.page.evaluate("getComputedStyle(document.body).color") == "rgb(29, 31, 35)"  # dark on paper, whatever the screen is
-        assert seen.page.evaluate(WIDER) == []
-        assert seen.page.evaluate("document.documentElement.scrollWidth") <= A4["width"]
-        parts = "[...document.querySelectorAll('figure, tr, .panels svg')]"
-        assert seen.page.evaluate(f"{parts}.every(e => getComputedStyle(e.closest('figure, table, svg')).breakInside === 'avoid')")
-        assert seen.page.evaluate(f"Math.max(0, ...{parts}.map(e => e.getBoundingClientRect().height))") <= A4["height"]
+    check_paper(pages / verb / "report.html")
+
+
+def test_the_summary_of_all_analyses_is_one_page(pages: Path, tmp_path: Path) -> None:
+    sources = [str(pages / verb / f"{stem}.json") for verb, stem in (("identify", "identified"), ("passive", "passive"))]
+    assert cli.main(["report", *sources, "--summary", "-o", str(tmp_path / "clinic")]) == 0
+    margins = dict.fromkeys(("top", "bottom", "left", "right"), "1cm")
+    with opened(tmp_path / "clinic" / "summary.html") as seen:
+        paper = seen.page.pdf(format="A4", margin=margins, print_background=True)
+    assert re.search(rb"/Type /Pages\s[^>]*/Count 1\b|/Count 1\s[^>]*/Type /Pages", paper)
 
 
 @pytest.mark.parametrize("verb", EVERY)

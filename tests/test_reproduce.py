@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 
 from armrs import cli
 from armrs.thesis.people import TABLE_4_10
-from browser import opened
+from browser import check_paper, check_screens, opened
 
 NEEDED = {"3.5", "3.6", "3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
 """Tables and figures that some item has to be about."""
@@ -260,3 +260,8 @@ def test_a_file_in_the_way_is_refused(tmp_path: Path, capsys: pytest.CaptureFixt
     taken.write_text("", encoding="utf-8")
     assert cli.main(["reproduce", "-o", str(taken)]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_the_page_is_read_on_every_screen_and_on_paper(made: Path) -> None:
+    check_screens(made / "report.html")
+    check_paper(made / "report.html")

@@ -187,3 +187,32 @@ def test_help_lists_the_statuses(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--help"]) == 0
     shown = capsys.readouterr().out
     assert "130" in shown and "143" in shown
+
+
+SWALLOWED = """
+import os, signal, time
+from armrs.cli import interrupts
+interrupts.obey()
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+except KeyboardInterrupt:
+    pass  # as the code of a library that is being loaded
+start = time.monotonic()
+try:
+    while time.monotonic() < start + 20.0:
+        pass
+except KeyboardInterrupt:
+    begun = time.monotonic()
+    while time.monotonic() < begun + 0.8:
+        pass  # work that is being undone is not interrupted again
+    interrupts.forget()
+    time.sleep(0.5)
+    print(f"{begun - start:.3f}")
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers that signal")
+def test_an_interrupt_that_a_library_swallows_is_raised_again() -> None:
+    """Ctrl-C while SciPy was loaded had no effect: `armrs identify` went on to its end."""
+    done = subprocess.run([sys.executable, "-c", SWALLOWED], capture_output=True, text=True, timeout=60, check=True)
+    assert float(done.stdout) < 1.0 and done.stderr == ""

@@ -464,7 +464,8 @@ def quantity(name: str, value: np.ndarray, truth: np.ndarray) -> Quantity:
 def test_the_figure_has_no_empty_panels_and_explains_its_line() -> None:
     truth = np.linspace(1.0, 2.0, 9)
     never = np.full(9, np.nan)
-    listed = [quantity(f"m{k}", truth + 0.01 * k, truth) for k in range(4)] + [quantity("I1", never, never)]
+    same = 2.0867 * (1.0 + 1e-15 * np.arange(9))  # one value but for rounding was a panel without bars
+    listed = [quantity(f"m{k}", truth + 0.01 * k, truth) for k in range(4)] + [quantity("I1", never, never), quantity("m9", same, same)]
     data = {"data": {"joints": ["shoulder"]}, "level": 0.95, "quantities": [q.to_dict(0.95) for q in listed[:4]]}
     with plotting.style():
         values, coverage = (draw().figure for draw in figures.sweep(Summary(listed, {}), data).values())

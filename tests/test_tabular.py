@@ -16,9 +16,14 @@ import pytest
 from matplotlib.axes import Axes
 
 import armrs
+from armrs import online, views
+from armrs.cosim.accuracy import run_checked
+from armrs.cosim.master import Coupled
+from armrs.cosim.system import load_system
 from armrs.workflows import history
 from armrs.workflows.demo import true_model
 from browser import opened
+from test_docs import DOCS, ROOT, blocks
 
 
 @pytest.fixture(scope="module")
@@ -154,3 +159,39 @@ def test_tables_of_a_report_fit_on_a4(identified: armrs.Identified, tmp_path: Pa
             seen.page.emulate_media(media="print")
             widths = seen.page.evaluate("[...document.querySelectorAll('table')].map(t => [t.offsetWidth, t.parentNode.clientWidth])")
         assert widths and all(table <= room for table, room in widths), widths
+
+
+RESULTS = (
+    armrs.Identified, armrs.GapFound, armrs.Simulated, armrs.Recorded, armrs.Plan, armrs.PassiveMoments, armrs.Cohort, armrs.Spasticity,
+    armrs.Swept, armrs.Demonstration, armrs.Checked, armrs.Imported, Coupled, online.Replay, history.History,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", RESULTS, ids=lambda kind: kind.__name__)
+def test_every_kind_of_result_has_the_same_methods(kind: type) -> None:
+    for name in ("_repr_html_", "to_dataframe", "__iter__", "plot", "report", "to_json", "to_dict"):
+        assert callable(getattr(kind, name))
+    assert kind.__repr__ is not object.__repr__
+    assert views._load(next(views.DRAWN_BY[k.__name__] for k in kind.__mro__ if k.__name__ in views.DRAWN_BY)).report
+    assert hasattr(kind, "to_xarray") == (kind in (armrs.Simulated, Coupled, online.Replay))
+
+
+def test_a_check_an_import_a_recording_and_a_coupled_run_are_shown_like_the_others(slow_arm: Path, tmp_path: Path) -> None:
+    files = sorted((slow_arm / "trials").glob("*.csv"))
+    imported = armrs.import_recordings(files, tmp_path / "set", model=slow_arm / "model.toml")
+    checked = armrs.check_dataset(imported.folder)
+    experiment = next(content for _, name, content in blocks(DOCS / "files.md") if name == "EXPERIMENT.toml")
+    (tmp_path / "EXPERIMENT.toml").write_text(experiment, encoding="utf-8")
+    recorded = armrs.record(tmp_path / "EXPERIMENT.toml", tmp_path / "recorded")
+    coupled = run_checked(load_system(ROOT / "examples" / "cosim" / "wall.toml"))
+    assert list(imported.to_dataframe()["symbol"])[:3] == ["t", "q1", "q2"]
+    assert list(checked.to_dataframe().columns) == ["level", "text", "next_step"]
+    assert recorded.to_dataframe()["tracking_error"].max() < 0.1
+    series = coupled.to_xarray()
+    assert series.sizes["time"] == len(coupled.t) and series["arm.q[1]"].attrs["units"] == "rad"
+    for result in (imported, checked, recorded, coupled):
+        assert len(repr(result)) < 500 and "\n" not in repr(result)
+        assert len(result._repr_html_()) < 20_000 and json.loads(result.to_json())["verb"]
+        assert len(result.plot()) > 0
+        page = result.report(tmp_path / f"{type(result).__name__}.html").read_text(encoding="utf-8")
+        assert "data:image/png;base64," in page and "<h1>" in page

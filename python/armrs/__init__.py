@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import anthropometry as anthropometry
     from . import cosim as cosim
     from . import online as online
     from ._armrs import Arm as Arm
@@ -130,7 +131,14 @@ _HOMES = {
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
-_MODULES = {"cosim": "cosim", "demo": "workflows.demo", "gap": "workflows.gap", "online": "online", "plotting": "report.plotting"}
+_MODULES = {
+    "anthropometry": "anthropometry",
+    "cosim": "cosim",
+    "demo": "workflows.demo",
+    "gap": "workflows.gap",
+    "online": "online",
+    "plotting": "report.plotting",
+}
 """Modules that are of use by themselves; `armrs.demo` loads the module."""
 
 __all__ = sorted(_HOME_OF)

@@ -11,9 +11,13 @@ from typing import Any
 
 from . import _armrs, checks
 from .errors import BadInput, Text
-from .model import Segment, Subject
+from .model import Joint, Model, Segment, Subject
 
 SEGMENTS = ("upper arm", "forearm", "hand")
+JOINTS = ("shoulder", "elbow", "wrist")
+UNCERTAINTY = 0.10
+"""Relative standard deviation of masses, centres of mass and inertias from body mass and height: between people of one build, after de Leva
+(1996) and Zatsiorsky and Seluyanov (1983)."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,32 @@ def segment_expectations(
     return tuple(Expected(**item) for item in _armrs.literature(body_mass, height, sex, list(lengths)))
 
 
+def literature_model(subject: Subject, lengths: Sequence[float | None] | None = None) -> Model:
+    """Return the arm of a person by de Leva's tables, its joints without laws.
+
+    Parameters
+    ----------
+    subject : Subject
+        Body mass, height and sex.
+    lengths : sequence of (float or None), optional
+        Of one to three segments [m], None scaled with height; `subject.lengths_m` when absent, or three that are scaled.
+
+    Raises
+    ------
+    BadInput
+        When the subject says too little.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> armrs.anthropometry.literature_model(armrs.Subject(78.0, 1.80, "male", lengths_m=[0.322, 0.345])).n_joints
+    2
+    """
+    lengths = list(lengths if lengths is not None else subject.lengths_m or [None] * len(SEGMENTS))
+    segments, _ = literature_arm(subject, lengths)
+    return Model(segments, tuple(Joint(name) for name in JOINTS[: len(segments)]), segment_uncertainty=UNCERTAINTY)
+
+
 def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple[Segment, ...], Sequence[Mapping[str, Any]]]:
     """Return the segments of a person by de Leva's tables, and the tables' values with their deviations.
 
@@ -91,14 +121,16 @@ def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple
     if missing:
         raise BadInput(f"[subject], {missing[0]}", Text("nothing"), "a value: the literature needs it")
     assert subject.body_mass is not None and subject.height is not None and subject.sex is not None
-    parts = _armrs.literature(subject.body_mass, subject.height, subject.sex, lengths if len(lengths) == 3 else [lengths[0], None, None])
+    if not 1 <= len(lengths) <= len(SEGMENTS):
+        raise BadInput("lengths", Text(f"{len(lengths)} lengths"), f"1 to {len(SEGMENTS)}: {', '.join(SEGMENTS)}")
+    parts = _armrs.literature(subject.body_mass, subject.height, subject.sex, [lengths[0], None, None] if len(lengths) == 2 else lengths)
     return tuple(segments_of(parts, lengths)), parts
 
 
 def segments_of(parts: Sequence[Mapping[str, Any]], lengths: list[float | None]) -> list[Segment]:
     """Return segments from the tables' values; with two lengths, forearm and hand are one."""
     single = [Segment(p["name"], p["length"], p["mass"][0], p["com"][0], p["inertia"][0]) for p in parts]
-    if len(lengths) == 3:
+    if len(lengths) != 2:
         return single
     upper, fore, hand = single
     mass = fore.mass + hand.mass

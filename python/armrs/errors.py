@@ -84,6 +84,10 @@ class BadInputs(BadInput):
 
     problems: tuple[BadInput, ...]
 
+    def within(self, *, file: str | os.PathLike[str] | None = None, place: str | None = None) -> BadInput:
+        """Return all of them seen from further outside."""
+        return BadInputs.of([problem.within(file=file, place=place) for problem in self.problems])
+
     @classmethod
     def of(cls, problems: Iterable[BadInput]) -> BadInput:
         """Return one refusal for all problems, which is the problem itself where there is but one."""

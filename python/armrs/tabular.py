@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _SHOWN = 30
 """Rows that a notebook shows; `to_dataframe` has all."""
+_SMALLEST = 1e-12
+"""Probabilities below are not told apart."""
 SYMBOLS = (
     "m is the mass of a segment, l the distance of its centre of mass from the joint, I its inertia about the centre of mass and a its "
     "length; the number is that of the segment, counted from the base. The elastic law of a joint is stiffness times its angle from rest; "
@@ -128,7 +130,7 @@ class Tabular:
         head = "".join(f"<th>{_text(name)}{_text(_unit(table.units.get(name)))}</th>" for name in names)
         shown = min(table.n_rows, _SHOWN)
         rows = "".join(
-            "<tr>" + "".join(f"<td>{_text(_cell(table.columns[name][k]))}</td>" for name in names) + "</tr>" for k in range(shown)
+            "<tr>" + "".join(f"<td>{_text(_cell(table.columns[name][k], name))}</td>" for name in names) + "</tr>" for k in range(shown)
         )
         more = f"<p>{table.n_rows - shown} more rows: to_dataframe()</p>" if table.n_rows > shown else ""
         meaning = f"<p>{_text(self.symbols)}</p>" if self.symbols else ""
@@ -182,7 +184,9 @@ def _unit(unit: str | None) -> str:
     return f" [{unit}]" if unit else ""
 
 
-def _cell(value: object) -> str:
+def _cell(value: object, name: str) -> str:
     if value is None or value != value:
         return ""
+    if isinstance(value, float) and name.startswith("p_") and value < _SMALLEST:
+        return f"< {_SMALLEST:g}"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

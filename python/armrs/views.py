@@ -9,12 +9,17 @@ import pkgutil
 from typing import Any
 
 DRAWN_BY = {
+    "Checked": "report.data_sets:CHECKED",
     "Cohort": "report.clinic_results:COHORT",
+    "Coupled": "cosim.outcome:COUPLED",
+    "Demonstration": "workflows.demo:SHOWN",
     "GapFound": "workflows.gap.results:GAP",
     "History": "report.results:HISTORY",
+    "Imported": "report.data_sets:IMPORTED",
     "Identified": "report.results:IDENTIFIED",
     "PassiveMoments": "report.results:PASSIVE",
     "Plan": "report.results:PLANNED",
+    "Recorded": "report.data_sets:RECORDED",
     "Replay": "report.online:REPLAYED",
     "Spasticity": "report.clinic_results:SPASTICITY",
     "Simulated": "report.results:SIMULATED",
@@ -23,6 +28,8 @@ DRAWN_BY = {
 }
 """What draws an object, by its class, below `armrs`."""
 WORDS = {
+    "check": "report.data_sets",
+    "import": "report.data_sets",
     "cohort": "report.clinic_words",
     "gap": "workflows.gap.words",
     "spasticity": "report.clinic_words",

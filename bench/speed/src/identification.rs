@@ -81,6 +81,7 @@ fn fast(n: usize, effects: &[Effect<f64>]) -> Trial<3> {
         moment_on_arm: None,
         torque: Some(torques),
         handle: None,
+        base: None,
         valid: vec![true; n],
     }
 }

@@ -135,8 +135,8 @@ impl TrialEntry {
 pub struct Description {
     /// Its name, where it states one.
     pub name: Option<String>,
-    /// The model that the data challenge, below the folder of the data set.
-    pub model: String,
+    /// The model that the data challenge, below the folder of the data set; without one it is that of the subject by the literature.
+    pub model: Option<String>,
     /// What the forces act on.
     pub force_on: Option<ForceOn>,
     /// As stated \[Hz\].
@@ -183,8 +183,9 @@ impl Description {
     pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
         let mut fields = Fields::new(place, value)?;
         fields.only(
-            &["model", "trial"],
+            &["trial"],
             &[
+                "model",
                 "name",
                 "force_on",
                 "sample_rate",
@@ -202,12 +203,22 @@ impl Description {
         check_trials(&trials)?;
         let rate = Bounds::finite("Hz").above(0.0).most(1e6);
         let table = |value: Option<Value>| value.unwrap_or_else(|| Table::new().into());
+        let subject = Subject::from_value("[subject]", table(fields.take("subject")))?;
+        let model = fields.maybe_text("model")?;
+        if model.is_none()
+            && let Some(lacking) = subject.lacks()
+        {
+            let allowed =
+                "the file of the model, or a [subject] with body_mass, height, sex and lengths_m";
+            return Err(Refused::new(fields.at("model"), "nothing", allowed)
+                .hint(format!("{lacking} is missing in [subject]")));
+        }
         Ok(Self {
             name: fields.maybe_text("name")?,
-            model: fields.required_text("model")?,
+            model,
             force_on: fields.choice("force_on", &FORCES)?,
             sample_rate: fields.maybe_number("sample_rate", &rate)?,
-            subject: Subject::from_value("[subject]", table(fields.take("subject")))?,
+            subject,
             tolerance: Tolerance::from_value("[tolerance]", table(fields.take("tolerance")))?,
             added: added(fields.tables("added", "added")?, &trials)?,
             synthetic: fields.flag("synthetic")?,
@@ -220,7 +231,7 @@ impl Description {
         let list = |tables: Vec<Table>| Value::List(tables.into_iter().map(Value::Table).collect());
         let mut table = Table::new();
         table.push("name", self.name.clone());
-        table.push("model", self.model.as_str());
+        table.push("model", self.model.clone());
         table.push("force_on", self.force_on.map(ForceOn::name));
         table.push("sample_rate", self.sample_rate);
         if self.synthetic {

@@ -199,7 +199,7 @@ impl Fields {
         Err(Refused::new(self.at(key), "nothing", allowed))
     }
 
-    fn at(&self, key: &str) -> String {
+    pub(crate) fn at(&self, key: &str) -> String {
         join(&self.place, key)
     }
 
@@ -248,6 +248,18 @@ impl Fields {
         self.given(key)
             .map(|value| bounds.read(&at, &value))
             .transpose()
+    }
+
+    /// A list of numbers, empty when absent.
+    pub(crate) fn list(&mut self, key: &str, bounds: &Bounds) -> Result<Vec<f64>, Refused> {
+        let at = self.at(key);
+        match self.given(key) {
+            None => Ok(Vec::new()),
+            Some(Value::List(items)) => (items.iter().enumerate())
+                .map(|(k, item)| bounds.read(&format!("{at}, {}", k + 1), item))
+                .collect(),
+            Some(other) => Err(Refused::new(at, other.shown(), "a list of numbers")),
+        }
     }
 
     /// Two numbers that are required.

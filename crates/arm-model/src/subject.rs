@@ -31,6 +31,8 @@ pub struct Subject {
     pub sex: Option<Sex>,
     /// By which sessions of one person are found again.
     pub name: Option<String>,
+    /// Measured lengths of the segments, the last one to the handle \[m\]; none where they are scaled with height.
+    pub lengths: Vec<f64>,
 }
 
 impl Subject {
@@ -39,6 +41,10 @@ impl Subject {
         .least(0.3)
         .most(3.0)
         .hint("centimetres?");
+    const LENGTH: Bounds = Bounds::finite("m")
+        .above(0.0)
+        .most(1.0)
+        .hint("centimetres or millimetres?");
 
     /// Reads a table; `place` names it in refusals.
     ///
@@ -46,13 +52,25 @@ impl Subject {
     /// [`Refused`] for an unknown key and for a value out of bounds.
     pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
         let mut fields = Fields::new(place, value)?;
-        fields.only(&[], &["body_mass", "height", "sex", "name"])?;
+        fields.only(&[], &["body_mass", "height", "sex", "name", "lengths_m"])?;
         Ok(Self {
             body_mass: fields.maybe_number("body_mass", &Self::BODY_MASS)?,
             height: fields.maybe_number("height", &Self::HEIGHT)?,
             sex: fields.choice("sex", &SEXES)?,
             name: fields.maybe_text("name")?,
+            lengths: fields.list("lengths_m", &Self::LENGTH)?,
         })
+    }
+
+    /// What the arm by the literature needs, and is not said; none where all is.
+    pub fn lacks(&self) -> Option<&'static str> {
+        let said = [
+            ("body_mass", self.body_mass.is_some()),
+            ("height", self.height.is_some()),
+            ("sex", self.sex.is_some()),
+            ("lengths_m", !self.lengths.is_empty()),
+        ];
+        said.into_iter().find(|(_, is)| !is).map(|(name, _)| name)
     }
 
     /// The subject as it stands in a file.
@@ -62,6 +80,10 @@ impl Subject {
         table.push("height", self.height);
         table.push("sex", self.sex.map(Sex::name));
         table.push("name", self.name.clone());
+        if !self.lengths.is_empty() {
+            let lengths = self.lengths.iter().copied().map(Value::Number).collect();
+            table.push("lengths_m", Value::List(lengths));
+        }
         table
     }
 }

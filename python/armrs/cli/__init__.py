@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import copy
 import os
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,7 +20,7 @@ import typer
 
 from ..errors import ArmrsError, BadInput, BadInputs, one_line
 from ..io import files
-from . import fmu
+from . import fmu, interrupts
 from .analysis import gap, identify, passive
 from .built_in import demo, reproduce
 from .clinic import cohort, spasticity
@@ -125,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USAGE as error:
         inside = getattr(error, "ctx", None)
         return _refuse(f"{_usage_text(error)} (see {inside.command_path if inside else 'armrs'} --help)")
-    except Terminated as end:
+    except interrupts.Terminated as end:
         print("armrs: terminated", file=sys.stderr)
         return end.status
     except (KeyboardInterrupt, typer.Abort):
@@ -150,24 +149,6 @@ def _turn_away_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-class Terminated(KeyboardInterrupt):
-    """The process was asked to end; work is undone as after Ctrl-C.
-
-    Attributes
-    ----------
-    status : int
-        128 and the number of the signal, as shells count it.
-    """
-
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self.status = 128 + number
-
-
-def _terminate(number: int, _: Any) -> None:
-    raise Terminated(number)
-
-
 def _prepare_outputs() -> None:
     """Let every text be printed: to an output that was closed, and on terminals that do not know all characters."""
     for name in ("stdout", "stderr"):
@@ -180,14 +161,12 @@ def _prepare_outputs() -> None:
 
 def run() -> None:
     """Entry point of the command `armrs`."""
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        # nohup ignores hang-ups on purpose.
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _terminate)
+    interrupts.obey()
     _prepare_outputs()
     files.sweep_scratch()
-    sys.exit(main())
+    status = main()
+    interrupts.forget()
+    sys.exit(status)
 
 
 _OPTIONS = {

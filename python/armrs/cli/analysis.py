@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import enum
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -124,7 +125,8 @@ def identify(
         console.warn([*data.warnings, *result.warnings])
         if history is not None and not result.is_sound:
             console.warn([f"{history}: not added to the history, since the result is not sound"])
-        present(lambda: plain, json, lambda: words.identified(plain, written))
+        step = f"armrs gap {_quoted(dataset)} -o gap" if result.is_sound else f"armrs check {_quoted(dataset)}, and the warnings above"
+        present(lambda: plain, json, lambda: words.identified(plain, written), step)
     return 0 if result.is_sound else 1
 
 
@@ -170,8 +172,21 @@ def gap(
     with kept(history, result, day, plain):
         written = write_gap(result, plain, folder) if folder else []
         console.warn([*data.warnings, *result.warnings])
-        present(lambda: plain, json, lambda: words.show(plain, written))
+        step = _after_gap(result.verdict, dataset, folder)
+        present(lambda: plain, json, lambda: words.show(plain, written), step)
     return 1 if result.verdict == "unexplained" else 0
+
+
+def _after_gap(verdict: str, dataset: Path, folder: Path | None) -> str:
+    if folder is None:
+        return f"armrs gap {_quoted(dataset)} -o gap writes a report with figures, and the amended model"
+    if verdict == "unexplained":
+        return f"{folder / 'report.html'} shows when and in which channel the gap is open; armrs check {_quoted(dataset)} asks the sensors"
+    return f"armrs report {_quoted(folder / 'gap.json')} --summary -o clinic writes one page in plain words"
+
+
+def _quoted(path: Path) -> str:
+    return shlex.quote(str(path))
 
 
 def passive(

@@ -61,7 +61,7 @@ def samples_suffix(to: Format | None, out: Path | None) -> str:
     return f".{(to or Format.csv).value}"
 
 
-def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None]) -> None:
+def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None], step: str | None = None) -> None:
     """Give a result to the user: JSON where `--json` says, and words on standard output unless the JSON is there.
 
     Parameters
@@ -72,6 +72,8 @@ def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None])
         The value of `--json`.
     human : callable
         Prints the result in words.
+    step : str, optional
+        What the user may do next; the last line.
     """
     if to == _STDOUT:
         sys.stdout.write(files.json_text(data()))
@@ -79,6 +81,8 @@ def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None])
     if to is not None:
         files.write_json(to, data())
     human()
+    if step:
+        print(f"Next: {step}")
 
 
 def writable(out: Path | None, json: Path | None = None) -> Path | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,6 +15,7 @@ from ..report import console
 from .common import JsonFile, OutFolder, Source, listed, present, writable
 
 if TYPE_CHECKING:
+    from ..workflows.checking import Checked
     from ..workflows.initialise import Worn
 
 
@@ -84,9 +86,8 @@ def init(
         print(f"Wrote {done.folder / 'model.toml'} and {done.folder / 'dataset.toml'}. Assumed:")
         for line in done.assumed:
             print(f"  {line}")
-        print(f"Next: armrs import RAW… --model {done.folder / 'model.toml'} -o SESSION")
 
-    present(done.to_dict, json, human)
+    present(done.to_dict, json, human, f"armrs import RAW… --model {shlex.quote(str(done.folder / 'model.toml'))} -o SESSION")
 
 
 def _length(text: str) -> float | None:
@@ -122,6 +123,8 @@ def import_(
     clockwise: Annotated[str | None, typer.Option(metavar="1,2,…|none", help="Joints whose angle is clockwise positive.")] = None,
     force_on: Annotated[Side | None, typer.Option("--force-on", help="Body on which the recorded force acts.")] = None,
     points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the midpoint.")] = "",
+    rate_hz: Annotated[float | None, typer.Option(help="Sample rate of recordings without a column of time [Hz].")] = None,
+    ask: Annotated[bool, typer.Option("--ask", help="Ask for each column on the terminal, with a guess and its reason.")] = False,
     json: JsonFile = None,
 ) -> None:
     """Convert recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO, exports of Vicon, Qualisys, OptiTrack) into a data set.
@@ -136,18 +139,25 @@ def import_(
 
     writable(out, json)
     joints = None if clockwise is None else [_joint(part) for part in listed(clockwise) if part != "none"]
-    files = [path for source in sources for path in _files(source)]
     options = {
         "angles": angles and angles.value, "zero": zero and zero.value, "clockwise": joints,
-        "force_on": force_on and force_on.value, "points": listed(points),
+        "force_on": force_on and force_on.value, "points": listed(points), "rate": rate_hz,
     }  # fmt: skip
+    talking = sys.stdin.isatty() and sys.stderr.isatty()
+    if ask and not talking:
+        raise BadInput("--ask", Text("no terminal"), "a terminal to ask on, or --map")
+    if ask:
+        columns = ",".join(filter(None, [_asked(sources, tuple(listed(points)), model), columns]))
     try:
-        done = import_recordings(files, out, model=model, columns_map=columns, **options)  # type: ignore[arg-type]
+        with console.progress("importing"):
+            done = import_recordings(sources, out, model=model, columns_map=columns, **options)  # type: ignore[arg-type]
     except BadInput as error:
-        answers = _asked(error) if sys.stdin.isatty() and sys.stderr.isatty() else ""
-        if not answers:
+        if ask or columns or not talking or not _about_columns(error):
             raise
-        done = import_recordings(files, out, model=model, columns_map=",".join(filter(None, [columns, answers])), **options)  # type: ignore[arg-type]
+        for problem in error.problems if isinstance(error, BadInputs) else (error,):
+            print(f"armrs: {problem}", file=sys.stderr)
+        columns = _asked(sources, tuple(listed(points)), model)
+        done = import_recordings(sources, out, model=model, columns_map=columns, **options)  # type: ignore[arg-type]
 
     picture = write_recording(load_dataset(done.folder), done.folder)
 
@@ -157,9 +167,15 @@ def import_(
         print("  (t: time; q1 …: joint angles, from the base on; Fy, Fz: force forward and upward)")
         count = len(done.recipe.trials)
         print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}.")
-        print(f"Look at {picture}: does the arm stand as in the laboratory, and does the force support it? Next: armrs check {done.folder}")
+        print(f"Look at {picture}: does the arm stand as in the laboratory, and does the force support it?")
 
-    present(done.to_dict, json, human)
+    present(done.to_dict, json, human, f"armrs check {shlex.quote(str(done.folder))}")
+
+
+def _about_columns(error: BadInput) -> bool:
+    """Whether a refusal is about columns alone, which the user can name."""
+    problems = error.problems if isinstance(error, BadInputs) else (error,)
+    return all(problem.place == "columns" for problem in problems)
 
 
 def _joint(text: str) -> int:
@@ -168,30 +184,38 @@ def _joint(text: str) -> int:
     return int(text)
 
 
-def _files(source: Path) -> list[Path]:
-    """Return a file, or the recordings in a folder, in the order of their names."""
-    from ..io.raw import SUFFIXES
+def _asked(sources: list[Path], points: tuple[str, ...], model: Path) -> str:
+    """Ask which column is what, each with a guess; returns the answers as `--map` has them."""
+    from ..model import load_model
+    from ..workflows.importing.questions import questions
 
-    if not source.is_dir():
-        return [source]
-    found = sorted(path for path in source.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file())
-    if not found:
-        raise BadInput("RAW", Text("a folder without recordings"), f"files of {', '.join(SUFFIXES)}", file=source)
-    return found
-
-
-def _asked(error: BadInput) -> str:
-    """Ask for the columns that were not found; returns them as `--map` has them, or nothing."""
-    problems = error.problems if isinstance(error, BadInputs) else (error,)
+    table, asked = questions(sources, points, [joint.name for joint in load_model(model).joints])
+    names = [c.name for c in table.columns]
+    print(f"{table.path} has these columns; first value in brackets:", file=sys.stderr)
+    for number, c in enumerate(table.columns, start=1):
+        print(f"  {number}  {c.name}  [{c.values[0]:.4g}]", file=sys.stderr)
+    print("Answer with a name or a number; Enter takes the guess, 0 leaves it out, a minus turns the sign.", file=sys.stderr)
     answers = []
-    for problem in problems:
-        found = str(problem.found)
-        if not found.startswith("no column for "):
-            return ""
-        symbol = found.removeprefix("no column for ")
-        print(f"{problem}", file=sys.stderr)
-        answers.append(f"{symbol}={typer.prompt(f'Which column is {symbol}', err=True)}")
+    for question in asked:
+        why = f" ({question.why})" if question.guess else ""
+        while True:
+            given = typer.prompt(f"{question.symbol}, {question.meaning}{why}", default=question.guess or "0", err=True).strip()
+            sign, name = ("-", given[1:].strip()) if given.startswith("-") and given not in names else ("", given)
+            if name.isdigit() and name not in names and 0 <= int(name) <= len(names):
+                name = names[int(name) - 1] if int(name) else "0"
+            if name == "0" or name in names:
+                break
+            print(f"found {given!r}, allowed a name or number of the list", file=sys.stderr)
+        answers += [] if name == "0" else [f"{question.symbol}={sign}{name}"]
     return ",".join(answers)
+
+
+def _after_check(done: Checked, dataset: Path) -> str:
+    place = shlex.quote(str(dataset))
+    if done.errors:
+        return f"correct the errors above, then armrs check {place} again"
+    able = [f"armrs {v.verb} {place} -o {v.verb}" for v in done.verbs if v.able and v.verb != "passive"]
+    return ", then ".join(able) or "record forces or joint torques beside the angles"
 
 
 def check(dataset: Source, json: JsonFile = None) -> int:
@@ -199,16 +223,17 @@ def check(dataset: Source, json: JsonFile = None) -> int:
 
     Exit status 1 if a problem prevents a verb from using the data.
     """
-    from ..workflows.checking import check_dataset
+    from ..workflows.checking import check_dataset, grouped
 
-    done = check_dataset(dataset)
+    with console.progress("checking"):
+        done = check_dataset(dataset)
 
     def human() -> None:
-        for problem in done.problems:
+        for problem in grouped(done.problems):
             print(f"{problem.level}: {problem}")
         if done.problems:
             print()
         console.table(("verb", "can", "why"), [(v.verb, "yes" if v.able else "no", v.why) for v in done.verbs], left=3)
 
-    present(done.to_dict, json, human)
+    present(done.to_dict, json, human, _after_check(done, dataset))
     return 1 if done.errors else 0

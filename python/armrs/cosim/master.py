@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from .. import views
 from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
+from ..tabular import Labelled, Series, Tidy
 from .between import Between, Jump
 from .pace import Pace
 from .partner import Partner, Status
@@ -56,7 +58,7 @@ class ConnectionReport:
 
 
 @dataclass(frozen=True, eq=False)
-class Coupled:
+class Coupled(Series):
     """A run of a system.
 
     Attributes
@@ -104,6 +106,28 @@ class Coupled:
     jumps: dict[str, list[Jump]] = field(default_factory=dict, repr=False)
     resolution: float | None = None
     estimates: tuple[Any, ...] = field(default=(), repr=False)
+
+    def __repr__(self) -> str:
+        return f"Coupled({', '.join(self.system.slaves)}: {self.verdict}, {self.t[-1]:g} s, {len(self.t)} points)"
+
+    def _units(self) -> dict[str, str]:
+        """Return the unit of each output."""
+        parted = {name: name.partition(".") for name in self.columns}
+        return {name: self.system.slaves[slave].variable(variable).unit or "" for name, (slave, _, variable) in parted.items()}
+
+    def tidy(self) -> Tidy:
+        """Return every output at every communication point."""
+        return Tidy({"t": self.t, **self.columns}, {"t": "s"} | {name: unit for name, unit in self._units().items() if unit})
+
+    def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
+        """Return every output over time."""
+        units = self._units()
+        return {"time": self.t}, {name: Labelled(("time",), values, units[name]) for name, values in self.columns.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the run came to, as plain data."""
+        data: dict[str, Any] = views.of(self).data(self)
+        return data
 
 
 def run_system(system: System, *, resolution: float = np.inf, progress: Callable[[int], None] = lambda steps: None) -> Coupled:

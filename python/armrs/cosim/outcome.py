@@ -10,6 +10,7 @@ import numpy as np
 from ..io import files
 from ..io.samples import write_samples
 from ..report import figures, plain, plotting, results
+from ..report.view import View
 from .master import RESULTS, Coupled
 
 
@@ -64,7 +65,7 @@ def write_coupled(run: Coupled, data: dict[str, Any], folder: Path, *, suffix: s
 
     Of a run that is no result only the diagnosis is written: no samples.
     """
-    drawn = [_drawn(run)]
+    drawn = figures.draw(_figures(run))
     good = run.verdict in RESULTS
     data["file"] = f"coupled{suffix}" if good else None
 
@@ -81,12 +82,15 @@ def write_coupled(run: Coupled, data: dict[str, Any], folder: Path, *, suffix: s
 
 def samples(run: Coupled) -> dict[str, np.ndarray]:
     """Return every output at every communication point, with its unit in the name of the column."""
-    table = {"t_s": run.t}
-    for name, values in run.columns.items():
-        slave, _, variable = name.partition(".")
-        unit = run.system.slaves[slave].variable(variable).unit
-        table[f"{name}_{unit}" if unit else name] = values
-    return table
+    table = run.tidy()
+    return {f"{name}_{table.units[name]}" if name in table.units else name: np.asarray(values) for name, values in table.columns.items()}
+
+
+def _figures(run: Coupled) -> figures.Figures:
+    return {"interface": lambda: _drawn(run)}
+
+
+COUPLED = View(lambda run: coupled_data(run, "a coupled run"), lambda run, _: _figures(run))
 
 
 def _drawn(run: Coupled) -> figures.Drawn:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..errors import BadInput, Text, nearest, unknown_name
+from ..errors import BadInput, BadInputs, Text, nearest, unknown_name
 
 _DEGREE = math.pi / 180.0
 _ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE}
@@ -80,7 +80,7 @@ class Column:
 
 
 def parse(names: Sequence[str], n_joints: int, *, loads: bool = True) -> list[Column]:
-    """Read the names of all columns of a trial.
+    """Read the names of all columns of a trial; every name that is wrong is refused at once (`BadInputs`).
 
     Parameters
     ----------
@@ -97,13 +97,22 @@ def parse(names: Sequence[str], n_joints: int, *, loads: bool = True) -> list[Co
         For a name that is not known (with the nearest known one), one that stands twice, a quantity given in two units, a joint that the
         model does not have, or a group of columns that is not complete.
     """
-    columns = [_parse_one(name, n_joints) for name in names]
+    columns: list[Column] = []
+    problems: list[BadInput] = []
     seen: dict[str, str] = {}
-    for column in columns:
+    for name in names:
+        try:
+            column = _parse_one(name, n_joints)
+        except BadInput as error:
+            problems.append(error)
+            continue
         if column.symbol in seen:
             both = f"{seen[column.symbol]} and {column.name}"
-            raise BadInput("header", Text(both), f"{column.symbol} once")
+            problems.append(BadInput("header", Text(both), f"{column.symbol} once"))
         seen[column.symbol] = column.name
+        columns.append(column)
+    if problems:
+        raise BadInputs.of(problems)
     _complete(seen, n_joints, loads=loads)
     return columns
 

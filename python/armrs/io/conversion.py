@@ -11,9 +11,8 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text
-from ..model import load_model
 from . import files
-from .dataset import FILE, describe, name_of, output_names
+from .dataset import FILE, describe, described_model, name_of, output_names
 from .samples import NUMBER, SUFFIXES, csv_place, explain_csv, header_of, parquet_table, write_table
 
 _EXACT = 2.0**53
@@ -62,21 +61,22 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
         files.not_an_input([target], [path])
         return [_write(_job(path, target))]
     described, description = describe(path)
-    model_path = described.parent / description.model
-    load_model(model_path)  # a data set without a sound model is not worth converting
+    described_model(described.parent, description)  # a data set without a sound model is not worth converting
+    named = [] if description.model is None else [described.parent / description.model]
     names = output_names([entry.file for entry in description.trials], suffix)
     sources = [described.parent / entry.file for entry in description.trials]
     targets = [out / name for name in names]
-    files.not_an_input([*targets, out / FILE, out / "model.toml"], [*sources, described, model_path])
-    model = model_path.read_text(encoding="utf-8")
+    files.not_an_input([*targets, out / FILE, out / "model.toml"], [*sources, described, *named])
+    models = [path.read_text(encoding="utf-8") for path in named]
     entries = [entry.replace(file=name) for entry, name in zip(description.trials, names, strict=True)]
-    content = description.replace(name=name_of(described, description), model="model.toml", trials=entries).to_toml()
+    content = description.replace(name=name_of(described, description), model="model.toml" if named else None, trials=entries).to_toml()
 
     def write(part: Path) -> list[Path]:
         written = [_write(_job(source, part / name)) for source, name in zip(sources, names, strict=True)]
-        files.write_text(part / "model.toml", model, kind=".toml")
+        for model in models:
+            files.write_text(part / "model.toml", model, kind=".toml")
         files.write_text(part / FILE, content, kind=".toml")
-        return [*written, part / "model.toml", part / FILE]
+        return [*written, *(part / "model.toml" for _ in models), part / FILE]
 
     return files.write_whole(out, write)
 

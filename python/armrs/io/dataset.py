@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
+from ..anthropometry import literature_model
 from ..errors import ArmrsError, BadInput, Text
 from ..model import AddedMass, Description, Model, Subject, Tolerance, TrialEntry, load_model
 from . import files
@@ -22,6 +23,7 @@ from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
 FILE = "dataset.toml"
+NO_MODEL = "no model is named: the arm is that of the subject by the literature (de Leva 1996)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +112,12 @@ class Dataset:
 
     def digest(self) -> str | None:
         """Return the SHA-256 of the files one after the other: `dataset.toml`, the model, the trials; None where they are not on disk."""
-        if self.folder is None or self.model_path is None:
+        if self.folder is None:
             return None
         whole = hashlib.sha256()
+        models = [] if self.model_path is None else [self.model_path]
         try:
-            for path in (self.folder / FILE, self.model_path, *(self.folder / t.file for t in self.trials)):
+            for path in (self.folder / FILE, *models, *(self.folder / t.file for t in self.trials)):
                 whole.update(path.read_bytes())
         except OSError:
             return None
@@ -155,12 +158,14 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     """
     path, description = describe(source)
     folder = path.parent
-    model_path = folder / description.model
-    model = load_model(model_path)
+    model_path = None if description.model is None else folder / description.model
+    model = described_model(folder, description)
     for number, item in enumerate(description.added, start=1):
         _on(model, item, f"[[added]] {number}", path)
     trials: list[Trial] = []
     warnings = list(model.warnings)
+    if model_path is None:
+        warnings.append(NO_MODEL)
     for entry in description.trials:
         trial_path = folder / entry.file
         reading = read_entry(trial_path, entry, model.n_joints, description)
@@ -188,6 +193,11 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         synthetic=description.synthetic,
         added=description.added,
     )
+
+
+def described_model(folder: Path, description: Description) -> Model:
+    """Return the model that a data set names, or that of its subject by the literature."""
+    return literature_model(description.subject) if description.model is None else load_model(folder / description.model)
 
 
 def read_entry(path: Path, entry: TrialEntry, n_joints: int, description: Description) -> Reading | None:

@@ -5,6 +5,8 @@ It is asked before any physics, so that a wrong column is named as such and not 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..errors import BadInput, Text
@@ -38,19 +40,25 @@ def refuse_implausible(dataset: Dataset, *, robot_matters: bool = True) -> None:
     BadInput
         Names the trial's file and the column.
     """
-    for trial in dataset.trials:
-        if trial.force_on_arm is not None:
-            for name, values in zip(("Fy", "Fz"), trial.force_on_arm.T, strict=True):
-                level = constant(values)
-                if level is not None:
-                    found, allowed = Text(f"{level:g} N in every sample"), "a force that changes with the movement"
-                    raise BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
+    for dead in dead_forces(dataset):
+        raise dead
     if all(constant(angle) is not None for trial in dataset.trials for angle in trial.q.T):
         raise BadInput("angles", Text("none that changes in any trial"), "an arm that moves", hint="dead sensors?")
     if dataset.model.robot is not None:
         for trial in dataset.trials:
             if trial.robot_q is not None:
                 _refuse_apart(dataset.model, dataset.model.robot, trial, robot_matters)
+
+
+def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
+    """Give the force channels that never change."""
+    for trial in dataset.trials:
+        if trial.force_on_arm is not None:
+            for name, values in zip(("Fy", "Fz"), trial.force_on_arm.T, strict=True):
+                level = constant(values)
+                if level is not None:
+                    found, allowed = Text(f"{level:g} N in every sample"), "a force that changes with the movement"
+                    yield BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
 
 
 def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool) -> None:
@@ -62,7 +70,7 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
     q, robot_q, base = trial.q[good], trial.robot_q[good], _displacement(model, trial)[good]
     reach = sum(s.length for s in model.segments)
     handle = handle_path(robot, robot_q) - base
-    gap = _tip(model, q) - handle
+    gap = hand_path(model, q) - handle
     own = _rms(gap)
     if own > _SUSPECT * reach:
         best, reading = _other_reading(model, robot, q, robot_q, base)
@@ -89,9 +97,9 @@ def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarra
     """Return what the angles of arm or robot may be instead, and how far apart hand and handle are then [m]."""
     handle = handle_path(robot, robot_q) - base
     found: list[tuple[float, Reading | None]] = [
-        (_rms(_tip(model, reading.angles(q)) - handle), reading) for reading in readings.of_angles(q.shape[1])
+        (_rms(hand_path(model, reading.angles(q)) - handle), reading) for reading in readings.of_angles(q.shape[1])
     ]
-    tip = _tip(model, q) + base
+    tip = hand_path(model, q) + base
     found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
     return min(found, key=lambda item: item[0])
 
@@ -108,7 +116,7 @@ def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float,
             sizes = []
             for value in tried:
                 offset[j] = value
-                sizes.append(_rms(_tip(model, q[thin] + offset) - handle[thin]))
+                sizes.append(_rms(hand_path(model, q[thin] + offset) - handle[thin]))
             offset[j] = tried[int(np.argmin(sizes))]
         found.append((min(sizes), j + 1, float(offset[j])))
     nearest = min(found)[0]
@@ -126,7 +134,7 @@ def hand_meets_handle(dataset: Dataset) -> bool:
             return False
         good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
         if good.any():
-            gap = _tip(model, trial.q[good]) + _displacement(model, trial)[good] - handle_path(robot, trial.robot_q[good])
+            gap = hand_path(model, trial.q[good]) + _displacement(model, trial)[good] - handle_path(robot, trial.robot_q[good])
             if _rms(gap) > _SUSPECT * sum(s.length for s in model.segments):
                 return False
     return True
@@ -146,7 +154,8 @@ def handle_path(robot: Robot, q: np.ndarray) -> np.ndarray:
     )
 
 
-def _tip(model: Model, q: np.ndarray) -> np.ndarray:
+def hand_path(model: Model, q: np.ndarray) -> np.ndarray:
+    """Return where an arm with angles q, (n, n_joints) [rad], has its hand, (n, 2) [m]."""
     angles = np.cumsum(q, axis=1)
     lengths = np.array([s.length for s in model.segments])
     return np.column_stack([model.base[0] + np.cos(angles) @ lengths, model.base[1] + np.sin(angles) @ lengths])

@@ -90,4 +90,5 @@ def other_zero(n: int, joint: int, offset: float) -> Reading:
     shift = np.zeros(n)
     shift[joint - 1] = offset
     size = f"{abs(offset):.2g} rad too {'large' if offset < 0.0 else 'small'}"
-    return Reading(f"column q{joint}", f"angles with the model's zero (another zero: q{joint} is {size}?)", np.eye(n), shift)
+    turned = ", or the axes of the force are turned by as much" if joint == 1 else ""
+    return Reading(f"column q{joint}", f"angles with the model's zero (another zero: q{joint} is {size}{turned}?)", np.eye(n), shift)

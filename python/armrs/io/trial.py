@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import checks, views
-from ..errors import BadInput, Text
+from ..errors import BadInput, BadInputs, Text
 from . import columns, resample
 from .samples import Samples, read_samples
 
@@ -258,7 +258,6 @@ def read_trial(
     warnings: list[str] = []
     original = _in_si(header, samples, warnings)
     t = original.pop("t_s")
-    _check_time(t, samples)
 
     grid, resampled = _grid(t, sample_rate, warnings)
     channels = {name: resample.onto_grid(t, values, grid) for name, values in original.items()}
@@ -292,14 +291,29 @@ def read_trial(
 
 
 def _in_si(header: Sequence[columns.Column], samples: Samples, warnings: list[str]) -> dict[str, np.ndarray]:
-    """Return the columns in SI units by name, angles without jumps by whole turns; what was done to them is added to the warnings."""
+    """Return the columns in SI units by name, angles without jumps by whole turns; what was done to them is added to the warnings.
+
+    Raises
+    ------
+    BadInput
+        With every column that is wrong.
+    """
     original: dict[str, np.ndarray] = {}
+    problems: list[BadInput] = []
     for column, raw in zip(header, samples.values, strict=True):
         values = raw if column.factor == 1.0 else raw * column.factor
-        _check_size(column, values, samples)
+        try:
+            _check_size(column, values, samples)
+            if column.symbol == "t":
+                _check_time(values, samples)
+        except BadInput as error:
+            problems.append(error)
+            continue
         if column.quantity is columns.ANGLE:
             values = _unwrapped(column, values, warnings)
         original[column.si_name] = values
+    if problems:
+        raise BadInputs.of(problems)
     return original
 
 

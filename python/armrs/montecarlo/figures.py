@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_PANELS = 12
+_ROUNDING = 1e-9
+"""Relative difference of values that are equal but for rounding."""
 _FEW = 50
 """Cases up to which a dot is drawn large."""
 
@@ -33,6 +35,7 @@ def sweep(summary: Summary, data: Mapping[str, Any]) -> Figures:
 
 def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:
     there = [q for q in quantities if q.value.n]
+    there = [q for q in there if _varies(q)] or there
     shown = sorted(there, key=lambda q: q.decided_by["data"] / q.value.n, reverse=True)[:MOST_PANELS]
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
@@ -46,6 +49,13 @@ def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:
     left = len(quantities) - len(shown)
     text = "A dot is a case; on the line, what was found is the truth. Where no truth is known, or one for all cases: a histogram."
     return Drawn("estimates", "Found against the truth", text + (f" {left} more are in the tables." if left else ""), figure)
+
+
+def _varies(quantity: Quantity) -> bool:
+    """Whether cases differ by more than rounding: of a value that is the same in all there is nothing to see."""
+    values = np.concatenate(quantity.values)
+    values = values[np.isfinite(values)]
+    return len(values) == 1 or bool(np.ptp(values) > _ROUNDING * np.abs(values).max())
 
 
 def _legend(figure: Figure, *, truth: bool, cases: bool) -> None:

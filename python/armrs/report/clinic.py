@@ -83,7 +83,13 @@ SLOW = (
 """What slow movements say of a joint."""
 Key = tuple[str, str, int]
 """Kind, parameter and joint of a quantity."""
+AS_ARMRS = (1.0, 0.0)
+"""How an angle is counted: sign, and the angle of armrs that is called zero [deg]."""
+ANGLES = ("rest", "tonic")
+"""Parameters that are angles."""
 NO_CHANGE = "no clear change"
+ZERO = "the first joint's from the horizontal, the others' from the straight line on, positive counter-clockwise with forward to the right"
+"""How armrs counts angles, in words."""
 MOST_TRENDS = 9
 """Plots over the sessions that find room on a page."""
 MOST_NOTES = 3
@@ -106,7 +112,7 @@ class Norm:
 
 @dataclass(frozen=True)
 class Line:
-    """One quantity of one joint, in its unit: `value` is None where these movements do not measure it, `at_limit` says that it is 0."""
+    """One quantity of one joint, in its unit: `value` is None where these movements do not measure it, `at_limit` says that it may be 0."""
 
     joint: str
     quantity: Quantity
@@ -115,10 +121,11 @@ class Line:
     norm: Norm | None
     trend: str | None
     at_limit: bool = False
+    counted: tuple[float, float] = AS_ARMRS
 
     def norm_band(self) -> tuple[float, float] | None:
         """Return the usual range in the unit of the quantity."""
-        return None if self.norm is None else (self.norm.low * self.quantity.factor, self.norm.high * self.quantity.factor)
+        return None if self.norm is None else _between((self.norm.low, self.norm.high), self.quantity, self.counted)
 
     @property
     def beside_norm(self) -> str | None:
@@ -183,7 +190,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
                 raise BadInput("data, name", name(result), f"the session of the others, {name(results[0])!r}", file=source)
         found = [line for result in results for line in lines_of(result, norms)]
         joints = results[0]["data"]["joints"]
-        lines = sorted(found, key=lambda line: joints.index(line.joint))
+        lines = sorted(_once(found), key=lambda line: joints.index(line.joint))
         page = {
             "name": name(results[0]),
             "synthetic": any(map(is_synthetic, results)),
@@ -191,7 +198,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "lines": lines,
             "words": [words_of(line) for line in lines],
             "unusual": unusual(lines, results),
-            "notes": notes(results),
+            "notes": [*_apart(found), *notes(results)],
             "since": max((c["dates"][-2] for r in results for c in r.get("history", ()) if len(c["dates"]) > 1), default=None),
             "not_measured": not_measured(results, lines),
             "next": next_steps(results, lines),
@@ -225,12 +232,33 @@ def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = ()) -> list[Line
             item = next((e for e in result["parameters"] if (e["kind"], e["name"], e["joint"]) == key), None)
             if item is None:
                 continue
-            known = item["decided_by"] != "prior"
-            interval = tuple(quantity.factor * x for x in item["interval"]) if known else None
-            value = quantity.factor * item["value"] if known else None
-            trend, at_limit = _trend(courses.get(key), quantity), item["decided_by"] == "bound" and item["value"] == 0.0
-            lines.append(Line(joint, quantity, value, interval, usual.get(key), trend, at_limit))
+            known, own = item["decided_by"] != "prior", counted(result, j, quantity)
+            interval = _between(item["interval"], quantity, own) if known else None
+            value = _in_unit(item["value"], quantity, own) if known else None
+            trend = _trend(courses.get(key), quantity, own)
+            at_limit = known and quantity.parameter not in ANGLES and item["interval"][0] <= 0.0
+            lines.append(Line(joint, quantity, value, interval, usual.get(key), trend, at_limit, own))
     return lines
+
+
+def _once(lines: Sequence[Line]) -> list[Line]:
+    """Return each quantity of a joint once: as the first result that measures it says."""
+    first: dict[tuple[str, str], Line] = {}
+    for line in lines:
+        key = (line.joint, line.quantity.title)
+        if key not in first or (first[key].value is None and line.value is not None):
+            first[key] = line
+    return list(first.values())
+
+
+def _apart(lines: Sequence[Line]) -> list[str]:
+    """Return the quantities of which two results say what cannot both be."""
+    said = []
+    for line in _once(lines):
+        own = [o for o in lines if (o.joint, o.quantity.title) == (line.joint, line.quantity.title) and o.interval is not None]
+        if own and max(o.interval[0] for o in own if o.interval) > min(o.interval[1] for o in own if o.interval):
+            said.append(f"{line.joint}: {line.quantity.title.lower()} differs between the analyses by more than both are uncertain.")
+    return said
 
 
 def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]]) -> list[Line]:
@@ -275,19 +303,39 @@ def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses:
             if found is None or found.get("interval") is None:
                 continue
             key = (quantity.kind, quantity.parameter, effect["joint"])
-            low, high = (quantity.factor * x for x in found["interval"])
+            own = counted(result, effect["joint"], quantity)
             joint = result["data"]["joints"][effect["joint"] - 1]
-            lines.append(
-                Line(joint, quantity, quantity.factor * found["value"], (low, high), usual.get(key), _trend(courses.get(key), quantity))
-            )
+            value, ends = _in_unit(found["value"], quantity, own), _between(found["interval"], quantity, own)
+            lines.append(Line(joint, quantity, value, ends, usual.get(key), _trend(courses.get(key), quantity, own), counted=own))
     return lines
 
 
-def _trend(course: Mapping[str, Any] | None, quantity: Quantity) -> str | None:
+def counted(result: Mapping[str, Any], joint: int, quantity: Quantity) -> tuple[float, float]:
+    """Return how a quantity of a joint is counted: an angle as the laboratory does, where the data set says how."""
+    if quantity.parameter not in ANGLES:
+        return AS_ARMRS
+    return _laboratory(result, joint)
+
+
+def _laboratory(result: Mapping[str, Any], joint: int) -> tuple[float, float]:
+    angles = result["data"].get("angles")
+    return AS_ARMRS if angles is None else (float(angles["signs"][joint - 1]), float(angles["zero_deg"][joint - 1]))
+
+
+def _in_unit(value: float, quantity: Quantity, own: tuple[float, float]) -> float:
+    return own[0] * (quantity.factor * value - own[1])
+
+
+def _between(interval: Sequence[float], quantity: Quantity, own: tuple[float, float]) -> tuple[float, float]:
+    low, high = sorted(_in_unit(end, quantity, own) for end in interval)
+    return low, high
+
+
+def _trend(course: Mapping[str, Any] | None, quantity: Quantity, own: tuple[float, float] = AS_ARMRS) -> str | None:
     """Say how the last session differs from the one before it, and how sure that is."""
     if course is None or len(course["dates"]) < 2 or course.get("since_last") is None or not math.isfinite(course["since_last"]):
         return None
-    change, either_way = quantity.factor * course["since_last"], quantity.factor * 1.96 * course["since_last_std"]
+    change, either_way = own[0] * quantity.factor * course["since_last"], quantity.factor * 1.96 * course["since_last_std"]
     if not course["changed_since_last"]:
         return f"{NO_CHANGE}: {_signed(change)} ± {_number(either_way)}"
     return f"{'higher' if change > 0.0 else 'lower'} by {_number(abs(change))} ± {_number(either_way)}"
@@ -347,11 +395,13 @@ def measured(results: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     ranges = data.get("range_deg")
     if ranges:
-        said = [
-            f"{joint} from {low:.0f}° to {high:.0f}°".replace("-", "−") for joint, (low, high) in zip(data["joints"], ranges, strict=True)
-        ]
+        said = []
+        for j, (joint, ends) in enumerate(zip(data["joints"], ranges, strict=True), start=1):
+            sign, zero = _laboratory(results[0], j)
+            low, high = sorted(sign * (end - zero) for end in ends)
+            said.append(f"{joint} from {low:.0f}° to {high:.0f}°".replace("-", "−"))
         lines.append(f"Range that was moved through: {', '.join(said)}. This is no test of how far the joints can go.")
-    return lines
+    return [*lines, f"Angles: {(data.get('angles') or {}).get('words', ZERO)}."]
 
 
 def words_of(line: Line) -> list[str]:

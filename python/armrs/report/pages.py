@@ -55,6 +55,8 @@ KINDS = {
     "gap": Kind("Gap between model and measurement", "gap.html.j2"),
     "online replay": Kind("Replay of a device log", "replay.html.j2"),
     "record": Kind("Virtual laboratory", "record.html.j2"),
+    "check": Kind("Check", "check.html.j2"),
+    "import": Kind("Import", "import.html.j2"),
     "fmu run": Kind("Co-simulation", "fmu_run.html.j2"),
     "sweep": Kind(
         "Sweep",

@@ -10,10 +10,12 @@ import numpy as np
 
 from .. import _armrs
 from ..analysis.quantities import value_in
+from ..errors import BadInput
 from ..io.dataset import Dataset
 from ..model import Contact
 from ..workflows.accuracy import energy_balance
 from ..workflows.identify import Estimate, Identified
+from ..workflows.importing.recipe import FILE, load_recipe
 from ..workflows.passive import LEVEL, PassiveMoments
 from ..workflows.simulate import Run, Simulated
 
@@ -45,6 +47,7 @@ def data_of(dataset: Dataset) -> dict[str, Any]:
         "synthetic": dataset.synthetic,
         "joints": [joint.name for joint in dataset.model.joints],
         "range_deg": ranges(dataset),
+        "angles": laboratory_angles(dataset),
         "configurations": list(dict.fromkeys(t.configuration for t in dataset.trials)),
         "fit": of("fit"),
         "test": of("test"),
@@ -52,6 +55,26 @@ def data_of(dataset: Dataset) -> dict[str, Any]:
         "torques": any(t.tau is not None for t in dataset.trials),
         "warnings": list(dataset.warnings),
     }
+
+
+def laboratory_angles(dataset: Dataset) -> dict[str, Any] | None:
+    """Return how the laboratory counts angles, where `armrs import` wrote the data set: sign and zero of each joint, and words.
+
+    None elsewhere, and where the laboratory's angles are no angles of joints.
+    """
+    path = None if dataset.folder is None else dataset.folder / FILE
+    if path is None or not path.is_file():
+        return None
+    try:
+        convention = load_recipe(path).convention
+    except BadInput:  # no longer whole: the angles are then counted as armrs does
+        return None
+    n = dataset.model.n_joints
+    if convention.reference != "relative" or len(convention.signs) != n:
+        return None
+    first = 0.0 if convention.zero == "horizontal" else -90.0
+    said = f"as in the laboratory: {convention.angles([joint.name for joint in dataset.model.joints])}"
+    return {"signs": list(convention.signs), "zero_deg": [first] + [0.0] * (n - 1), "words": said}
 
 
 def ranges(dataset: Dataset) -> list[list[float]] | None:

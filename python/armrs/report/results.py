@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +16,7 @@ from ..workflows.passive import PassiveMoments
 from ..workflows.plan import Plan, plan_data, write_movements
 from ..workflows.record import Recorded
 from ..workflows.simulate import Run, Simulated
-from . import figures, live, moving, pages, plain, plotting
-from .recording import recording
+from . import data_sets, figures, live, moving, pages, plain, plotting
 from .view import View
 
 if TYPE_CHECKING:
@@ -35,8 +33,6 @@ IDENTIFIED = View(plain.identified_data, figures.identified)
 SIMULATED = View(
     lambda run: plain.simulated_data(run, "a simulated run"), lambda run, _: figures.simulated(figures.outline(run)), moving.simulated
 )
-MOST_RECORDINGS = 6
-"""So many movements of a session are drawn, one trial of each."""
 PASSIVE = View(plain.passive_data, lambda result, _: figures.passive(result))
 PLANNED = View(plan_data, lambda plan, data: figures.planned(data, plan.model))
 HISTORY = View(history_data, lambda _, data: figures.history(data["courses"]))
@@ -129,11 +125,8 @@ def write_simulated(result: Run, data: dict[str, Any], folder: Path, *, suffix: 
 
 def write_recorded(result: Recorded, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write `record.json`, figures and `report.html` beside a session of the virtual laboratory; return the files, the report last."""
-    dataset = result.dataset
-    by_movement = {trial.configuration: trial for trial in reversed(dataset.trials)}
-    shown = list(reversed(by_movement.values()))[:MOST_RECORDINGS]
-    drawn = figures.draw({str(k): partial(recording, trial, dataset.model) for k, trial in enumerate(shown)})
-    return write_result(folder, "record", data, drawn, moving.recorded(shown[0], dataset.model))
+    drawn = figures.draw(data_sets.recordings(result.dataset))
+    return write_result(folder, "record", data, drawn, data_sets.first_trial(result.dataset))
 
 
 def write_passive(result: PassiveMoments, data: dict[str, Any], folder: Path) -> list[Path]:

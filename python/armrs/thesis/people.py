@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import _armrs
-from ..anthropometry import literature_arm
+from ..anthropometry import JOINTS, literature_arm
 from ..io.trial import Trial
 from ..model import Effect, Joint, Model, Robot, Segment, Subject
 from ..workflows import demo
-from ..workflows.experiment import JOINTS, THESIS_CONTACT
+from ..workflows.experiment import THESIS_CONTACT
 from ..workflows.movement import Movement
 from ..workflows.simulate import Sensors, Simulated, simulate
 

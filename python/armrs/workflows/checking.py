@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,17 @@ import numpy as np
 from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
-from ..io.dataset import Dataset, describe, name_of, read_entry
+from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, read_entry
 from ..io.trial import Trial, moving_bases, still_angles
-from ..model import Description, Model, load_model
+from ..model import Description, Model
+from ..tabular import Tabular, Tidy
 from . import setup
 from .gap import suspicion
+from .importing.clock import lateness
 
+_LATE, _LATE_BY = 0.06, 2.0
+"""Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
+_SAME_RATE = 0.02
 _SLOW = 0.3
 """Joint speed up to which a movement counts as slow enough for passive moments [rad/s]."""
 
@@ -56,11 +61,20 @@ class Ability:
 
 
 @dataclass(frozen=True)
-class Checked:
-    """The result of `check_dataset`."""
+class Checked(Tabular):
+    """The result of `check_dataset`.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+    verbs : tuple of Ability
+    dataset : Dataset or None
+        What of it can be read; None where that is nothing.
+    """
 
     problems: tuple[Problem, ...]
     verbs: tuple[Ability, ...]
+    dataset: Dataset | None = field(default=None, repr=False, compare=False)
 
     @property
     def errors(self) -> tuple[Problem, ...]:
@@ -71,6 +85,10 @@ class Checked:
         warnings = len(self.problems) - len(self.errors)
         able = ", ".join(v.verb for v in self.verbs if v.able) or "no verb"
         return f"Checked({len(self.errors)} errors, {warnings} warnings; usable by {able})"
+
+    def tidy(self) -> Tidy:
+        """Return the problems, one a row."""
+        return Tidy({name: [getattr(p, name) for p in self.problems] for name in ("level", "text", "next_step")}, {})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data."""
@@ -103,31 +121,87 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
             tuple(problems), tuple(Ability(verb, False, "the data set cannot be read") for verb in ("identify", "passive", "gap"))
         )
     path, description = described
-    model = _caught(lambda: load_model(path.parent / description.model), problems)
+    model = _caught(lambda: described_model(path.parent, description), problems)
     trials = _trials(path.parent, description, model, problems)
     if model is None or not trials:
         why = "no model" if model is None else "no trial can be read"
         return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
-    problems += [Problem("warning", line) for line in model.warnings]
+    problems += [_warned(line) for line in model.warnings]
+    if description.model is None:
+        problems.append(_warned(NO_MODEL))
     dataset = Dataset(name_of(path, description), model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
-    problems += [Problem("warning", line) for line in (*still_angles(dataset.trials), *moving_bases(dataset.trials))]
+    problems += [_warned(line) for line in (*still_angles(dataset.trials), *moving_bases(dataset.trials))]
     _plausible(dataset, problems)
     _balanced(dataset, problems)
+    problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
-    return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked))
+    return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked), dataset)
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
-    """Return what `read` returns, or None with its refusal among the problems."""
+    """Return what `read` returns, or None with its refusal among the problems, each once."""
     try:
         return read()
     except BadInputs as error:
-        problems += [Problem("error", str(p)) for p in error.problems]
-    except BadInput as error:
-        problems.append(Problem("error", str(error)))
+        refused: Sequence[ArmrsError] = error.problems
     except ArmrsError as error:
-        problems.append(Problem("error", str(error)))
+        refused = [error]
+    known = {p.text for p in problems}
+    problems += [Problem("error", str(one), _remedy(one)) for one in refused if str(one) not in known]
     return None
+
+
+_FILES = {
+    "time": "write the unit of time in the name of the column (t_s, t_ms), or correct the time stamps",
+    "header": "rename or remove the column",
+    "samples": "leave the copy out of dataset.toml",
+    "force_on": "state what the forces act on: force_on in dataset.toml",
+    "file": "correct the file, or its name in dataset.toml",
+}
+"""By the place of an error, what to do about it."""
+
+
+def _remedy(error: ArmrsError) -> str:
+    """Return the next step about an error."""
+    if not isinstance(error, BadInput):
+        return "correct the file that it names"
+    place = error.place.rpartition(", ")[2]
+    for start, step in _FILES.items():
+        if place.startswith(start):
+            return step
+    if "dead sensor" in (error.hint or ""):
+        return "repair the sensor and record again, or leave the trial out of dataset.toml"
+    if "if read otherwise" in str(error.found):
+        return "import the recordings again and let armrs import find the convention, or correct the columns"
+    if place.startswith(("column", "line", "row", "Fy", "q", "angles")):
+        return "correct the column: its unit, its sign, or its values"
+    return "correct it in the file that it names"
+
+
+_WARNINGS = (
+    ("saturated", "record with a larger range of the sensor, or leave these trials out"),
+    ("no samples from", "fill the gap or record the movement again; where it was, nothing is compared"),
+    ("samples are missing", "record these repeats again, or leave them out"),
+    ("bridged", "look for lost samples in the recorder"),
+    ("whole turns", "nothing, if the joint did not turn round"),
+    ("the time stamps are used", "correct sample_rate in dataset.toml"),
+    ("one fit trial", "record repeats of each movement"),
+    ("no movement was repeated", "record repeats of each movement"),
+    ('role = "test"', 'set role = "test" for one repeat of each movement'),
+    ("hardly", "move the joint, or give its law in the model"),
+    ("what holds it cannot be told", "move the joint, or give its law in the model"),
+    ("a joint that is held", "nothing, if the joint was held; else repair its sensor"),
+    ("begin them at one", "cut the trials at a rest"),
+    ("at a higher rate", "record the robot at a higher rate, or let it start and stop smoothly"),
+    ("are compared by joint torques", "leave such trials out, or add what they lack"),
+    ("no model is named", "nothing, or name a model of your own: model = in dataset.toml"),
+)
+"""By words of a warning, what to do about it."""
+
+
+def _warned(text: str) -> Problem:
+    step = next((step for words, step in _WARNINGS if words in text), "look at the values in model.toml")
+    return Problem("warning", text, step)
 
 
 def _trials(folder: Path, description: Description, model: Model | None, problems: list[Problem]) -> list[Trial]:
@@ -137,7 +211,7 @@ def _trials(folder: Path, description: Description, model: Model | None, problem
         joints = model.n_joints if model is not None else 1
         reading = _caught(partial(read_entry, path, entry, joints, description), problems)
         if reading is not None and model is not None:
-            problems += [Problem("warning", f"{path}: {line}") for line in reading.warnings]
+            problems += [_warned(f"{path}: {line}") for line in reading.warnings]
             trials.append(reading.trial)
     return trials
 
@@ -146,14 +220,13 @@ def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
     """Ask each trial by itself, so that one dead sensor does not hide another."""
     for trial in dataset.trials:
         one = dataset.replace(trials=(trial,))
-        _caught(partial(plausibility.refuse_implausible, one), problems)
+        dead = list(plausibility.dead_forces(one))
+        problems += [Problem("error", str(error), _remedy(error)) for error in dead]
+        if not dead:
+            _caught(partial(plausibility.refuse_implausible, one), problems)
     led = _is_led(dataset)
-    try:
-        problems += [Problem("warning", line) for line in suspicion.examine(dataset, led)]
-    except BadInput as error:
-        text = str(error)
-        if all(p.text != text for p in problems):
-            problems.append(Problem("error", text))
+    for test in suspicion.tests():
+        problems += [_warned(line) for line in _caught(partial(test, dataset, led), problems) or ()]
 
 
 def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
@@ -164,6 +237,45 @@ def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
         said = {p.text for p in problems}
         found = [str(one) for one in setup.wrong_trials(dataset.model, trials, met=met)]
         problems += [Problem("warning", text, "compare with the other trials") for text in found if text not in said]
+
+
+def _clocks(dataset: Dataset, errors: Sequence[str]) -> Iterator[Problem]:
+    """Give the trials whose forces are late or early against their angles by more than a calibration may leave.
+
+    Trials with errors, and all where angles are counted otherwise, are not asked.
+    """
+    if not dataset.model.gravity or any("if read otherwise" in text and " more: " in text for text in errors):
+        return
+    for trial in setup.balanced_trials(dataset):
+        if trial.force_on_arm is None or any(trial.file in text for text in errors):
+            continue
+        late, better = lateness(dataset.model, trial.t, np.where(trial.valid[:, None], trial.q, np.nan), trial.force_on_arm)
+        if abs(late) >= _LATE and better >= _LATE_BY:
+            said = f"{trial.file}: forces are about {abs(late):.2g} s {'late' if late > 0.0 else 'early'} against the angles"
+            yield Problem("warning", said, "bring both on one clock: armrs import does, of forces in a file of their own")
+
+
+def _rates(dataset: Dataset) -> Iterator[Problem]:
+    """Give the trials that are sampled at another rate than most."""
+    rates = np.array([trial.rate for trial in dataset.trials])
+    usual = float(np.median(rates))
+    for trial, rate in zip(dataset.trials, rates, strict=True):
+        if abs(rate / usual - 1.0) > _SAME_RATE:
+            said = f"{trial.file}: {rate:.4g} samples a second, where most trials have {usual:.4g}"
+            yield Problem("warning", said, "record all trials at one rate; lost samples?")
+
+
+def grouped(problems: Sequence[Problem]) -> list[Problem]:
+    """Return problems with those together that differ by their file alone."""
+    together: dict[tuple[str, str, str], list[str]] = {}
+    for p in problems:
+        file, colon, rest = p.text.partition(": ")
+        together.setdefault((p.level, rest if colon else p.text, p.next_step), []).append(file if colon else "")
+    lines = []
+    for (level, rest, step), files in together.items():
+        more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+        lines.append(Problem(level, f"{files[0]}{more}: {rest}" if files[0] else rest, step))
+    return lines
 
 
 def _is_led(dataset: Dataset) -> bool:

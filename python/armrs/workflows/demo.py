@@ -20,7 +20,9 @@ from ..io import files
 from ..io.dataset import Dataset, load_dataset, write_dataset
 from ..io.trial import Trial
 from ..model import Contact, Joint, Model, Robot, Segment
-from ..report import figures, pages, plain, plotting, results
+from ..report import figures, pages, plain, results
+from ..report.view import View
+from ..tabular import Tabular, Tidy
 from .gap import GapFound, find_gap
 from .gap.headline import effect_name, headline, joined
 from .gap.results import gap_data, write_gap
@@ -75,7 +77,7 @@ refer in part to rounded references or to none that can be told, so that they ar
 
 
 @dataclass(frozen=True, eq=False)
-class Demonstration:
+class Demonstration(Tabular):
     """What `run_demo` came to.
 
     Attributes
@@ -105,6 +107,16 @@ class Demonstration:
 
     def __repr__(self) -> str:
         return f"Demonstration({self.gap.verdict}, {self.identified!r}, report {str(self.files[-1])!r})"
+
+    def tidy(self) -> Tidy:
+        """Return identified values beside known ones, one a row."""
+        names = ("name", "kind", "joint", "value", "std", "reference", "error_percent", "unit", "decided_by")
+        rows = comparison(self.truth, self.identified)
+        return Tidy({name: [row[name] for row in rows] for name in names}, {})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain data."""
+        return _shown(self)[0]
 
 
 def true_model() -> Model:
@@ -277,15 +289,27 @@ def _left_over(found: Identified, passive: PassiveMoments) -> list[figures.Part]
     return parts
 
 
-def _write(out: Path, made: Demonstration, command: str | None) -> list[Path]:
+def _shown(made: Demonstration, command: str | None = None) -> tuple[dict[str, Any], figures.Figures]:
+    """Return what is said and drawn of a demonstration."""
     found, passive = made.identified, made.passive
     rows = comparison(made.truth, found)
     joints = [joint.name for joint in made.truth.joints]
     left = [_left_over(fit, passive) for fit in (made.without_friction, found)]
-    with plotting.style():
-        opening = summary(made.gap)
-    drawn = [opening, figures.known(rows, joints, found.level), figures.direction_of_motion(left[0], left[1], joints)]
-    data = _demo_data(made, rows, [_half_gap(parts) for parts in left], command)
+    drawn: figures.Figures = {
+        "summary": lambda: summary(made.gap),
+        "known": lambda: figures.known(rows, joints, found.level),
+        "directions": lambda: figures.direction_of_motion(left[0], left[1], joints),
+    }
+    return _demo_data(made, rows, [_half_gap(parts) for parts in left], command), drawn
+
+
+SHOWN = View(lambda made: _shown(made)[0], lambda made, _: _shown(made)[1])
+
+
+def _write(out: Path, made: Demonstration, command: str | None) -> list[Path]:
+    found, passive = made.identified, made.passive
+    data, shown = _shown(made, command)
+    drawn = figures.draw(shown)
     gap = write_gap(made.gap, gap_data(made.gap, command), out / "gap")
     identified = results.write_identified(found, plain.identified_data(found, command), out / "identified")
     moments = results.write_passive(passive, plain.passive_data(passive, command), out / "passive")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..anthropometry import literature_arm, segments_of
+from ..anthropometry import JOINTS, UNCERTAINTY, literature_arm, segments_of
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Subject, Tolerance, load_model
@@ -20,9 +20,6 @@ from .movement import Movement, movement_of
 
 THESIS_ROBOT = Robot(lengths=(0.45, 0.45), base=(1.05, -0.10))
 THESIS_CONTACT = Contact(stiffness=(10_000.0, 10_000.0), damping=(25.0, 25.0))
-JOINTS = ("shoulder", "elbow", "wrist")
-LITERATURE_UNCERTAINTY = 0.1
-"""Relative standard deviation of masses and first moments taken from the literature."""
 FAULTS = ("runaway", "frozen", "nan", "late", "force")
 
 
@@ -334,7 +331,7 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
     plain = tuple(Joint(name) for name in JOINTS[:count])
     return (
         Model(tuple(segments_of(true_parts, lengths)), joints or plain, segment_uncertainty=0.0, robot=robot, contact=contact),
-        Model(believed, plain, segment_uncertainty=LITERATURE_UNCERTAINTY, robot=robot, contact=contact),
+        Model(believed, plain, segment_uncertainty=UNCERTAINTY, robot=robot, contact=contact),
     )
 
 

@@ -9,15 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from .. import checks
-from ..anthropometry import SEGMENTS, Expected, literature_arm, segment_expectations
+from ..anthropometry import SEGMENTS, UNCERTAINTY, Expected, literature_model, segment_expectations
 from ..errors import BadInput, Text
 from ..io import files
-from ..model import Joint, Model, Segment, Subject
-
-JOINTS = ("shoulder", "elbow", "wrist")
-UNCERTAINTY = 0.10
-"""Relative standard deviation of masses, centres of mass and inertias from body mass and height: between people of one build, after de Leva
-(1996) and Zatsiorsky and Seluyanov (1983)."""
+from ..model import Model, Segment, Subject
 
 
 @dataclass(frozen=True)
@@ -111,10 +106,8 @@ def initialise(
         if (target / name).exists() and not replace:
             raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)
     expected = segment_expectations(body_mass, height, sex, lengths)
-    segments = tuple(e.segment() for e in expected)
-    if len(lengths) == len(SEGMENTS) - 1:
-        segments, _ = literature_arm(Subject(body_mass, height, sex), list(lengths))
-    model = Model(segments, tuple(Joint(name) for name in JOINTS[: len(segments)]), segment_uncertainty=UNCERTAINTY)
+    model = literature_model(Subject(body_mass, height, sex), lengths)
+    segments = model.segments
     for item in worn:
         model = model.with_mass(item.segment, item.mass, item.at)
     assumed = _assumed(segments, expected, lengths, worn)

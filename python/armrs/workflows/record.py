@@ -18,6 +18,7 @@ from ..io.markers import Markers, planar_motion
 from ..io.opensim import write_trc
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Effect, Model
+from ..tabular import Tabular, Tidy
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .movement import Movement
 from .simulate import DEFAULT_DT, Channel, Sensors, Simulated, driven, simulate
@@ -37,7 +38,7 @@ _POINTS = ("shoulder", "elbow", "wrist", "handle")
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class Recorded(Tabular):
     """What the virtual laboratory measured.
 
     Attributes
@@ -60,6 +61,16 @@ class Recorded:
     def stopped(self) -> list[dict[str, Any]]:
         """The trials that the supervisor stopped; they are not in the data set."""
         return [trial for trial in self.trials if trial["stop"] is not None]
+
+    def __repr__(self) -> str:
+        return f"Recorded({self.dataset!r}, {len(self.stopped)} stopped)"
+
+    def tidy(self) -> Tidy:
+        """Return the trials, one a row."""
+        columns: dict[str, list[Any]] = {name: [t[name] for t in self.trials] for name in ("configuration", "repeat", "seed")}
+        columns["tracking_error"] = [t["tracking_error_rad"] for t in self.trials]
+        columns["stopped"] = [None if t["stop"] is None else t["stop"]["reason"] for t in self.trials]
+        return Tidy(columns, {"tracking_error": "rad"})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with units in the names."""

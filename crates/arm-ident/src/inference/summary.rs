@@ -332,7 +332,7 @@ impl Certainty<'_> {
     }
 }
 
-/// The rest angle of a fitted spring; none for a spring without amplitude.
+/// The rest angle of a fitted spring; none for a spring whose amplitude may be zero, which rests anywhere.
 fn rest_angle(
     certainty: &Certainty<'_>,
     effect: &Effect<f64>,
@@ -344,7 +344,8 @@ fn rest_angle(
         return Ok(None);
     };
     let x = certainty.x;
-    if x[k] == 0.0 {
+    let [low, high] = certainty.unknown(k)?.interval;
+    if low <= 0.0 && high >= 0.0 {
         return Ok(None);
     }
     let parameter = &effect.kind.info().parameters[rest];

@@ -63,6 +63,33 @@ fn every_key_is_read_and_written() {
     assert!(text.starts_with("name = \"S1\"\nmodel = \"model.toml\"\nforce_on = \"robot\"\nsample_rate = 50.0\n\n[subject]\n"));
 }
 
+#[test]
+fn a_whole_subject_takes_the_place_of_a_model() {
+    let subject = DATASET.replace("model = \"model.toml\"\n", "").replace(
+        "sex = \"male\"",
+        "sex = \"male\"\nlengths_m = [0.322, 0.345]",
+    );
+    let data = Description::from_toml(&subject).unwrap();
+    assert_eq!(
+        (data.model.as_deref(), data.subject.lengths.len()),
+        (None, 2)
+    );
+    assert_eq!(Description::from_toml(&data.to_toml()).unwrap(), data);
+    let refused =
+        Description::from_toml(&DATASET.replace("model = \"model.toml\"\n", "")).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "model: found nothing, allowed the file of the model, or a [subject] with body_mass, height, sex and lengths_m \
+         (lengths_m is missing in [subject])"
+    );
+    let long = subject.replace("0.345", "345.0");
+    let refused = Description::from_toml(&long).unwrap_err().to_string();
+    assert!(
+        refused.starts_with("[subject], lengths_m, 2: found 345"),
+        "{refused}"
+    );
+}
+
 const BROKEN: &[(&str, &str, &str)] = &[
     (
         "force_on",
@@ -77,7 +104,7 @@ const BROKEN: &[(&str, &str, &str)] = &[
     (
         "height",
         "hight",
-        "[subject]: found unknown key 'hight', allowed body_mass, height, name, sex (nearest known: height)",
+        "[subject]: found unknown key 'hight', allowed body_mass, height, lengths_m, name, sex (nearest known: height)",
     ),
     (
         "force_bias_N",
@@ -87,7 +114,7 @@ const BROKEN: &[(&str, &str, &str)] = &[
     (
         "model = \"model.toml\"\n",
         "",
-        "model: found nothing, allowed key model is required",
+        "model: found nothing, allowed the file of the model, or a [subject] with body_mass, height, sex and lengths_m (lengths_m is missing in [subject])",
     ),
     (
         "\"robot\"",

@@ -119,6 +119,8 @@ value_class!(
 ///     [m]
 /// sex : {"male", "female"}, optional
 /// name : str, optional
+/// lengths_m : sequence of float, optional
+///     Measured lengths of the segments, the last one to the handle [m]; without them they are scaled with height.
 ///
 /// Raises
 /// ------
@@ -137,18 +139,20 @@ pub struct Subject(pub arm_model::Subject);
 #[pymethods]
 impl Subject {
     #[new]
-    #[pyo3(signature = (body_mass=None, height=None, sex=None, name=None))]
+    #[pyo3(signature = (body_mass=None, height=None, sex=None, name=None, lengths_m=None))]
     fn new(
         body_mass: Option<Any<'_, '_>>,
         height: Option<Any<'_, '_>>,
         sex: Option<Any<'_, '_>>,
         name: Option<Any<'_, '_>>,
+        lengths_m: Option<Any<'_, '_>>,
     ) -> PyResult<Self> {
         let given = [
             ("body_mass", body_mass),
             ("height", height),
             ("sex", sex),
             ("name", name),
+            ("lengths_m", lengths_m),
         ];
         built("", table(given))
     }
@@ -172,6 +176,12 @@ impl Subject {
     fn name(&self) -> Option<&str> {
         self.0.name.as_deref()
     }
+    /// Measured lengths of the segments [m]; None where they are scaled with height.
+    #[getter]
+    fn lengths_m<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyTuple>>> {
+        let known = Some(&self.0.lengths).filter(|lengths| !lengths.is_empty());
+        known.map(|lengths| PyTuple::new(py, lengths)).transpose()
+    }
 }
 
 value_class!(
@@ -180,7 +190,8 @@ value_class!(
         ("body_mass", "kg"),
         ("height", "m"),
         ("sex", ""),
-        ("name", "")
+        ("name", ""),
+        ("lengths_m", "m")
     ]
 );
 
@@ -330,8 +341,8 @@ value_class!(
 /// Parameters
 /// ----------
 /// name : str
-/// model : str
-///     The file of the model, below the folder of the data set.
+/// model : str or None
+///     The file of the model, below the folder of the data set; None for that of the subject by the literature.
 /// trials : sequence of TrialEntry
 /// force_on : {"robot", "arm"}, optional
 ///     What the forces act on.
@@ -429,10 +440,10 @@ impl Description {
     fn name(&self) -> Option<&str> {
         self.0.name.as_deref()
     }
-    /// The file of the model, below the folder of the data set.
+    /// The file of the model, below the folder of the data set; None for that of the subject by the literature.
     #[getter]
-    fn model(&self) -> &str {
-        &self.0.model
+    fn model(&self) -> Option<&str> {
+        self.0.model.as_deref()
     }
     /// The trials, in the order of the file.
     #[getter]

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import BadInput, Text
-from . import matlab, motion, programs, text, workbook
+from . import matlab, motion, numpy_files, programs, text, workbook
+from .table import NoTable as NoTable
 from .table import RawColumn as RawColumn
 from .table import RawTable as RawTable
 
@@ -14,12 +15,20 @@ _READERS: dict[tuple[str, ...], Callable[[Path], RawTable | list[RawTable]]] = {
     text.SUFFIXES: programs.read_text,
     workbook.SUFFIXES: workbook.read_workbook,
     matlab.SUFFIXES: matlab.read_matlab,
+    numpy_files.SUFFIXES: numpy_files.read_archive,
     motion.PARQUET_SUFFIXES: motion.read_parquet,
     motion.MOTION_SUFFIXES: motion.read_motion_table,
     motion.C3D_SUFFIXES: motion.read_c3d_table,
     motion.TRC_SUFFIXES: motion.read_trc_table,
 }
 """By suffix. A new format is one module and one line here."""
+
+_INSTEAD = {
+    (".ods", ".xlsb", ".numbers"): "save it as .xlsx or .csv",
+    (".gz", ".zip", ".bz2", ".xz", ".7z"): "unpack it first",
+    (".tdms", ".acq", ".adicht", ".bag", ".mcap", ".h5", ".hdf5", ".tdf", ".slx"): "export it as text, .mat or C3D from its program",
+}
+"""What to do with files of other formats."""
 
 SUFFIXES = tuple(suffix for suffixes in _READERS for suffix in suffixes)
 
@@ -30,8 +39,9 @@ def read_raw(path: Path) -> list[RawTable]:
     Parameters
     ----------
     path : Path
-        By its suffix: text (`.csv`, `.txt`, `.tsv`, `.dat`, `.asc`, `.log`), also as Vicon, Qualisys, OptiTrack and Biodex export it;
-        Excel, MATLAB, Parquet, OpenSim motion (`.mot`, `.sto`), TRC or C3D.
+        By its suffix: text (`.csv`, `.txt`, `.tsv`, `.dat`, `.asc`, `.log`, `.lvm`, `.xls` between tabs), also as Vicon,
+        Qualisys, OptiTrack, LabChart and Biodex export it;
+        Excel, MATLAB, NumPy, Parquet, OpenSim motion (`.mot`, `.sto`), TRC or C3D.
 
     Raises
     ------
@@ -49,4 +59,5 @@ def read_raw(path: Path) -> list[RawTable]:
             except (OSError, ValueError) as error:
                 raise BadInput("file", Text(str(error).splitlines()[0]), "a file that can be read", file=path) from None
             return found if isinstance(found, list) else [found]
-    raise BadInput("file", Text(f"suffix {path.suffix!r}"), f"one of {', '.join(SUFFIXES)}", file=path)
+    hint = next((step for suffixes, step in _INSTEAD.items() if path.suffix.lower() in suffixes), None)
+    raise BadInput("file", Text(f"suffix {path.suffix!r}"), f"one of {', '.join(SUFFIXES)}", file=path, hint=hint)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import biodex, delsys, motive, qualisys, text, vicon
+from . import biodex, delsys, labchart, motive, qualisys, text, vicon
 from .table import RawTable
 
-_PROGRAMS = (vicon, qualisys, motive, biodex, delsys)
+_PROGRAMS = (vicon, qualisys, motive, biodex, labchart, delsys)
 """Each tells by the first lines whether it `recognises` a text, and `read`s it. A new one is one module and one name here."""
 
 

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from ...errors import BadInput
 from ..markers import Markers
 from .units import UNITS
 
 _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>]\s*$")
 _AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
+_SAYS_LITTLE = re.compile(r"[xyzlr]|\d+", flags=re.IGNORECASE)
+"""Names that say little by themselves."""
 _AFTER_LAST = re.compile(r"^(?P<name>.*[^_\s/])[_\s/](?P<unit>[^_\s]+)$")
+
+
+class NoTable(BadInput):
+    """A file that can be read and holds no table of numbers, such as notes."""
+
+    def within(self, *, file: str | os.PathLike[str] | None = None, place: str | None = None) -> NoTable:
+        """Return this error with the file, or with the table that holds the place."""
+        seen = super().within(file=file, place=place)
+        return NoTable(seen.place, seen.found, seen.allowed, file=seen.file, hint=seen.hint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,3 +92,26 @@ def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
         if (match := pattern.match(text)) and match["unit"].lower() in UNITS:
             return RawColumn(name, match["name"], match["unit"], values)
     return RawColumn(name, text, "", values)
+
+
+def grouped(groups: Sequence[str], names: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return names and units of columns that stand in groups: a word above several of them, as `Force [N]` above `y` and `z`.
+
+    A name that says little by itself, or stands there twice, takes the word of its group before it, and its unit.
+
+    >>> grouped(["", "Force [N]", ""], ["t", "y", "z"], ["s", "", ""])
+    (['t', 'Force y', 'Force z'], ['s', 'N', 'N'])
+    """
+    names, units = list(names), list(units)
+    filled = sum(map(bool, groups))
+    if not filled or filled >= sum(map(bool, names)) or (filled == 1 and groups[0]):  # the last is a title
+        return names, units
+    twice = [names.count(name) > 1 for name in names]
+    word = ""
+    for k, name in enumerate(list(names)):
+        word = groups[k] if k < len(groups) and groups[k] else word
+        if not word or not name or not (_SAYS_LITTLE.fullmatch(name) or twice[k]):
+            continue
+        own = column(word, np.empty(0))
+        names[k], units[k] = f"{own.label} {name}", units[k] or own.unit
+    return names, units

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import codecs
+import csv as csv_cells
 import io
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...errors import BadInput, Text
-from .table import RawColumn, RawTable, column
+from .cells import number, seconds
+from .table import NoTable, RawColumn, RawTable, column, grouped
 from .units import unit
 
-SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".xls")
+_WORKBOOK = b"\xd0\xcf\x11\xe0"
+"""How a workbook of the old binary format begins; programs also give this suffix to text between tabs."""
 _COMMENT = ("#", "%", "//", '"#')
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", " ": "blanks"}
 _PROBED = 400
@@ -24,7 +30,13 @@ _FEWEST = 3
 _TWO_PARTS = ("ZeitInSec", "ZeitInNanoSec")
 """Columns that hold the time of KUKA's DataRecorder."""
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "#NV", "-", "--", "null", "None", "inf", "-inf"]
-_NUMBER = {".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"), ",": re.compile(r"[-+]?(\d+,?\d*|,\d+)([eE][-+]?\d+)?")}
+_NUMBER = {
+    ".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+|[1-9]\d{0,2}(,\d{3})+\.\d*)([eE][-+]?\d+)?"),
+    ",": re.compile(r"[-+]?(\d+,?\d*|,\d+|[1-9]\d{0,2}(\.\d{3})+,\d*)([eE][-+]?\d+)?"),
+}
+"""Numbers by their decimal mark; thousands are recognised as such where a decimal mark follows."""
+_BAD_CELLS = 0.1
+"""A column with more cells than this that are no numbers holds something else."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +53,10 @@ class _Layout:
 
 def decoded_lines(path: Path) -> tuple[list[str], str]:
     """Return the lines of a text that are not blank, and the name of its encoding."""
-    content, encoding = _decoded(path.read_bytes())
+    raw = path.read_bytes()
+    if raw.startswith(_WORKBOOK):
+        raise BadInput("file", Text("a workbook of the old binary format"), "an Excel workbook (.xlsx), or text", hint="save it as .xlsx")
+    content, encoding = _decoded(raw)
     # Form feeds and other separators of str.splitlines may stand in a remark.
     return [line for line in re.split(r"\r\n|\r|\n", content) if line.strip()], encoding
 
@@ -62,10 +77,10 @@ def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
     lines = [line for index, line in enumerate(lines) if not (index and _is_comment(line))]
     layout = _layout(lines[:_PROBED])
     if layout is None:
-        raise BadInput("file", Text("no block of rows with at least two numbers each"), "a table with one row a sample")
+        raise NoTable("file", Text("no block of rows with at least two numbers each"), "a table with one row a sample")
     names, units = _header(lines, layout)
-    columns, dropped = _columns(lines[layout.first :], names, units, layout)
     notes = [f"text in {encoding}, cells between {_SEPARATORS[layout.separator]}, decimal {'comma' if layout.decimal == ',' else 'point'}"]
+    columns, dropped = _columns(lines[layout.first :], names, units, layout, notes)
     if dropped:
         notes.append(f"left out, since they hold no numbers: {', '.join(dropped)}")
     return RawTable(path, path.stem, tuple(_one_clock(columns, notes)), tuple(notes))
@@ -92,6 +107,9 @@ def _decoded(raw: bytes) -> tuple[str, str]:
                 return raw.decode(encoding), name
             except UnicodeDecodeError:
                 raise BadInput("file", Text(f"a mark of {name}, and bytes that are not"), "text in one encoding") from None
+    for k, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # text whose every second byte is zero
+        if len(raw) > 8 and raw[k:400:2].count(0) > 0.9 * len(raw[k:400:2]):
+            return raw.decode(encoding, errors="replace"), "UTF-16"
     try:
         content, name = raw.decode("utf-8"), "UTF-8"
     except UnicodeDecodeError:
@@ -109,6 +127,8 @@ def split(line: str, separator: str) -> list[str]:
     """Return the cells of a line without blanks and quotes around them."""
     if separator == " ":
         return line.split()
+    if '"' in line:
+        return [cell.strip() for cell in next(csv_cells.reader([line], delimiter=separator))]
     return [cell.strip().strip('"').strip() for cell in line.split(separator)]
 
 
@@ -121,7 +141,7 @@ def _layout(lines: list[str]) -> _Layout | None:
     found = []
     for separator in _SEPARATORS:
         for decimal in ",.":
-            if separator == decimal:
+            if separator == decimal and not any('"' in line for line in lines):
                 continue
             block = _block(lines, separator, decimal)
             if block is not None:
@@ -151,13 +171,15 @@ def _block(lines: list[str], separator: str, decimal: str) -> _Layout | None:
 def _header(lines: list[str], layout: _Layout) -> tuple[list[str], list[str]]:
     """Return names and units of the columns from the lines above the numbers."""
     above = [split(line.lstrip("#%/ "), layout.separator) for line in lines[: layout.first]]
-    rows = [row for row in above if len(row) == layout.cells and any(row)]
+    # The name of a column of remarks may stand above rows that have none.
+    rows = [row[: layout.cells] for row in above if len(row) in (layout.cells, layout.cells + 1) and any(row)]
     units = [""] * layout.cells
     if len(rows) > 1 and _is_units(rows[-1]):
         units = [cell.strip("[]() ") for cell in rows.pop()]
     elif len(rows) > 1 and rows[-1] == rows[-2]:
         rows.pop()
     names = rows[-1] if rows else [""] * layout.cells
+    names, units = grouped(rows[-2] if len(rows) > 1 else [], names, units)
     return [name or f"column {k}" for k, name in enumerate(names, start=1)], units
 
 
@@ -166,7 +188,7 @@ def _is_units(row: list[str]) -> bool:
     return bool(cells) and sum(unit(cell) is not None for cell in cells) >= 0.5 * len(cells)
 
 
-def _columns(lines: list[str], names: list[str], units: list[str], layout: _Layout) -> tuple[list[RawColumn], list[str]]:
+def _columns(lines: list[str], names: list[str], units: list[str], layout: _Layout, notes: list[str]) -> tuple[list[RawColumn], list[str]]:
     import pyarrow as pa
     from pyarrow import csv
 
@@ -184,18 +206,49 @@ def _columns(lines: list[str], names: list[str], units: list[str], layout: _Layo
         io.BytesIO("\n".join(lines).encode("utf-8")),
         read_options=csv.ReadOptions(column_names=places, use_threads=False),
         parse_options=csv.ParseOptions(delimiter=separator, invalid_row_handler=odd),
-        convert_options=csv.ConvertOptions(
-            decimal_point=layout.decimal, null_values=_MISSING, strings_can_be_null=True, quoted_strings_can_be_null=True
-        ),
+        convert_options=csv.ConvertOptions(column_types={place: pa.string() for place in places}),
     )
     if len(skipped) > 0.01 * len(lines):
         found = Text(f"{len(skipped)} of {len(lines)} rows with another number of cells")
         raise BadInput("file", found, f"{len(names)} cells in every row")
     columns, dropped = [], []
     for place, name, stated in zip(places, names, units, strict=True):
-        values = data.column(place)
-        if pa.types.is_floating(values.type) or pa.types.is_integer(values.type):
-            columns.append(column(name, np.ascontiguousarray(values.to_numpy(), dtype=np.float64), stated))
-        elif not pa.types.is_null(values.type):
+        values, unit_of_clock = _numbers(data.column(place), layout.decimal)
+        if values is not None and (odd_cells := _odd_cells(data.column(place), values)):
+            notes.append(f"{name}: cells without a number, which count as missing: {odd_cells}")
+        if values is not None:
+            columns.append(column(name, values, stated or unit_of_clock))
+        elif any(cell not in _MISSING for cell in data.column(place).to_pylist()):
             dropped.append(name)
     return columns, dropped
+
+
+def _numbers(cells: Any, decimal: str) -> tuple[np.ndarray | None, str]:
+    """Return the numbers in the cells of a column, and the unit of one of times of day; None for a column of something else."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    plain = pc.utf8_trim_whitespace(cells)
+    known = pc.if_else(pc.is_in(plain, pa.array(_MISSING)), None, plain)
+    dotted = pc.replace_substring(known, ",", ".") if decimal == "," else known
+    try:
+        values = pc.cast(dotted, pa.float64()).to_numpy()
+    except pa.ArrowInvalid:
+        return _odd_numbers(known.to_pylist(), decimal)
+    return (None if np.isnan(values).all() else np.ascontiguousarray(values)), ""
+
+
+def _odd_cells(cells: Any, values: np.ndarray) -> int:
+    """Return how many cells hold something that is neither a number nor a mark of a missing value."""
+    return sum(cells[int(k)].as_py().strip() not in _MISSING for k in np.flatnonzero(np.isnan(values)))
+
+
+def _odd_numbers(cells: list[str | None], decimal: str) -> tuple[np.ndarray | None, str]:
+    """Return numbers with marks for thousands and cells of errors among them, or times of day in seconds."""
+    other = "." if decimal == "," else ","
+    values = [number(cell.replace(other, "").replace(decimal, ".")) if cell else math.nan for cell in cells]
+    wrong = sum(value is None for value in values)
+    if wrong <= _BAD_CELLS * len(cells):
+        return np.array([math.nan if value is None else value for value in values]), ""
+    times = seconds(cells)
+    return times, "" if times is None else "s"

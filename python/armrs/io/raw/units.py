@@ -26,8 +26,8 @@ def _spelled(dimension: str, units: dict[str, float]) -> dict[str, Unit]:
 
 UNITS: dict[str, Unit] = {
     **_spelled("time", {"s sec secs second seconds sek sekunden": 1.0, "min": 60.0}),
-    **_spelled("time", {"ms msec millisec milliseconds millisekunden": 1e-3, "µs us μs usec": 1e-6}),
-    **_spelled("angle", {"rad radian radians": 1.0, "deg ° degree degrees grad": _DEGREE, "mrad": 1e-3}),
+    **_spelled("time", {"ms msec millisec milliseconds millisekunden": 1e-3, "µs us μs usec": 1e-6, "ns nsec nanoseconds": 1e-9}),
+    **_spelled("angle", {"rad radian radians": 1.0, "deg ° degree degrees grad grados": _DEGREE, "mrad": 1e-3}),
     **_spelled("speed", {"rad/s rad_s rads": 1.0, "deg/s °/s deg_s grad/s deg/sec": _DEGREE}),
     **_spelled("force", {"N newton newtons": 1.0, "kN": 1e3, "mN": 1e-3, "daN": 10.0, "kgf kp": _KILOGRAM_FORCE, "lbf": _POUND_FORCE}),
     **_spelled("moment", {"Nm N·m N*m N.m N-m Nmeter": 1.0, "kNm": 1e3, "Nmm N·mm N.mm mm.N": 1e-3, "Ncm N·cm": 1e-2}),

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...errors import ArmrsError, BadInput, Text
-from .table import RawTable, column
+from .table import NoTable, RawTable, column, grouped
 from .units import unit
 
 SUFFIXES = (".xlsx", ".xlsm")
 _FEWEST = 3
+_FIRST_DAY = datetime.datetime(2000, 1, 1)
 
 
 def read_workbook(path: Path) -> list[RawTable]:
@@ -38,7 +39,7 @@ def read_workbook(path: Path) -> list[RawTable]:
         raise BadInput("file", Text(f"no readable workbook ({error})"), "an Excel workbook (.xlsx)") from None
     tables = {title: table for title, rows in sheets.items() if (table := _table(path, rows)) is not None}
     if not tables:
-        raise BadInput("file", Text(f"no table of numbers in {', '.join(sheets)}"), "a sheet with one row a sample")
+        raise NoTable("file", Text(f"no table of numbers in {', '.join(sheets)}"), "a sheet with one row a sample")
     left = [repr(title) for title in sheets if title not in tables]
     said = f"{'sheets' if len(tables) > 1 else 'sheet'} {', '.join(map(repr, tables))}" + (
         f"; no table in {', '.join(left)}" if left else ""
@@ -54,18 +55,23 @@ def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
     if end - start < _FEWEST:
         return None
     width = max(len(row) for row in rows[start:end])
-    above = [row for row in rows[:start] if sum(isinstance(cell, str) and bool(cell.strip()) for cell in row) >= 2]
+    above = [row for row in rows[:start] if _named(row)]
+    above = above[next((k for k, row in enumerate(above) if _named(row) >= 2), len(above)) :]
     units = [""] * width
     if len(above) > 1 and _is_units(above[-1]):
         units = _words(above.pop(), width)
     names = _words(above[-1], width) if above else [""] * width
+    names, units = grouped(_words(above[-2], width) if len(above) > 1 else [], names, units)
     columns, dropped = [], []
     for k, name in enumerate(names):
         cells = [row[k] if k < len(row) else None for row in rows[start:end]]
         values = np.array([_number(cell) for cell in cells])
         label = name or f"column {k + 1}"
         if np.isfinite(values).any():
-            columns.append(column(label, values, units[k].strip("[]() ")))
+            dated = any(isinstance(cell, (datetime.datetime, datetime.time, datetime.timedelta)) for cell in cells)
+            # Beside the seconds since a first day a float64 keeps 0.1 µs: they are counted from the first row.
+            values = np.round(values - values[np.isfinite(values)][0], 6) if dated else values
+            columns.append(column(label, values, units[k].strip("[]() ") or ("s" if dated else "")))
         elif any(cell is not None for cell in cells):
             dropped.append(label)
     notes = [f"left out, since they hold no numbers: {', '.join(dropped)}"] if dropped else []
@@ -84,6 +90,11 @@ def _words(row: list[Any], width: int) -> list[str]:
     return [str(row[k]).strip() if k < len(row) and row[k] is not None else "" for k in range(width)]
 
 
+def _named(row: list[Any]) -> int:
+    """Return the number of words in a row."""
+    return sum(isinstance(cell, str) and bool(cell.strip()) for cell in row)
+
+
 def _is_units(row: list[Any]) -> bool:
     cells = [str(cell).strip("[]() ") for cell in row if cell is not None and str(cell).strip("[]() ")]
     return bool(cells) and sum(unit(cell) is not None for cell in cells) >= 0.5 * len(cells)
@@ -94,6 +105,10 @@ def _number(cell: Any) -> float:
         return np.nan
     if isinstance(cell, (int, float)):
         return float(cell)
+    if isinstance(cell, datetime.datetime):
+        return (cell - _FIRST_DAY).total_seconds()
+    if isinstance(cell, datetime.timedelta):
+        return cell.total_seconds()
     if isinstance(cell, datetime.time):
         return 3600.0 * cell.hour + 60.0 * cell.minute + cell.second + 1e-6 * cell.microsecond
     if isinstance(cell, str):

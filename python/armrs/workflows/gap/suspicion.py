@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,19 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
     BadInput
         For channels that never change, and trials that are copies.
     """
-    lines = _without_the_robot(dataset, led)
+    return [line for test in tests() for line in test(dataset, led)]
+
+
+def tests() -> tuple[Callable[[Dataset, bool], list[str]], ...]:
+    """Return the tests of `examine`, each by itself: of a data set and whether a robot leads the arm, lines or a refusal."""
+    return (
+        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _still_joints, _moving_starts, unresolved, _uneven_repeats,
+        _saturated,
+    )  # fmt: skip
+
+
+def _few_trials(dataset: Dataset, led: bool) -> list[str]:
+    lines = []
     fit = dataset.fit_trials
     if len(fit) == 1:
         lines.append("one fit trial only: what is noise and what is missing cannot be told apart by repeats")
@@ -50,6 +62,10 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
         lines.append("no movement was repeated: what is noise and what is missing cannot be told apart; names after the first are guesses")
     if not dataset.test_trials:
         lines.append('no trial with role = "test": the gap cannot be measured on data that were kept apart')
+    return lines
+
+
+def _dead_sensors(dataset: Dataset, led: bool) -> list[str]:
     refuse_implausible(dataset)
     for trial in dataset.trials:
         for name, values in _channels(trial, led):
@@ -57,16 +73,12 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
             if level:  # zero is an arm that swings freely
                 found = Text(f"{level:g} N m in every sample")
                 raise BadInput(f"column {name}", found, "a torque that changes with the movement", file=trial.file, hint="a dead sensor?")
-    _refuse_copies(dataset.trials)
+    return []
+
+
+def _wrong_setup(dataset: Dataset, led: bool) -> list[str]:
     refuse_wrong_setup(dataset)
-    return (
-        lines
-        + _still_joints(fit, led)
-        + _moving_starts(dataset.trials, led)
-        + unresolved(dataset, led)
-        + _uneven_repeats(fit)
-        + _saturated(dataset, led)
-    )
+    return []
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
@@ -83,7 +95,7 @@ def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
     ]
 
 
-def _still_joints(fit: Sequence[Trial], led: bool) -> list[str]:
+def _still_joints(dataset: Dataset, led: bool) -> list[str]:
     """Return which joints hardly move, but for noise and one trial in which a sensor may slip."""
     if not led:
         return []
@@ -93,7 +105,7 @@ def _still_joints(fit: Sequence[Trial], led: bool) -> list[str]:
         means = np.array([np.convolve(q, np.full(window, 1.0 / window), "valid") for q in trial.q.T])
         return np.asarray(np.nanmax(means, axis=1) - np.nanmin(means, axis=1))
 
-    each = np.sort([ranges(trial) for trial in fit], axis=0)
+    each = np.sort([ranges(trial) for trial in dataset.fit_trials], axis=0)
     moved = each[-min(2, len(each))]
     return [
         f"joint {j + 1} moves by {reach:.2g} rad in the fit trials: what holds it cannot be told; where the model states no law for it the "
@@ -103,10 +115,10 @@ def _still_joints(fit: Sequence[Trial], led: bool) -> list[str]:
     ]
 
 
-def _refuse_copies(trials: Sequence[Trial]) -> None:
+def _copies(dataset: Dataset, led: bool) -> list[str]:
     """Refuse a trial whose samples are those of another, or of its start: such repeats tell no noise, and such a test proves nothing."""
     known: dict[bytes, list[Trial]] = {}
-    for trial in trials:
+    for trial in dataset.trials:
         # Comparing those alone that start alike is cheap for many trials and long ones.
         alike = known.setdefault(trial.q[:_FIRST].tobytes(), [])
         for other in alike:
@@ -116,6 +128,7 @@ def _refuse_copies(trials: Sequence[Trial]) -> None:
                 found, allowed = Text(f"those of {first.file}, one by one"), "a measurement of its own"
                 raise BadInput("samples", found, allowed, file=copy.file, hint=f"{why}; simulated repeats need noise")
         alike.append(trial)
+    return []
 
 
 def _same_samples(a: Trial, b: Trial) -> bool:
@@ -131,10 +144,10 @@ def _same_samples(a: Trial, b: Trial) -> bool:
     return any(np.isfinite(column).any() and constant(column) is None for x, _ in pairs for column in x.T)
 
 
-def _moving_starts(trials: Sequence[Trial], led: bool) -> list[str]:
+def _moving_starts(dataset: Dataset, led: bool) -> list[str]:
     """Return the trials that begin while the robot moves: a simulated run starts at rest."""
     fastest: dict[str, float] = {}
-    for trial in trials if led else ():
+    for trial in dataset.trials if led else ():
         step = max(1, int(np.ceil(_STARTING / np.median(np.diff(trial.t)) - 1e-6)))
         start = trial.robot_q[: 3 * step + 1 : step] if trial.robot_q is not None else np.empty((0, 2))
         if len(start) < 4 or not np.isfinite(start).all():
@@ -150,9 +163,10 @@ def _moving_starts(trials: Sequence[Trial], led: bool) -> list[str]:
     return [f"the robot moves when these begin: {each}; runs are simulated from rest, so begin them at one, or what is left says little"]
 
 
-def _uneven_repeats(trials: Sequence[Trial]) -> list[str]:
+def _uneven_repeats(dataset: Dataset, led: bool) -> list[str]:
     """Return the movements whose repeats have no common samples, since a gap of one of them was too long to be bridged."""
     lines = []
+    trials = dataset.fit_trials
     for name in dict.fromkeys(t.configuration for t in trials):
         own = [t for t in trials if t.configuration == name]
         broken = [t for t in own if not t.valid.all()]
@@ -166,7 +180,7 @@ def _saturated(dataset: Dataset, led: bool) -> list[str]:
     """Return the channels that are cut off: at the extreme of all trials, for long, and hardly ever next to it."""
     together: dict[str, list[tuple[str, np.ndarray]]] = {}
     for trial in dataset.trials:
-        for name, values in _channels(trial, led):
+        for name, values in _efforts(trial):
             together.setdefault(name, []).append((trial.file, values[np.isfinite(values)]))
     lines = []
     for name, columns in together.items():
@@ -189,6 +203,11 @@ def _longest(flags: np.ndarray) -> int:
         run = run + 1 if flag else 0
         best = max(best, run)
     return best
+
+
+def _efforts(trial: Trial) -> list[tuple[str, np.ndarray]]:
+    """Return the channels of forces and torques that a trial has."""
+    return [] if trial.force_on_arm is None and trial.tau is None else _channels(trial, trial.force_on_arm is not None)
 
 
 def _channels(trial: Any, led: bool) -> list[tuple[str, np.ndarray]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,10 @@ _ALIKE = 3.0
 """Shifts that leave at most this many times as much unexplained as the best are compared by the balance of the arm."""
 _MOST = 6
 """As many are compared at most."""
+_LATEST = 0.6
+"""Lateness up to which forces are looked for [s]."""
+_AS_GOOD = 1.2
+"""The clock of the file is kept where it leaves at most so many times what the best shift does."""
 _EXPLAINED = 0.6
 """Least share of the force's variance that the posture must explain: less is no match."""
 
@@ -81,7 +86,26 @@ def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) 
     return sorted((found[k] for k in peaks), key=lambda shift: -shift.explained)[:_MOST]
 
 
-def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray, near: float) -> float:
+def lateness(model: Model, t: np.ndarray, q: np.ndarray, force_on_arm: np.ndarray) -> tuple[float, float]:
+    """Return how late forces are against angles of one recording [s], and how many times less is then unexplained.
+
+    Parameters
+    ----------
+    model : Model
+    t, q, force_on_arm
+        As in `refine`, on one clock.
+    """
+    good = np.isfinite(q).all(axis=1) & np.isfinite(force_on_arm).all(axis=1)
+    unexplained = _fitted(model, t[good], q[good], t[good], force_on_arm[good])
+    best = 0.0
+    for width, step in ((_LATEST, _COARSE), (_COARSE, 0.25 * _COARSE)):
+        best = min((float(shift) for shift in best + np.arange(-width, width + 0.5 * step, step)), key=unexplained)
+    return -best, unexplained(0.0) / max(unexplained(best), 1e-300)
+
+
+def refine(
+    model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray, near: float, *, one_file: bool = False
+) -> float:
     """Return the shift near `near` [s] at which the equation of motion explains the torques of the contact force best.
 
     Parameters
@@ -94,7 +118,22 @@ def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, forc
         As in `align`.
     near : float
         What `align` found.
+    one_file : bool
+        Whether both stand in one file: their clocks are the same where that explains the torques about as well.
     """
+    unexplained = _fitted(model, t, q, force_t, force_on_arm)
+    shifts = near + np.arange(-_NEAR, _NEAR + _FINE, _FINE)
+    left = np.array([unexplained(float(shift)) for shift in shifts])
+    if one_file and abs(near) <= _NEAR and unexplained(0.0) <= _AS_GOOD * left.min():
+        return 0.0
+    k = int(np.clip(np.argmin(left), 1, len(left) - 2))
+    below, at, above = left[k - 1 : k + 2]
+    curvature = below - 2.0 * at + above
+    return float(shifts[k] + (0.5 * _FINE * (below - above) / curvature if curvature > 0.0 else 0.0))
+
+
+def _fitted(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray) -> Callable[[float], float]:
+    """Return what the equation of motion leaves unexplained, by the shift of the forces' clock; arguments as in `refine`."""
     good, seen = np.isfinite(q).all(axis=1), np.isfinite(force_on_arm).all(axis=1)
     grid = np.arange(t[good][0], t[good][-1], 1.0 / _RATE)
     angles = _smoothed(np.column_stack([np.interp(grid, t[good], column) for column in q[good].T]))
@@ -117,12 +156,7 @@ def refine(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, forc
         solved = np.linalg.lstsq(matrix, torque.ravel(), rcond=None)[0]
         return float(np.mean((torque.ravel() - matrix @ solved) ** 2))
 
-    shifts = near + np.arange(-_NEAR, _NEAR + _FINE, _FINE)
-    left = np.array([unexplained(float(shift)) for shift in shifts])
-    k = int(np.clip(np.argmin(left), 1, len(left) - 2))
-    below, at, above = left[k - 1 : k + 2]
-    curvature = below - 2.0 * at + above
-    return float(shifts[k] + (0.5 * _FINE * (below - above) / curvature if curvature > 0.0 else 0.0))
+    return unexplained
 
 
 def _smoothed(angles: np.ndarray) -> np.ndarray:

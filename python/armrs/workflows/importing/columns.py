@@ -13,13 +13,14 @@ from ...io.raw import RawColumn, RawTable
 from ...io.raw.units import unit
 from .recipe import Channel
 
-_TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed"}
+_TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed", "xvalue"}
 _JOINTS = (
     {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral"},
     {"elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec"},
     {"wrist", "handgelenk", "poignet", "muneca", "polso", "zapestje"},
 )
 _ROBOT = {"robot", "roboter", "rob", "manipulator", "actuator"}
+_HANDLE = _ROBOT | {"handle", "griff", "hand", "tcp", "tip", "ee", "effector", "endeffector", "flange", "flansch", "poignee", "manico"}
 _SPEED = {"velocity", "speed", "geschwindigkeit", "vitesse", "omega", "vel", "dq", "qd", "velocidad"}
 _ACCELERATION = {"acceleration", "beschleunigung", "accel", "acc", "ddq", "qdd"}
 _TORQUE = {"torque", "moment", "drehmoment", "tau", "couple", "trq"}
@@ -27,18 +28,20 @@ _FORCE = {"force", "kraft", "f", "forza", "fuerza", "sila"}
 _ANGLE = {"angle", "winkel", "theta", "phi", "q", "joint", "gelenk", "flexion", "ang", "position", "pos", "j"}
 _AXES = {"x": "x", "y": "y", "z": "z", "horizontal": "y", "forward": "y", "vertical": "z", "vertikal": "z", "up": "z"}
 _MUSCLES = {"biceps", "triceps", "brachialis", "brachioradialis", "deltoid", "deltoideus", "pectoralis", "trapezius"}
-_CANONICAL = re.compile(r"(qr|dq|tau|q)(\d)|f([xyz])|m([xyz])")
-_DIMENSION = {"t": "time", "q": "angle", "qr": "angle", "dq": "speed", "tau": "moment", "F": "force", "Mx": "moment"}
+_CANONICAL = re.compile(r"(qr|dq|tau|q)(\d)|f([xyz])|m([xyz])|p([xyz])")
+_DIMENSION = {"t": "time", "q": "angle", "qr": "angle", "dq": "speed", "tau": "moment", "F": "force", "Mx": "moment", "P": "length"}
 _DEGREES_FROM = 7.0
 """An angle whose unit is not stated and that exceeds this [rad] is in degrees: no joint turns by more than a turn."""
 _RATES = (4.0, 20000.0)
 """Sample rates that recordings have [Hz]."""
 _DEFAULT_UNIT = {"angle": "rad", "speed": "rad/s", "force": "N", "moment": "Nm"}
+_MILLIMETRES_FROM = 5.0
+"""A position whose unit is not stated and that exceeds this [m] is in millimetres: no arm reaches farther."""
 
 
 def dimension_of(symbol: str) -> str:
-    """Return what a symbol measures: `time`, `angle`, `speed`, `force`, `moment`, or nothing for EMG."""
-    stem = symbol[:1] if symbol[:1] in ("F", "t") and not symbol.startswith("tau") else symbol.rstrip("0123456789")
+    """Return what a symbol measures: `time`, `angle`, `speed`, `force`, `moment`, `length`, or nothing for EMG."""
+    stem = symbol[:1] if symbol[:1] in ("F", "P", "t") and not symbol.startswith("tau") else symbol.rstrip("0123456789")
     return _DIMENSION.get(stem, "")
 
 
@@ -67,7 +70,7 @@ def symbol_of(column: RawColumn) -> str | None:
     if not tokens:
         return None
     joined = "".join(tokens)
-    if dimension in (None, "time") and (joined in _TIME or tokens[0] in _TIME):
+    if dimension in (None, "time") and (joined in _TIME or tokens[0] in _TIME or tokens[0].endswith("timestamp")):
         return "t"
     if tokens[0].startswith("emg") or _mentions(tokens, _MUSCLES) or dimension == "voltage":
         return "emg_" + "_".join(token for token in tokens if token != "emg") if len(tokens) > 1 or tokens[0] != "emg" else "emg_1"
@@ -76,12 +79,14 @@ def symbol_of(column: RawColumn) -> str | None:
             return f"F{match[3]}"
         if match[4]:
             return f"M{match[4]}"
+        if match[5]:
+            return f"P{match[5]}"
         return f"{match[1]}{match[2]}"
     if _mentions(tokens, _ACCELERATION):
         return None
     if any(token.startswith("cart") for token in tokens):  # of a robot's flange, as KUKA names them: cartForce1_X, cartTorque1_TauX
         return _force(tokens, dimension)
-    return _force(tokens, dimension) or _joint(tokens, dimension)
+    return _force(tokens, dimension) or _position(tokens, dimension) or _joint(tokens, dimension)
 
 
 def _force(tokens: Sequence[str], dimension: str | None) -> str | None:
@@ -93,6 +98,13 @@ def _force(tokens: Sequence[str], dimension: str | None) -> str | None:
     if is_force and axis:
         return f"F{axis}"
     return None
+
+
+def _position(tokens: Sequence[str], dimension: str | None) -> str | None:
+    """Return the symbol of a position of the handle: a length along an axis of a robot or its handle, or of nothing else."""
+    axis = next((_AXES[token] for token in reversed(tokens) if token in _AXES), None)
+    mine = set(tokens) <= {*_AXES, "pos", "position"} or _mentions(tokens, _HANDLE)
+    return f"P{axis}" if axis and dimension in (None, "length") and mine and not _mentions(tokens, _SPEED | _TORQUE) else None
 
 
 def _joint(tokens: Sequence[str], dimension: str | None) -> str | None:
@@ -119,12 +131,12 @@ def parse_map(text: str) -> dict[str, tuple[str, int]]:
         For a part that is not `SYMBOL=COLUMN`.
     """
     found: dict[str, tuple[str, int]] = {}
-    for part in re.split(r",(?=\s*(?:t|q\d|qr\d|dq\d|tau\d|F[yz]|Mx|emg_\w+)\s*=)", text):
+    for part in re.split(r",(?=\s*(?:t|q\d|qr\d|dq\d|tau\d|F[yz]|P[yz]|Mx|emg_\w+)\s*=)", text):
         if not part.strip():
             continue
         symbol, equals, name = (piece.strip() for piece in part.partition("="))
         if not equals or not name or not (dimension_of(symbol) or symbol.startswith("emg_")):
-            raise BadInput("--map", part.strip(), "SYMBOL=COLUMN with t, q1 …, Fy, Fz, Mx, tau1 …, qr1, qr2, dq1 … or emg_NAME")
+            raise BadInput("--map", part.strip(), "SYMBOL=COLUMN with t, q1 …, Fy, Fz, Mx, tau1 …, qr1, qr2, Py, Pz, dq1 … or emg_NAME")
         found[symbol] = (name[1:].strip(), -1) if name.startswith("-") else (name, 1)
     return found
 
@@ -178,26 +190,56 @@ def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequen
     values = [c.values for table in tables for c in table.columns if c.name == column.name]
     if symbol == "t":
         return _time(column, stated.text if stated else "", values[0], why, tables[0], problems)
+    most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
+    if stated is not None and stated.text == "rad" and most > _DEGREES_FROM:
+        return Channel(
+            symbol, column.name, "deg", sign, f"{why}; values up to {most:.3g}, so in degrees, although its header says {stated.text}"
+        )
     if stated is not None:
         return Channel(symbol, column.name, stated.text, sign, why)
     if dimension == "angle":
-        most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
         in_degrees = most > _DEGREES_FROM
         reason = f"no unit stated; values up to {most:.3g}, so in {'degrees' if in_degrees else 'radians'}"
         return Channel(symbol, column.name, "deg" if in_degrees else "rad", sign, f"{why}; {reason}")
+    if dimension == "length":
+        text = "mm" if most > _MILLIMETRES_FROM else "m"
+        return Channel(symbol, column.name, text, sign, f"{why}; no unit stated; values up to {most:.3g}, so in {text}")
     return Channel(symbol, column.name, _DEFAULT_UNIT[dimension], sign, f"{why}; no unit stated, so {_DEFAULT_UNIT[dimension]}")
+
+
+def went_back(name: str, values: np.ndarray, sample: int, table: RawTable) -> BadInput:
+    """Return the refusal of time stamps that do not increase after a sample."""
+    after = values[np.isfinite(values)][sample : sample + 2]
+    found = Text(f"{after[1]:g} after {after[0]:g} in sample {sample + 2}")
+    return BadInput(f"column {name!r}", found, "time stamps that increase", file=table.path, hint="two recordings in one file? divide it")
+
+
+def is_clock(values: np.ndarray, text: str) -> bool:
+    """Whether time stamps in a unit increase at a rate that recordings have."""
+    known = unit(text)
+    step = _step(values) * (known.factor if known else 1.0)
+    return step > 0.0 and _RATES[0] <= 1.0 / step <= _RATES[1]
+
+
+def _step(values: np.ndarray) -> float:
+    """Return the usual step of time stamps, in their unit; 0 where there is none."""
+    steps = np.diff(values[np.isfinite(values)])
+    return float(np.median(steps)) if steps.size else 0.0
 
 
 def _time(column: RawColumn, stated: str, values: np.ndarray, why: str, table: RawTable, problems: list[BadInput]) -> Channel | None:
     """Return the time, in the unit in which the rate is one that recordings have."""
-    steps = np.diff(values[np.isfinite(values)])
-    step = float(np.median(steps)) if steps.size else 0.0
+    step = _step(values)
     if step <= 0.0:
         problems.append(
             BadInput(f"column {column.name!r}", Text("time that does not increase"), "time stamps that increase", file=table.path)
         )
         return None
-    plausible = [text for text, factor in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)) if _RATES[0] <= 1.0 / (factor * step) <= _RATES[1]]
+    back = np.flatnonzero(np.diff(values[np.isfinite(values)]) <= 0.0)
+    if back.size:
+        problems.append(went_back(column.name, values, int(back[0]), table))
+        return None
+    plausible = [text for text in ("s", "ms", "µs", "ns") if is_clock(values, text)]
     if stated in plausible or (stated and not plausible):
         return Channel("t", column.name, stated, 1, f"{why}; in {stated} as stated")
     if not plausible:

@@ -24,6 +24,9 @@ _CLOSE = 1.1
 """The usual convention is kept when it leaves at most this many times what the best does."""
 _UNEXPLAINED = 0.6
 """With more than this unexplained, no convention fits."""
+_CONTRADICTED, _BY = 0.04, 2.0
+"""What is stated is refused when it leaves at least this share, and so many times what the best convention leaves."""
+_STATED = {"reference": "--angles", "zero": "--zero", "signs": "--clockwise", "force_on": "--force-on"}
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,10 @@ def decide(
     ranked = sorted(found, key=lambda b: b.unexplained)
     best = usual if usual.unexplained <= _CLOSE * ranked[0].unexplained else ranked[0]
     rivals = [b for b in ranked if b is not best and not _equivalent(b.convention, best.convention, motion)]
-    if best.unexplained > _UNEXPLAINED:
+    contradicted = _contradicted(model, motion, given, best)
+    if contradicted is not None:
+        problems.append(contradicted)
+    elif best.unexplained > _UNEXPLAINED:
         said = Text(f"{100 * best.unexplained:.0f} % of the contact torques unexplained by the best convention ({best.convention.words()})")
         allowed = f"at most {100 * _UNEXPLAINED:.0f} %"
         problems.append(BadInput("angles and forces", said, allowed, hint="wrong lengths, units or force axes?"))
@@ -118,6 +124,19 @@ def decide(
     next_best = f", the next best {100 * rivals[0].unexplained:.0f} %" if rivals else ""
     why = f"the balance leaves {100 * best.unexplained:.0f} % of the contact torques unexplained{next_best}"
     return Convention(c.reference, c.zero, c.signs, c.force_on, why)
+
+
+def _contradicted(model: Model, motion: Motion | None, given: Mapping[str, object], best: Balance) -> BadInput | None:
+    """Return the refusal of what is stated where the arm balances in another convention and not in any that agrees with it."""
+    if not given or best.unexplained < _CONTRADICTED:
+        return None
+    free = min((balance(model, motion, c) for c in candidates(model.n_joints, {}, has_force=True)), key=lambda b: b.unexplained)
+    if free.unexplained > _UNEXPLAINED or best.unexplained < _BY * free.unexplained:
+        return None
+    wrong = [_STATED[key] for key, value in given.items() if getattr(free.convention, key) != value]
+    found = Text(f"{100 * best.unexplained:.0f} % of the contact torques unexplained in every convention that agrees with it")
+    allowed = f"{free.convention.words()}, which leaves {100 * free.unexplained:.2g} %"
+    return BadInput(" and ".join(wrong), found, allowed, hint="leave the option out, and compare recording.png with the laboratory")
 
 
 def _equivalent(a: Convention, b: Convention, motion: Motion | None) -> bool:

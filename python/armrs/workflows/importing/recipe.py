@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -65,12 +65,16 @@ class Convention:
 
     def words(self) -> str:
         """Return the convention in words."""
-        flipped = [f"q{j}" for j, sign in enumerate(self.signs, start=1) if sign < 0]
+        return f"angles {self.angles()}" + ("" if self.force_on is None else f"; forces on the {self.force_on}")
+
+    def angles(self, joints: Sequence[str] = ()) -> str:
+        """Return how angles are counted, in words, with the names of the joints where they are given."""
+        names = joints or [f"q{j}" for j in range(1, len(self.signs) + 1)]
+        flipped = [name for name, sign in zip(names, self.signs, strict=True) if sign < 0]
         turn = "counter-clockwise positive" if not flipped else f"clockwise positive in {', '.join(flipped)}"
         zero = "zero pointing forward" if self.zero == "horizontal" else "zero hanging down"
         reference = "relative to the segment before" if self.reference == "relative" else "absolute"
-        force = "" if self.force_on is None else f"; forces on the {self.force_on}"
-        return f"angles {reference}, {zero}, {turn}{force}"
+        return f"{reference}, {zero}, {turn}"
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,8 @@ class RawTrial:
         A further raw file, with the forces.
     force_shift : float
         Added to the time of the forces [s].
+    force_table : str, optional
+        Title of the table of forces in it; the first when absent.
     """
 
     file: str
@@ -99,6 +105,7 @@ class RawTrial:
     role: str
     force_file: str | None = None
     force_shift: float = 0.0
+    force_table: str | None = None
 
 
 @dataclass(frozen=True)
@@ -109,6 +116,10 @@ class Recipe:
     convention: Convention
     trials: tuple[RawTrial, ...]
     points: tuple[str, ...] = ()
+    origin: tuple[float, float] | None = None
+    """Of the positions of the handle, seen from that of the model [m]; None where no angles of the robot are made of them."""
+    rate: float | None = None
+    """Sample rate of recordings without a column of time [Hz]."""
 
     def to_toml(self) -> str:
         """Return the text of `import.toml`."""
@@ -120,6 +131,8 @@ class Recipe:
             "signs": list(c.signs),
             "force_on": c.force_on,
             "points": list(self.points) or None,
+            "rate_Hz": self.rate,
+            "handle_origin": None if self.origin is None else list(self.origin),
         }
         blocks.append("\n".join([*_reason(c.why), "[convention]", *tomlfile.lines(angles)]))
         for channel in self.channels:
@@ -149,7 +162,9 @@ def load_recipe(path: Path) -> Recipe:
 def _recipe(document: Mapping[str, Any]) -> Recipe:
     checks.keys("", document, required=["convention", "channel", "trial"], optional=[])
     angles = checks.table("[convention]", document["convention"])
-    checks.keys("[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points"])
+    checks.keys(
+        "[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points", "handle_origin", "rate_Hz"]
+    )
     convention = Convention(
         checks.choice("[convention], reference", angles["reference"], REFERENCES),
         checks.choice("[convention], zero", angles["zero"], ZEROS),
@@ -158,7 +173,19 @@ def _recipe(document: Mapping[str, Any]) -> Recipe:
     )
     channels = tuple(_channel(f"[[channel]] {k}", table) for k, table in enumerate(checks.tables("channel", document["channel"]), 1))
     trials = tuple(_trial(f"[[trial]] {k}", table) for k, table in enumerate(checks.tables("trial", document["trial"]), 1))
-    return Recipe(channels, convention, trials, tuple(checks.instances("[convention], points", angles.get("points", []), str)))
+    points = tuple(checks.instances("[convention], points", angles.get("points", []), str))
+    rate = angles.get("rate_Hz")
+    rate = None if rate is None else checks.number("[convention], rate_Hz", rate, above=0.0, most=1e6, unit="Hz")
+    return Recipe(channels, convention, trials, points, _origin(angles.get("handle_origin")), rate)
+
+
+def _origin(value: object) -> tuple[float, float] | None:
+    place = "[convention], handle_origin"
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 2:
+        raise BadInput(place, value, "two numbers, forward and upward [m]")
+    return checks.number(place, value[0], unit="m"), checks.number(place, value[1], unit="m")
 
 
 def _sign(place: str, value: object) -> int:
@@ -176,7 +203,9 @@ def _channel(place: str, table: Mapping[str, Any]) -> Channel:
 
 
 def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
-    checks.keys(place, table, required=["file", "table", "configuration", "repeat", "role"], optional=["force_file", "force_shift"])
+    checks.keys(
+        place, table, required=["file", "table", "configuration", "repeat", "role"], optional=["force_file", "force_shift", "force_table"]
+    )
     for key in ("file", "table", "configuration"):
         checks.text(f"{place}, {key}", table[key])
     return RawTrial(
@@ -187,4 +216,5 @@ def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
         checks.choice(f"{place}, role", table["role"], ("fit", "test")),
         table.get("force_file"),
         checks.number(f"{place}, force_shift", table.get("force_shift", 0.0), unit="s"),
+        table.get("force_table"),
     )

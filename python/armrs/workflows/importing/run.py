@@ -13,24 +13,26 @@ import numpy as np
 from ... import checks
 from ...errors import BadInput, BadInputs, Text
 from ...io import files, tomlfile
-from ...io.markers import planar_motion
-from ...io.raw import RawColumn, RawTable, read_raw
+from ...io.raw import RawTable
 from ...io.raw.units import unit
 from ...io.samples import write_samples
-from ...model import Model, load_model
-from . import clock, columns, conventions, trials
+from ...model import Model, Robot, load_model
+from ...tabular import Tabular, Tidy
+from . import clock, columns, conventions, handle, trials
+from . import sources as raw
+from .columns import symbol_of
 from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
+from .samples import cleaned
 
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
 _FORWARD_AND_UP = {("x", "y"): ("x", "y"), ("x", "z"): ("x", "z"), ("y", "z"): ("y", "z"), ("x", "y", "z"): ("y", "z")}
 """Axes of a force sensor -> the one forward and the one up. Of three, the first is taken to point sideways."""
-_AXES = ("Fx", "Fy", "Fz")
 _NAMED = 8
 """Columns that a line names at most."""
 
 
 @dataclass(frozen=True)
-class Imported:
+class Imported(Tabular):
     """An imported data set.
 
     Attributes
@@ -47,12 +49,20 @@ class Imported:
     recipe: Recipe
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"Imported({str(self.folder)!r}, {len(self.recipe.trials)} trials, {self.recipe.convention.words()})"
+
+    def tidy(self) -> Tidy:
+        """Return the channels, one a row: which column became what, and why."""
+        return Tidy({name: [getattr(c, name) for c in self.recipe.channels] for name in ("symbol", "column", "unit", "sign", "why")}, {})
+
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data."""
+        convention = self.recipe.convention
         return {
             "verb": "import",
             "folder": os.fspath(self.folder),
-            "convention": {**vars(self.recipe.convention), "signs": list(self.recipe.convention.signs)},
+            "convention": {**vars(convention), "signs": list(convention.signs), "words": convention.words()},
             "channels": [dict(vars(c)) for c in self.recipe.channels],
             "trials": [dict(vars(t)) for t in self.recipe.trials],
             "notes": list(self.notes),
@@ -79,6 +89,7 @@ def import_recordings(
     clockwise: Sequence[int] | None = None,
     force_on: str | None = None,
     points: Sequence[str] = (),
+    rate: float | None = None,
 ) -> Imported:
     """Turn own recordings into a data set.
 
@@ -102,6 +113,8 @@ def import_recordings(
         The four above are read off the data where they are not given.
     points : sequence of str
         Markers of the joints, shoulder to handle, for C3D and TRC files.
+    rate : float, optional
+        Sample rate of recordings without a column of time [Hz].
 
     Returns
     -------
@@ -116,6 +129,7 @@ def import_recordings(
     paths = [checks.path("sources", source) for source in sources]
     checks.instance("columns_map", columns_map, str)
     points = checks.instances("points", points, str)
+    rate = None if rate is None else checks.number("rate", rate, above=0.0, most=1e6, unit="Hz")
     if not paths:
         raise BadInput("sources", Text("nothing"), "one recording or more")
     loaded = model if isinstance(model, Model) else load_model(model)
@@ -125,7 +139,7 @@ def import_recordings(
         notes = [f"as {paths[0]} says"]
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
-        recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points))
+        recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
     folder = _write(files.output_folder(out), loaded, recipe, reads)
     return Imported(folder, recipe, tuple(notes))
 
@@ -145,59 +159,19 @@ def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None
     return given
 
 
-def _tables(paths: Sequence[Path], points: tuple[str, ...], problems: list[BadInput]) -> list[RawTable]:
-    tables: list[RawTable] = []
-    for path in paths:
-        try:
-            tables += _read(path, points)
-        except BadInput as error:  # noqa: PERF203 (every file is asked)
-            problems.append(error)
-    return tables
-
-
-def _read(path: Path, points: tuple[str, ...]) -> list[RawTable]:
-    """Return the tables of a file; markers become angles where `points` names those of the joints."""
-    try:
-        return [_with_angles(table, points) if points and table.markers is not None else table for table in read_raw(path)]
-    except BadInput as error:
-        raise error.within(file=error.file or path) from None
-
-
-def _with_angles(table: RawTable, points: tuple[str, ...]) -> RawTable:
-    """Return a table with the angles that its markers show, on their clock, and its forces in the plane of the movement."""
-    if table.markers is None:
-        return table
-    motion = planar_motion(table.markers, points)
-    found = [RawColumn("time", "time", "s", motion.t)]
-    found += [RawColumn(f"q{j}", f"q{j}", "rad", np.ascontiguousarray(q)) for j, q in enumerate(motion.q.T, start=1)]
-    clock = next((c.values for c in table.columns if columns.symbol_of(c) == "t"), motion.t)
-    named = [(columns.symbol_of(c) or "", c) for c in table.columns]
-    others = [
-        RawColumn(c.name, c.label, c.unit, np.interp(motion.t, clock, c.values))
-        for symbol, c in named
-        if symbol != "t" and not symbol.startswith(("q", "dq"))
-    ]
-    forces = {symbol: c for symbol, c in named if symbol in _AXES}
-    notes = [*table.notes, f"angles from the markers {', '.join(points)}", *motion.warnings()]
-    if len(forces) == sum(symbol in _AXES for symbol, _ in named) == len(_AXES) and len({c.unit for c in forces.values()}) == 1:
-        in_file = np.column_stack([np.interp(motion.t, clock, forces[axis].values) for axis in _AXES])
-        unit_of_all = forces[_AXES[0]].unit
-        names = {c.name for c in forces.values()}
-        others = [c for c in others if c.name not in names]
-        for symbol, direction in (("Fy", motion.forward), ("Fz", motion.upward)):
-            others.append(RawColumn(symbol, symbol, unit_of_all, in_file @ direction))
-        said = (" ".join(f"{value:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
-        notes.append("forces: {} are taken in the axes of the markers; forward is ({}), up is ({})".format(", ".join(sorted(names)), *said))
-    return RawTable(table.path, table.title, (*found, *others), tuple(notes))
-
-
 def _decided(
-    paths: Sequence[Path], model: Model, mapped: Mapping[str, tuple[str, int]], given: Mapping[str, object], points: tuple[str, ...]
+    paths: Sequence[Path],
+    model: Model,
+    mapped: Mapping[str, tuple[str, int]],
+    given: Mapping[str, object],
+    points: tuple[str, ...],
+    rate: float | None,
 ) -> tuple[Recipe, list[_Read], list[str]]:
     """Return what all files say together; every problem is collected before any is raised."""
     problems: list[BadInput] = []
-    tables = _tables(paths, points, problems)
-    mapped_tables = [_renamed(table, mapped) for table in tables]
+    sources = raw.read_all(paths, points, problems)
+    tables = sources.tables
+    mapped_tables = [part for table in tables for part in cleaned(_renamed(table, mapped), rate, sources.notes)]
     named, left, roles = trials.arrange(mapped_tables)
     seen = next((t for t in left if t.markers is not None), None)
     if seen is not None and seen.markers is not None and not points:
@@ -205,20 +179,18 @@ def _decided(
         problems.append(BadInput("--points", Text("nothing"), f"the markers of the joints, shoulder to handle, of {names}", file=seen.path))
         left = [t for t in left if t.markers is None]
     elif not tables and not problems:
-        problems.append(
-            BadInput(
-                "file",
-                Text("only a file that accompanies another recording"),
-                "the recording of the movement in the same folder",
-                file=paths[0],
-            )
-        )
-    elif not named and not problems:
-        found = Text(f"columns {', '.join(repr(c.name) for c in tables[0].columns[:12])}")
-        problems.append(BadInput("columns", found, "an angle of every joint", file=tables[0].path, hint="--map q1=COLUMN,q2=COLUMN"))
+        found = Text("no recording of a movement" if sources.notes else "only a file that accompanies another recording")
+        problems.append(BadInput("file", found, "the recording of the movement", file=paths[0], hint="; ".join(sources.notes) or None))
+    elif not named:
+        for table in mapped_tables[:1]:
+            _complete(columns.guess([table], _present(mapped, table), problems), model.n_joints, table, problems)
     if not named:
         raise BadInputs.of(problems)
-    problems += [BadInput("file", Text("neither joint angles nor forces"), "columns of one of them", file=t.path) for t in left]
+    for table in left:
+        if table.path in sources.in_folders:
+            sources.notes.append(f"left out, since it holds neither joint angles nor forces: {table.path}")
+        else:
+            problems.append(BadInput("file", Text("neither joint angles nor forces"), "columns of one of them", file=table.path))
     channels = columns.guess([n.table for n in named], _present(mapped, named[0].table), problems)
     force_tables = [n.forces for n in named if n.forces is not None]
     if force_tables:
@@ -230,6 +202,8 @@ def _decided(
         ]
     channels, axes = _plane(channels)
     _complete(channels, model.n_joints, named[0].table, problems)
+    _alike([n.table for n in named[1:]], [c for c in channels if not force_tables or c.symbol[0] not in "FM"], problems)
+    _alike(force_tables[1:], [c for c in channels if c.symbol[0] in "FM"], problems)
     if problems:
         raise BadInputs.of(problems)
     reads = [_aligned(n, channels, model, given, problems) for n in named]
@@ -244,13 +218,58 @@ def _decided(
     if problems:
         raise BadInputs.of(problems)
     reads = [_refined(read, channels, convention, model) for read in reads]
-    recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points)
-    notes = [*dict.fromkeys(note for t in tables for note in t.notes), *axes]
+    origin = _origin(reads, channels, convention, model, axes)
+    recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
+    notes = [*sources.notes, *dict.fromkeys(note for t in tables for note in t.notes), *axes]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
     shifted = [f"{r.trial.force_file}: forces shifted by {r.trial.force_shift:+.3f} s" for r in reads if r.trial.force_file]
     return recipe, reads, [*notes, *shifted]
+
+
+def _alike(tables: Sequence[RawTable], channels: Sequence[Channel], problems: list[BadInput]) -> None:
+    """Refuse tables that lack a column of the first, or have it in another unit."""
+    for table in tables:
+        there = {c.name: c for c in table.columns}
+        for channel in channels:
+            if channel.symbol == "t of forces":
+                continue
+            if channel.column not in there:
+                found = Text(f"no column {channel.column!r}")
+                problems.append(BadInput("columns", found, f"the columns of the first file: this one is {channel.symbol}", file=table.path))
+                continue
+            stated = unit(there[channel.column].unit)
+            if stated is not None and stated.text != channel.unit:
+                place, allowed = f"column {channel.column!r}", f"{channel.unit}, as in the first file"
+                problems.append(BadInput(place, there[channel.column].unit, allowed, file=table.path, hint="import it by itself"))
+            elif channel.symbol == "t" and (back := np.flatnonzero(np.diff(there[channel.column].values) <= 0.0)).size:
+                problems.append(columns.went_back(channel.column, there[channel.column].values, int(back[0]), table))
+            elif channel.symbol == "t" and not columns.is_clock(there[channel.column].values, channel.unit):
+                place, allowed = f"column {channel.column!r}", f"time in {channel.unit}, as in the first file"
+                problems.append(BadInput(place, Text("time stamps that are not"), allowed, file=table.path, hint="import it by itself"))
+
+
+def _origin(
+    reads: Sequence[_Read], channels: Sequence[Channel], convention: Convention, model: Model, notes: list[str]
+) -> tuple[float, float] | None:
+    """Return the origin of the handle's positions, None where there are none or the model has no robot."""
+    if not {"Py", "Pz"} <= {c.symbol for c in channels} or any(c.symbol == "qr1" for c in channels):
+        return None
+    if model.robot is None:
+        notes.append("positions of the handle: not used, since the model has no [robot] whose angles they would tell")
+        return None
+    pairs = [
+        (conventions.to_model_angles(_arrays(read, channels, model.n_joints)[1], convention), _positions(read, channels)) for read in reads
+    ]
+    y, z = handle.origin(model, pairs)
+    place = f"their origin lies at ({y:.3f}, {z:.3f}) m from that of the model, as the angles of the arm say" if y or z else "as recorded"
+    notes.append(f"qr1, qr2: from the positions of the handle, {place}")
+    return y, z
+
+
+def _positions(read: _Read, channels: Sequence[Channel]) -> np.ndarray:
+    return np.column_stack([_values(read.table, _by(channels, symbol)) for symbol in ("Py", "Pz")])
 
 
 def _unused(tables: Sequence[RawTable], channels: Sequence[Channel]) -> list[str]:
@@ -281,39 +300,42 @@ def _present(mapped: Mapping[str, tuple[str, int]], table: RawTable) -> dict[str
 
 
 def _plane(channels: list[Channel]) -> tuple[list[Channel], list[str]]:
-    """Return the channels with the force named in the plane of armrs: y forward, z up."""
-    axes = tuple(sorted(c.symbol[1] for c in channels if c.symbol in ("Fx", "Fy", "Fz")))
-    if axes not in _FORWARD_AND_UP or any(c.why.startswith("as --map") for c in channels if c.symbol in ("Fy", "Fz")):
-        return [c for c in channels if c.symbol not in ("Fx", "My", "Mz")], []
-    forward, up = _FORWARD_AND_UP[axes]
-    names = {f"F{forward}": "Fy", f"F{up}": "Fz"}
-    kept = [
-        replace(c, symbol=names.get(c.symbol, c.symbol))
-        for c in channels
-        if c.symbol in names or c.symbol[0] not in "FM" or c.symbol == "Mx"
-    ]
-    if (forward, up) == ("y", "z"):
-        return kept, []
-    return kept, [f"force axes: {forward} is taken as forward, {up} as up"]
+    """Return the channels with forces and positions named in the plane of armrs: y forward, z up."""
+    notes = []
+    for kind, said in (("F", "force"), ("P", "position")):
+        own = {f"{kind}x", f"{kind}y", f"{kind}z"}
+        axes = tuple(sorted(c.symbol[1] for c in channels if c.symbol in own))
+        names = {f"{kind}y": f"{kind}y", f"{kind}z": f"{kind}z"}
+        if axes in _FORWARD_AND_UP and not any(c.why.startswith("as --map") for c in channels if c.symbol in names):
+            forward, up = _FORWARD_AND_UP[axes]
+            names = {f"{kind}{forward}": f"{kind}y", f"{kind}{up}": f"{kind}z"}
+            if (forward, up) != ("y", "z"):
+                notes.append(f"{said} axes: {forward} is taken as forward, {up} as up")
+        channels = [replace(c, symbol=names.get(c.symbol, c.symbol)) for c in channels if c.symbol in names or c.symbol not in own]
+    return [c for c in channels if c.symbol not in ("My", "Mz")], notes
 
 
 def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, problems: list[BadInput]) -> None:
     symbols = {c.symbol for c in channels}
+    # A column that was refused for its unit or its values is not missing.
+    refused = {symbol_of(c) for c in table.columns for p in problems if repr(c.name) in p.place}
     offered = ", ".join(repr(c.name) for c in table.columns)
     angles = [f"q{j}" for j in range(1, n_joints + 1)]
     there = [symbol for symbol in angles if symbol in symbols]
     if 0 < len(there) < n_joints and there == angles[: len(there)]:
-        found, allowed = Text(f"angles of {len(there)} joints"), f"{n_joints}, as the model has"
+        found, allowed = Text(f"angles of {len(there)} joint{'s' * (len(there) > 1)}"), f"{n_joints}, as the model has"
         hint = f"a model of {len(there)}: armrs init --lengths-m {','.join('?' * len(there))}; or --map {angles[len(there)]}=COLUMN"
         problems.append(BadInput("columns", found, allowed, file=table.path, hint=hint))
         angles = there
     needed = ["t", *angles]
     if symbols & {"Fy", "Fz"} or not any(s.startswith("tau") for s in symbols):
         needed += ["Fy", "Fz"]
-    for symbol in needed:
-        if symbol not in symbols and f"no column for {symbol}" not in [str(p.found) for p in problems]:
-            why = f"a column for it; there are {offered}"
-            problems.append(BadInput("columns", Text(f"no column for {symbol}"), why, file=table.path, hint=f"--map {symbol}=COLUMN"))
+    lacking = [symbol for symbol in needed if symbol not in symbols and symbol not in refused]
+    if lacking:
+        found = Text(f"no column for {', '.join(lacking)}")
+        even = ", or --rate-hz HZ for samples at a constant rate" if "t" in lacking else ""
+        hint = f"--map {','.join(f'{symbol}=COLUMN' for symbol in lacking)}{even}"
+        problems.append(BadInput("columns", found, f"columns for these; there are {offered}", file=table.path, hint=hint))
     for c in channels:
         number = c.symbol.removeprefix("q")
         if number.isdigit() and int(number) > n_joints:
@@ -330,7 +352,7 @@ def _aligned(
         return _Read(trial, named.table, None)
     q = np.column_stack([_values(named.table, c) for c in channels if c.symbol.startswith("q") and c.symbol[1:].isdigit()])
     force = np.column_stack([_values(named.forces, _by(channels, s)) for s in ("Fy", "Fz")])
-    trial = replace(trial, force_file=os.fspath(named.forces.path), force_shift=0.0)
+    trial = replace(trial, force_file=os.fspath(named.forces.path), force_table=named.forces.title, force_shift=0.0)
     try:
         shifts = clock.align(_values(named.table, _by(channels, "t")), q, _values(named.forces, _by(channels, "t of forces")), force)
     except BadInput as error:
@@ -360,7 +382,15 @@ def _refined(read: _Read, channels: Sequence[Channel], convention: Convention, m
     force = np.column_stack([_values(read.forces, _by(channels, s)) for s in ("Fy", "Fz")])
     on_arm = force if convention.force_on == "arm" else -force
     q = conventions.to_model_angles(raw, convention)
-    shift = clock.refine(model, t, q, _values(read.forces, _by(channels, "t of forces")), on_arm, read.trial.force_shift)
+    shift = clock.refine(
+        model,
+        t,
+        q,
+        _values(read.forces, _by(channels, "t of forces")),
+        on_arm,
+        read.trial.force_shift,
+        one_file=read.trial.force_file == read.trial.file,
+    )
     return replace(read, trial=replace(read.trial, force_shift=shift))
 
 
@@ -401,12 +431,19 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
     """Return the trials of a recipe with their tables."""
     problems: list[BadInput] = []
     reads = []
+    clocks = {c.symbol[:1]: (c.column, 1) for c in recipe.channels if c.symbol in ("t", "t of forces")}
+
+    def table_of(file: str, title: str | None, points: tuple[str, ...]) -> RawTable:
+        tables = [part for t in raw.read(folder / file, points) for part in cleaned(_renamed(t, clocks), recipe.rate, [])]
+        found = next((t for t in tables if title in (t.title, None)), None)
+        if found is None:
+            raise BadInput("table", title, "the title of a table in it", file=file)
+        return found
+
     for trial in recipe.trials:
         try:
-            table = next((t for t in _read(folder / trial.file, recipe.points) if t.title == trial.table), None)
-            if table is None:
-                raise BadInput("table", trial.table, "the title of a table in it", file=trial.file)
-            reads.append(_Read(trial, table, _read(folder / trial.force_file, ())[0] if trial.force_file else None))
+            table = table_of(trial.file, trial.table, recipe.points)
+            reads.append(_Read(trial, table, table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None))
         except BadInput as error:  # noqa: PERF203 (every file is asked)
             problems.append(error)
     if problems:
@@ -425,7 +462,7 @@ def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read]) -> P
         entries = []
         for read in reads:
             name = _name_of(read.trial)
-            table = _si_columns(read, recipe, model.n_joints)
+            table = _si_columns(read, recipe, model.n_joints, model.robot)
             (part / name).parent.mkdir(exist_ok=True)
             write_samples(part / name, list(table), list(table.values()))
             written.append(part / name)
@@ -464,7 +501,7 @@ def _seen_from(folder: Path, trial: RawTrial) -> RawTrial:
     return replace(trial, file=os.path.relpath(Path(trial.file).resolve(), here), force_file=force_file)
 
 
-def _si_columns(read: _Read, recipe: Recipe, n_joints: int) -> dict[str, np.ndarray]:
+def _si_columns(read: _Read, recipe: Recipe, n_joints: int, robot: Robot | None) -> dict[str, np.ndarray]:
     """Return the columns of a trial file: SI units, the angles of armrs, the sign of `force_on`."""
     t, q, force = _arrays(read, recipe.channels, n_joints)
     angles = conventions.to_model_angles(q, recipe.convention)
@@ -475,9 +512,12 @@ def _si_columns(read: _Read, recipe: Recipe, n_joints: int) -> dict[str, np.ndar
         raw = np.column_stack([_values(read.table, _by(recipe.channels, f"dq{j}")) for j in range(1, n_joints + 1)])
         speeds = conventions.to_model_speeds(raw, recipe.convention)
         table |= {f"dq{j}_rad_s": np.ascontiguousarray(speeds[:, j - 1]) for j in range(1, n_joints + 1)}
+    if recipe.origin is not None and robot is not None:
+        angles = handle.robot_angles(robot, _positions(read, recipe.channels) + recipe.origin)
+        table |= {f"qr{j}_rad": np.ascontiguousarray(angles[:, j - 1]) for j in (1, 2)}
     for channel in recipe.channels:
         symbol = channel.symbol
-        if symbol in ("t", "t of forces", "Fy", "Fz") or (symbol[0] == "q" and symbol[1:].isdigit()):
+        if symbol in ("t", "t of forces", "Fy", "Fz", "Py", "Pz") or (symbol[0] == "q" and symbol[1:].isdigit()):
             continue
         values = _on_clock(read, t, recipe.channels, symbol)
         if symbol.startswith("dq"):

@@ -1,0 +1,146 @@
+"""The raw tables of an import: of files and folders, without what is no recording and what is there twice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import BadInput, Text
+from ...io.markers import planar_motion
+from ...io.raw import SUFFIXES, NoTable, RawColumn, RawTable, read_raw
+from . import columns
+
+_AXES = ("Fx", "Fy", "Fz")
+_MOST = 5
+"""Files that a line names at most."""
+
+
+@dataclass
+class Sources:
+    """What an import reads.
+
+    Attributes
+    ----------
+    tables : list of RawTable
+    in_folders : set of Path
+        Files that were found in a folder: one without a table is left out, one that was named is refused.
+    notes : list of str
+        What was left out, and why.
+    """
+
+    tables: list[RawTable] = field(default_factory=list)
+    in_folders: set[Path] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+
+
+def read_all(paths: Sequence[Path], points: tuple[str, ...], problems: list[BadInput]) -> Sources:
+    """Read files, and the recordings in folders by the order of their names; what cannot be read is added to `problems`."""
+    found = Sources()
+    for path in paths:
+        for file in _files(path, found, problems):
+            try:
+                found.tables += read(file, points)
+            except NoTable as error:  # noqa: PERF203 (every file is asked)
+                if file in found.in_folders:
+                    found.notes.append(f"left out, since it holds no table: {file}")
+                else:
+                    problems.append(error)
+            except BadInput as error:
+                problems.append(error)
+    found.tables = _once(found.tables, found.notes)
+    return found
+
+
+def _files(path: Path, found: Sources, problems: list[BadInput]) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    inside = sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith((".", "~$")))
+    recordings = [file for file in inside if file.suffix.lower() in SUFFIXES]
+    others = [file.name for file in inside if file.suffix.lower() not in (*SUFFIXES, ".toml")]
+    if not recordings:
+        below = sorted(
+            folder.name for folder in path.iterdir() if folder.is_dir() and any(f.suffix.lower() in SUFFIXES for f in folder.iterdir())
+        )
+        hint = f"name its folders: {', '.join(below[:_MOST])}" if below else f"it holds {', '.join(others[:_MOST])}" if others else None
+        problems.append(BadInput("RAW", Text("a folder without recordings"), f"files of {', '.join(SUFFIXES)}", file=path, hint=hint))
+    elif others:
+        more = f" and {len(others) - _MOST} more" if len(others) > _MOST else ""
+        found.notes.append(f"left out, by their suffixes: {', '.join(others[:_MOST])}{more}")
+    found.in_folders.update(recordings)
+    return recordings
+
+
+def read(path: Path, points: tuple[str, ...]) -> list[RawTable]:
+    """Return the tables of a file; markers become angles where `points` names those of the joints."""
+    try:
+        return [_with_angles(table, points) if points and table.markers is not None else table for table in read_raw(path)]
+    except BadInput as error:
+        raise error.within(file=error.file or path) from None
+
+
+def _once(tables: Sequence[RawTable], notes: list[str]) -> list[RawTable]:
+    """Return tables without those that hold the samples of another, such as a workbook beside the text exported from it."""
+    kept: list[RawTable] = []
+    for table in tables:
+        same = next((other for other in kept if _same_samples(table, other)), None)
+        if same is None:
+            kept.append(table)
+        else:
+            notes.append(f"left out, since it holds the same samples as {_called(same)}: {_called(table)}")
+    return kept
+
+
+def _called(table: RawTable) -> str:
+    return f"{table.path}" if table.title == table.path.stem else f"{table.path} ({table.title})"
+
+
+def _same_samples(a: RawTable, b: RawTable) -> bool:
+    """Whether two tables hold the same numbers, to the rounding of the coarser."""
+    if a.n_rows != b.n_rows or len(a.columns) != len(b.columns) or a.n_rows == 0:
+        return False
+    return all(_same(one.values, other.values) for one, other in zip(a.columns, b.columns, strict=True))
+
+
+def _same(a: np.ndarray, b: np.ndarray) -> bool:
+    known = np.isfinite(a)
+    if not np.array_equal(known, np.isfinite(b)) or not known.any():
+        return bool(np.array_equal(known, np.isfinite(b)))
+    within = 0.5 * max(_step(a[known]), _step(b[known])) + 1e-9 * float(np.abs(a[known]).max())
+    return bool(np.abs(a[known] - b[known]).max() <= within)
+
+
+def _step(values: np.ndarray) -> float:
+    """Return the smallest difference between different values, at least the unit of their last digit; 0 where all are equal."""
+    steps = np.diff(np.unique(values))
+    return float(steps.min()) if steps.size else 0.0
+
+
+def _with_angles(table: RawTable, points: tuple[str, ...]) -> RawTable:
+    """Return a table with the angles that its markers show, on their clock, and its forces in the plane of the movement."""
+    if table.markers is None:
+        return table
+    motion = planar_motion(table.markers, points)
+    found = [RawColumn("time", "time", "s", motion.t)]
+    found += [RawColumn(f"q{j}", f"q{j}", "rad", np.ascontiguousarray(q)) for j, q in enumerate(motion.q.T, start=1)]
+    clock = next((c.values for c in table.columns if columns.symbol_of(c) == "t"), motion.t)
+    named = [(columns.symbol_of(c) or "", c) for c in table.columns]
+    others = [
+        RawColumn(c.name, c.label, c.unit, np.interp(motion.t, clock, c.values))
+        for symbol, c in named
+        if symbol != "t" and not symbol.startswith(("q", "dq"))
+    ]
+    forces = {symbol: c for symbol, c in named if symbol in _AXES}
+    notes = [*table.notes, f"angles from the markers {', '.join(points)}", *motion.warnings()]
+    if len(forces) == sum(symbol in _AXES for symbol, _ in named) == len(_AXES) and len({c.unit for c in forces.values()}) == 1:
+        in_file = np.column_stack([np.interp(motion.t, clock, forces[axis].values) for axis in _AXES])
+        unit_of_all = forces[_AXES[0]].unit
+        names = {c.name for c in forces.values()}
+        others = [c for c in others if c.name not in names]
+        for symbol, direction in (("Fy", motion.forward), ("Fz", motion.upward)):
+            others.append(RawColumn(symbol, symbol, unit_of_all, in_file @ direction))
+        said = (" ".join(f"{value:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
+        notes.append("forces: {} are taken in the axes of the markers; forward is ({}), up is ({})".format(", ".join(sorted(names)), *said))
+    return RawTable(table.path, table.title, (*found, *others), tuple(notes))

@@ -1,0 +1,117 @@
+"""Every problem of a data set at once, each with its next step."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import cli
+from armrs.workflows.checking import check_dataset, grouped
+from test_import import KNOWN, SI, Recording, recording, repeated, table, write_text
+
+__all__ = ["recording"]
+
+
+@pytest.fixture(scope="module")
+def session(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("checked")
+    names, values = table(recording, names=SI)
+    files = [write_text(folder / f"{name}_{k}.csv", names, repeated(values, seed)) for seed, (name, k) in enumerate(TRIALS)]
+    return armrs.import_recordings(files, folder / "set", model=KNOWN).folder
+
+
+TRIALS = [(name, k) for name in ("slow", "reach") for k in (1, 2, 3)]
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+def changed(session: Path, folder: Path, changes: dict[str, Change], header: dict[str, str] | None = None) -> Path:
+    """Return a copy of a session with other samples in some trials, and other names in their headers."""
+    shutil.copytree(session, folder)
+    for name, change in changes.items():
+        path = folder / "trials" / f"{name}.csv"
+        head = (header or {}).get(name, path.read_text(encoding="utf-8").splitlines()[0])
+        write_text(path, head.split(","), change(np.genfromtxt(path, delimiter=",", skip_header=1)))
+    return folder
+
+
+def late(samples: np.ndarray, by: int = 30) -> np.ndarray:
+    return np.column_stack([samples[:, :3], np.roll(samples[:, 3:], by, axis=0)])
+
+
+def same(samples: np.ndarray) -> np.ndarray:
+    return samples
+
+
+def test_a_sound_session_has_no_problem(session: Path) -> None:
+    assert check_dataset(session).problems == ()
+
+
+def test_forces_on_another_clock_are_named(session: Path, tmp_path: Path) -> None:
+    one = check_dataset(changed(session, tmp_path / "one", {"slow_2": late})).problems
+    assert [p.text for p in one] == ["trials/slow_2.csv: forces are about 0.3 s late against the angles"]
+    everything = {f"{name}_{k}": lambda s: late(s, -30) for name, k in TRIALS}
+    lines = grouped(check_dataset(changed(session, tmp_path / "all", everything)).problems)
+    assert len(lines) == 1 and lines[0].text.endswith("and 5 more: forces are about 0.3 s early against the angles")
+
+
+def test_every_problem_is_listed_with_its_next_step(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Only the first was told of a file, and one refusal hid the tests after it."""
+
+    def in_milliseconds(samples: np.ndarray) -> np.ndarray:
+        return samples * [1000.0, 60.0, 1.0, 1.0, 1.0]
+
+    def dead(samples: np.ndarray) -> np.ndarray:
+        return np.column_stack([samples[:, :3], np.ones((len(samples), 2))])
+
+    limit = np.quantile(np.genfromtxt(session / "trials" / "slow_1.csv", delimiter=",", skip_header=1)[:, 3], 0.8)
+
+    def cut(samples: np.ndarray) -> np.ndarray:
+        return np.column_stack([samples[:, :3], np.minimum(samples[:, 3], limit), samples[:, 4]])
+
+    folder = changed(
+        session, tmp_path / "set",
+        {"slow_1": in_milliseconds, "slow_2": dead, "reach_1": same, "reach_2": lambda s: s[::2]},
+        {"reach_1": "t_s,q1_grad,q2_rad,Fy_N,Fzz_N"},
+    )  # fmt: skip
+    shutil.copy(folder / "trials" / "reach_2.csv", folder / "trials" / "reach_3.csv")
+    problems = check_dataset(folder).problems
+    assert all(p.next_step for p in problems)
+    for words in (
+        "slow_1.csv: time: found 10 s between samples", "slow_1.csv: line 2, column q1_rad", "reach_1.csv: header: found 'q1_grad'",
+        "found unknown column 'Fzz_N'", "slow_2.csv: column Fy: found", "slow_2.csv: column Fz: found", "samples: found those of",
+    ):  # fmt: skip
+        assert any(words in p.text for p in problems), words
+    assert cli.main(["check", str(folder)]) == 1
+    assert capsys.readouterr().out.endswith(f"Next: correct the errors above, then armrs check {folder} again\n")
+    lines = check_dataset(
+        changed(session, tmp_path / "more", {f"{name}_{k}": cut for name, k in TRIALS} | {"reach_2": lambda s: cut(s)[::2]})
+    ).problems
+    assert any("Fy stays at" in p.text for p in lines) and any("50 samples a second, where most trials have 100" in p.text for p in lines)
+
+
+def test_commands_end_with_the_next(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["check", str(session)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith(f"Next: armrs identify {session} -o identify")
+    cli.main(["identify", str(session), "-o", str(tmp_path / "i")])
+    assert capsys.readouterr().out.splitlines()[-1].startswith("Next: armrs ")
+
+
+def test_a_subject_takes_the_place_of_a_model(session: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    shutil.copytree(session, folder)
+    (folder / "model.toml").unlink()
+    text = (folder / "dataset.toml").read_text(encoding="utf-8").replace('model = "model.toml"\n', "")
+    subject = '\n[subject]\nbody_mass = 78.0\nheight = 1.80\nsex = "male"\nlengths_m = [0.322, 0.264]\n\n[[trial]]'
+    (folder / "dataset.toml").write_text(text.replace("\n[[trial]]", subject, 1), encoding="utf-8")
+    data = armrs.load_dataset(folder)
+    made = armrs.initialise(tmp_path / "subject", body_mass=78.0, height=1.80, sex="male", lengths=(0.322, 0.264)).model
+    assert data.model == made and data.digest() is not None
+    assert any("no model is named" in line for line in data.warnings)
+    assert [p.text for p in check_dataset(folder).problems if p.level == "error"] == []
+    armrs.convert(folder, tmp_path / "parquet", to="parquet")
+    assert armrs.load_dataset(tmp_path / "parquet").model == made

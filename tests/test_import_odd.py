@@ -1,0 +1,235 @@
+"""Tables as spreadsheets, recorders and programs leave them: each becomes the samples of the true recording, or is refused with what to do."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs.errors import BadInput
+from test_import import DEGREE, KNOWN, Recording, recording
+
+__all__ = ["recording"]
+GERMAN = ["Zeit [ms]", "Schulter [°]", "Ellbogen [°]", "Kraft y [N]", "Kraft z [N]"]
+START = datetime.datetime(2026, 3, 14, 23, 59, 58)
+Writer = Callable[[Recording, Path], Path]
+
+
+def values(r: Recording, *, t: float = 1.0, angle: float = DEGREE) -> np.ndarray:
+    return np.column_stack([r.t * t, r.q * angle, r.force_on_robot])
+
+
+def rows(samples: np.ndarray, separator: str = ";", decimal: str = ",") -> list[str]:
+    return [separator.join(f"{x:.9g}".replace(".", decimal) for x in row) for row in samples]
+
+
+def text(make: Callable[[Recording], list[str]], name: str = "slow_1.csv", encoding: str = "utf-8", end: str = "\n") -> Writer:
+    def write(r: Recording, folder: Path) -> Path:
+        (folder / name).write_bytes((end.join(make(r)) + end).encode(encoding))
+        return folder / name
+
+    return write
+
+
+def german(r: Recording) -> list[str]:
+    return [";".join(GERMAN), *rows(values(r, t=1e3))]
+
+
+def thousands(r: Recording) -> list[str]:
+    marked = [f"{t:,.1f}".replace(",", "_").replace(".", ",").replace("_", ".") for t in 1e3 * r.t]
+    return [";".join(GERMAN), *(f"{t};{row}" for t, row in zip(marked, rows(values(r)[:, 1:]), strict=True))]
+
+
+def quoted(r: Recording) -> list[str]:
+    return [",".join(f'"{name}"' for name in GERMAN), *(",".join(f'"{cell}"' for cell in row.split(";")) for row in rows(values(r, t=1e3)))]
+
+
+def timed(stamp: Callable[[float], str], name: str) -> Callable[[Recording], list[str]]:
+    def make(r: Recording) -> list[str]:
+        samples = rows(values(r)[:, 1:], ",", ".")
+        return [f"{name},shoulder_deg,elbow_deg,Fy_N,Fz_N", *(f"{stamp(t)},{row}" for t, row in zip(r.t, samples, strict=True))]
+
+    return make
+
+
+def day(t: float) -> str:
+    return (START + datetime.timedelta(seconds=t)).isoformat(sep=" ", timespec="microseconds")
+
+
+def with_means(r: Recording) -> list[str]:
+    return [*german(r), "Mittelwert;1,2;3,4;5,6;7,8", "SD;0,1;0,2;0,3;0,4"]
+
+
+def twice_headed(r: Recording) -> list[str]:
+    lines = german(r)
+    return [*lines[:200], lines[0], *lines[200:]]
+
+
+def grouped(r: Recording) -> list[str]:
+    return [";Winkel [°];;Kraft [N];", "Zeit [ms];Schulter;Ellbogen;y;z", *rows(values(r, t=1e3))]
+
+
+def with_errors(r: Recording) -> list[str]:
+    lines = german(r)
+    for k, cell in ((100, "#DIV/0!"), (101, "****")):
+        lines[k] = lines[k].rpartition(";")[0] + f";{cell}"
+    return lines
+
+
+def with_codes(r: Recording) -> list[str]:
+    samples = values(r)
+    samples[100:104, 1] = samples[250, 3] = -9999.0
+    return ["t_s,shoulder_deg,elbow_deg,Fy_N,Fz_N", *rows(samples, ",", ".")]
+
+
+def doubled(r: Recording) -> list[str]:
+    lines = german(r)
+    return [*lines[:50], lines[49], *lines[50:]]
+
+
+def labelled_rad(r: Recording) -> list[str]:
+    return ["t_s,q1_rad,q2_rad,Fy_N,Fz_N", *rows(values(r), ",", ".")]
+
+
+def nanoseconds(r: Recording) -> list[str]:
+    samples = rows(values(r, angle=1.0)[:, 1:], ",", ".")
+    stamps = [1_773_482_102_000_000_000 + round(1e9 * t) for t in r.t]
+    return ["rosbagTimestamp,position_1,position_2,force_y,force_z", *(f"{t},{row}" for t, row in zip(stamps, samples, strict=True))]
+
+
+def labchart(r: Recording) -> list[str]:
+    head = ["Interval=\t0.01 s", "ChannelTitle=\tShoulder\tElbow\tForce y\tForce z", "Range=\t180 deg\t180 deg\t100 N\t100 N"]
+    return [*head, "UnitName=\tdeg\tdeg\tN\tN", *rows(values(r), "\t", ".")]
+
+
+def labview(r: Recording) -> list[str]:
+    head = ["LabVIEW Measurement", "Separator\tTab", "***End_of_Header***", "Channels\t4", "***End_of_Header***"]
+    return [*head, "X_Value\tShoulder\tElbow\tForce y\tForce z\tComment", *rows(values(r), "\t", ".")]
+
+
+def frames(r: Recording) -> list[str]:
+    samples = rows(values(r)[:, 1:])
+    return ["Frame;Schulter [°];Ellbogen [°];Kraft y [N];Kraft z [N]", *(f"{k};{row}" for k, row in enumerate(samples, start=1))]
+
+
+def two_devices(r: Recording) -> list[str]:
+    """Angles and forces side by side in one sheet, each with its own time; the forces at twice the rate."""
+    clock = np.arange(2 * len(r.t) - 1) / 200.0
+    force = rows(np.column_stack([clock, *(np.interp(clock, r.t, f) for f in r.force_on_robot.T)]), ",", ".")
+    angles = rows(values(r)[:, :3], ",", ".") + [",,"] * (len(force) - len(r.t))
+    return ["time,shoulder_deg,elbow_deg,time,Fy_N,Fz_N", *(f"{a},{f}" for a, f in zip(angles, force, strict=True))]
+
+
+def workbook(fill: Callable[[Recording], list[list[object]]]) -> Writer:
+    def write(r: Recording, folder: Path) -> Path:
+        openpyxl = pytest.importorskip("openpyxl")
+        book = openpyxl.Workbook()
+        for row in fill(r):
+            book.active.append(row)
+        book.save(folder / "slow_1.xlsx")
+        return folder / "slow_1.xlsx"
+
+    return write
+
+
+def aside(r: Recording) -> list[list[object]]:
+    """A table that begins in the third column, with a title above and means below."""
+    table: list[list[object]] = [[None, None, *row] for row in values(r).tolist()]
+    head: list[list[object]] = [[None, None, "Subject 7"], [], [None, None, "t [s]", "Shoulder [deg]", "Elbow [deg]", "Fy [N]", "Fz [N]"]]
+    return [*head, *table, [None, None, "Mean", 1.0, 2.0, 3.0, 4.0]]
+
+
+def dated(r: Recording) -> list[list[object]]:
+    samples = [[START + datetime.timedelta(seconds=t), *row] for t, row in zip(r.t.tolist(), values(r)[:, 1:].tolist(), strict=True)]
+    return [["Time", "Shoulder (deg)", "Elbow (deg)", "Fy (N)", "Fz (N)"], *samples]
+
+
+def archive(r: Recording, folder: Path) -> Path:
+    np.savez(folder / "slow_1.npz", t=r.t, q=r.q, force=r.force_on_robot)
+    return folder / "slow_1.npz"
+
+
+def structs(r: Recording, folder: Path) -> Path:
+    """A cell array of structs, a trial each, with the force as a matrix."""
+    from scipy.io import savemat
+
+    cells = np.empty(2, dtype=object)
+    for k in range(2):
+        cells[k] = {"t": r.t, "q": r.q + 1e-3 * k, "force": r.force_on_robot}
+    savemat(folder / "slow.mat", {"trials": cells})
+    return folder / "slow.mat"
+
+
+CASES: dict[str, tuple[Writer, dict[str, object], str]] = {
+    "marks for thousands": (text(thousands, encoding="cp1252"), {}, "decimal comma"),
+    "every cell in quotes, commas within and between": (text(quoted), {}, "cells between commas, decimal comma"),
+    "date and time of day, over midnight": (text(timed(day, "timestamp")), {}, "in s as stated"),
+    "time of day": (text(timed(lambda t: f"10:15:{2.0 + t:06.3f}", "Time")), {}, "in s as stated"),
+    "means below the samples": (text(with_means, encoding="cp1252"), {}, "2 rows without a time"),
+    "a header that stands twice": (text(twice_headed), {}, "Zeit [ms]: cells without a number, which count as missing: 1"),
+    "groups above the names": (text(grouped), {}, "'Kraft y'"),
+    "error messages of a spreadsheet": (text(with_errors), {}, "Kraft z [N]: cells without a number, which count as missing: 2"),
+    "codes for missing values": (text(with_codes), {}, "-9999 counts as missing"),
+    "a row twice": (text(doubled), {}, "1 row that repeats the row before"),
+    "degrees under the name of radians": (text(labelled_rad), {}, "in degrees, although its header says rad"),
+    "UTF-16 without its mark": (text(german, encoding="utf-16-le"), {}, "text in UTF-16"),
+    "line ends of an old Macintosh": (text(german, end="\r"), {}, "decimal comma"),
+    "nanoseconds since 1970": (text(nanoseconds), {}, "so in ns"),
+    "LabChart": (text(labchart, "slow_1.txt"), {}, "export of LabChart"),
+    "LabVIEW": (text(labview, "slow_1.lvm"), {}, "cells between tabs"),
+    "text under the suffix of a workbook": (text(german, "slow_1.xls"), {}, "decimal comma"),
+    "frames instead of time": (text(frames), {"rate": 100.0}, "samples at 100 Hz, as stated"),
+    "two devices side by side": (text(two_devices), {}, "2 columns of time"),
+    "workbook with a table aside": (workbook(aside), {}, "1 row without a time"),
+    "workbook with dates": (workbook(dated), {}, "in s as stated"),
+    "NumPy archive": (archive, {}, "'force y'"),
+    "cell array of structs": (structs, {}, "'force z'"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_an_odd_table_becomes_the_true_samples(case: str, recording: Recording, tmp_path: Path) -> None:
+    write, options, said = CASES[case]
+    done = armrs.import_recordings([write(recording, tmp_path)], tmp_path / "set", model=KNOWN, **options)  # type: ignore[arg-type]
+    assert any(said in note for note in done.notes), done.notes
+    trial = armrs.load_dataset(done.folder).trials[0]
+    assert len(trial.t) == len(recording.t) and np.abs(trial.t - trial.t[0] - recording.t).max() < 1e-6
+    measured = ~trial.filled & trial.valid
+    assert measured.mean() > 0.97
+    assert np.abs(trial.q - recording.q)[measured].max() < 1e-8
+    assert trial.force_on_arm is not None
+    assert np.abs(trial.force_on_arm + recording.force_on_robot)[measured].max() < (0.05 if "devices" in case else 1e-8)
+    again = armrs.import_recordings([done.folder / "import.toml"], tmp_path / "again", model=KNOWN)
+    assert all((again.folder / t.file).read_bytes() == (done.folder / t.file).read_bytes() for t in armrs.load_dataset(done.folder).trials)
+
+
+REFUSED: dict[str, tuple[str, bytes, str]] = {
+    "a workbook of the old format": ("slow_1.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "save it as .xlsx"),
+    "OpenDocument": ("slow_1.ods", b"PK\x03\x04", "save it as .xlsx or .csv"),
+    "compressed": ("slow_1.csv.gz", b"\x1f\x8b", "unpack it first"),
+    "NumPy objects": ("slow_1.npz", b"PK\x05\x06" + bytes(18), "no numeric vector"),
+    "damaged archive": ("slow_1.npz", b"PK\x03\x04 broken", "no readable NumPy archive"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_read_says_what_to_do(case: str, tmp_path: Path) -> None:
+    name, content, step = REFUSED[case]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(BadInput) as refused:
+        armrs.import_recordings([tmp_path / name], tmp_path / "set", model=KNOWN)
+    assert step in str(refused.value) and str(tmp_path / name) in str(refused.value)
+
+
+def test_two_recordings_in_one_file_are_refused(recording: Recording, tmp_path: Path) -> None:
+    """They were written as one trial, which no verb could read."""
+    samples = values(recording, t=1e3)
+    samples[300:, 0] -= samples[300, 0]
+    path = text(lambda _: [";".join(GERMAN), *rows(samples)])(recording, tmp_path)
+    with pytest.raises(BadInput, match=r"found 0 after 2990 in sample 301, allowed time stamps that increase \(two recordings in one file"):
+        armrs.import_recordings([path], tmp_path / "set", model=KNOWN)
+    assert not (tmp_path / "set").exists()
