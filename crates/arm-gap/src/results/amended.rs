@@ -1,0 +1,104 @@
+use arm_model::{Contact, Effect, Joint, Model, Refused, Robot, Segment};
+use serde::Serialize;
+
+use crate::measurement_model::hypothesis::Hypothesis;
+
+/// What was fitted of a model, in the terms of the model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Fitted {
+    /// Relative changes of mass, centre of mass and inertia of each segment.
+    pub segments: Vec<[f64; 3]>,
+    /// Relative changes of compliance and damping of the contact, y and z.
+    pub contact: [[f64; 2]; 2],
+    /// Shift of the robot's base, y and z \[m\].
+    pub shift: [f64; 2],
+    /// Effects of the model, with what was refitted of them.
+    pub known: Vec<Effect>,
+    /// Imperfections of the sensors.
+    pub calibration: Vec<Effect>,
+    /// Effects that the model lacks.
+    pub named: Vec<Effect>,
+}
+
+impl Fitted {
+    pub(super) fn of<const N: usize>(hypothesis: &Hypothesis<N>) -> Self {
+        let effects = |list: &[_]| list.iter().map(Effect::from_core).collect();
+        Self {
+            segments: hypothesis.segments.to_vec(),
+            contact: hypothesis.contact,
+            shift: hypothesis.shift,
+            known: effects(&hypothesis.known),
+            calibration: effects(&hypothesis.calibration),
+            named: effects(&hypothesis.named),
+        }
+    }
+
+    fn segments(&self, model: &Model) -> Vec<Segment> {
+        let each = model.segments.iter().zip(&self.segments);
+        each.map(|(old, [mass, com, inertia])| Segment {
+            mass: old.mass * (1.0 + mass),
+            com: (old.com * (1.0 + com)).clamp(0.0, old.length),
+            inertia: old.inertia * (1.0 + inertia),
+            com_normal: old.com_normal * (1.0 + com),
+            ..old.clone()
+        })
+        .collect()
+    }
+
+    fn contact(&self, of: &Contact) -> Contact {
+        let [compliance, damping] = self.contact;
+        Contact {
+            stiffness: [0, 1].map(|a| of.stiffness[a] / (1.0 + compliance[a])),
+            damping: [0, 1].map(|a| of.damping[a] * (1.0 + damping[a])),
+        }
+    }
+
+    /// The model with refitted segments, contact and known effects, and the named effects and rhythms added.
+    ///
+    /// # Errors
+    /// [`Refused`] where a refitted value is none that a model may have.
+    pub fn amended(&self, model: &Model, rhythms: &[Effect]) -> Result<Model, Refused> {
+        let mut rest = self.known.iter().copied();
+        let joints: Vec<Joint> = model
+            .joints
+            .iter()
+            .map(|joint| joint.with_sizes(|| rest.next()))
+            .collect();
+        model.change(|parts| {
+            parts.segments = self.segments(model);
+            parts.contact = model.contact.map(|contact| self.contact(&contact));
+            parts.joints = joints;
+            parts.effects = rest
+                .chain(self.named.iter().chain(rhythms).copied())
+                .collect();
+        })
+    }
+
+    /// The model with everything that was fitted as effects, the imperfections of its sensors included, and these effects: a rig that shows
+    /// what the fit shows.
+    ///
+    /// # Errors
+    /// [`Refused`] where a refitted value is none that a model may have.
+    pub fn as_fitted(
+        &self,
+        model: &Model,
+        rhythms: &[Effect],
+    ) -> Result<(Model, Vec<Effect>), Refused> {
+        let bare = model.change(|parts| {
+            parts.segments = self.segments(model);
+            parts.contact = Some(self.contact(&model.contact.unwrap_or(Contact::ASSUMED)));
+            parts.joints = model
+                .joints
+                .iter()
+                .map(|j| Joint::named(j.name.as_str()))
+                .collect();
+            parts.effects.clear();
+            parts.robot = model.robot.map(|robot| Robot {
+                base: [0, 1].map(|a| robot.base[a] + self.shift[a]),
+                ..robot
+            });
+        })?;
+        let lists = [&self.known[..], &self.named, rhythms, &self.calibration];
+        Ok((bare, lists.concat()))
+    }
+}
