@@ -26,7 +26,7 @@ macro_rules! plain {
                 Ok(self.clone().into_pyobject(py)?.to_owned().into_any())
             }
             fn read(given: &Bound<'_, PyAny>) -> PyResult<Self> {
-                Ok(given.extract()?)
+                given.extract()
             }
         })*
     };
