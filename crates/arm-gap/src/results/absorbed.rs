@@ -93,3 +93,55 @@ fn worded(kind: Kind, index: usize) -> String {
         (None, None) => name,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A viscosity of 0.1 that was refitted to 0.11 with a prior of 0.005: a tenth more, where twice a twentieth was promised.
+    #[test]
+    fn what_was_refitted_is_told_relative_to_what_was_promised() {
+        let model = "[[arm.segment]]\nlength = 0.5\nmass = 2.0\ncom = 0.2\ninertia = 0.02\n[[arm.joint]]\nviscosity = 0.1\n";
+        let model = Model::from_toml(model).expect("a model");
+        let mut known = model.core_effects();
+        known[0].parameters[0] = 0.11;
+        known.push(known[0]);
+        let hypothesis = Hypothesis::<1> {
+            segments: [[0.02, 0.0, 0.0]],
+            contact: [[0.0; 2]; 2],
+            shift: [0.0, 0.003],
+            placement: [0.0; 2],
+            eccentricity: [[0.0; 2]],
+            known,
+            calibration: Vec::new(),
+            named: Vec::new(),
+        };
+        let coordinate = |target, sd| Coordinate {
+            target,
+            prior: Some((0.0, sd)),
+            lower: -1.0,
+            upper: 1.0,
+            step: 1e-3,
+        };
+        let unknowns = [
+            coordinate(Target::Segment(0, 0), 0.05),
+            coordinate(Target::Shift(1), 0.002),
+            coordinate(Target::Known(0, 0), 0.005),
+            // A law of the passive base, and what is each trial's own.
+            coordinate(Target::Known(1, 0), 1.0),
+            coordinate(Target::Placement(0), 1.0),
+        ];
+        let told = absorbed(&model, &hypothesis, unknowns.iter());
+        let names: Vec<_> = told.iter().map(|a| a.name.as_str()).collect();
+        let expected = [
+            "mass of segment 1",
+            "place of the robot, z",
+            "viscosity of viscous of joint 1",
+        ];
+        assert_eq!(names, expected);
+        assert_eq!((told[0].value, told[0].promised), (0.02, 0.1));
+        assert_eq!((told[1].unit.as_str(), told[1].value), ("m", 0.003));
+        assert!((told[2].value - 0.1).abs() < 1e-12 && (told[2].promised - 0.1).abs() < 1e-12);
+        assert_eq!(told[2].unit, RELATIVE);
+    }
+}

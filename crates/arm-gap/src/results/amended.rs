@@ -102,3 +102,71 @@ impl Fitted {
         Ok((bare, lists.concat()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MODEL: &str = r#"
+        [[arm.segment]]
+        length = 0.5
+        mass = 2.0
+        com = 0.2
+        inertia = 0.02
+        [[arm.joint]]
+        viscosity = 0.1
+        coulomb = 0.2
+        [robot]
+        lengths = [0.4, 0.4]
+        base = [1.0, 0.0]
+        [contact]
+        stiffness = [10000.0, 10000.0]
+        damping = [20.0, 20.0]
+        [[effect]]
+        kind = "force_gain"
+        channel = "Fy"
+        gain = 0.05
+    "#;
+
+    fn effect(kind: &str, site: arm_model::Site, (name, value): (&str, f64)) -> Effect {
+        let kind = arm_model::kind(kind).expect("a kind");
+        let effect = Effect::new(kind, site).and_then(|e| e.with(name, value));
+        effect.expect("an effect")
+    }
+
+    /// Ten per cent more mass, a contact half as stiff, a joint half as viscous.
+    #[test]
+    fn what_was_fitted_changes_the_model_that_was_given() {
+        use arm_model::{Channel, Site};
+        let model = Model::from_toml(MODEL).expect("a model");
+        let (joint, channel) = (Site::Joint(0), Site::Channel(Channel::Fy));
+        let fitted = Fitted {
+            segments: vec![[0.1, 10.0, 0.0]],
+            contact: [[1.0, 1.0], [0.5, 0.0]],
+            shift: [0.01, 0.0],
+            known: vec![
+                effect("viscous", joint, ("viscosity", 0.05)),
+                effect("coulomb", joint, ("torque", 0.3)),
+                effect("force_gain", channel, ("gain", 0.06)),
+            ],
+            calibration: vec![effect("force_bias", channel, ("bias", 0.2))],
+            named: vec![effect("elastic", joint, ("stiffness", 1.0))],
+        };
+        let amended = fitted.amended(&model, &[]).expect("a model");
+        let segment = &amended.segments[0];
+        assert_eq!([segment.mass, segment.com], [2.0 * 1.1, 0.5]);
+        let contact = amended.contact.expect("a contact");
+        assert_eq!(
+            (contact.stiffness, contact.damping),
+            ([5000.0; 2], [30.0, 20.0])
+        );
+        let own = &amended.joints[0];
+        assert_eq!([own.viscosity, own.coulomb], [0.05, 0.3]);
+        let kinds: Vec<_> = amended.effects.iter().map(Effect::name).collect();
+        assert_eq!(kinds, ["force_gain", "elastic"]);
+        let (bare, effects) = fitted.as_fitted(&model, &[]).expect("a rig");
+        assert_eq!(bare.robot.map(|robot| robot.base), Some([1.01, 0.0]));
+        assert!(bare.joints[0].viscosity == 0.0 && bare.effects.is_empty());
+        assert_eq!(effects.len(), 5);
+    }
+}

@@ -142,3 +142,56 @@ impl Rung {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::{Effect, Kind};
+
+    use super::*;
+
+    fn ruled(kind: &str, index: usize, (gain, price, smallest): (f64, f64, f64)) -> Ruled {
+        let kind = Kind::named(kind).expect("a kind");
+        let candidate = Candidate {
+            effect: Effect::new(kind, index),
+            question: 0,
+            free: vec![0],
+            rest: None,
+            refined: Vec::new(),
+            tried: 1,
+            step: 1.0,
+            price: 0.0,
+            spread: 1.0,
+            expected: Vec::new(),
+        };
+        Ruled {
+            candidate,
+            gain,
+            price,
+            smallest,
+        }
+    }
+
+    #[test]
+    fn of_several_shapes_the_clearest_size_and_the_most_gain_count() {
+        let all = [
+            ruled("coulomb", 0, (3.0, 20.0, 0.05)),
+            ruled("coulomb", 0, (8.0, 20.0, 0.04)),
+            ruled("coulomb", 0, (5.0, 20.0, 0.03)),
+            // Not seen at any size, and named.
+            ruled("viscous", 0, (0.0, 20.0, f64::INFINITY)),
+            ruled("viscous", 1, (90.0, 20.0, 0.02)),
+            ruled("force_bias", 1, (1.0, 20.0, 0.3)),
+        ];
+        let named = [("viscous".to_owned(), Some(2), None)];
+        let limits = limits(&all, &named);
+        let told: Vec<_> = limits.iter().map(|l| (l.kind.as_str(), l.joint)).collect();
+        assert_eq!(told, [("coulomb", Some(1)), ("force_bias", None)]);
+        let dry = &limits[0];
+        assert_eq!((dry.gain, dry.price, dry.at_least), (8.0, 20.0, 0.03));
+        assert_eq!(
+            (dry.parameter.as_str(), dry.unit.as_str()),
+            ("torque", "N m")
+        );
+        assert_eq!(limits[1].channel.as_deref(), Some("Fz"));
+    }
+}
