@@ -12,6 +12,7 @@ import pytest
 
 import armrs
 from armrs import cli
+from armrs._armrs import SimulatedTrial
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.model import AddedMass
@@ -172,11 +173,14 @@ def test_one_trial_with_another_label_is_refused(change: Callable[[np.ndarray], 
 def test_a_movement_that_all_repeats_show_against_the_model_is_not_a_wrong_label() -> None:
     data = session()
 
-    def plays(measured: Callable[[armrs.Trial], float], given: Callable[[armrs.Trial], float]) -> list[dict[str, np.ndarray]]:
+    def plays(measured: Callable[[armrs.Trial], float], given: Callable[[armrs.Trial], float]) -> list[SimulatedTrial]:
         sides = [
             (np.column_stack((t.q, measured(t) * t.force_on_arm)), np.column_stack((t.q, given(t) * t.force_on_arm))) for t in data.trials
         ]
-        return [{"measured": m, "given": g} for m, g in sides]
+        return [
+            SimulatedTrial(t.file, 0, False, t.rate, np.array(t.valid), m, {"given": g}, {})
+            for t, (m, g) in zip(data.trials, sides, strict=True)
+        ]
 
     first = data.trials[0]
     refuse_mislabelled(data, True, plays(lambda t: 1.0, lambda t: -1.0 if t.configuration == first.configuration else 1.0))
@@ -302,9 +306,9 @@ def test_a_joint_that_hardly_moves_is_warned_of() -> None:
         q = trial.q.copy()
         q[:, 1] = 0.5 + 2e-3 * np.sin(np.arange(len(q))) + (0.05 * (np.arange(len(q)) > 40) if k == 0 else 0.0)
         trials.append(dataclasses.replace(trial, q=q))
-    (line,) = _still_joints(trials, led=True)
+    (line,) = _still_joints(data.replace(trials=tuple(trials)), led=True)
     assert line.startswith("joint 2 moves by ")
-    assert _still_joints(data.fit_trials, led=True) == []
+    assert _still_joints(data, led=True) == []
 
 
 def test_a_gap_that_keeps_repeats_from_being_compared_is_warned_of() -> None:

@@ -13,12 +13,12 @@ import pytest
 from matplotlib.colors import to_hex
 
 import armrs
-from armrs import cli
+from armrs import _armrs, cli
 from armrs.catalogue import catalogue
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.report import plotting
-from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, figures, separate
+from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, figures, separate, separating
 from armrs.workflows.gap.found import Value
 from armrs.workflows.gap.results import gap_data, write_gap
 from gap_sessions import model, session
@@ -233,14 +233,12 @@ def test_maps_tell_what_was_visited_and_the_law_has_a_legend(found: armrs.GapFou
 
 def test_a_movement_separates_two_laws_that_are_not_the_same(found: armrs.GapFound, tmp_path: Path) -> None:
     kinds = {"quadratic_drag": [0.3], "coulomb": [0.15, 0.01], "viscous": [found.effects[0].parameters["viscosity"].value]}
-    alternatives = tuple(Alternative(kind, 2, None, "", 1.0, 0.9) for kind in kinds)
-    raw = [
-        {**item, "alternatives": [(((kind, 1, values), [0]), 1.0, 0.9) for kind, values in kinds.items()]} for item in found.raw["named"]
+    alternatives = [
+        Alternative(kind, 2, None, "", 1.0, 0.9, simulated=armrs.Effect(kind, 2, parameters=catalogue()[kind].values(values)), free=[0])
+        for kind, values in kinds.items()
     ]
-    rivals = dataclasses.replace(
-        found, effects=(dataclasses.replace(found.effects[0], alternatives=alternatives),), raw={**found.raw, "named": raw}
-    )
-    told = separate(rivals, threads=2)
+    rivals = found.result.replace(effects=[found.effects[0].replace(alternatives=alternatives)])
+    told = separate(dataclasses.replace(found, result=rivals), threads=2)
     drag, dry, same = (a.separation for a in told.effects[0].alternatives)
     assert drag is not None and dry is not None and same is not None
     assert drag.then > drag.now + 5.0
@@ -257,6 +255,25 @@ def test_a_movement_separates_two_laws_that_are_not_the_same(found: armrs.GapFou
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "standard deviations apart" in page
     assert "none of the movements tried would" in page
+
+
+def test_the_named_effect_acts_once_where_movements_are_foretold(found: armrs.GapFound, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It acted twice: effects of a model were compared by identity, and those of two lists are never the same objects."""
+    rigs: list[list[armrs.Effect]] = []
+    real = _armrs.Rig
+
+    def seen(model: armrs.Model, effects: list[armrs.Effect] | None = None) -> _armrs.Rig:
+        rigs.append(list(effects or ()))
+        return real(model, effects)
+
+    rival = Alternative("coulomb", 2, None, "", 1.0, 0.9, simulated=armrs.Effect("coulomb", 2, parameters={"torque": 0.1}), free=[0])
+    torn = found.result.replace(effects=[found.effects[0].replace(alternatives=[rival])])
+    family = separating._family(found)
+    monkeypatch.setattr(separating, "_family", lambda result: family)
+    monkeypatch.setattr(_armrs, "Rig", seen)
+    separate(dataclasses.replace(found, result=torn), threads=2)
+    # The law that the joint states, and the named effect beside it.
+    assert [sum((e.kind, e.joint) == ("viscous", 2) for e in effects) for effects in rigs] == [2]
 
 
 def detent(angle: np.ndarray, speed: np.ndarray, height: float, pitch: float) -> np.ndarray:

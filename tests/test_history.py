@@ -27,11 +27,11 @@ def identified(slow_arm: Path) -> Identified:
 def moved(result: Identified, by: dict[str, float]) -> Identified:
     """The same result with some values changed, by name."""
     shifted = [tuple(_shifted(e, by.get(e.name, 0.0)) for e in part) for part in (result.parameters, result.combinations)]
-    return dataclasses.replace(result, parameters=shifted[0], combinations=shifted[1])
+    return dataclasses.replace(result, result=result.result.replace(parameters=shifted[0], combinations=shifted[1]))
 
 
 def _shifted(e: armrs.Estimate, by: float) -> armrs.Estimate:
-    return dataclasses.replace(e, value=e.value + by, interval=(e.interval[0] + by, e.interval[1] + by))
+    return e.replace(value=e.value + by, interval=(e.interval[0] + by, e.interval[1] + by))
 
 
 def test_a_change_is_found_and_the_rest_is_not(identified: Identified, tmp_path: Path) -> None:
@@ -59,8 +59,8 @@ def test_no_more_than_one_in_twenty_is_called_changed() -> None:
 
 def test_sessions_compare_when_the_data_decided_the_same(identified: Identified, tmp_path: Path) -> None:
     file = tmp_path / "subject.sqlite"
-    bound = tuple(dataclasses.replace(e, decided_by="bound") if (e.name, e.joint) == ("torque", 2) else e for e in identified.parameters)
-    sessions.add(file, dataclasses.replace(identified, parameters=bound), "2026-01-05")
+    bound = tuple(e.replace(decided_by="bound") if (e.name, e.joint) == ("torque", 2) else e for e in identified.parameters)
+    sessions.add(file, dataclasses.replace(identified, result=identified.result.replace(parameters=bound)), "2026-01-05")
     courses = sessions.add(file, identified, "2026-02-03").courses
     alone = [(c.kind, c.joint) for c in courses if np.isnan(c.change)]
     assert ("coulomb", 2) in alone and ("coulomb", 1) not in alone and ("combination", None) not in alone

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armrs._armrs import verdict_of
 from armrs.io import tomlfile
 from armrs.io.raw.text import read_text_table
 from armrs.io.samples import read_samples, write_samples
 from armrs.report import html, series
-from armrs.workflows.gap.reading import verdict_of
 
 hypothesis = pytest.importorskip("hypothesis")
 st = hypothesis.strategies

@@ -93,3 +93,16 @@ def test_what_the_readme_shows_is_installed_and_short() -> None:
     assert built is not None and "--extras files" in built[0]
     python = [content for language, _, content in blocks(ROOT / "README.md") if language == "python"]
     assert len(python) >= 3 and not any(re.search(r"\blist\(|\.copy\(|\[\*", content) for content in python)
+
+
+def test_the_documented_thresholds_are_those_of_the_code() -> None:
+    """A null misfit of 4.3 stood in one place and of 4.8 in another."""
+    guide = (ROOT / "docs" / "developer.md").read_text(encoding="utf-8")
+    table = dict(re.findall(r"^\| `([A-Z]+)`[^|]*\| ([0-9.]+) \|", guide, flags=re.M))
+    assert set(table) >= {"THRESHOLD", "MISFIT", "LEVEL", "TOLERATED", "PLAIN", "TIE", "NAMED"}
+    source = "\n".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "crates" / "arm-gap" / "src").rglob("*.rs")))
+    for name, value in table.items():
+        assert {float(v) for v in re.findall(rf"const {name}: f64 = ([0-9.]+);", source)} == {float(value)}, name
+    texts = [*(ROOT / "docs").glob("*.md"), *(ROOT / "crates").rglob("verdict.rs")]
+    said = {v for path in texts for v in re.findall(r"(?:hidden|nulls)(?:\s|///)+reach (\d\.\d)", path.read_text(encoding="utf-8"))}
+    assert said == {"4.8"}

@@ -39,6 +39,14 @@ def test_no_circle_in_a_crate() -> None:
     assert found == []
 
 
+def test_a_crate_whose_library_is_not_tested_has_no_tests_in_it() -> None:
+    """`test = false` saves a second compilation of a library, and would leave its unit tests unasked."""
+    asked = [source.parent for source in CRATES if "\ntest = false" in (source.parent / "Cargo.toml").read_text(encoding="utf-8")]
+    assert {"arm-core", "arm-capi", "arm-cosim"} <= {crate.name for crate in asked}
+    unit_tests = [path for crate in asked for path in crate.glob("src/**/*.rs") if "cfg(test)" in path.read_text(encoding="utf-8")]
+    assert unit_tests == []
+
+
 def test_no_circle_of_imports_in_the_package() -> None:
     """With those in functions and those for type checkers."""
     assert structure.circles(structure.python_imports(PACKAGE)) == []

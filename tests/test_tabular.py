@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import re
 import sys
@@ -84,7 +85,7 @@ def test_a_notebook_shows_one_screen_and_no_markup_of_files(run: armrs.Simulated
     shown = run._repr_html_()
     assert shown.count("<tr>") == 31 and "more rows: to_dataframe()" in shown
     named = identified.dataset.replace(name="<script>alert(1)</script>")
-    html = type(identified)(**{**vars(identified), "dataset": named})._repr_html_()
+    html = dataclasses.replace(identified, dataset=named)._repr_html_()
     assert "<script>" not in html and "&lt;script&gt;" in html
     assert len(html) < 20_000
 

@@ -9,30 +9,54 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "DECISIONS",
+    "MISFIT",
     "SAMPLE_STATUSES",
+    "SPEED_NOISE_ALLOWED",
+    "STILL",
+    "Absorbed",
     "AddedMass",
+    "Alternative",
     "Arm",
     "ArmSlave",
     "ArmState",
+    "ChannelGap",
     "Contact",
     "Description",
     "Digest",
     "Effect",
+    "Estimate",
+    "Fit",
+    "Fitted",
+    "GapResult",
+    "Identification",
     "Joint",
+    "Limit",
+    "Missing",
     "Model",
     "OnlineCompensation",
     "OnlineEstimator",
     "OnlineMonitor",
+    "Open",
     "ParameterId",
     "ParameterInfo",
+    "Place",
     "Rig",
     "Robot",
+    "Rung",
+    "Screening",
     "Segment",
+    "Separation",
+    "SimulatedTrial",
     "Subject",
+    "Suspect",
     "Tolerance",
     "TrialEntry",
+    "Tried",
+    "Value",
     "__version__",
     "build_profile",
+    "channel_names",
+    "confirmed",
     "control",
     "declare",
     "design",
@@ -42,7 +66,6 @@ __all__ = [
     "firmware",
     "fit_by_simulation",
     "forecast",
-    "held_out",
     "identify",
     "literature",
     "load_model",
@@ -50,59 +73,24 @@ __all__ = [
     "low_pass_both_ways",
     "online_settings",
     "play",
+    "reach",
     "simulate",
     "simulate_in_pieces",
+    "sizes",
     "smooth",
+    "verdict_of",
 ]
 
 __version__: str
 build_profile: str
 DECISIONS: tuple[str, str, str]
+MISFIT: float
+STILL: float
+SPEED_NOISE_ALLOWED: float
 SAMPLE_STATUSES: list[str]
 
 # ---- what the functions return: these names are there for type checkers alone
 _Array: TypeAlias = NDArray[np.float64]
-_Entry: TypeAlias = tuple[str, int, list[float]]  # kind, place from 0, parameters
-_Asked: TypeAlias = tuple[_Entry, list[int]]  # an effect, and which of its parameters are free
-_Lack: TypeAlias = tuple[float, float, float]  # ratio, z, excess
-_Unknown: TypeAlias = tuple[str, int, int, float, float, float]  # what, place, part, value, standard deviation before and after
-
-@type_check_only
-class _Estimate(TypedDict):
-    name: str
-    joint: int | None
-    kind: str
-    value: float
-    std: float
-    unit: str
-    interval: list[float]
-    decided_by: str
-
-@type_check_only
-class _Explained(TypedDict):
-    samples: NDArray[np.uint64]
-    measured: _Array
-    fitted: _Array
-
-@type_check_only
-class _Identified(TypedDict):
-    status: str
-    rank: int
-    unknowns: int
-    scale_free: bool
-    cutoff: float
-    clusters: int
-    neglected_inertia: list[float]
-    speed_noise: list[float]
-    speed_noise_allowed: float
-    not_simulated: str | None
-    trades: list[str]
-    parameters: list[_Estimate]
-    combinations: list[_Estimate]
-    calibration: list[_Estimate]
-    explained: list[_Explained]
-    segments: list[tuple[float, float, float, float, float]]
-    effects: list[_Entry]
 
 @type_check_only
 class _Predicted(TypedDict):
@@ -154,62 +142,6 @@ class _Fit(TypedDict):
     residuals: int
     rounds: int
     settled: bool
-
-@type_check_only
-class _Free(TypedDict, total=False):
-    given: _Array | None
-    calibrated: _Array | None
-    amended: _Array | None
-
-@type_check_only
-class _Played(_Free):
-    measured: _Array
-    counted: NDArray[np.bool_]
-    free: _Free
-
-@type_check_only
-class _Fitted(TypedDict):
-    cost: float
-    segments: list[list[float]]
-    contact: list[list[float]]
-    shift: list[float]
-    known: list[_Entry]
-    calibration: list[_Entry]
-    named: list[_Entry]
-
-@type_check_only
-class _Named(TypedDict):
-    effect: _Entry
-    sd: list[tuple[int, float]]
-    p_value: float
-    share: float
-    alternatives: list[tuple[_Asked, float, float]]
-
-@type_check_only
-class _Screened(TypedDict):
-    groups: list[int]
-    calibrated: _Fitted
-    lack: _Lack
-    unknowns: list[_Unknown]
-    suspects: list[tuple[_Entry, list[int], float, float, float]]
-    trials: list[_Played]
-
-@type_check_only
-class _Found(TypedDict):
-    repeated: bool
-    groups: list[int]
-    scale: float
-    calibrated: _Fitted
-    amended: _Fitted
-    rhythms: list[_Entry]
-    locked: list[_Entry]
-    lack: tuple[_Lack, _Lack]
-    unknowns: list[_Unknown]
-    named: list[_Named]
-    apart: list[tuple[_Entry, float, int | None, tuple[float, float], float, list[tuple[_Entry, float]]]]
-    ruled: list[tuple[_Asked, float, float, float]]
-    ladder: list[tuple[list[tuple[list[_Asked], float]], float, float]]
-    trials: list[_Played]
 
 @type_check_only
 class _Controlled(TypedDict):
@@ -727,6 +659,646 @@ class Description:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
+@final
+class Value:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        value: float,
+        std: float | None,
+        unit: str,
+        interval: tuple[float, float] | None = ...,
+    ) -> Value: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def std(self) -> float | None: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def interval(self) -> tuple[float, float] | None: ...
+    @staticmethod
+    def of(value: float, std: float | None, unit: str, limits: tuple[float, float]) -> Value: ...
+    def replace(self, **changes: object) -> Value: ...
+    def __replace__(self, **changes: object) -> Value: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Separation:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        waypoints_deg: Iterable[Iterable[float]],
+        speed_rad_s: float,
+        acceleration_rad_s2: float,
+        shape: str,
+        now: float,
+        then: float,
+    ) -> Separation: ...
+    @property
+    def waypoints_deg(self) -> tuple[tuple[float, ...], ...]: ...
+    @property
+    def speed_rad_s(self) -> float: ...
+    @property
+    def acceleration_rad_s2(self) -> float: ...
+    @property
+    def shape(self) -> str: ...
+    @property
+    def now(self) -> float: ...
+    @property
+    def then(self) -> float: ...
+    def replace(self, **changes: object) -> Separation: ...
+    def __replace__(self, **changes: object) -> Separation: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Alternative:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        kind: str,
+        joint: int | None,
+        channel: str | None,
+        why: str,
+        worse: float,
+        likeness: float,
+        separating_movement: str | None = ...,
+        separation: Separation | None = ...,
+        simulated: Effect | None = ...,
+        free: Iterable[int] = ...,
+    ) -> Alternative: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def joint(self) -> int | None: ...
+    @property
+    def channel(self) -> str | None: ...
+    @property
+    def why(self) -> str: ...
+    @property
+    def worse(self) -> float: ...
+    @property
+    def likeness(self) -> float: ...
+    @property
+    def separating_movement(self) -> str | None: ...
+    @property
+    def separation(self) -> Separation | None: ...
+    @property
+    def simulated(self) -> Effect | None: ...
+    @property
+    def free(self) -> tuple[int, ...]: ...
+    def replace(self, **changes: object) -> Alternative: ...
+    def __replace__(self, **changes: object) -> Alternative: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Missing:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        kind: str,
+        joint: int | None,
+        channel: str | None,
+        parameters: Mapping[str, Value],
+        p_value: float,
+        share: float,
+        alternatives: Iterable[Alternative] = ...,
+        trial: str | None = ...,
+        span: tuple[float, float] | None = ...,
+        family: str = ...,
+        decided: bool = ...,
+        without: float | None = ...,
+        simulated: Effect | None = ...,
+    ) -> Missing: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def joint(self) -> int | None: ...
+    @property
+    def channel(self) -> str | None: ...
+    @property
+    def parameters(self) -> MappingProxyType[str, Value]: ...
+    @property
+    def p_value(self) -> float: ...
+    @property
+    def share(self) -> float: ...
+    @property
+    def alternatives(self) -> tuple[Alternative, ...]: ...
+    @property
+    def trial(self) -> str | None: ...
+    @property
+    def span(self) -> tuple[float, float] | None: ...
+    @property
+    def family(self) -> str: ...
+    @property
+    def decided(self) -> bool: ...
+    @property
+    def without(self) -> float | None: ...
+    @property
+    def simulated(self) -> Effect | None: ...
+    def replace(self, **changes: object) -> Missing: ...
+    def __replace__(self, **changes: object) -> Missing: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Place:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        trial: str,
+        channel: str,
+        t_start: float,
+        t_end: float,
+        joint: int | None,
+        condition: str,
+        mean: float,
+        z: float,
+    ) -> Place: ...
+    @property
+    def trial(self) -> str: ...
+    @property
+    def channel(self) -> str: ...
+    @property
+    def t_start(self) -> float: ...
+    @property
+    def t_end(self) -> float: ...
+    @property
+    def joint(self) -> int | None: ...
+    @property
+    def condition(self) -> str: ...
+    @property
+    def mean(self) -> float: ...
+    @property
+    def z(self) -> float: ...
+    def replace(self, **changes: object) -> Place: ...
+    def __replace__(self, **changes: object) -> Place: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Open:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        trial: str,
+        t_start: float,
+        t_end: float,
+        size: float | None,
+    ) -> Open: ...
+    @property
+    def trial(self) -> str: ...
+    @property
+    def t_start(self) -> float: ...
+    @property
+    def t_end(self) -> float: ...
+    @property
+    def size(self) -> float | None: ...
+    def replace(self, **changes: object) -> Open: ...
+    def __replace__(self, **changes: object) -> Open: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class ChannelGap:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        before: float | None,
+        calibrated: float | None,
+        after: float | None,
+        floor: float | None,
+        floor_std: float | None = ...,
+        open: Open | None = ...,
+    ) -> ChannelGap: ...
+    @property
+    def before(self) -> float | None: ...
+    @property
+    def calibrated(self) -> float | None: ...
+    @property
+    def after(self) -> float | None: ...
+    @property
+    def floor(self) -> float | None: ...
+    @property
+    def floor_std(self) -> float | None: ...
+    @property
+    def open(self) -> Open | None: ...
+    @property
+    def closed(self) -> float | None: ...
+    def replace(self, **changes: object) -> ChannelGap: ...
+    def __replace__(self, **changes: object) -> ChannelGap: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Absorbed:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        name: str,
+        value: float,
+        promised: float,
+        unit: str,
+    ) -> Absorbed: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def promised(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    def replace(self, **changes: object) -> Absorbed: ...
+    def __replace__(self, **changes: object) -> Absorbed: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Limit:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        kind: str,
+        joint: int | None,
+        channel: str | None,
+        parameter: str,
+        at_least: float,
+        unit: str,
+        gain: float = ...,
+        price: float = ...,
+    ) -> Limit: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def joint(self) -> int | None: ...
+    @property
+    def channel(self) -> str | None: ...
+    @property
+    def parameter(self) -> str: ...
+    @property
+    def at_least(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def price(self) -> float: ...
+    def replace(self, **changes: object) -> Limit: ...
+    def __replace__(self, **changes: object) -> Limit: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Suspect:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        kind: str,
+        joint: int | None,
+        channel: str | None,
+        parameters: Mapping[str, float],
+        unit: str,
+        gain: float,
+        price: float,
+        smallest: float,
+    ) -> Suspect: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def joint(self) -> int | None: ...
+    @property
+    def channel(self) -> str | None: ...
+    @property
+    def parameters(self) -> MappingProxyType[str, float]: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def price(self) -> float: ...
+    @property
+    def smallest(self) -> float: ...
+    def replace(self, **changes: object) -> Suspect: ...
+    def __replace__(self, **changes: object) -> Suspect: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Tried:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        effects: Iterable[tuple[str, int | None, str | None]],
+        gain: float,
+    ) -> Tried: ...
+    @property
+    def effects(self) -> tuple[tuple[str, int | None, str | None], ...]: ...
+    @property
+    def gain(self) -> float: ...
+    def replace(self, **changes: object) -> Tried: ...
+    def __replace__(self, **changes: object) -> Tried: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Rung:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        tried: Iterable[Tried],
+        before: float,
+        after: float,
+    ) -> Rung: ...
+    @property
+    def tried(self) -> tuple[Tried, ...]: ...
+    @property
+    def before(self) -> float: ...
+    @property
+    def after(self) -> float: ...
+    def replace(self, **changes: object) -> Rung: ...
+    def __replace__(self, **changes: object) -> Rung: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Fitted:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        segments: Iterable[Sequence[float]],
+        contact: Sequence[Sequence[float]],
+        shift: Sequence[float],
+        known: Iterable[Effect],
+        calibration: Iterable[Effect],
+        named: Iterable[Effect],
+    ) -> Fitted: ...
+    @property
+    def segments(self) -> tuple[list[float], ...]: ...
+    @property
+    def contact(self) -> list[list[float]]: ...
+    @property
+    def shift(self) -> list[float]: ...
+    @property
+    def known(self) -> tuple[Effect, ...]: ...
+    @property
+    def calibration(self) -> tuple[Effect, ...]: ...
+    @property
+    def named(self) -> tuple[Effect, ...]: ...
+    def rig(self, model: Model, rhythms: Iterable[Effect]) -> Rig: ...
+    def replace(self, **changes: object) -> Fitted: ...
+    def __replace__(self, **changes: object) -> Fitted: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class GapResult:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        verdict: str,
+        effects: Iterable[Missing],
+        places: Iterable[Place],
+        gap: Mapping[str, ChannelGap],
+        would_have_seen: Iterable[Limit],
+        unexplained: float,
+        looks_like: str | None,
+        absorbed: Iterable[Absorbed],
+        lack: tuple[tuple[float, float], tuple[float, float]],
+        ladder: Iterable[Rung],
+        warnings: Iterable[str],
+        model: Model,
+        calibrated: Fitted,
+        amended: Fitted,
+        rhythms: Iterable[Effect],
+        locked: int,
+        scale: float,
+        trials: Iterable[SimulatedTrial],
+    ) -> GapResult: ...
+    @property
+    def verdict(self) -> str: ...
+    @property
+    def effects(self) -> tuple[Missing, ...]: ...
+    @property
+    def places(self) -> tuple[Place, ...]: ...
+    @property
+    def gap(self) -> MappingProxyType[str, ChannelGap]: ...
+    @property
+    def would_have_seen(self) -> tuple[Limit, ...]: ...
+    @property
+    def unexplained(self) -> float: ...
+    @property
+    def looks_like(self) -> str | None: ...
+    @property
+    def absorbed(self) -> tuple[Absorbed, ...]: ...
+    @property
+    def lack(self) -> tuple[tuple[float, float], tuple[float, float]]: ...
+    @property
+    def ladder(self) -> tuple[Rung, ...]: ...
+    @property
+    def warnings(self) -> tuple[str, ...]: ...
+    @property
+    def model(self) -> Model: ...
+    @property
+    def calibrated(self) -> Fitted: ...
+    @property
+    def amended(self) -> Fitted: ...
+    @property
+    def rhythms(self) -> tuple[Effect, ...]: ...
+    @property
+    def locked(self) -> int: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def trials(self) -> tuple[SimulatedTrial, ...]: ...
+    def lasting(self) -> Model: ...
+    def replace(self, **changes: object) -> GapResult: ...
+    def __replace__(self, **changes: object) -> GapResult: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Screening:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        model: Model,
+        absorbed: Iterable[Absorbed],
+        gap: Mapping[str, ChannelGap],
+        lack: tuple[float, float],
+        suspects: Iterable[Suspect],
+    ) -> Screening: ...
+    @property
+    def model(self) -> Model: ...
+    @property
+    def absorbed(self) -> tuple[Absorbed, ...]: ...
+    @property
+    def gap(self) -> MappingProxyType[str, ChannelGap]: ...
+    @property
+    def lack(self) -> tuple[float, float]: ...
+    @property
+    def suspects(self) -> tuple[Suspect, ...]: ...
+    def replace(self, **changes: object) -> Screening: ...
+    def __replace__(self, **changes: object) -> Screening: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Estimate:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        name: str,
+        joint: int | None,
+        kind: str,
+        value: float,
+        std: float,
+        unit: str,
+        interval: tuple[float, float],
+        decided_by: str,
+        caveat: str | None = ...,
+    ) -> Estimate: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def joint(self) -> int | None: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def std(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def interval(self) -> tuple[float, float]: ...
+    @property
+    def decided_by(self) -> str: ...
+    @property
+    def caveat(self) -> str | None: ...
+    def replace(self, **changes: object) -> Estimate: ...
+    def __replace__(self, **changes: object) -> Estimate: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Identification:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        method: str,
+        status: str,
+        rank: int,
+        unknowns: int,
+        parameters: Iterable[Estimate],
+        combinations: Iterable[Estimate],
+        calibration: Iterable[Estimate],
+        contradictions: Iterable[str],
+        misfits: Iterable[str],
+        left_out: Iterable[str],
+        trades: Iterable[str],
+        scale_free: bool,
+        level: float,
+        cutoff: float,
+        residual_rms: Mapping[str, Mapping[str, float]],
+        residual_rms_by_configuration: Mapping[str, Mapping[str, Mapping[str, float]]],
+        neglected_inertia: Iterable[float],
+        speed_noise: Iterable[float],
+        not_simulated: str | None,
+        model: Model,
+        explained: Iterable[Fit],
+    ) -> Identification: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def status(self) -> str: ...
+    @property
+    def rank(self) -> int: ...
+    @property
+    def unknowns(self) -> int: ...
+    @property
+    def parameters(self) -> tuple[Estimate, ...]: ...
+    @property
+    def combinations(self) -> tuple[Estimate, ...]: ...
+    @property
+    def calibration(self) -> tuple[Estimate, ...]: ...
+    @property
+    def contradictions(self) -> tuple[str, ...]: ...
+    @property
+    def misfits(self) -> tuple[str, ...]: ...
+    @property
+    def left_out(self) -> tuple[str, ...]: ...
+    @property
+    def trades(self) -> tuple[str, ...]: ...
+    @property
+    def scale_free(self) -> bool: ...
+    @property
+    def level(self) -> float: ...
+    @property
+    def cutoff(self) -> float: ...
+    @property
+    def residual_rms(self) -> MappingProxyType[str, MappingProxyType[str, float]]: ...
+    @property
+    def residual_rms_by_configuration(self) -> MappingProxyType[str, MappingProxyType[str, MappingProxyType[str, float]]]: ...
+    @property
+    def neglected_inertia(self) -> tuple[float, ...]: ...
+    @property
+    def speed_noise(self) -> tuple[float, ...]: ...
+    @property
+    def not_simulated(self) -> str | None: ...
+    @property
+    def model(self) -> Model: ...
+    @property
+    def explained(self) -> tuple[Fit, ...]: ...
+    def replace(self, **changes: object) -> Identification: ...
+    def __replace__(self, **changes: object) -> Identification: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class SimulatedTrial:
+    def __new__(
+        cls,
+        file: str,
+        group: int,
+        test: bool,
+        rate: float,
+        counted: NDArray[np.bool_],
+        measured: _Array,
+        shown: Mapping[str, _Array | None],
+        free: Mapping[str, _Array | None],
+    ) -> SimulatedTrial: ...
+    @property
+    def file(self) -> str: ...
+    @property
+    def group(self) -> int: ...
+    @property
+    def test(self) -> bool: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def counted(self) -> NDArray[np.bool_]: ...
+    @property
+    def measured(self) -> _Array: ...
+    @property
+    def shown(self) -> MappingProxyType[str, _Array | None]: ...
+    @property
+    def free(self) -> MappingProxyType[str, _Array | None]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Fit:
+    def __new__(cls, samples: NDArray[np.uint64], measured: _Array, fitted: _Array) -> Fit: ...
+    @property
+    def samples(self) -> NDArray[np.uint64]: ...
+    @property
+    def measured(self) -> _Array: ...
+    @property
+    def fitted(self) -> _Array: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
 def load_model(path: str | os.PathLike[str]) -> Model: ...
 
 @final
@@ -837,6 +1409,16 @@ class ArmSlave:
     @staticmethod
     def deserialize(bytes: bytes) -> ArmState: ...
 
+def verdict_of(*, named: bool, is_open: bool, z: float, ratio: float, share: float) -> str: ...
+def channel_names(joints: int, led: bool) -> list[str]: ...
+def sizes(trials: Sequence[SimulatedTrial], version: str) -> list[float | None]: ...
+def confirmed(
+    given: Sequence[SimulatedTrial],
+    calibrated: Sequence[SimulatedTrial],
+    amended: Sequence[SimulatedTrial],
+    known: GapResult,
+    names: Sequence[str],
+) -> MappingProxyType[str, ChannelGap]: ...
 def control(
     rig: Rig,
     drive: Mapping[str, object],
@@ -857,20 +1439,17 @@ def distances(
     trials: Sequence[Mapping[str, object]],
     settings: Mapping[str, object],
     planned: Sequence[Mapping[str, object]],
-    rivals: Sequence[tuple[str, int, Sequence[float], Sequence[int]]],
+    rivals: Sequence[Alternative],
 ) -> list[list[float] | None]: ...
 def effects() -> list[_Kind]: ...
 def online_settings(rig: Rig, period: float) -> _OnlineSettings: ...
 def firmware(rig: Rig, uncertainty: float, samples: Sequence[Sequence[float]]) -> _Firmware: ...
-def held_out(
-    trials: Sequence[tuple[int, bool, float, list[list[float]] | None, list[bool]]],
-) -> list[tuple[float | None, float | None, float | None, tuple[int, float, float, float] | None]]: ...
 def find_gap(
     rig: Rig,
     trials: Sequence[Mapping[str, object]],
     settings: Mapping[str, object],
     progress: Callable[[str, float], None] | None = None,
-) -> _Found: ...
+) -> GapResult: ...
 def fit_by_simulation(
     rig: Rig,
     drive: Mapping[str, object],
@@ -881,9 +1460,10 @@ def fit_by_simulation(
 def forecast(
     rig: Rig, settings: Mapping[str, object], sensing: Mapping[str, object], tasks: Sequence[Mapping[str, object]]
 ) -> _Forecast: ...
-def identify(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object]) -> _Identified: ...
+def identify(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object]) -> Identification: ...
 def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[_Literature]: ...
-def play(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object], own: bool = False) -> list[_Played]: ...
+def play(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object], own: bool = False) -> list[SimulatedTrial]: ...
+def reach(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object]) -> list[float]: ...
 def simulate(
     rig: Rig,
     drive: Mapping[str, object],
@@ -901,5 +1481,5 @@ def look(
     trials: Sequence[Mapping[str, object]],
     settings: Mapping[str, object],
     progress: Callable[[str, float], None] | None = None,
-) -> _Screened: ...
+) -> Screening: ...
 def low_pass_both_ways(values: NDArray[np.float64], rate: float, cutoff: float, order: int) -> NDArray[np.float64]: ...

@@ -5,6 +5,7 @@ pub mod data;
 mod error;
 pub mod joint_torque;
 pub mod measurement_model;
+pub mod results;
 pub mod selection;
 pub mod sensitivity;
 pub mod threads;

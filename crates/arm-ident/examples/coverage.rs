@@ -105,7 +105,7 @@ fn tolerance(exact: bool) -> Tolerance {
     let share = if exact { 0.0 } else { 1.0 };
     let usual = Tolerance::default();
     Tolerance {
-        angle_offset: share * usual.angle_offset,
+        angle_offset_deg: share * usual.angle_offset_deg,
         force_bias: share * usual.force_bias,
         force_gain: share * usual.force_gain,
         time_delay: 0.0,
@@ -122,7 +122,7 @@ fn repetition(seed: u64, run: &Recording<2>, options: &Options, truth: [f64; 4])
     let t = options.tolerance;
     let mut draw = |sd: f64| [(); 2].map(|()| sd * gaussian(&mut random));
     let session = Session {
-        offset: draw(t.angle_offset),
+        offset: draw(t.angle_offset()),
         bias: draw(t.force_bias),
         gain: draw(t.force_gain),
     };

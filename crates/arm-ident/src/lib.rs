@@ -5,5 +5,6 @@ pub mod error;
 pub mod experiment_design;
 pub mod inference;
 pub mod regression;
+pub mod results;
 
 pub use error::IdentError;

@@ -162,6 +162,18 @@ impl Joint {
         Some(joint)
     }
 
+    /// The same joint with the sizes of the effects that it states taken from fitted ones, in the order of [`Joint::effects`].
+    #[must_use]
+    pub fn with_sizes(&self, mut next: impl FnMut() -> Option<Effect>) -> Self {
+        let mut joint = self.clone();
+        for key in KEYS.iter().filter(|key| key.size && self.states(key.kind)) {
+            if let Some(size) = next().and_then(|fitted| fitted.value(key.parameter)) {
+                *(key.of)(&mut joint) = size;
+            }
+        }
+        joint
+    }
+
     /// The same joint without an effect.
     pub(crate) fn without(&self, kind: Kind) -> Self {
         let mut joint = self.clone();

@@ -2,26 +2,31 @@
 
 use arm_core::effect::{Effect, Place};
 use arm_core::{Chain, Joints};
-use arm_ident::inference::estimate::{Estimate, Explained, Identified, Quantity};
 use arm_ident::inference::joint_method::{MotionSource, Options};
 use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
-use arm_ident::regression::unknown::Source;
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use arm_ident::results as core;
+use arm_ident::results::{Asked, TrialName};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
 
 use crate::arm::{AnyChain, each_short_length};
 use crate::convert::rows;
-use crate::errors::{bad_input, identification, invalid};
+use crate::errors::{bad_input, identification, invalid, refused};
 use crate::model;
+use crate::results::Identification;
 use crate::rig::Rig;
 
 /// One trial as Python hands it over: SI units, uniform samples, no gaps in the numbers.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Columns<'py> {
-    role: String,
+    pub file: String,
+    pub role: String,
+    /// Time of the last sample [s].
+    pub end: f64,
     configuration: usize,
+    /// Name of the movement.
+    movement: String,
     rate: f64,
     q: PyReadonlyArray2<'py, f64>,
     dq: Option<PyReadonlyArray2<'py, f64>>,
@@ -33,24 +38,14 @@ pub struct Columns<'py> {
     valid: PyReadonlyArray1<'py, bool>,
 }
 
-/// What the calibration promises, as the estimation takes it: in radians.
-pub fn tolerance(of: &model::Tolerance) -> Tolerance {
-    Tolerance {
-        angle_offset: of.0.angle_offset(),
-        force_bias: of.0.force_bias,
-        force_gain: of.0.force_gain,
-        time_delay: of.0.time_delay,
-        handle_placement: of.0.handle_placement,
-    }
-}
-
 /// How to identify.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Settings {
     method: String,
     fitted: Vec<bool>,
-    segment_uncertainty: f64,
+    /// The model as given.
+    model: Py<model::Model>,
     tolerance: Py<model::Tolerance>,
     cutoff: Option<f64>,
     motion: String,
@@ -60,7 +55,7 @@ pub struct Settings {
 impl Settings {
     /// What the calibration promises.
     pub fn tolerance(&self) -> Tolerance {
-        tolerance(self.tolerance.get())
+        *self.tolerance.get().inner()
     }
 }
 
@@ -162,7 +157,7 @@ pub fn model<const N: usize>(
     }
     Ok(Model {
         chain: setup.chain().map_err(invalid)?,
-        segment_uncertainty: settings.segment_uncertainty,
+        segment_uncertainty: settings.model.get().inner().segment_uncertainty,
         fitted,
         held,
         contact: setup.contact,
@@ -171,18 +166,18 @@ pub fn model<const N: usize>(
 
 /// Identifies by the joint method or the cascade; see `armrs.identify`.
 #[pyfunction]
-pub fn identify<'py>(
-    py: Python<'py>,
+pub fn identify(
+    py: Python<'_>,
     rig: &Rig,
-    trials: Vec<Columns<'py>>,
+    trials: Vec<Columns<'_>>,
     settings: Settings,
-) -> PyResult<Bound<'py, PyDict>> {
-    fn run<'py, const N: usize>(
-        py: Python<'py>,
+) -> PyResult<Identification> {
+    fn run<const N: usize>(
+        py: Python<'_>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        input: (&[Columns<'py>], &Settings),
-    ) -> PyResult<Bound<'py, PyDict>> {
+        input: (&[Columns<'_>], &Settings),
+    ) -> PyResult<Identification> {
         let (columns, settings) = input;
         let model = model(chain, rig, settings)?;
         let trials = read_trials::<N>(columns, rig)?;
@@ -210,115 +205,20 @@ pub fn identify<'py>(
             other => return Err(bad_input("method", other, "joint or cascade")),
         }
         .map_err(identification)?;
-        outcome(py, &result)
+        let names = trials.iter().zip(columns).map(|(trial, c)| TrialName {
+            role: trial.role,
+            configuration: c.movement.clone(),
+        });
+        let asked = Asked {
+            model: settings.model.get().inner(),
+            effects: &rig.effects,
+            trials: &names.collect::<Vec<_>>(),
+            method: &settings.method,
+            level: settings.level,
+        };
+        core::Identification::of(&result, &asked)
+            .map(Identification)
+            .map_err(refused)
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&trials, &settings)))
-}
-
-fn outcome<'py, const N: usize>(
-    py: Python<'py>,
-    result: &Identified<N>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let out = PyDict::new(py);
-    out.set_item("status", result.status.name())?;
-    out.set_item("rank", result.rank)?;
-    out.set_item("unknowns", result.unknowns)?;
-    out.set_item("scale_free", result.scale_free)?;
-    out.set_item("cutoff", result.cutoff)?;
-    out.set_item("clusters", result.clusters)?;
-    out.set_item("neglected_inertia", &result.neglected_inertia)?;
-    out.set_item("speed_noise", &result.speed_noise)?;
-    out.set_item(
-        "speed_noise_allowed",
-        arm_ident::regression::measured_motion::QUIET,
-    )?;
-    let not_simulated = result.not_simulated.as_ref();
-    out.set_item("not_simulated", not_simulated.map(ToString::to_string))?;
-    out.set_item("trades", &result.trades)?;
-    for (name, list) in [
-        ("parameters", &result.parameters),
-        ("combinations", &result.combinations),
-        ("calibration", &result.calibration),
-    ] {
-        let items = list
-            .iter()
-            .map(|e| estimate(py, e, &result.fitted))
-            .collect::<PyResult<Vec<_>>>()?;
-        out.set_item(name, PyList::new(py, items)?)?;
-    }
-    let explained = result
-        .explained
-        .iter()
-        .map(|e| series(py, e))
-        .collect::<PyResult<Vec<_>>>()?;
-    out.set_item("explained", PyList::new(py, explained)?)?;
-    let segments: Vec<_> = result
-        .chain
-        .segments()
-        .iter()
-        .map(|s| (s.length, s.mass, s.com[0], s.com[1], s.inertia))
-        .collect();
-    out.set_item("segments", segments)?;
-    let effects: Vec<_> = result
-        .fitted
-        .iter()
-        .map(|e| {
-            let info = e.kind.info();
-            (
-                info.kind,
-                e.index,
-                e.parameters[..info.parameters.len()].to_vec(),
-            )
-        })
-        .collect();
-    out.set_item("effects", effects)?;
-    Ok(out)
-}
-
-fn estimate<'py>(
-    py: Python<'py>,
-    e: &Estimate,
-    fitted: &[Effect<f64>],
-) -> PyResult<Bound<'py, PyDict>> {
-    let own = e.name.as_str();
-    let (name, kind) = match e.quantity {
-        Quantity::Unknown(Source::Effect(i, p)) | Quantity::EffectParameter(i, p) => {
-            let info = fitted[i].kind.info();
-            (info.parameters[p].name, info.kind)
-        }
-        // "elastic1 stiffness*rest": the kind and the joint stand in fields of their own.
-        Quantity::Unknown(Source::RestTorque(i, _)) => (
-            own.split_once(' ').map_or(own, |(_, name)| name),
-            fitted[i].kind.info().kind,
-        ),
-        Quantity::Unknown(Source::Calibration(_)) => (own, "calibration"),
-        Quantity::Unknown(Source::Segment(..)) | Quantity::Segment => (own, "segment"),
-        Quantity::Combination => (own, "combination"),
-    };
-    let out = PyDict::new(py);
-    out.set_item("name", name)?;
-    out.set_item("joint", e.joint.map(|j| j + 1))?;
-    out.set_item("kind", kind)?;
-    out.set_item("value", e.value)?;
-    out.set_item("std", e.std)?;
-    out.set_item("unit", e.unit.replace('·', " "))?;
-    out.set_item("interval", e.interval)?;
-    out.set_item("decided_by", e.decided_by.name())?;
-    Ok(out)
-}
-
-fn series<'py, const N: usize>(py: Python<'py>, e: &Explained<N>) -> PyResult<Bound<'py, PyDict>> {
-    let flat = |rows: &[Joints<f64, N>]| -> Vec<f64> {
-        rows.iter().flat_map(|r| r.iter().copied()).collect()
-    };
-    let shape = |values: Vec<f64>| {
-        values
-            .to_pyarray(py)
-            .call_method1("reshape", (e.samples.len(), N))
-    };
-    let out = PyDict::new(py);
-    out.set_item("samples", e.samples.to_pyarray(py))?;
-    out.set_item("measured", shape(flat(&e.measured))?)?;
-    out.set_item("fitted", shape(flat(&e.fitted))?)?;
-    Ok(out)
 }

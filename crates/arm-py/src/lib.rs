@@ -15,6 +15,7 @@ mod model;
 mod online;
 mod own;
 mod plan;
+mod results;
 mod rig;
 mod signal;
 mod sim;
@@ -27,6 +28,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("build_profile", env!("BUILD_PROFILE"))?;
     m.add_class::<arm::Arm>()?;
     model::add(m)?;
+    results::add(m)?;
     m.add_class::<rig::Rig>()?;
     m.add_class::<cosim::ArmSlave>()?;
     m.add_class::<cosim::ArmState>()?;
@@ -34,10 +36,11 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(ident::identify, m)?)?;
     m.add_function(wrap_pyfunction!(fit::fit_by_simulation, m)?)?;
     m.add_function(wrap_pyfunction!(gap::find_gap, m)?)?;
-    m.add_function(wrap_pyfunction!(gap::held_out, m)?)?;
     m.add_function(wrap_pyfunction!(gap::distances, m)?)?;
     m.add_function(wrap_pyfunction!(gap::look, m)?)?;
     m.add_function(wrap_pyfunction!(gap::play, m)?)?;
+    m.add_function(wrap_pyfunction!(gap::reach, m)?)?;
+    m.add("STILL", arm_gap::data::identified_base::STILL)?;
     m.add_function(wrap_pyfunction!(own::declare, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate_in_pieces, m)?)?;

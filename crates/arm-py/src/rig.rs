@@ -42,16 +42,7 @@ impl Rig {
             Some(effects) => model::each("effects", effects, |e: &model::Effect| e.0.core())?,
             None => model.core_effects(),
         };
-        for effect in &effects {
-            effect.validate(model.n_joints()).map_err(invalid)?;
-        }
-        let robot = model.robot.map(|robot| robot.core()).transpose();
-        Ok(Self {
-            arm: Arm::of(&model)?,
-            effects,
-            contact: model.core_contact(),
-            robot: robot.map_err(invalid)?,
-        })
+        Self::of(&model, effects)
     }
 
     /// Torque with which each effect resists in its joint along a motion, shape (n, n_effects) [N m].
@@ -139,6 +130,20 @@ impl<'a, const N: usize> Along<'a, N> {
 }
 
 impl Rig {
+    /// The rig of a model, with these effects in place of its own.
+    pub fn of(model: &arm_model::Model, effects: Vec<Effect<f64>>) -> PyResult<Self> {
+        for effect in &effects {
+            effect.validate(model.n_joints()).map_err(invalid)?;
+        }
+        let robot = model.robot.map(|robot| robot.core()).transpose();
+        Ok(Self {
+            arm: Arm::of(model)?,
+            effects,
+            contact: model.core_contact(),
+            robot: robot.map_err(invalid)?,
+        })
+    }
+
     /// The rig without its effects.
     pub fn setup<const N: usize>(&self, chain: &Chain<f64, N>) -> Setup<f64, N> {
         Setup::new(chain, self.contact)

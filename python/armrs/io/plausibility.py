@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import BadInput, Text
 from ..model import Model, Robot
 from . import readings
+from .chain import chain_points
 from .dataset import Dataset
 from .readings import Reading
 from .trial import Trial, constant
@@ -147,18 +148,12 @@ def _displacement(model: Model, trial: Trial) -> np.ndarray:
 
 def handle_path(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Return where a robot with angles q, (n, 2) [rad], the second relative to the first, has its handle, (n, 2) [m]."""
-    first, second = q[:, 0], q[:, 0] + q[:, 1]
-    near, far = robot.lengths
-    return np.column_stack(
-        [robot.base[0] + near * np.cos(first) + far * np.cos(second), robot.base[1] + near * np.sin(first) + far * np.sin(second)]
-    )
+    return chain_points(robot.base, robot.lengths, q)[:, -1]
 
 
 def hand_path(model: Model, q: np.ndarray) -> np.ndarray:
     """Return where an arm with angles q, (n, n_joints) [rad], has its hand, (n, 2) [m]."""
-    angles = np.cumsum(q, axis=1)
-    lengths = np.array([s.length for s in model.segments])
-    return np.column_stack([model.base[0] + np.cos(angles) @ lengths, model.base[1] + np.sin(angles) @ lengths])
+    return chain_points(model.base, [s.length for s in model.segments], q)[:, -1]
 
 
 def _rms(distance: np.ndarray) -> float:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..io.chain import chain_points
+
 if TYPE_CHECKING:
     from ..model import Model
 
@@ -21,20 +23,13 @@ _MARGIN = 0.06
 
 def points(model: Model, q: np.ndarray) -> np.ndarray:
     """Return the joints of an arm and its end, shape (n, n_joints + 1, 2) [m], of angles (n, n_joints)."""
-    directions = np.cumsum(q, axis=1)
-    lengths = np.array([s.length for s in model.segments])
-    steps = lengths[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=-1)
-    base = np.broadcast_to(np.asarray(model.base, dtype=float), (len(q), 1, 2))
-    return np.concatenate([base, base + np.cumsum(steps, axis=1)], axis=1)
+    return chain_points(model.base, [s.length for s in model.segments], q)
 
 
 def robot_points(model: Model, robot_q: np.ndarray) -> np.ndarray:
     """Return base, elbow and handle of the robot, shape (n, 3, 2) [m], of its angles (n, 2), the second relative to the first."""
     assert model.robot is not None
-    directions = np.cumsum(robot_q, axis=1)
-    steps = np.array(model.robot.lengths)[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=-1)
-    base = np.broadcast_to(np.array(model.robot.base), (len(robot_q), 1, 2))
-    return np.concatenate([base, base + np.cumsum(steps, axis=1)], axis=1)
+    return chain_points(model.robot.base, model.robot.lengths, robot_q)
 
 
 def film(title: str, text: str, t: np.ndarray, chains: Mapping[str, tuple[str, np.ndarray]]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import platform
 from typing import Any
 
@@ -13,7 +12,6 @@ from ..analysis.quantities import value_in
 from ..errors import BadInput
 from ..io.dataset import Dataset
 from ..model import Contact
-from ..workflows.accuracy import energy_balance
 from ..workflows.identify import Estimate, Identified
 from ..workflows.importing.recipe import FILE, load_recipe
 from ..workflows.passive import LEVEL, PassiveMoments
@@ -93,7 +91,7 @@ def identified_data(result: Identified, command: str | None = None) -> dict[str,
 
 def _with_given(estimate: Estimate, result: Identified) -> dict[str, Any]:
     given = value_in(result.dataset.model, estimate.name, kind=estimate.kind, joint=estimate.joint)
-    return dataclasses.asdict(estimate) | {"given": given}
+    return {**estimate.to_dict(), "given": given}
 
 
 def simulated_data(result: Run, name: str, command: str | None = None) -> dict[str, Any]:
@@ -110,7 +108,7 @@ def simulated_data(result: Run, name: str, command: str | None = None) -> dict[s
         fastest = max(fastest, np.abs(piece.qd).max())
         first, last = piece if first is None else first, piece
     assert first is not None and last is not None
-    balance = energy_balance(result.pieces())
+    balance = result.balance
     stored = sum(last.columns[f"energy.{part}"][-1] - first.columns[f"energy.{part}"][0] for part in ("kinetic", "potential", "contact"))
     return {
         "verb": "simulate",
@@ -167,7 +165,7 @@ def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str
             d.to_dict() | {"joint_name": joints[d.joint - 1], "adjacent_name": joints[d.adjacent - 1]} for d in result.dependence
         ],
         "couplings": [c.to_dict() | {"joint_names": [joints[j - 1] for j in c.joints]} for c in result.couplings],
-        "repeated": [dataclasses.asdict(e) for e in result.followed()],
+        "repeated": [e.to_dict() for e in result.followed()],
         "checks": [{"name": c.name, "passed": c.passed, "text": c.text} for c in result.checks],
         "level": LEVEL,
         "warnings": list(result.warnings),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..analysis import mixed_model
+from ..analysis import mixed_model, students_t
 from ..analysis.mixed_model import MixedModel
 from ..errors import ArmrsError, BadInput, Text
 from ..io import files
@@ -244,11 +244,10 @@ def _summary(values: Sequence[Value]) -> tuple[list[Quantity], list[Contrast], l
 
 def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str], own: Sequence[Value]) -> Quantity:
     from scipy.stats import norm
-    from scipy.stats import t as student
 
     mean, variance = float(fitted.coefficients[place]), float(fitted.covariance[place, place])
     freedom, z = fitted.total_freedom, float(norm.ppf(0.5 + 0.5 * LEVEL))
-    half = float(student.ppf(0.5 + 0.5 * LEVEL, freedom) * np.hypot(fitted.total, np.sqrt(variance)))
+    half = float(students_t.quantile(LEVEL, freedom) * np.hypot(fitted.total, np.sqrt(variance)))
     end_std = float(np.sqrt(variance + z**2 * fitted.total**2 / (2.0 * freedom)))
     ends = [mean - z * fitted.total, mean + z * fitted.total]
     return Quantity(
@@ -266,12 +265,10 @@ def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str], own: 
 
 
 def _contrast(fitted: MixedModel, vector: np.ndarray, named: tuple[str, str], between: tuple[str, str], freedom: float) -> Contrast:
-    from scipy.stats import t as student
-
     difference = float(vector @ fitted.coefficients)
     std = max(float(np.sqrt(vector @ fitted.covariance @ vector)), 1e-300)
-    half = float(student.ppf(0.5 + 0.5 * LEVEL, freedom)) * std
-    p_value = float(2.0 * student.sf(abs(difference) / std, freedom))
+    half = students_t.quantile(LEVEL, freedom) * std
+    p_value = students_t.chance(difference, std, freedom)
     return Contrast(*named, between, difference, std, (difference - half, difference + half), p_value)
 
 

@@ -2,64 +2,26 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .. import _armrs, checks
+from .._armrs import Estimate as Estimate
+from .._armrs import Fit as Fit
+from .._armrs import Identification as Identification
 from ..catalogue import catalogue
 from ..errors import BadInput, IdentificationError, Text, unknown_name
 from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_added
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial, refuse_moving_base
-from ..model import Effect, Model, Segment, Tolerance
+from ..model import Effect, Model, Tolerance
 from ..tabular import SYMBOLS, Tabular, Tidy
 from .setup import refuse_wrong_setup
-
-if TYPE_CHECKING:
-    from .._armrs import _Identified
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One estimated quantity.
-
-    Attributes
-    ----------
-    name : str
-        Parameter of a segment (`m2`, `m2*l2`, `l2`, `I2`) or of an effect (`torque`), or a combination of parameters.
-    joint : int or None
-        Joint or segment, from 1.
-    kind : str
-        "segment", "combination", "calibration", or the kind of effect.
-    value, std : float
-        Estimate and standard deviation, in `unit`.
-    unit : str
-    interval : (float, float)
-    decided_by : {"data", "prior", "bound"}
-        What the value rests on. A prior's value is an assumption that the data left open, not a measurement.
-    caveat : str or None
-        Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
-    """
-
-    name: str
-    joint: int | None
-    kind: str
-    value: float
-    std: float
-    unit: str
-    interval: tuple[float, float]
-    decided_by: str
-    caveat: str | None = None
-
-    def __str__(self) -> str:
-        own = self.kind in ("segment", "combination", "calibration")
-        name = self.name if own else f"{self.kind} {self.name}"
-        return f"{name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +49,10 @@ class Identified(Tabular):
 
     Attributes
     ----------
+    result : Identification
+        What the core identified: everything below but the trials.
+    dataset : Dataset
+        What it was identified from.
     method : {"joint", "cascade"}
     status : str
         How the solver ended: "solved", "almost_solved".
@@ -122,27 +88,101 @@ class Identified(Tabular):
         The model with the estimates.
     """
 
-    method: str
-    status: str
-    rank: int
-    unknowns: int
-    parameters: tuple[Estimate, ...]
-    combinations: tuple[Estimate, ...]
-    calibration: tuple[Estimate, ...]
-    contradictions: tuple[str, ...]
-    misfits: tuple[str, ...]
-    left_out: tuple[str, ...]
-    trades: tuple[str, ...]
-    scale_free: bool
-    level: float
-    cutoff: float
-    residual_rms: dict[str, dict[str, float]]
-    residual_rms_by_configuration: dict[str, dict[str, dict[str, float]]]
-    explained: tuple[Explained, ...]
-    model: Model
+    result: Identification = field(repr=False)
     dataset: Dataset
 
     symbols: ClassVar[str] = SYMBOLS
+
+    @cached_property
+    def explained(self) -> tuple[Explained, ...]:
+        """How the fitted model explains each trial."""
+        fits = zip(self.dataset.trials, self.result.explained, strict=True)
+        return tuple(Explained(trial, trial.t[fit.samples], fit.measured, fit.fitted) for trial, fit in fits)
+
+    @property
+    def method(self) -> str:
+        """The method: "joint" or "cascade"."""
+        return self.result.method
+
+    @property
+    def status(self) -> str:
+        """How the solver ended: "solved", "almost_solved"."""
+        return self.result.status
+
+    @property
+    def rank(self) -> int:
+        """How many combinations of the unknowns the data determine."""
+        return self.result.rank
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns, calibration not counted."""
+        return self.result.unknowns
+
+    @cached_property
+    def parameters(self) -> tuple[Estimate, ...]:
+        """The unknowns and what follows from them."""
+        return self.result.parameters
+
+    @cached_property
+    def combinations(self) -> tuple[Estimate, ...]:
+        """The base parameters: what a planar chain can show at all."""
+        return self.result.combinations
+
+    @cached_property
+    def calibration(self) -> tuple[Estimate, ...]:
+        """Small imperfections of the measurement that were refitted."""
+        return self.result.calibration
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """What in the result cannot be true of this arm and these sensors."""
+        return self.result.contradictions
+
+    @property
+    def misfits(self) -> tuple[str, ...]:
+        """What the fitted model does not describe well."""
+        return self.result.misfits
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What of the model the method does not take into account."""
+        return self.result.left_out
+
+    @property
+    def trades(self) -> tuple[str, ...]:
+        """Which unknowns the movements cannot tell apart, in words."""
+        return self.result.trades
+
+    @property
+    def scale_free(self) -> bool:
+        """Whether all parameters are known up to one common factor only."""
+        return self.result.scale_free
+
+    @property
+    def level(self) -> float:
+        """Probability of the intervals."""
+        return self.result.level
+
+    @property
+    def cutoff(self) -> float:
+        """Cutoff of the common low-pass [Hz]."""
+        return self.result.cutoff
+
+    @cached_property
+    def residual_rms(self) -> Mapping[str, Mapping[str, float]]:
+        """Root mean square of the torque residual by role and channel [N m]."""
+        return self.result.residual_rms
+
+    @cached_property
+    def residual_rms_by_configuration(self) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+        """The same by role, configuration and channel [N m]."""
+        return self.result.residual_rms_by_configuration
+
+    @cached_property
+    def model(self) -> Model:
+        """The model with the estimates."""
+        return self.result.model
 
     def __repr__(self) -> str:
         known = f"{self.rank} of {self.unknowns} unknowns determined"
@@ -176,23 +216,7 @@ class Identified(Tabular):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as it is written to JSON; the model stands in a file of its own."""
-        return {
-            "method": self.method,
-            "status": self.status,
-            "rank": self.rank,
-            "unknowns": self.unknowns,
-            "parameters": [dataclasses.asdict(e) for e in self.parameters],
-            "combinations": [dataclasses.asdict(e) for e in self.combinations],
-            "calibration": [dataclasses.asdict(e) for e in self.calibration],
-            "warnings": list(self.warnings),
-            "not_separable": list(self.trades),
-            "scale_free": self.scale_free,
-            "level": self.level,
-            "cutoff_Hz": self.cutoff,
-            "residual_rms": self.residual_rms,
-            "residual_rms_by_configuration": self.residual_rms_by_configuration,
-            "model": "identified.toml",
-        }
+        return self.result.to_dict()
 
 
 def identify(
@@ -241,8 +265,8 @@ def identify(
     configurations = sorted({t.configuration for t in dataset.trials})
     columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     with naming_trials(dataset.trials):
-        raw, follows = _identified(_armrs.Rig(model, effects), columns, settings, dataset)
-    return _result(dataset, raw, effects, settings, follows)
+        found, follows = _identified(_armrs.Rig(model, effects), columns, settings, dataset)
+    return _result(dataset, found, effects, follows)
 
 
 def _checked(
@@ -267,25 +291,17 @@ def _checked(
     return None if with_effects is None and method == "joint" else kinds
 
 
-def _result(dataset: Dataset, raw: _Identified, effects: list[Effect], settings: Mapping[str, Any], follows: Sequence[str]) -> Identified:
+def _result(dataset: Dataset, found: Identification, effects: list[Effect], follows: Sequence[str]) -> Identified:
     """Return what the core found, with what is to be said of it."""
-    model, method = dataset.model, settings["method"]
-    explained = tuple(
-        Explained(trial, trial.t[e["samples"]], e["measured"], e["fitted"])
-        for trial, e in zip(dataset.trials, raw["explained"], strict=True)
-    )
-    noisy = _noisy_speeds(raw["speed_noise"], raw["speed_noise_allowed"])
+    model = dataset.model
+    noisy = _noisy_speeds(found.speed_noise)
     parameters, combinations, calibration = (
-        _estimates(raw[name], NOISY_SPEED if noisy else None) for name in ("parameters", "combinations", "calibration")
+        _with_caveat(estimates, NOISY_SPEED if noisy else None) for estimates in (found.parameters, found.combinations, found.calibration)
     )
     calibration = _moved_by_data(calibration, dataset.tolerance)
     # Without a load there is no torque that a residual could be a part of.
-    shares = [] if raw["scale_free"] else _residual_shares(explained)
-    return Identified(
-        method=method,
-        status=raw["status"],
-        rank=raw["rank"],
-        unknowns=raw["unknowns"],
+    shares = [] if found.scale_free else _residual_shares(Identified(found, dataset).explained)
+    told = found.replace(
         parameters=parameters,
         combinations=combinations,
         calibration=calibration,
@@ -299,34 +315,26 @@ def _result(dataset: Dataset, raw: _Identified, effects: list[Effect], settings:
             *_beyond_segment(model, parameters),
             *(f"{line}: what the model lacks may be in it" for line in _beyond_tolerance(calibration, dataset.tolerance, _FAR, _BEYOND)),
             *noisy,
-            *_not_quasi_static(raw["neglected_inertia"]),
+            *_not_quasi_static(found.neglected_inertia),
         ),
-        left_out=(*follows, *_left_out(method, effects), *_unmoved(method, parameters)),
-        trades=tuple(raw["trades"]),
-        scale_free=raw["scale_free"],
-        level=settings["level"],
-        cutoff=raw["cutoff"],
-        residual_rms=_residuals(explained),
-        residual_rms_by_configuration=_residuals_by_configuration(explained),
-        explained=explained,
-        model=_identified_model(model, raw, effects),
-        dataset=dataset,
+        left_out=(*follows, *_left_out(found.method, effects), *_unmoved(found.method, parameters)),
     )
+    return Identified(told, dataset)
 
 
 def _identified(
     built: _armrs.Rig, columns: list[dict[str, Any]], settings: dict[str, Any], dataset: Dataset
-) -> tuple[_Identified, tuple[str, ...]]:
+) -> tuple[Identification, tuple[str, ...]]:
     """Return what the core identified, and a line where the measured motion had to take the place of the simulated one."""
-    raw = _armrs.identify(built, columns, settings)
-    error = raw["not_simulated"]
+    found = _armrs.identify(built, columns, settings)
+    error = found.not_simulated
     if error is None:
-        return raw, ()
+        return found, ()
     # An arm of which little is known moves elsewhere than its model; one whose robot does not fit is refused.
     if not hand_meets_handle(dataset):
         raise IdentificationError(error)
     why = error.split(":")[0] if "differs from" in error else "the arm cannot be simulated"
-    return raw, (f"speeds and accelerations are measured, not simulated: with what measured motion tells {why}",)
+    return found, (f"speeds and accelerations are measured, not simulated: with what measured motion tells {why}",)
 
 
 _INERTIA_FELT = 1.0
@@ -400,7 +408,7 @@ def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dic
     return {
         "method": "joint",
         "fitted": fitted,
-        "segment_uncertainty": model.segment_uncertainty,
+        "model": model,
         "tolerance": tolerance,
         "cutoff": None,
         "motion": "auto",
@@ -417,7 +425,7 @@ _POOR = 0.2
 _NO_FIT = 0.5
 """And above this, none."""
 _ROUNDING = 1e-12
-"""An inertia below this part of mass · length² is a difference of equal numbers; so is what of a length is beyond another."""
+"""What of a length is beyond another by this part of it is a difference of equal numbers."""
 
 
 def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
@@ -458,7 +466,7 @@ def _moved_by_data(calibration: Sequence[Estimate], tolerance: Tolerance) -> tup
     Where the model does not fit, standard deviations are as wide as the tolerance, which says that the data decided nothing. The value
     itself says the contrary: beforehand it was zero.
     """
-    return tuple(dataclasses.replace(e, decided_by="data") if abs(e.value) > _FAR * _promised(e, tolerance) else e for e in calibration)
+    return tuple(e.replace(decided_by="data") if abs(e.value) > _FAR * _promised(e, tolerance) else e for e in calibration)
 
 
 def _promised(calibration: Estimate, tolerance: Tolerance) -> float:
@@ -487,13 +495,13 @@ NOISY_SPEED = "noisy speed"
 leaves or takes goes into masses and calibration."""
 
 
-def _noisy_speeds(shares: Sequence[float], allowed: float) -> tuple[str, ...]:
+def _noisy_speeds(shares: Sequence[float]) -> tuple[str, ...]:
     """Return the joints whose speeds are noise to a good part, a line each."""
     return tuple(
         f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are biased by "
         "more than their intervals say, and masses with them; give the robot's angles and a [robot], measured speeds, or a lower cutoff"
         for j, share in enumerate(shares, start=1)
-        if share > allowed
+        if share > _armrs.SPEED_NOISE_ALLOWED
     )
 
 
@@ -541,7 +549,10 @@ def core_columns(trial: Trial) -> dict[str, Any]:
         return table.reshape(values.shape)
 
     return {
+        "file": trial.file,
         "role": trial.role,
+        "end": float(trial.t[-1]),
+        "movement": trial.configuration,
         "rate": trial.rate,
         "q": whole(trial.q),
         "dq": whole(trial.dq),
@@ -554,45 +565,6 @@ def core_columns(trial: Trial) -> dict[str, Any]:
     }
 
 
-def _estimates(items: Sequence[Mapping[str, Any]], caveat: str | None) -> tuple[Estimate, ...]:
+def _with_caveat(estimates: Sequence[Estimate], caveat: str | None) -> tuple[Estimate, ...]:
     """Return estimates; a caveat is one against the data, and so against what they decided alone."""
-    return tuple(
-        Estimate(**{**item, "interval": tuple(item["interval"])}, caveat=caveat if item["decided_by"] == "data" else None) for item in items
-    )
-
-
-def _residuals(explained: Sequence[Explained]) -> dict[str, dict[str, float]]:
-    result: dict[str, dict[str, float]] = {}
-    for role in ("fit", "test"):
-        rows = [e.measured - e.fitted for e in explained if e.trial.role == role and len(e.t)]
-        if rows:
-            rms = np.sqrt(np.mean(np.square(np.concatenate(rows)), axis=0))
-            result[role] = {f"tau{j}_Nm": float(v) for j, v in enumerate(rms, start=1)}
-    return result
-
-
-def _residuals_by_configuration(explained: Sequence[Explained]) -> dict[str, dict[str, dict[str, float]]]:
-    result: dict[str, dict[str, dict[str, float]]] = {}
-    for configuration in dict.fromkeys(e.trial.configuration for e in explained):
-        own = [e for e in explained if e.trial.configuration == configuration]
-        for role, channels in _residuals(own).items():
-            result.setdefault(role, {})[configuration] = channels
-    return result
-
-
-def _identified_model(model: Model, raw: _Identified, effects: list[Effect]) -> Model:
-    """Return the model with estimates; effects that its joints state stay there, the others become effects."""
-    segments = tuple(
-        Segment(old.name, length, mass, min(max(com, 0.0), length), _not_rounding(inertia, mass * length**2), com_normal=normal)
-        for old, (length, mass, com, normal, inertia) in zip(model.segments, raw["segments"], strict=True)
-    )
-    fitted = [Effect(kind, index + 1, parameters=catalogue()[kind].values(values)) for kind, index, values in raw["effects"]]
-    # What an effect did to the segments is in them now.
-    absorbed = {name for name, kind in catalogue().items() if kind.where in ("segment", "hand")}
-    held = [e for e in effects if e.kind not in _joint_kinds() and e.kind not in absorbed]
-    return model.replace(segments=segments).with_joint_effects(fitted, held)
-
-
-def _not_rounding(value: float, scale: float) -> float:
-    """Return a value, or zero where it is what rounding left of a bound at zero."""
-    return value if abs(value) > _ROUNDING * scale else 0.0
+    return tuple(e.replace(caveat=caveat) if e.decided_by == "data" else e for e in estimates)

@@ -380,7 +380,7 @@ def plan_data(
     data: dict[str, Any] = {
         "verb": "plan",
         **found.to_dict(),
-        "would_show": [dict(vars(w)) for w in smallest],
+        "would_show": [w.to_dict() for w in smallest],
         "data": {"name": name, "synthetic": True, "joints": [joint.name for joint in found.model.joints]},
         "made_by": origin(command),
     }

@@ -18,7 +18,7 @@ from ..errors import BadInput, SimulationError, Text
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Model, load_model
 from ..tabular import Labelled, Series, Tidy
-from .accuracy import energy_balance
+from .accuracy import EnergyBalance, energy_balance
 from .movement import Movement
 
 if TYPE_CHECKING:
@@ -117,6 +117,10 @@ class Run(Protocol):
     def digest(self) -> str:
         """As of `Simulated`."""
 
+    @property
+    def balance(self) -> EnergyBalance:
+        """As of `Simulated`."""
+
     def pieces(self) -> Iterator[Simulated]:
         """Give the samples in order, as runs of at most `PIECE` of them."""
 
@@ -201,6 +205,11 @@ class Simulated(Series):
                 digest.values(values)
         return digest.value()
 
+    @cached_property
+    def balance(self) -> EnergyBalance:
+        """What of the energy of the run is not accounted for."""
+        return energy_balance(self.pieces())
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is hardly a movement of an arm, or not accounted for, a line each."""
@@ -246,7 +255,7 @@ def is_doubtful(run: Run) -> str | None:
     speeds = _smoothings(run.model)
     if run.settings["engine"] == "rapier" and 0.0 in speeds:
         return "rapier does not locate where set-valued friction sticks and slips"
-    if any(speed > 0.0 for speed in speeds) and energy_balance(run.pieces()).share > CHATTER:
+    if any(speed > 0.0 for speed in speeds) and run.balance.share > CHATTER:
         return "the dry friction may be too steep for the step"
     return None
 
@@ -271,7 +280,7 @@ def _smoothings(model: Model) -> list[float]:
 
 def warnings(run: Run) -> tuple[str, ...]:
     """Return fast joints, missing energy and doubts about the step, a line each."""
-    lines = [*runaway(run.pieces()), *energy_balance(run.pieces()).warnings]
+    lines = [*runaway(run.pieces()), *run.balance.warnings]
     doubt = is_doubtful(run)
     if doubt is not None:
         lines.append(f"{doubt}: compare with half the step, or give it smoothing = 0 in the native engine, which solves it at any step")

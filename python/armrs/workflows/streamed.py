@@ -15,6 +15,7 @@ from ..errors import SimulationError
 from ..io import files
 from ..io.trial import Trial
 from ..model import Model
+from .accuracy import EnergyBalance, energy_balance
 from .movement import Movement
 from .simulate import PIECE, Simulated, digested, is_doubtful, simulate_in_pieces, steps_to_try, warnings
 
@@ -97,6 +98,11 @@ class Streamed:
                 for start in range(0, self.samples, PIECE):
                     digest.values(self._read(name, start))
         return digest.value()
+
+    @cached_property
+    def balance(self) -> EnergyBalance:
+        """What of the energy of the run is not accounted for."""
+        return energy_balance(self.pieces())
 
     @property
     def warnings(self) -> tuple[str, ...]:

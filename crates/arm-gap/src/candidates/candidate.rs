@@ -576,7 +576,7 @@ fn ask<const N: usize>(
 /// The amplitude with which the effect's torque is a small share of what its joint carries, or the largest that the kind
 /// allows; `None` where it has none.
 fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate) -> Option<f64> {
-    const LEAST: f64 = 1e-6;
+    const LEAST: f64 = 1e-6; // In the unit of the effect: what less of it changes drowns in rounding.
     let joint = candidate.effect.index;
     let mut largest = 0.0;
     for movement in movements {

@@ -12,8 +12,10 @@ use arm_ident::regression::trial::{Model, Role};
 use arm_ident::regression::unknown::{Source, spring};
 use arm_numerics::statistics::extent::extent;
 
+use crate::GapError;
 use crate::data::passive_law::{Free, Passive};
 use crate::data::session::{ComparisonMode, Session};
+use crate::measurement_model::prediction::Course;
 
 /// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
 const LIKELY: f64 = 2.0;
@@ -22,6 +24,8 @@ const LIKELY: f64 = 2.0;
 const NOISY: f64 = 0.3;
 /// Standard deviation of a rest angle about the middle of the angles that were reached \[rad\].
 const REST_SD: f64 = 1.0;
+/// Range of an angle in the common band up to which its joint hardly moves \[rad\]: a slip of a sensor or a soft orthosis makes as much.
+pub const STILL: f64 = 0.01;
 /// Furthest start of a segment from its literature values, in standard deviations.
 const FURTHEST_START: f64 = 3.0;
 
@@ -132,25 +136,29 @@ impl<const N: usize> Session<N> {
             .collect()
     }
 
-    /// Which joints stay where they are in all fit trials but for noise. In one of them a sensor may slip.
-    fn hardly_moving(&self) -> [bool; N] {
-        /// Range of the angle in the common band \[rad\].
-        const STILL: f64 = 0.01;
+    /// How far each joint moves in the fit trials, in the common band \[rad\]. In one trial a sensor may slip, so the second largest range
+    /// counts where there are several; infinite where a trial cannot be read.
+    pub fn reach(&self) -> [f64; N] {
         let fit = self.fit_trials();
-        let mut moving = [0; N];
-        for &trial in &fit {
-            let course = self.course(trial);
-            for (joint, count) in moving.iter_mut().enumerate() {
-                let range = course.as_ref().map_or(f64::INFINITY, |course| {
+        let courses: Vec<_> = fit.iter().map(|&trial| self.course(trial)).collect();
+        std::array::from_fn(|joint| {
+            let range = |course: &Result<Course<N>, GapError>| {
+                course.as_ref().map_or(f64::INFINITY, |course| {
                     let angles = std::iter::zip(&course.seen[joint], &course.counted);
                     let counted = angles.filter(|(_, counted)| **counted);
                     let (low, high) = extent(counted.map(|(q, _)| *q));
                     high - low
-                });
-                *count += usize::from(range > STILL);
-            }
-        }
-        moving.map(|count| count <= usize::from(fit.len() > 1))
+                })
+            };
+            let mut ranges: Vec<f64> = courses.iter().map(range).collect();
+            ranges.sort_by(|a, b| b.total_cmp(a));
+            ranges.get(1).or(ranges.first()).copied().unwrap_or(0.0)
+        })
+    }
+
+    /// Which joints stay where they are but for noise.
+    fn hardly_moving(&self) -> [bool; N] {
+        self.reach().map(|reach| reach <= STILL)
     }
 
     /// Makes of a law of a joint that hardly moves what holds it: friction that sticks, larger than any torque that it must hold. How

@@ -77,6 +77,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         shifts: &[Arc<Vec<Thinned>>],
         (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
+        /// Turns: noise says how far trials are shifted, and what is left without the shifts says what noise is.
         const TURNS: usize = 3;
         let known: Vec<f64> = self
             .session

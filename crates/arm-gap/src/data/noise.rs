@@ -262,6 +262,7 @@ fn roughened(series: &[f64], size: f64) -> Vec<f64> {
 
 /// Inverse of the lower Cholesky factor; a little of the diagonal is added where channels repeat each other.
 fn inverse_factor(correlation: &[f64], n: usize) -> Vec<f64> {
+    /// Share of the diagonal that is added: a channel that repeats another makes the matrix singular.
     const RIDGE: f64 = 1e-3;
     let mut lower = vec![0.0; n * n];
     for j in 0..n {

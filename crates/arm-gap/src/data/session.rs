@@ -134,7 +134,7 @@ impl<const N: usize> Session<N> {
 
     fn promised(&self, promise: Promise) -> f64 {
         match promise {
-            Promise::AngleOffset => self.tolerance.angle_offset,
+            Promise::AngleOffset => self.tolerance.angle_offset(),
             Promise::ForceBias => self.tolerance.force_bias,
             Promise::ForceGain => self.tolerance.force_gain,
             Promise::TimeDelay => self.tolerance.time_delay,
@@ -187,7 +187,7 @@ impl<const N: usize> Session<N> {
             }
         }
         if self.comparison == ComparisonMode::Torque {
-            let sd = self.tolerance.angle_offset;
+            let sd = self.tolerance.angle_offset();
             for (j, part) in (0..N).flat_map(|j| [(j, 0), (j, 1)]) {
                 let target = Target::Eccentricity(j, part);
                 add(target, sd, f64::NEG_INFINITY, f64::INFINITY);

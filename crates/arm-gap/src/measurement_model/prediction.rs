@@ -493,6 +493,7 @@ pub(crate) fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N>
 /// Longest step with which steep resistance does not rattle \[s\]: one time constant of its slope at rest on the inertia of its
 /// joint. Set-valued dry friction is solved, whatever the step.
 fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>) -> f64 {
+    /// Speed at which the slope at rest is taken \[rad/s\]: a thousandth of the default smoothing of dry laws, 0.01 rad/s.
     const SPEED: f64 = 1e-5;
     let Ok(setup) = experiment.altered() else {
         return f64::INFINITY;

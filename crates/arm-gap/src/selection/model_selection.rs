@@ -298,6 +298,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (own, gain): (&Candidate, f64),
         bent: f64,
     ) -> bool {
+        /// Units of twice the log-likelihood by which a rival must beat its handicap: two laws that show the same must not take
+        /// each other's place in turn.
         const BETTER: f64 = 0.05;
         let shapes = |c: &Candidate| self.price_of_shapes(std::slice::from_ref(c));
         let plain = |c: &Candidate| {

@@ -321,6 +321,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
         point: &LinearizationPoint<N>,
     ) -> Option<Fitted<N>> {
+        /// Shares of the first-order coefficients that are tried: a strong effect answers with less than it would to first order.
         const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
         let mut all = current.asked.clone();
         all.extend_from_slice(asked);

@@ -32,7 +32,9 @@ pub(super) fn newton<const N: usize>(
     const ENOUGH: (f64, f64) = (1e-7, 1e-3);
     /// Share of what is missing that a step of a good slope leaves at most.
     const GOOD: f64 = 0.3;
+    /// Most rounds.
     const ROUNDS: usize = 30;
+    /// Lengths of a step that are tried, each half the one before: to a 32nd.
     const HALVINGS: usize = 6;
     // What is not a number is larger than anything.
     let larger = |most: f64, v: &f64| {
@@ -122,6 +124,7 @@ pub(super) fn slide<const N: usize>(
     const NUDGE: f64 = 1e-5;
     /// Torque that a further step answers where the solution is good enough, and at most where no step helps \[N m\].
     const ENOUGH: (f64, f64) = (1e-7, 1e-3);
+    /// Most rounds: six with the slope of the start and eight with one that is taken anew.
     const ROUNDS: usize = 14;
     /// Rounds after which the slope is taken anew, for a contact that opens and the end of a range.
     const RENEWED: usize = 6;

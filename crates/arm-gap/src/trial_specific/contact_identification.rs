@@ -54,7 +54,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// * `rhythms` - what swings besides and would pass for ringing: it is taken out, with a size and phase that change slowly
     pub fn tuned(&self, start: &Hypothesis<N>, rhythms: &[Effect<f64>]) -> Option<Hypothesis<N>> {
         /// What the other start must gain, in squares of what is left: as an effect of as many parameters must.
-        const PLAIN: f64 = 12.0;
+        const LEAST_GAIN: f64 = 12.0;
         if self.session.comparison != ComparisonMode::Led {
             return None;
         }
@@ -88,7 +88,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             && let Some(other) = from(&given, left)
         {
             let least = best.as_ref().map_or(&before, |b| &b.left);
-            if dot(&other.left, &other.left) + PLAIN < dot(least, least) {
+            if dot(&other.left, &other.left) + LEAST_GAIN < dot(least, least) {
                 best = Some(other);
             }
         }

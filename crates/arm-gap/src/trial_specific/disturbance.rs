@@ -116,7 +116,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let own = dot(&one.row, &suspect.own).abs();
         let further = |other: &Vec<f64>| own > dot(&one.row, other).abs();
         let promised = match one.effect.kind.probe().promise {
-            Some(_) => self.session.tolerance.angle_offset,
+            Some(_) => self.session.tolerance.angle_offset(),
             None => 0.0,
         };
         let size = one.along(&suspect.deviation) / one.square;
@@ -183,6 +183,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn repeats_of(&self, place: usize) -> Option<(Vec<usize>, ValidSegments)> {
         /// Share of its samples that a repeat has to hold.
         const WHOLE: f64 = 0.9;
+        /// The same of a repeat that was broken off.
         const HALF: f64 = 0.5;
         let own = &self.valid_segments[self.fitted[place]];
         let group = self.group_of[self.fitted[place]];
@@ -211,7 +212,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         point: &LinearizationPoint<N>,
         trial: usize,
     ) -> Vec<(Effect<f64>, Channels)> {
+        /// Time between the starts that are tried \[s\]: a third of the shortest burst.
         const EVERY: f64 = 0.1;
+        /// Durations of bursts that are tried \[s\], each twice the one before.
         const LONG: [f64; 3] = [0.3, 0.6, 1.2];
         let course = &self.courses[self.references[self.group_of[trial]]];
         let end = course.raw[0].len() as f64 / course.rate;

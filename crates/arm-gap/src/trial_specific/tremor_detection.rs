@@ -32,8 +32,8 @@ const SLOWEST_RHYTHM: f64 = 2.0;
 pub(crate) const SLOWEST_RIPPLE: f64 = 0.4;
 /// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
 const FASTEST_RIPPLE: f64 = 8.0;
-/// Gain below which a line is no rhythm: many frequencies and channels were looked at.
-const PLAIN: f64 = 60.0;
+/// Gain in units of twice the log-likelihood below which a line is no rhythm: many frequencies and channels were looked at.
+const LEAST_GAIN: f64 = 60.0;
 /// Share of the squared sizes of a ripple over trials that may differ from one size: the robot makes the same one in every movement,
 /// a vibration of the arm follows what it does.
 pub(crate) const UNSTEADY: f64 = 0.05;
@@ -107,9 +107,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         let sounds = |e: &Explained| {
             e.effect.kind.probe().nature == Nature::Periodic && frequency >= FASTEST_RIPPLE
         };
-        let (most, first) = list
-            .next()
-            .filter(|(_, e)| e.gain > PLAIN && e.share > SEEN && e.is_steady() && !sounds(e))?;
+        let (most, first) = list.next().filter(|(_, e)| {
+            e.gain > LEAST_GAIN && e.share > SEEN && e.is_steady() && !sounds(e)
+        })?;
         let rivals = list
             .filter(|(worth, other)| {
                 let same = (other.effect.kind, other.effect.index)

@@ -281,6 +281,7 @@ impl Certainty<'_> {
     /// Half width of an interval in standard deviations: of so many degrees of freedom as a sum of two variances has of which one
     /// is known (Satterthwaite 1946), so that what the prior alone tells does not widen with the few clusters.
     fn quantile(&self, std: f64, scatter: f64) -> Result<f64, IdentError> {
+        /// Degrees of freedom from which on Student's distribution is taken as normal.
         const NORMAL: f64 = 1e9;
         let share = if scatter > 0.0 { std / scatter } else { NORMAL };
         let dof = self.dof * share * share * share * share;

@@ -146,6 +146,7 @@ fn angle_offset<const N: usize>(
     (force, memory, i, time): (Plane<f64>, &InternalStates<N>, usize, f64),
     joint: usize,
 ) -> Joints<f64, N> {
+    /// Half of the step of the central difference \[rad\]: its square is the error of truncation, rounding over it about 1e-11.
     const STEP: f64 = 1e-5;
     let chain = motion.felt(&model.chain, i);
     let row = |shift: f64| {

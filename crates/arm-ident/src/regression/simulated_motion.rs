@@ -72,6 +72,7 @@ pub(crate) fn simulated<const N: usize>(
 
 /// The motion and the force of a run, the least part of what is recorded.
 fn moved<const N: usize>(experiment: &Experiment<N>) -> Result<Recording<N>, IdentError> {
+    /// Samples of a run that are held in full at a time: only what moves is kept of them.
     const PIECE: usize = 4096;
     let mut kept = Recording::default();
     simulate_in_pieces(Engine::Native, experiment, PIECE, &mut |piece| {

@@ -2,6 +2,7 @@
 
 use arm_core::effect::Effect;
 use arm_core::{Chain, Contact, Joints, Plane};
+pub use arm_model::Tolerance;
 
 /// Whether anything may be fitted on a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,33 +61,6 @@ impl<const N: usize> Trial<N> {
             .flatten()
             .all(|t| t.iter().all(|&v| v == 0.0));
         force && moment && torque
-    }
-}
-
-/// What the calibration of the sensors promises, as standard deviations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerance {
-    /// Offset of a joint angle \[rad\].
-    pub angle_offset: f64,
-    /// Bias of a force channel \[N\].
-    pub force_bias: f64,
-    /// Relative error of a force channel's gain.
-    pub force_gain: f64,
-    /// Delay between forces and angles \[s\].
-    pub time_delay: f64,
-    /// Displacement of the handle in the hand \[m\].
-    pub handle_placement: f64,
-}
-
-impl Default for Tolerance {
-    fn default() -> Self {
-        Self {
-            angle_offset: 0.3_f64.to_radians(),
-            force_bias: 0.2,
-            force_gain: 0.01,
-            time_delay: 0.005,
-            handle_placement: 0.001,
-        }
     }
 }
 

@@ -238,7 +238,7 @@ pub(crate) fn calibration<const N: usize>(
             Imperfection::AngleOffset(j),
             format!("angle offset {}", j + 1),
             "rad",
-            tolerance.angle_offset,
+            tolerance.angle_offset(),
         );
     }
     if trials.iter().any(|t| t.force_on_arm.is_some()) {

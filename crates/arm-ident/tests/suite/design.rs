@@ -32,7 +32,7 @@ fn question(tolerance: Tolerance) -> Question<2> {
 }
 
 const EXACT: Tolerance = Tolerance {
-    angle_offset: 0.0,
+    angle_offset_deg: 0.0,
     force_bias: 0.0,
     force_gain: 0.0,
     time_delay: 0.0,

@@ -25,7 +25,7 @@ fn faults() -> Vec<Fault> {
             name: "angle offset 1",
             size: 0.01,
             tolerance: Tolerance {
-                angle_offset: 0.02,
+                angle_offset_deg: 1.15,
                 ..EXACT
             },
             spoil: |_, _, trial, size| trial.q.iter_mut().for_each(|q| q[0] += size),
@@ -34,7 +34,7 @@ fn faults() -> Vec<Fault> {
             name: "angle offset 2",
             size: -0.01,
             tolerance: Tolerance {
-                angle_offset: 0.02,
+                angle_offset_deg: 1.15,
                 ..EXACT
             },
             spoil: |_, _, trial, size| trial.q.iter_mut().for_each(|q| q[1] += size),
@@ -231,7 +231,7 @@ fn calibration_within_tolerance_does_not_shrink_the_arm() {
 fn sd_of(name: &str) -> f64 {
     let t = Tolerance::default();
     [
-        ("angle", t.angle_offset),
+        ("angle", t.angle_offset()),
         ("bias", t.force_bias),
         ("gain", t.force_gain),
         ("delay", t.time_delay),

@@ -193,7 +193,7 @@ pub fn wrong<const N: usize>(
 }
 
 pub const EXACT: Tolerance = Tolerance {
-    angle_offset: 0.0,
+    angle_offset_deg: 0.0,
     force_bias: 0.0,
     force_gain: 0.0,
     time_delay: 0.0,

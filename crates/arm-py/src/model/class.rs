@@ -39,14 +39,17 @@ pub(crate) fn shown(
     Ok(format!("{class}({})", parts.join(", ")))
 }
 
-/// An attribute as a constructor takes it and as it can be pickled.
+/// An attribute as a constructor takes it and as it can be pickled: read-only mappings are dicts.
 fn plain(item: Bound<'_, PyAny>) -> PyResult<Bound<'_, PyAny>> {
-    if item.is_instance_of::<PyMappingProxy>() {
-        let copy = PyDict::new(item.py());
-        copy.update(item.cast()?)?;
-        return Ok(copy.into_any());
+    if !item.is_instance_of::<PyMappingProxy>() {
+        return Ok(item);
     }
-    Ok(item)
+    let copy = PyDict::new(item.py());
+    for pair in item.call_method0("items")?.try_iter()? {
+        let (name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = pair?.extract()?;
+        copy.set_item(name, plain(value)?)?;
+    }
+    Ok(copy.into_any())
 }
 
 /// Class and arguments that make an equal object.

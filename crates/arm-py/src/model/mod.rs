@@ -8,6 +8,7 @@ mod parts;
 mod value;
 mod whole;
 
+pub(crate) use class::{Attribute, Wraps, reduced, replaced, shown};
 pub use dataset::{AddedMass, Description, Subject, Tolerance, TrialEntry};
 pub use effect::Effect;
 pub use parameter::{ParameterId, ParameterInfo};

@@ -4,7 +4,25 @@
 """
 
 from .detecting import detectable
-from .found import Absorbed, Alternative, ChannelGap, GapFound, Limit, Missing, Open, Place, Rung, Separation, Suspect, Value
+from .found import (
+    Absorbed,
+    Alternative,
+    ChannelGap,
+    Fitted,
+    GapFound,
+    GapResult,
+    Limit,
+    Missing,
+    Open,
+    Place,
+    Rung,
+    Screening,
+    Separation,
+    SimulatedTrial,
+    Suspect,
+    Tried,
+    Value,
+)
 from .search import find_gap
 from .separating import separate
 from .stages import Calibrated, Compared, calibrate, compare, confirm
@@ -15,14 +33,19 @@ __all__ = [
     "Calibrated",
     "ChannelGap",
     "Compared",
+    "Fitted",
     "GapFound",
+    "GapResult",
     "Limit",
     "Missing",
     "Open",
     "Place",
     "Rung",
+    "Screening",
     "Separation",
+    "SimulatedTrial",
     "Suspect",
+    "Tried",
     "Value",
     "calibrate",
     "compare",

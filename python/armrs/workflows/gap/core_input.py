@@ -1,4 +1,4 @@
-"""What the search in the core is asked with: trials and what is known beforehand."""
+"""What the search in the core is asked with: trials, channels and what is known beforehand."""
 
 from __future__ import annotations
 
@@ -6,10 +6,21 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from ... import checks
+from ... import _armrs, checks
 from ...io.dataset import Dataset, refuse_added
 from ...io.trial import refuse_moving_base
 from ..identify import core_columns
+
+
+def is_led(dataset: Dataset) -> bool:
+    """Whether every trial has what the closed chain is simulated from: robot angles, a robot, and forces."""
+    known = all(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials)
+    return known and dataset.model.robot is not None
+
+
+def channel_names(dataset: Dataset, led: bool) -> list[str]:
+    """Return the names of the channels that are compared."""
+    return _armrs.channel_names(dataset.model.n_joints, led)
 
 
 def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
@@ -23,7 +34,8 @@ def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
 def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> dict[str, Any]:
     """Return what is known beforehand, for the core."""
     return {
-        "segment_uncertainty": dataset.model.segment_uncertainty,
+        "model": dataset.model,
+        "force_on_robot": dataset.force_on == "robot",
         "tolerance": dataset.tolerance,
         "led": led,
         "own": list(own),

@@ -15,7 +15,6 @@ from ..plan import Instruments
 from ..simulate import Channel, Sensors, simulate
 from .core_input import core_settings, core_trials
 from .found import Limit
-from .stages import suspect
 
 _STEP = 0.5e-3
 """Largest step of the simulation [s]."""
@@ -72,11 +71,10 @@ def detectable(
             columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
             trials.append(Trial(f"planned {number + 1}, {repeat}", f"planned {number + 1}", repeat, "fit", read["time"], **columns))
     data = Dataset("planned", model, tuple(trials), force_on="arm", synthetic=True, tolerance=instruments.tolerance)
-    raw = _armrs.look(_armrs.Rig(model, model.all_effects), core_trials(data), core_settings(data, True, threads))
-    found = [suspect(item) for item in raw["suspects"]]
+    seen = _armrs.look(_armrs.Rig(model, model.all_effects), core_trials(data), core_settings(data, True, threads))
     limits = [
         Limit(s.kind, s.joint, s.channel, next(iter(s.parameters)), s.smallest, s.unit, s.gain, s.price)
-        for s in found
+        for s in seen.suspects
         if s.smallest == s.smallest and s.smallest != float("inf")
     ]
     order = list(catalogue())

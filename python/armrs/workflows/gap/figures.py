@@ -11,9 +11,9 @@ import numpy as np
 from ...report import plotting
 from ...report.figures import Drawn, Figures, slug
 from . import maps
+from .core_input import channel_names, is_led
 from .found import GapFound, Missing, Suspect
 from .headline import place_of
-from .reading import channel_names, is_led
 from .shapes import Portrait, portrait, telling_trial
 from .summary import summary
 
@@ -57,7 +57,7 @@ def _before_and_after(result: GapFound) -> Drawn:
     """Draw the test trial with the largest gap: each channel, and below it what simulation and measurement differ by."""
     names = channel_names(result.dataset, is_led(result.dataset))
     shown = telling_trial(result)
-    trial, play = result.dataset.trials[shown], result.raw["trials"][shown]
+    trial, play = result.dataset.trials[shown], result.trials[shown]
     t, columns = trial.t - trial.t[0], 2 if len(names) in (2, 4) else min(len(names), 3)
     rows = -(-len(names) // columns)
     figure = plotting.figure(10.4, 3.4 * rows)
@@ -67,14 +67,15 @@ def _before_and_after(result: GapFound) -> Drawn:
         inner = outer[c // columns, c % columns].subgridspec(2, 1, height_ratios=(1.5, 1.0), hspace=0.04)
         above = figure.add_subplot(inner[0])
         below = figure.add_subplot(inner[1], sharex=above)
-        measured = np.where(trial.valid, play["measured"][:, c], np.nan) * factor
+        measured = np.where(trial.valid, play.measured[:, c], np.nan) * factor
         above.plot(t, measured, color=plotting.SILVER, lw=3.2)
         for step in steps_of(result):
-            if play[step] is None:
+            course = play.shown[step]
+            if course is None:
                 continue
             colour, _, width, dash = STEPS[step]
-            above.plot(t, play[step][:, c] * factor, color=colour, lw=width, ls=dash)
-            below.plot(t, play[step][:, c] * factor - measured, color=colour, lw=width - 0.2, ls=dash if step == "given" else "-")
+            above.plot(t, course[:, c] * factor, color=colour, lw=width, ls=dash)
+            below.plot(t, course[:, c] * factor - measured, color=colour, lw=width - 0.2, ls=dash if step == "given" else "-")
         below.axhline(0.0, color=plotting.INK, lw=0.8)
         above.tick_params(labelbottom=False)
         above.set_title(label)
@@ -97,7 +98,7 @@ def _time_legend(figure: Any, steps: Sequence[str]) -> None:
 
 def _missing_torques(result: GapFound) -> dict[str, list[maps.Discrepancy]]:
     """Return what torque is missing in the fit trials, by model; nothing where that cannot be computed."""
-    led, plays = is_led(result.dataset), result.raw["trials"]
+    led, plays = is_led(result.dataset), result.trials
     versions = [s for s in steps_of(result) if s != "given"]
     return {v: [d for d in maps.discrepancies(result.dataset, led, plays, v) if d.trial.role == "fit"] for v in versions}
 

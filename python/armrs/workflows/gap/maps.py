@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from ... import _armrs
 from ...io.dataset import Dataset
 from ...io.trial import Trial
-from .found import Place
+from .found import Place, SimulatedTrial
 
 _MOVING = 0.1
 """Share of a joint's fastest speed in a trial below which it counts as resting."""
@@ -45,7 +45,7 @@ class Discrepancy:
         return np.asarray(self.trial.valid, dtype=bool)
 
 
-def discrepancies(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any]], version: str) -> list[Discrepancy]:
+def discrepancies(dataset: Dataset, led: bool, plays: Sequence[SimulatedTrial], version: str) -> list[Discrepancy]:
     """Return the torque that a model lacks in every trial that it could be simulated on.
 
     Parameters
@@ -53,8 +53,7 @@ def discrepancies(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any]
     dataset : Dataset
     led : bool
         Whether channels are angles and forces of the closed chain; else they are joint torques.
-    plays : sequence of mappings
-        Measured and simulated channels of every trial.
+    plays : sequence of SimulatedTrial
     version : {"given", "calibrated", "amended"}
 
     Notes
@@ -70,7 +69,7 @@ def discrepancies(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any]
         return through - np.asarray(body.gravity(q))
 
     for trial, play in zip(dataset.trials, plays, strict=True):
-        measured, simulated = play["measured"], play[version]
+        measured, simulated = play.measured, play.shown[version]
         if simulated is None:
             continue
         if led:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from ...errors import BadInput, SimulationError
@@ -14,10 +11,10 @@ from ...report.live import NOTHING, Live
 from ...report.moving import SERIES, compared
 from ...report.series import Line, Panel, series
 from ..simulate import Simulated, simulate
+from .core_input import channel_names, is_led
 from .figures import STEPS, channel_label, steps_of
 from .found import GapFound
 from .headline import place_of
-from .reading import channel_names, is_led
 from .shapes import telling_trial
 
 
@@ -26,30 +23,30 @@ def moving(result: GapFound) -> Live:
     if not is_led(result.dataset):
         return NOTHING
     shown = telling_trial(result)
-    trial, play = result.dataset.trials[shown], result.raw["trials"][shown]
-    steps = [step for step in steps_of(result) if play[step] is not None]
+    trial, play = result.dataset.trials[shown], result.trials[shown]
+    steps = {step: course for step in steps_of(result) if (course := play.shown[step]) is not None}
     if not steps:
         return NOTHING
     t, n = trial.t - trial.t[0], result.dataset.model.n_joints
-    without = _without(result, trial, play) if "amended" in steps else {}
+    without = _without(result, trial, steps["amended"]) if "amended" in steps else {}
     panels = []
     for c, name in enumerate(channel_names(result.dataset, True)):
         label, factor = channel_label(name)
         title, _, unit = label.rstrip("]").partition(" [")
-        lines = [Line("measured", plotting.SILVER, np.where(trial.valid, play["measured"][:, c], np.nan) * factor)]
-        lines += [Line(STEPS[step][1], STEPS[step][0], play[step][:, c] * factor, shown=step != "given") for step in steps]
+        lines = [Line("measured", plotting.SILVER, np.where(trial.valid, play.measured[:, c], np.nan) * factor)]
+        lines += [Line(STEPS[step][1], STEPS[step][0], course[:, c] * factor, shown=step != "given") for step, course in steps.items()]
         lines += [
             Line(f"without {words}", plotting.CYCLE[(k + 2) % len(plotting.CYCLE)], course[:, c] * factor, shown=False)
             for k, (words, course) in enumerate(without.items())
         ]
         panels.append(Panel(title, unit, tuple(lines)))
     text = f"The test trial with the largest gap, {trial.file}: measured, and simulated with each model. Switch single effects off."
-    arms = {"arm as simulated": play[steps[-1]][:, :n], "arm as measured": trial.q}
+    arms = {"arm as simulated": [*steps.values()][-1][:, :n], "arm as measured": trial.q}
     film = compared(result.dataset.model, t, arms, trial.robot_q)
     return Live(film, series(SERIES, text, t, panels))
 
 
-def _without(result: GapFound, trial: Trial, play: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _without(result: GapFound, trial: Trial, amended: np.ndarray) -> dict[str, np.ndarray]:
     """Return the channels of a trial without each named effect: what its absence changes in a simulation, from the amended course."""
     named = [e for e in result.effects if e.trial is None and e.joint is not None]
     joints = [joint.name for joint in result.dataset.model.joints]
@@ -61,7 +58,7 @@ def _without(result: GapFound, trial: Trial, play: Mapping[str, Any]) -> dict[st
             left = tuple(e for e in model.effects if (e.kind, e.joint) != (effect.kind, effect.joint))
             if len(left) < len(model.effects):
                 changed = _channels(simulate(model.replace(effects=left), trial), trial) - with_all
-                found[place_of(effect.kind, effect.joint, None, joints)] = play["amended"] + changed
+                found[place_of(effect.kind, effect.joint, None, joints)] = amended + changed
     except (BadInput, SimulationError):
         # An arm that cannot be followed without an effect has no course to show.
         return found

@@ -10,8 +10,8 @@ from ... import _armrs, checks
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
-from . import reading, separating, suspicion
-from .core_input import core_settings, core_trials
+from . import maps, separating, suspicion
+from .core_input import core_settings, core_trials, is_led
 from .found import GapFound
 
 
@@ -64,25 +64,32 @@ def find_gap(
     try:
         result = _searched(dataset, own, threads, progress)
     except SimulationError as error:
-        if not reading.is_led(dataset):
+        if not is_led(dataset):
             raise
         # The arm that robot angles would lead is not simulated then: the torques of its measured motion are compared.
         still = dataset.replace(trials=tuple(dataclasses.replace(t, robot_q=None) for t in dataset.trials))
         result = _searched(still, own, threads, progress)
-        result = dataclasses.replace(result, warnings=(_torques_instead(error), *result.warnings))
+        warned = result.result.replace(warnings=(_torques_instead(error), *result.warnings))
+        result = dataclasses.replace(result, result=warned)
     return separating.separate(result, threads=threads, progress=progress) if separate else result
 
 
 def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progress: Callable[[str, float], None] | None) -> GapFound:
-    led = reading.is_led(dataset)
+    led = is_led(dataset)
     settings = core_settings(dataset, led, threads, own)
     columns = core_trials(dataset)
     built = _armrs.Rig(dataset.model, dataset.model.all_effects)
     warnings = suspicion.examine(dataset, led)
     with naming_trials(dataset.trials):
         suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
-        raw = _armrs.find_gap(built, columns, settings, progress)
-    return reading.found(dataset, led, raw, warnings)
+        result = _armrs.find_gap(built, columns, settings, progress)
+
+    def lacking(version: str) -> list[maps.Discrepancy]:
+        return maps.discrepancies(dataset, led, result.trials, version)
+
+    looks_like = maps.shape(lacking("amended")) if result.verdict == "unexplained" else None
+    told = result.replace(places=maps.places(lacking("calibrated")), looks_like=looks_like, warnings=warnings)
+    return GapFound(told, dataset)
 
 
 def _torques_instead(error: SimulationError) -> str:

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ... import _armrs
-from ...catalogue import catalogue
 from ...errors import ArmrsError, SimulationError
 from ...io.trial import Trial
 from ...model import Model
 from ..identify import core_columns
 from ..movement import Movement
 from ..simulate import Sensors, simulate
-from .core_input import core_settings, core_trials
+from .core_input import core_settings, core_trials, is_led
 from .found import Alternative, GapFound, Missing, Separation
-from .reading import is_led, lasting
 
 SPEEDS = (0.15, 1.2)
 """Largest joint speeds of the movements that are tried, as far as the limits allow [rad/s]."""
@@ -71,33 +68,31 @@ def separate(result: GapFound, *, threads: int | None = None, progress: Callable
     family = _family(result)
     if not family:
         return result
-    better = {id(e): _separated(result, e, family, threads) for e in asked}
-    return replace(result, effects=tuple(better.get(id(e), e) for e in result.effects))
+    effects = tuple(_separated(result, e, family, threads) if e in asked else e for e in result.effects)
+    return replace(result, result=result.result.replace(effects=effects))
 
 
 def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], threads: int | None) -> Missing:
     """Return an effect whose alternatives carry the movement that separates them best."""
-    raw = next((item for item in result.raw["named"] if _is(item, effect)), None)
-    if raw is None:
+    model = result.result.lasting()
+    there = [k for k, e in enumerate(model.all_effects) if (e.kind, e.joint, e.channel) == (effect.kind, effect.joint, effect.channel)]
+    if not there or any(a.simulated is None for a in effect.alternatives):
         return effect
-    model = lasting(result)
-    own = [e for e in model.effects if (e.kind, e.joint, e.channel) == (effect.kind, effect.joint, effect.channel)][-1]
-    others = [e for e in model.all_effects if e is not own]
-    rivals = [(entry[0], entry[1], list(entry[2]), list(free)) for (entry, free), *_ in raw["alternatives"]]
+    own, others = model.all_effects[there[-1]], [e for k, e in enumerate(model.all_effects) if k != there[-1]]
     try:
         rows = _armrs.distances(
             _armrs.Rig(model, [*others, own]),
             core_trials(result.dataset),
             core_settings(result.dataset, True, threads),
             [core_columns(c.trial) | {"configuration": 0} for c in family],
-            rivals,
+            effect.alternatives,
         )
     except SimulationError:
         # Of an arm that cannot be simulated no movement can be proposed.
         return effect
     now = rows[0] or []
     # What no choice explains counts as noise, as it does in the search.
-    noise = float(np.sqrt(max(result.raw["scale"], 1.0)))
+    noise = float(np.sqrt(max(result.result.scale, 1.0)))
     listed: list[Alternative] = []
     for k, alternative in enumerate(effect.alternatives):
         found = [(row[k], c) for row, c in zip(rows[1:], family, strict=True) if row is not None and np.isfinite(row[k])]
@@ -116,19 +111,13 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
             now=seen,
             then=float(np.sqrt(seen**2 + max(then**2 - expected**2, 0.0))),
         )
-        listed.append(replace(alternative, separating_movement=best.words, separation=separation))
-    return replace(effect, alternatives=tuple(listed))
-
-
-def _is(item: Any, effect: Missing) -> bool:
-    kind, index, _ = item["effect"]
-    joint, channel = catalogue()[kind].place(index)
-    return (kind, joint, channel) == (effect.kind, effect.joint, effect.channel)
+        listed.append(alternative.replace(separating_movement=best.words, separation=separation))
+    return effect.replace(alternatives=listed)
 
 
 def _family(result: GapFound) -> list[Candidate]:
     """Return the movements that are tried, simulated with the amended model."""
-    data, model = result.dataset, lasting(result)
+    data, model = result.dataset, result.result.lasting()
     trials = [t for t in data.trials if t.force_on_arm is not None]
     q = np.concatenate([t.q[t.valid] for t in trials])
     low, high = q.min(axis=0), q.max(axis=0)

@@ -10,9 +10,8 @@ from ... import _armrs
 from ...catalogue import catalogue
 from ...model import Effect
 from . import maps
-from .core_input import core_settings, core_trials
+from .core_input import channel_names, core_settings, core_trials, is_led
 from .found import GapFound, Missing
-from .reading import channel_names, in_file, is_led
 
 _BINS = 24
 _FEWEST = 8
@@ -65,14 +64,14 @@ def portrait(result: GapFound, effect: Missing) -> Portrait:
 
 def telling_trial(result: GapFound) -> int:
     """Return the number of the trial that shows the calibrated gap best: of the test trials where there are such."""
-    trials, plays = result.dataset.trials, result.raw["trials"]
-    simulated = [k for k, play in enumerate(plays) if play["calibrated"] is not None]
+    trials, plays = result.dataset.trials, result.trials
+    simulated = {k: course for k, play in enumerate(plays) if (course := play.shown["calibrated"]) is not None}
     tests = [k for k in simulated if trials[k].role == "test"]
     names = channel_names(result.dataset, is_led(result.dataset))
     size = np.array([result.gap[n].floor or result.gap[n].calibrated or 1.0 for n in names])
 
     def misfit(k: int) -> float:
-        rows = (plays[k]["calibrated"] - plays[k]["measured"])[trials[k].valid]
+        rows = (simulated[k] - plays[k].measured)[trials[k].valid]
         return float(np.mean(np.square(rows / np.maximum(size, 1e-12)))) if len(rows) else 0.0
 
     return max(tests or simulated, key=misfit, default=0)
@@ -83,10 +82,8 @@ def _own(result: GapFound, effect: Missing) -> Effect:
     for known in reversed(result.model.effects if effect.trial is None else ()):
         if (known.kind, known.joint, known.channel) == (effect.kind, effect.joint, effect.channel):
             return known
-    sign = in_file(effect.kind, result.dataset)
-    linear = {p.name for p in catalogue()[effect.kind].parameters if p.linear}
-    values = {n: v.value * (sign if n in linear else 1.0) for n, v in effect.parameters.items()}
-    return Effect(effect.kind, effect.joint, effect.channel, parameters=_values(effect, values))
+    assert effect.simulated is not None, "an effect of a result"
+    return effect.simulated
 
 
 def _values(effect: Missing, values: dict[str, float]) -> dict[str, float]:
@@ -109,7 +106,7 @@ def _law(result: GapFound, effect: Missing, own: Effect, shown: Portrait) -> Por
     joint = (effect.joint or 1) - 1
     found = [
         d
-        for d in maps.discrepancies(result.dataset, is_led(result.dataset), result.raw["trials"], "amended")
+        for d in maps.discrepancies(result.dataset, is_led(result.dataset), result.trials, "amended")
         if d.trial.role == "fit" and d.valid().sum() > _FEWEST
     ]
     if not found:
@@ -184,7 +181,7 @@ def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.nd
     settings = core_settings(data, led, 1)
     plays = []
     for listed in ([*others, own], others):
-        given = _armrs.play(_armrs.Rig(result.model, listed), columns, settings)[0]["given"]
+        given = _armrs.play(_armrs.Rig(result.model, listed), columns, settings)[0].shown["given"]
         if given is None:
             return trial.file, t, None
         plays.append(given)

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ... import _armrs, checks
-from ...catalogue import catalogue
 from ...custom_effects import OwnEffect
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset, load_dataset, naming_trials
-from ...model import Contact, Model, Robot
+from ...model import Model
 from ...report.figures import shown
 from ...report.plain import data_of, origin
-from . import figures, maps, reading, suspicion
-from .core_input import core_settings, core_trials
-from .found import Absorbed, ChannelGap, GapFound, Place, Suspect, gap_to_dict
+from . import figures, maps, suspicion
+from .core_input import channel_names, core_settings, core_trials, is_led
+from .found import Absorbed, ChannelGap, GapFound, Place, Suspect
 
 Source = Dataset | str | os.PathLike[str]
 
@@ -61,10 +60,12 @@ class Calibrated:
 
     Attributes
     ----------
+    result : Screening
+        What the core found.
     model : Model
         Segments and known effects refitted.
     absorbed : tuple of Absorbed
-    gap : dict of ChannelGap
+    gap : mapping of str to ChannelGap
         On the test trials; `after` is None.
     lack : (float, float)
         Lack of fit, ratio and z; NaN without repeats.
@@ -73,13 +74,34 @@ class Calibrated:
         nothing was converged, and several of them may be one.
     """
 
-    model: Model
-    absorbed: tuple[Absorbed, ...]
-    gap: Mapping[str, ChannelGap]
-    lack: tuple[float, float]
-    suspects: tuple[Suspect, ...]
+    result: _armrs.Screening = field(repr=False)
     warnings: tuple[str, ...]
     dataset: Dataset = field(repr=False)
+
+    @cached_property
+    def model(self) -> Model:
+        """Segments and known effects refitted."""
+        return self.result.model
+
+    @cached_property
+    def absorbed(self) -> tuple[Absorbed, ...]:
+        """Small imperfections that were refitted."""
+        return self.result.absorbed
+
+    @cached_property
+    def gap(self) -> Mapping[str, ChannelGap]:
+        """The gap by channel on the test trials; `after` is None."""
+        return self.result.gap
+
+    @property
+    def lack(self) -> tuple[float, float]:
+        """Lack of fit, ratio and z; NaN without repeats."""
+        return self.result.lack
+
+    @cached_property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """Every effect that was asked, alone and to first order, the likeliest first."""
+        return self.result.suspects
 
     def plot(self) -> np.ndarray:
         """Draw what each effect alone would explain, the likeliest first; return the Axes."""
@@ -91,10 +113,7 @@ class Calibrated:
         """Return the result as it is written to JSON."""
         return {
             "verb": "gap --quick",
-            "gap": {name: gap_to_dict(g) for name, g in self.gap.items()},
-            "suspects": [dict(vars(s)) for s in self.suspects],
-            "calibration": [dict(vars(a)) for a in self.absorbed],
-            "lack_of_fit": {"calibrated": {"ratio": self.lack[0], "z": self.lack[1]}},
+            **self.result.to_dict(),
             "warnings": list(self.warnings),
             "data": data_of(self.dataset),
             "made_by": origin(command),
@@ -116,14 +135,12 @@ def compare(dataset: Source, model: Model | None = None) -> Compared:
         For data that cannot be judged, as `find_gap`.
     """
     data = _loaded(dataset, model)
-    led = reading.is_led(data)
+    led = is_led(data)
     warnings = suspicion.examine(data, led)
     plays = _armrs.play(_armrs.Rig(data.model), core_trials(data), core_settings(data, led, 1))
     suspicion.refuse_mislabelled(data, led, plays)
-    known = [p for p in plays if p["given"] is not None]
-    trials = [t for t, p in zip(data.trials, plays, strict=True) if p["given"] is not None]
-    found = maps.discrepancies(data.replace(trials=tuple(trials)), led, known, "given") if trials else []
-    gap = {name: reading.size(known, "given", c) for c, name in enumerate(reading.channel_names(data, led))}
+    found = maps.discrepancies(data, led, plays, "given")
+    gap = dict(zip(channel_names(data, led), _armrs.sizes(plays, "given"), strict=True))
     return Compared({n: g for n, g in gap.items() if g is not None}, maps.places(found), tuple(found), tuple(warnings))
 
 
@@ -150,25 +167,17 @@ def calibrate(
         When the model as given cannot be simulated on a trial.
     """
     data = _loaded(dataset, None)
-    led = reading.is_led(data)
+    led = is_led(data)
     warnings = suspicion.examine(data, led)
     settings = core_settings(data, led, threads, [e.kind for e in effects])
     built, columns = _armrs.Rig(data.model, data.model.all_effects), core_trials(data)
     with naming_trials(data.trials):
         suspicion.refuse_mislabelled(data, led, _armrs.play(built, columns, settings))
-        raw = _armrs.look(built, columns, settings, progress)
-    return Calibrated(
-        model=reading.amended(data.model, raw["calibrated"]),
-        absorbed=reading.absorbed(data, raw),
-        gap=reading.gaps(data, led, raw, last="calibrated"),
-        lack=raw["lack"][:2],
-        suspects=tuple(suspect(item) for item in raw["suspects"]),
-        warnings=tuple(warnings),
-        dataset=data,
-    )
+        seen = _armrs.look(built, columns, settings, progress)
+    return Calibrated(seen, tuple(warnings), data)
 
 
-def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, ChannelGap]:
+def confirm(result: GapFound, dataset: Source | None = None) -> Mapping[str, ChannelGap]:
     """Measure the gap of a result on trials that played no part in it, such as those of another day.
 
     Parameters
@@ -181,52 +190,22 @@ def confirm(result: GapFound, dataset: Source | None = None) -> dict[str, Channe
 
     Returns
     -------
-    dict of ChannelGap
+    mapping of str to ChannelGap
         By channel; `floor` is that of the result, and `open` says where these trials exceed what their own repeats differ by.
     """
     data = result.dataset if dataset is None else _loaded(dataset, result.dataset.model)
-    led = reading.is_led(data)
+    led = is_led(data)
     tests = data.test_trials or data.trials
     data = data.replace(trials=tuple(tests))
     columns, settings = [t | {"role": "fit"} for t in core_trials(data)], core_settings(data, led, 1)
-    model, raw = result.dataset.model, result.raw
-    plays = {
-        "given": _armrs.play(_armrs.Rig(data.model), columns, settings),
-        "calibrated": _armrs.play(as_fitted(model, raw["calibrated"]), columns, settings, own=True),
-        "amended": _armrs.play(as_fitted(model, raw["amended"], raw["rhythms"]), columns, settings, own=True),
-    }
-    configurations = sorted({t.configuration for t in data.trials})
-    groups = [configurations.index(t.configuration) for t in data.trials]
-    tests_only = data.replace(trials=tuple(dataclasses.replace(t, role="test") for t in data.trials))
-    tested = reading.held_out(tests_only, plays["amended"], groups, "given")
-    gap = {}
-    for c, name in enumerate(reading.channel_names(data, led)):
-        size = {version: reading.size(listed, "given", c) for version, listed in plays.items()}
-        known = result.gap[name]
-        opened = tested[c][2] if tested else None
-        gap[name] = ChannelGap(size["given"], size["calibrated"], size["amended"], known.floor, known.floor_std, opened)
-    return gap
-
-
-def as_fitted(model: Model, fitted: Mapping[str, Any], rhythms: Sequence[Any] = ()) -> _armrs.Rig:
-    """Return a model for the core with everything that was fitted, the imperfections of its sensors included."""
-    if model.contact is None:
-        model = model.replace(contact=Contact.assumed())
-    robot = model.robot
-    if robot is not None:
-        base = (robot.base[0] + fitted["shift"][0], robot.base[1] + fitted["shift"][1])
-        robot = Robot(robot.lengths, base, robot.elbow)
-    bare = reading.amended(model, {**fitted, "known": [], "named": []}, joints=False).replace(robot=robot)
-    effects = [*fitted["known"], *fitted["named"], *rhythms, *fitted["calibration"]]
-    return _armrs.Rig(bare, [reading.effect(entry) for entry in effects])
-
-
-def suspect(item: Sequence[Any]) -> Suspect:
-    """Return an effect of the core's first look."""
-    (name, index, values), free, gain, price, smallest = item
-    kind = catalogue()[name]
-    parameters = {kind.parameters[p].name: float(values[p]) for p in free}
-    return Suspect(name, *kind.place(index), parameters, kind.parameters[free[0]].unit, float(gain), float(price), float(smallest))
+    model, found = result.dataset.model, result.result
+    return _armrs.confirmed(
+        _armrs.play(_armrs.Rig(data.model), columns, settings),
+        _armrs.play(found.calibrated.rig(model, ()), columns, settings, own=True),
+        _armrs.play(found.amended.rig(model, found.rhythms), columns, settings, own=True),
+        found,
+        channel_names(data, led),
+    )
 
 
 def _loaded(dataset: Source, model: Model | None) -> Dataset:

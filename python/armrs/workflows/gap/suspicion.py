@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from ... import _armrs
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.plausibility import refuse_implausible
 from ...io.trial import Trial, constant
 from ..setup import refuse_wrong_setup
 from .between_samples import unresolved
+from .core_input import core_settings, core_trials
+from .found import SimulatedTrial
 
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
@@ -24,10 +27,6 @@ _ALIKE = 0.9
 """Correlation above which two signals are the same movement."""
 _STARTING = 0.02
 """Time between the samples that tell how fast the robot is when a trial begins [s]."""
-_STILL = 0.01
-"""Range of an angle up to which its joint hardly moves [rad], as in the search."""
-_MEAN = 0.2
-"""Time over which an angle is averaged for that [s]."""
 _AT_REST = 0.05
 """Speed of a robot's joint up to which it counts as resting [rad/s]: four samples of an encoder of 0.1 mrad tell it to 0.02."""
 _FIRST = 16
@@ -96,22 +95,15 @@ def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
 
 
 def _still_joints(dataset: Dataset, led: bool) -> list[str]:
-    """Return which joints hardly move, but for noise and one trial in which a sensor may slip."""
+    """Return which joints hardly move, but for noise and one trial in which a sensor may slip: those that the search holds."""
     if not led:
         return []
-
-    def ranges(trial: Trial) -> np.ndarray:
-        window = max(1, round(_MEAN * trial.rate))
-        means = np.array([np.convolve(q, np.full(window, 1.0 / window), "valid") for q in trial.q.T])
-        return np.asarray(np.nanmax(means, axis=1) - np.nanmin(means, axis=1))
-
-    each = np.sort([ranges(trial) for trial in dataset.fit_trials], axis=0)
-    moved = each[-min(2, len(each))]
+    moved = _armrs.reach(_armrs.Rig(dataset.model), core_trials(dataset), core_settings(dataset, led, 1))
     return [
         f"joint {j + 1} moves by {reach:.2g} rad in the fit trials: what holds it cannot be told; where the model states no law for it the "
         "simulation holds it, and amended.toml has no law for it either"
         for j, reach in enumerate(moved)
-        if reach < _STILL
+        if reach <= _armrs.STILL
     ]
 
 
@@ -216,13 +208,13 @@ def _channels(trial: Any, led: bool) -> list[tuple[str, np.ndarray]]:
     return [] if trial.tau is None else [(f"tau{j + 1}", trial.tau[:, j]) for j in range(trial.tau.shape[1])]
 
 
-def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str, Any]]) -> None:
+def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[SimulatedTrial]) -> None:
     """Compare what was measured with what the model as given would show, and refuse what only a label can explain.
 
     Parameters
     ----------
     plays
-        For each trial `measured` and `given`, (n_samples, n_channels); `given` is None where it cannot be simulated.
+        Each trial as it was measured, and as the model as given shows it.
 
     Raises
     ------
@@ -232,9 +224,9 @@ def refuse_mislabelled(dataset: Dataset, led: bool, plays: Sequence[Mapping[str,
     if not led:
         return
     n = dataset.model.n_joints
-    pairs = [(trial, p) for trial, p in zip(dataset.trials, plays, strict=True) if p["given"] is not None]
-    compared = [trial for trial, _ in pairs]
-    shown = [(trial.file, p["measured"][:, n:], p["given"][:, n:]) for trial, p in pairs]
+    pairs = [(trial, p.measured, given) for trial, p in zip(dataset.trials, plays, strict=True) if (given := p.shown["given"]) is not None]
+    compared = [trial for trial, _, _ in pairs]
+    shown = [(trial.file, measured[:, n:], given[:, n:]) for trial, measured, given in pairs]
     if not shown:
         return
     together = np.concatenate([f for _, f, _ in shown]), np.concatenate([e for _, _, e in shown])

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..._armrs import MISFIT
 from ...report import words as common
 from ...report.tables import Table, digits, number, smallest_effects, spread, unit
 from . import headline
 from .headline import effect_name, joined
-from .reading import MISFIT
 
 verdict = headline.headline
 """The result in one sentence."""

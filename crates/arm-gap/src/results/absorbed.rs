@@ -1,0 +1,147 @@
+use arm_core::effect::Kind;
+use arm_model::{Effect, Model};
+use serde::Serialize;
+
+use super::placed;
+use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+
+/// A small imperfection that was refitted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Absorbed {
+    /// What it is, in words.
+    pub name: String,
+    /// Its value, in `unit`.
+    pub value: f64,
+    /// Twice the standard deviation that was known of it beforehand: the tolerance of the data set, or the `segment_uncertainty`.
+    pub promised: f64,
+    /// SI unit; `of its value` for what is relative.
+    pub unit: String,
+}
+
+/// Unit of relative changes.
+const RELATIVE: &str = "of its value";
+
+/// What was refitted of a model, from the unknowns of its fit.
+pub(super) fn absorbed<'c, const N: usize>(
+    model: &Model,
+    hypothesis: &Hypothesis<N>,
+    unknowns: impl Iterator<Item = &'c Coordinate>,
+) -> Vec<Absorbed> {
+    let modelled = model.all_effects();
+    let each = unknowns.filter_map(|c| {
+        let promised = 2.0 * c.prior.map_or(f64::INFINITY, |(_, sd)| sd);
+        let value = hypothesis.get(c.target);
+        one(&modelled, hypothesis, c.target, (value, promised))
+    });
+    each.collect()
+}
+
+fn one<const N: usize>(
+    modelled: &[Effect],
+    hypothesis: &Hypothesis<N>,
+    target: Target,
+    (mut value, mut promised): (f64, f64),
+) -> Option<Absorbed> {
+    let axis = |axis: usize| ["y", "z"][axis];
+    let (name, unit) = match target {
+        Target::Segment(k, part) => {
+            let part = ["mass", "com", "inertia"][part.min(2)];
+            (format!("{part} of segment {}", k + 1), RELATIVE)
+        }
+        Target::Contact(part, along) => {
+            let part = ["compliance", "damping"][part.min(1)];
+            (format!("{part} of the contact, {}", axis(along)), RELATIVE)
+        }
+        Target::Shift(along) => (format!("place of the robot, {}", axis(along)), "m"),
+        Target::Eccentricity(j, part) => {
+            let wave = ["cosine", "sine"][part];
+            let name = format!("once-per-turn error of angle {}, {wave}", j + 1);
+            (name, "rad")
+        }
+        Target::Known(e, p) => {
+            // A law of the passive base is not in the model: it is named.
+            let own = modelled.get(e)?;
+            let parameter = &own.kind().info().parameters[p];
+            let given = own.value(parameter.name)?;
+            (value, promised) = (value / given - 1.0, promised / given.abs());
+            let index = own.site().index();
+            let name = format!("{} of {}", parameter.name, worded(own.kind(), index));
+            (name, RELATIVE)
+        }
+        Target::Calibration(e) => {
+            let effect = &hypothesis.calibration[e];
+            let unit = effect.kind.info().parameters[0].unit;
+            (worded(effect.kind, effect.index), unit)
+        }
+        Target::Placement(_) | Target::Named(..) => return None,
+    };
+    Some(Absorbed {
+        name,
+        value,
+        promised,
+        unit: unit.to_owned(),
+    })
+}
+
+/// An effect in words, with its place.
+fn worded(kind: Kind, index: usize) -> String {
+    let (name, joint, channel) = placed(kind, index);
+    let name = name.replace('_', " ");
+    match (joint, channel) {
+        (Some(joint), _) => format!("{name} of joint {joint}"),
+        (None, Some(channel)) => format!("{name} of {channel}"),
+        (None, None) => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A viscosity of 0.1 that was refitted to 0.11 with a prior of 0.005: a tenth more, where twice a twentieth was promised.
+    #[test]
+    fn what_was_refitted_is_told_relative_to_what_was_promised() {
+        let model = "[[arm.segment]]\nlength = 0.5\nmass = 2.0\ncom = 0.2\ninertia = 0.02\n[[arm.joint]]\nviscosity = 0.1\n";
+        let model = Model::from_toml(model).expect("a model");
+        let mut known = model.core_effects();
+        known[0].parameters[0] = 0.11;
+        known.push(known[0]);
+        let hypothesis = Hypothesis::<1> {
+            segments: [[0.02, 0.0, 0.0]],
+            contact: [[0.0; 2]; 2],
+            shift: [0.0, 0.003],
+            placement: [0.0; 2],
+            eccentricity: [[0.0; 2]],
+            known,
+            calibration: Vec::new(),
+            named: Vec::new(),
+        };
+        let coordinate = |target, sd| Coordinate {
+            target,
+            prior: Some((0.0, sd)),
+            lower: -1.0,
+            upper: 1.0,
+            step: 1e-3,
+        };
+        let unknowns = [
+            coordinate(Target::Segment(0, 0), 0.05),
+            coordinate(Target::Shift(1), 0.002),
+            coordinate(Target::Known(0, 0), 0.005),
+            // A law of the passive base, and what is each trial's own.
+            coordinate(Target::Known(1, 0), 1.0),
+            coordinate(Target::Placement(0), 1.0),
+        ];
+        let told = absorbed(&model, &hypothesis, unknowns.iter());
+        let names: Vec<_> = told.iter().map(|a| a.name.as_str()).collect();
+        let expected = [
+            "mass of segment 1",
+            "place of the robot, z",
+            "viscosity of viscous of joint 1",
+        ];
+        assert_eq!(names, expected);
+        assert_eq!((told[0].value, told[0].promised), (0.02, 0.1));
+        assert_eq!((told[1].unit.as_str(), told[1].value), ("m", 0.003));
+        assert!((told[2].value - 0.1).abs() < 1e-12 && (told[2].promised - 0.1).abs() < 1e-12);
+        assert_eq!(told[2].unit, RELATIVE);
+    }
+}

@@ -1,0 +1,197 @@
+use serde::Serialize;
+
+use super::{Named, placed};
+use crate::candidates::candidate::Candidate;
+use crate::selection::first_order_screening;
+use crate::selection::search_state::{Ruled, SearchStep};
+
+/// An effect that was asked for and not named: the smallest that these data would have shown, and what it would explain.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Limit {
+    /// Its kind.
+    pub kind: String,
+    /// Joint or segment where it would act, from 1.
+    pub joint: Option<usize>,
+    /// Channel of the force sensor where it would act.
+    pub channel: Option<String>,
+    /// The parameter that is its size.
+    pub parameter: String,
+    /// Smallest size of the parameter that would have been named.
+    pub at_least: f64,
+    /// Unit of the parameter.
+    pub unit: String,
+    /// What it would still explain, in units of twice the log-likelihood.
+    pub gain: f64,
+    /// What it would have to.
+    pub price: f64,
+}
+
+/// The limits of all candidates that were ruled out, but for the effects that were named. Of several shapes of an effect that counts which
+/// shows most clearly, and the most that any of them explains.
+pub(super) fn limits(
+    ruled: &[Ruled],
+    named: &[(String, Option<usize>, Option<String>)],
+) -> Vec<Limit> {
+    let mut all: Vec<Limit> = Vec::new();
+    for one in ruled {
+        let effect = &one.candidate.effect;
+        let place = placed(effect.kind, effect.index);
+        if !one.smallest.is_finite() || named.contains(&place) {
+            continue;
+        }
+        let parameter = &effect.kind.info().parameters[one.candidate.free[0]];
+        let (kind, joint, channel) = place;
+        let same = |l: &&mut Limit| {
+            (&l.kind, l.joint, &l.channel) == (&kind, joint, &channel)
+                && l.parameter == parameter.name
+        };
+        if let Some(known) = all.iter_mut().find(same) {
+            if known.gain - known.price <= one.gain - one.price {
+                (known.gain, known.price) = (one.gain, one.price);
+            }
+            if one.smallest < known.at_least {
+                known.at_least = one.smallest;
+            }
+            continue;
+        }
+        all.push(Limit {
+            kind,
+            joint,
+            channel,
+            parameter: parameter.name.to_owned(),
+            at_least: one.smallest,
+            unit: parameter.unit.to_owned(),
+            gain: one.gain,
+            price: one.price,
+        });
+    }
+    all
+}
+
+/// An effect alone, to first order.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Suspect {
+    /// Its kind.
+    pub kind: String,
+    /// Joint or segment where it would act, from 1.
+    pub joint: Option<usize>,
+    /// Channel of the force sensor where it would act.
+    pub channel: Option<String>,
+    /// What is free in it, as it would be.
+    pub parameters: Named<f64>,
+    /// Unit of the first.
+    pub unit: String,
+    /// What it would explain, in units of twice the log-likelihood.
+    pub gain: f64,
+    /// What it must explain to be named.
+    pub price: f64,
+    /// Smallest size of the first parameter that would be named.
+    pub smallest: f64,
+}
+
+impl Suspect {
+    pub(super) fn of(one: &first_order_screening::Suspect) -> Self {
+        let (kind, joint, channel) = placed(one.effect.kind, one.effect.index);
+        let known = one.effect.kind.info().parameters;
+        let free = &one.candidate.free;
+        let named = |&p: &usize| (known[p].name.to_owned(), one.effect.parameters[p]);
+        Self {
+            kind,
+            joint,
+            channel,
+            parameters: free.iter().map(named).collect(),
+            unit: known[free[0]].unit.to_owned(),
+            gain: one.gain,
+            price: one.price,
+            smallest: one.smallest,
+        }
+    }
+}
+
+/// Effects that were added together and converged by simulation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tried {
+    /// Kind, joint from 1, and channel of each.
+    pub effects: Vec<(String, Option<usize>, Option<String>)>,
+    /// What they gained, in units of twice the log-likelihood.
+    pub gain: f64,
+}
+
+/// One round of the search.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rung {
+    /// What was converged by simulation, best first.
+    pub tried: Vec<Tried>,
+    /// Misfit before the round.
+    pub before: f64,
+    /// Misfit with the best of what was tried.
+    pub after: f64,
+}
+
+impl Rung {
+    pub(super) fn of(step: &SearchStep) -> Self {
+        let place = |c: &Candidate| placed(c.effect.kind, c.effect.index);
+        let tried = step.tried.iter().map(|(members, gain)| Tried {
+            effects: members.iter().map(place).collect(),
+            gain: *gain,
+        });
+        Self {
+            tried: tried.collect(),
+            before: step.before,
+            after: step.after,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::{Effect, Kind};
+
+    use super::*;
+
+    fn ruled(kind: &str, index: usize, (gain, price, smallest): (f64, f64, f64)) -> Ruled {
+        let kind = Kind::named(kind).expect("a kind");
+        let candidate = Candidate {
+            effect: Effect::new(kind, index),
+            question: 0,
+            free: vec![0],
+            rest: None,
+            refined: Vec::new(),
+            tried: 1,
+            step: 1.0,
+            price: 0.0,
+            spread: 1.0,
+            expected: Vec::new(),
+        };
+        Ruled {
+            candidate,
+            gain,
+            price,
+            smallest,
+        }
+    }
+
+    #[test]
+    fn of_several_shapes_the_clearest_size_and_the_most_gain_count() {
+        let all = [
+            ruled("coulomb", 0, (3.0, 20.0, 0.05)),
+            ruled("coulomb", 0, (8.0, 20.0, 0.04)),
+            ruled("coulomb", 0, (5.0, 20.0, 0.03)),
+            // Not seen at any size, and named.
+            ruled("viscous", 0, (0.0, 20.0, f64::INFINITY)),
+            ruled("viscous", 1, (90.0, 20.0, 0.02)),
+            ruled("force_bias", 1, (1.0, 20.0, 0.3)),
+        ];
+        let named = [("viscous".to_owned(), Some(2), None)];
+        let limits = limits(&all, &named);
+        let told: Vec<_> = limits.iter().map(|l| (l.kind.as_str(), l.joint)).collect();
+        assert_eq!(told, [("coulomb", Some(1)), ("force_bias", None)]);
+        let dry = &limits[0];
+        assert_eq!((dry.gain, dry.price, dry.at_least), (8.0, 20.0, 0.03));
+        assert_eq!(
+            (dry.parameter.as_str(), dry.unit.as_str()),
+            ("torque", "N m")
+        );
+        assert_eq!(limits[1].channel.as_deref(), Some("Fz"));
+    }
+}

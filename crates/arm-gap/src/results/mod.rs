@@ -1,0 +1,52 @@
+//! What a session came to, in the terms of files and reports: kinds with joints from 1 and channels by name, values with units and
+//! intervals, gaps in root mean square, the verdict. One type for Rust, Python and JSON.
+
+mod absorbed;
+mod amended;
+mod asked;
+mod channel_gap;
+mod effect;
+mod found;
+mod limit;
+mod root_mean_square;
+mod simulated;
+mod value;
+mod verdict;
+
+pub use absorbed::Absorbed;
+pub use amended::Fitted;
+pub use asked::{Asked, TrialFile};
+pub use channel_gap::{ChannelGap, Open, channel_names, confirmed};
+pub use effect::{Alternative, Missing, Place, Separation};
+pub use found::{GapResult, Lack, Screening};
+pub use limit::{Limit, Rung, Suspect, Tried};
+pub use root_mean_square::{pairwise_sum, root_mean_square};
+pub use simulated::{SimulatedTrial, Version, sizes};
+pub use value::Value;
+pub use verdict::{Evidence, MISFIT, NEAR_NOISE, NEGLIGIBLE, Verdict};
+
+use arm_core::effect::Kind;
+use arm_model::Site;
+
+/// Values by name, in their order.
+pub type Named<T> = indexmap::IndexMap<String, T>;
+
+/// Name of a kind, joint or segment from 1, and channel, of what the core knows by an index.
+fn placed(kind: Kind, index: usize) -> (String, Option<usize>, Option<String>) {
+    let name = kind.info().kind.to_owned();
+    match Site::of(kind, index) {
+        Site::Whole => (name, None, None),
+        Site::Joint(joint) => (name, Some(joint + 1), None),
+        Site::Channel(channel) => (name, None, Some(channel.name().to_owned())),
+    }
+}
+
+/// A value, or the least that it may be; what is no number stays.
+fn at_least(value: f64, least: f64) -> f64 {
+    if least > value { least } else { value }
+}
+
+/// A value, or the most that it may be; what is no number stays.
+fn at_most(value: f64, most: f64) -> f64 {
+    if most < value { most } else { value }
+}

@@ -1,0 +1,397 @@
+//! What an identification came to, in the terms of files and reports: one type for Rust, Python and JSON.
+
+use std::sync::Arc;
+
+use arm_core::effect::{Effect as CoreEffect, Place};
+use arm_core::{Chain, Joints};
+use arm_model::{Effect, Model, Refused, Segment};
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+
+use crate::inference::estimate::{self, Quantity};
+use crate::regression::trial::Role;
+use crate::regression::unknown::Source;
+
+/// One estimated quantity.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Parameter of a segment (`m2`, `m2*l2`, `l2`, `I2`) or of an effect (`torque`), or a combination of parameters.
+    pub name: String,
+    /// Joint or segment, from 1.
+    pub joint: Option<usize>,
+    /// `segment`, `combination`, `calibration`, or the kind of effect.
+    pub kind: String,
+    /// Estimate, in `unit`.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// SI unit.
+    pub unit: String,
+    /// Interval at the level asked for.
+    pub interval: (f64, f64),
+    /// What the value rests on: `data`, `prior` or `bound`.
+    pub decided_by: String,
+    /// Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
+    pub caveat: Option<String>,
+}
+
+impl Estimate {
+    /// An estimate by the name that it has in files.
+    fn of(estimate: &estimate::Estimate, fitted: &[CoreEffect<f64>]) -> Self {
+        let own = estimate.name.as_str();
+        let (name, kind) = match estimate.quantity {
+            Quantity::Unknown(Source::Effect(i, p)) | Quantity::EffectParameter(i, p) => {
+                let info = fitted[i].kind.info();
+                (info.parameters[p].name, info.kind)
+            }
+            // "elastic1 stiffness*rest": the kind and the joint stand in fields of their own.
+            Quantity::Unknown(Source::RestTorque(i, _)) => (
+                own.split_once(' ').map_or(own, |(_, name)| name),
+                fitted[i].kind.info().kind,
+            ),
+            Quantity::Unknown(Source::Calibration(_)) => (own, "calibration"),
+            Quantity::Unknown(Source::Segment(..)) | Quantity::Segment => (own, "segment"),
+            Quantity::Combination => (own, "combination"),
+        };
+        Self {
+            name: name.to_owned(),
+            joint: estimate.joint.map(|j| j + 1),
+            kind: kind.to_owned(),
+            value: estimate.value,
+            std: estimate.std,
+            unit: estimate.unit.replace('·', " "),
+            interval: estimate.interval.into(),
+            decided_by: estimate.decided_by.name().to_owned(),
+            caveat: None,
+        }
+    }
+}
+
+/// How a fitted model explains one trial, after the common low-pass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Position of each sample that was used in the trial.
+    pub samples: Vec<usize>,
+    /// Joint torques that the measurement asks for, a row a sample \[N m\].
+    pub measured: Vec<Vec<f64>>,
+    /// Joint torques of the fitted model \[N m\].
+    pub fitted: Vec<Vec<f64>>,
+}
+
+impl<const N: usize> From<&estimate::Explained<N>> for Fit {
+    fn from(of: &estimate::Explained<N>) -> Self {
+        let rows =
+            |rows: &[Joints<f64, N>]| rows.iter().map(|r| r.iter().copied().collect()).collect();
+        Self {
+            samples: of.samples.clone(),
+            measured: rows(&of.measured),
+            fitted: rows(&of.fitted),
+        }
+    }
+}
+
+/// Values by name, in their order.
+pub type Named<T> = indexmap::IndexMap<String, T>;
+
+/// What of a trial a result names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrialName {
+    /// Whether it was fitted or kept apart.
+    pub role: Role,
+    /// Its movement.
+    pub configuration: String,
+}
+
+/// What an identification was asked about, as the files have it.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    /// The model as given.
+    pub model: &'a Model,
+    /// Every effect that was taken into account.
+    pub effects: &'a [CoreEffect<f64>],
+    /// The trials.
+    pub trials: &'a [TrialName],
+    /// `joint` or `cascade`.
+    pub method: &'a str,
+    /// Probability of the intervals.
+    pub level: f64,
+}
+
+/// What an identification came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identification {
+    /// `joint` or `cascade`.
+    pub method: String,
+    /// How the solver ended: `solved`, `almost_solved`.
+    pub status: String,
+    /// How many combinations of the unknowns the data determine.
+    pub rank: usize,
+    /// Number of unknowns, calibration not counted.
+    pub unknowns: usize,
+    /// The unknowns and what follows from them.
+    pub parameters: Vec<Estimate>,
+    /// The base parameters: what a planar chain can show at all.
+    pub combinations: Vec<Estimate>,
+    /// Small imperfections of the measurement that were refitted within the declared tolerance.
+    pub calibration: Vec<Estimate>,
+    /// What in the result cannot be true of this arm and these sensors, in words.
+    pub contradictions: Vec<String>,
+    /// What the fitted model does not describe well, in words.
+    pub misfits: Vec<String>,
+    /// What of the model the method does not take into account, in words.
+    pub left_out: Vec<String>,
+    /// Which unknowns the movements cannot tell apart, in words.
+    pub trades: Vec<String>,
+    /// Whether all parameters are known up to one common factor only: no torque acted.
+    pub scale_free: bool,
+    /// Probability of the intervals.
+    pub level: f64,
+    /// Cutoff of the zero-phase low-pass that motion and torque share \[Hz\].
+    pub cutoff: f64,
+    /// Root mean square of the torque residual after the low-pass by role and channel \[N m\].
+    pub residual_rms: Named<Named<f64>>,
+    /// The same by role, configuration and channel.
+    pub residual_rms_by_configuration: Named<Named<Named<f64>>>,
+    /// By how many standard deviations the inertia that the cascade neglects moves each first moment.
+    pub neglected_inertia: Vec<f64>,
+    /// Noise of each joint's speed relative to the speed itself; zero where the motion was simulated.
+    pub speed_noise: Vec<f64>,
+    /// Why the motion was measured where it was to be simulated if that could be done.
+    pub not_simulated: Option<String>,
+    /// The model with the estimates.
+    pub model: Model,
+    /// How each trial is explained.
+    pub explained: Vec<Arc<Fit>>,
+}
+
+impl Identification {
+    /// What was identified, in the terms of the files.
+    ///
+    /// # Errors
+    /// [`Refused`] where an estimate is none that a model may have.
+    pub fn of<const N: usize>(
+        result: &estimate::Identified<N>,
+        asked: &Asked<'_>,
+    ) -> Result<Self, Refused> {
+        let estimates = |list: &[estimate::Estimate]| {
+            let each = list.iter().map(|e| Estimate::of(e, &result.fitted));
+            each.collect::<Vec<_>>()
+        };
+        let not_simulated = result.not_simulated.as_ref();
+        let trials: Vec<_> = result.explained.iter().zip(asked.trials).collect();
+        Ok(Self {
+            method: asked.method.to_owned(),
+            status: result.status.name().to_owned(),
+            rank: result.rank,
+            unknowns: result.unknowns,
+            parameters: estimates(&result.parameters),
+            combinations: estimates(&result.combinations),
+            calibration: estimates(&result.calibration),
+            contradictions: Vec::new(),
+            misfits: Vec::new(),
+            left_out: Vec::new(),
+            trades: result.trades.clone(),
+            scale_free: result.scale_free,
+            level: asked.level,
+            cutoff: result.cutoff,
+            residual_rms: by_role(&trials),
+            residual_rms_by_configuration: by_configuration(&trials),
+            neglected_inertia: result.neglected_inertia.clone(),
+            speed_noise: result.speed_noise.clone(),
+            not_simulated: not_simulated.map(ToString::to_string),
+            model: identified_model(&result.chain, &result.fitted, asked)?,
+            explained: result
+                .explained
+                .iter()
+                .map(|e| Arc::new(e.into()))
+                .collect(),
+        })
+    }
+}
+
+type Fitted<'a, const N: usize> = (&'a estimate::Explained<N>, &'a TrialName);
+
+/// Root mean square residual by role and channel, of the roles that there are.
+fn by_role<const N: usize>(trials: &[Fitted<'_, N>]) -> Named<Named<f64>> {
+    let role = |(role, name): (Role, &str)| {
+        let own = trials.iter().filter(|(_, trial)| trial.role == role);
+        let rows = own.flat_map(|(fit, _)| fit.measured.iter().zip(&fit.fitted));
+        let (mut sum, mut n) = ([0.0; N], 0);
+        for (measured, fitted) in rows {
+            for j in 0..N {
+                sum[j] += (measured[j] - fitted[j]) * (measured[j] - fitted[j]);
+            }
+            n += 1;
+        }
+        let channel = |(j, sum)| (format!("tau{}_Nm", j + 1), libm::sqrt(sum / f64::from(n)));
+        (n > 0).then(|| {
+            (
+                name.to_owned(),
+                sum.into_iter().enumerate().map(channel).collect(),
+            )
+        })
+    };
+    let roles = [(Role::Fit, "fit"), (Role::Test, "test")];
+    roles.into_iter().filter_map(role).collect()
+}
+
+/// The same by role, configuration and channel.
+fn by_configuration<const N: usize>(trials: &[Fitted<'_, N>]) -> Named<Named<Named<f64>>> {
+    let mut configurations: Named<Vec<Fitted<'_, N>>> = Named::new();
+    for trial in trials {
+        let own = configurations.entry(trial.1.configuration.clone());
+        own.or_default().push(*trial);
+    }
+    let mut all: Named<Named<Named<f64>>> = Named::new();
+    for (configuration, own) in configurations {
+        for (role, channels) in by_role(&own) {
+            let listed = all.entry(role).or_default();
+            listed.insert(configuration.clone(), channels);
+        }
+    }
+    all
+}
+
+/// An inertia below this part of mass · length² is a difference of equal numbers.
+const ROUNDING: f64 = 1e-12;
+
+/// The model with estimates; effects that its joints state stay there, the others become effects.
+fn identified_model<const N: usize>(
+    chain: &Chain<f64, N>,
+    fitted: &[CoreEffect<f64>],
+    asked: &Asked<'_>,
+) -> Result<Model, Refused> {
+    let model = asked.model;
+    let fitted: Vec<Effect> = fitted.iter().map(Effect::from_core).collect();
+    // What effects of segments and of the hand did to the segments is in them now.
+    let held = asked.effects.iter().filter(|e| {
+        let place = e.kind.info().place;
+        !matches!(place, Place::Joint | Place::Segment | Place::Hand)
+    });
+    let held: Vec<Effect> = held.map(Effect::from_core).collect();
+    let segments = model.segments.iter().zip(chain.segments());
+    let segments = segments.map(|(old, s)| {
+        let scale = s.mass * (s.length * s.length);
+        Segment {
+            name: old.name.clone(),
+            length: s.length,
+            mass: s.mass,
+            com: s.com[0].clamp(0.0, s.length),
+            inertia: if s.inertia.abs() > ROUNDING * scale {
+                s.inertia
+            } else {
+                0.0
+            },
+            com_normal: s.com[1],
+        }
+    });
+    let segments = segments.collect();
+    let changed = model.change(|parts| parts.segments = segments)?;
+    changed.with_joint_effects(&fitted, &held)
+}
+
+/// The file beside `identified.json` that has the model.
+const MODEL_FILE: &str = "identified.toml";
+
+impl Serialize for Identification {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let warnings = [&self.contradictions[..], &self.misfits, &self.left_out].concat();
+        let mut out = to.serialize_struct("Identification", 15)?;
+        out.serialize_field("method", &self.method)?;
+        out.serialize_field("status", &self.status)?;
+        out.serialize_field("rank", &self.rank)?;
+        out.serialize_field("unknowns", &self.unknowns)?;
+        out.serialize_field("parameters", &self.parameters)?;
+        out.serialize_field("combinations", &self.combinations)?;
+        out.serialize_field("calibration", &self.calibration)?;
+        out.serialize_field("warnings", &warnings)?;
+        out.serialize_field("not_separable", &self.trades)?;
+        out.serialize_field("scale_free", &self.scale_free)?;
+        out.serialize_field("level", &self.level)?;
+        out.serialize_field("cutoff_Hz", &self.cutoff)?;
+        out.serialize_field("residual_rms", &self.residual_rms)?;
+        let by_configuration = &self.residual_rms_by_configuration;
+        out.serialize_field("residual_rms_by_configuration", by_configuration)?;
+        out.serialize_field("model", MODEL_FILE)?;
+        out.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+    use arm_core::estimator::Decision;
+    use arm_numerics::least_squares::program::Status;
+
+    use super::*;
+
+    fn estimate(name: &str, quantity: Quantity) -> estimate::Estimate {
+        estimate::Estimate {
+            name: name.to_owned(),
+            quantity,
+            joint: Some(1),
+            unit: "N·m/rad",
+            value: 1.0,
+            std: 0.1,
+            interval: [0.8, 1.2],
+            decided_by: Decision::Data,
+        }
+    }
+
+    /// Once an estimate was a combination if its name contained a `+`.
+    #[test]
+    fn a_combination_is_one_by_what_it_is_and_not_by_its_name() {
+        let of = |name, quantity| Estimate::of(&estimate(name, quantity), &[]).kind;
+        assert_eq!(of("m1+m2", Quantity::Segment), "segment");
+        assert_eq!(of("m1", Quantity::Combination), "combination");
+    }
+
+    #[test]
+    fn a_spring_is_named_by_its_kind_with_the_joint_beside_it() {
+        let springs = [arm_core::effect::Effect::new(
+            Kind::named("elastic").expect("a kind"),
+            1,
+        )];
+        let torque = Quantity::Unknown(Source::RestTorque(0, 1));
+        let told = Estimate::of(&estimate("elastic2 stiffness*rest", torque), &springs);
+        let told = (told.kind.as_str(), told.name.as_str(), told.joint);
+        assert_eq!(told, ("elastic", "stiffness*rest", Some(2)));
+    }
+
+    /// Once it was the lower-cased name of a variant, `almostsolved`.
+    #[test]
+    fn a_status_is_written_in_words() {
+        assert_eq!(Status::Solved.name(), "solved");
+        assert_eq!(Status::AlmostSolved.name(), "almost_solved");
+    }
+
+    fn explained(rows: &[f64]) -> estimate::Explained<1> {
+        estimate::Explained {
+            samples: (0..rows.len()).collect(),
+            measured: rows.iter().map(|&v| Joints::from([v])).collect(),
+            fitted: rows.iter().map(|_| Joints::from([0.0])).collect(),
+        }
+    }
+
+    /// Residuals of 3 and 4 N m in one trial to fit, 1 N m in the other, and none where no sample was used.
+    #[test]
+    fn residuals_are_told_by_role_and_movement() {
+        let name = |role, configuration: &str| TrialName {
+            role,
+            configuration: configuration.to_owned(),
+        };
+        let fits = [explained(&[3.0, 4.0]), explained(&[1.0]), explained(&[])];
+        let names = [
+            name(Role::Fit, "slow"),
+            name(Role::Fit, "fast"),
+            name(Role::Test, "slow"),
+        ];
+        let trials: Vec<_> = fits.iter().zip(&names).collect();
+        let all = by_role(&trials);
+        assert_eq!(all.keys().collect::<Vec<_>>(), ["fit"]);
+        assert_eq!(all["fit"]["tau1_Nm"], libm::sqrt(26.0 / 3.0));
+        let each = &by_configuration(&trials)["fit"];
+        assert_eq!(each.keys().collect::<Vec<_>>(), ["slow", "fast"]);
+        assert_eq!(each["slow"]["tau1_Nm"], libm::sqrt(12.5));
+    }
+}

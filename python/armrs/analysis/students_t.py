@@ -1,0 +1,25 @@
+"""Student's t: intervals and probabilities of what few repeats tell."""
+
+from __future__ import annotations
+
+
+def quantile(level: float, freedom: float) -> float:
+    """Return the half width of a two-sided interval in standard deviations.
+
+    Parameters
+    ----------
+    level : float
+        Probability of the interval.
+    freedom : float
+        Degrees of freedom.
+    """
+    from scipy.stats import t as student
+
+    return float(student.ppf(0.5 + 0.5 * level, freedom))
+
+
+def chance(value: float, std: float, freedom: float) -> float:
+    """Return the probability of a value so far from zero, on either side, where the true one is zero."""
+    from scipy.stats import t as student
+
+    return float(2.0 * student.sf(abs(value) / std, freedom)) if std > 0.0 else float(value == 0.0)

@@ -1,0 +1,159 @@
+"""The classes of results: typed in the core, the same in Python, one JSON."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armrs
+from armrs import BadInput, _armrs
+from armrs.io import files
+
+CLASSES: dict[str, dict[str, Any]] = {
+    "Value": {"value": 0.4, "std": 0.01, "unit": "N m s/rad", "interval": (0.38, 0.42)},
+    "Separation": {
+        "waypoints_deg": ((0.0, 1.0), (2.0, 3.0)),
+        "speed_rad_s": 0.5,
+        "acceleration_rad_s2": 2.0,
+        "shape": "smooth",
+        "now": 1.0,
+        "then": 3.0,
+    },
+    "Place": {
+        "trial": "a.csv",
+        "channel": "tau1_Nm",
+        "t_start": 0.0,
+        "t_end": 1.0,
+        "joint": 1,
+        "condition": "dq1 > 0",
+        "mean": 0.1,
+        "z": 4.0,
+    },
+    "Open": {"trial": "a.csv", "t_start": 0.0, "t_end": 1.0, "size": None},
+    "ChannelGap": {"before": 3.0, "calibrated": 2.0, "after": 1.0, "floor": 0.9, "floor_std": 0.1, "open": None},
+    "Absorbed": {"name": "force bias of Fy", "value": 0.1, "promised": 0.4, "unit": "N"},
+    "Limit": {
+        "kind": "coulomb",
+        "joint": 1,
+        "channel": None,
+        "parameter": "torque",
+        "at_least": 0.02,
+        "unit": "N m",
+        "gain": 1.0,
+        "price": 20.0,
+    },
+    "Suspect": {
+        "kind": "viscous",
+        "joint": 2,
+        "channel": None,
+        "parameters": {"viscosity": 0.4},
+        "unit": "N m s/rad",
+        "gain": 90.0,
+        "price": 20.0,
+        "smallest": 0.03,
+    },
+    "Tried": {"effects": (("viscous", 2, None),), "gain": 90.0},
+    "Fitted": {
+        "segments": ([0.0, 0.1, 0.0],),
+        "contact": [[0.0, 0.0], [0.0, 0.1]],
+        "shift": [0.0, 0.001],
+        "known": (armrs.Effect("coulomb", 1, parameters={"torque": 0.1}),),
+        "calibration": (),
+        "named": (),
+    },
+    "Estimate": {
+        "name": "m2*l2",
+        "joint": 2,
+        "kind": "segment",
+        "value": 0.7,
+        "std": 0.002,
+        "unit": "kg m",
+        "interval": (0.69, 0.71),
+        "decided_by": "data",
+        "caveat": None,
+    },
+}
+"""Arguments of small classes; the others are made of these."""
+
+
+def made(name: str, **change: Any) -> Any:
+    return getattr(_armrs, name)(**(CLASSES[name] | change))
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_result_is_a_value(name: str) -> None:
+    one = made(name)
+    assert one == made(name)
+    assert pickle.loads(pickle.dumps(one)) == copy.deepcopy(one) == one
+    assert {key: getattr(one, key) for key in one.__match_args__} == CLASSES[name]
+    assert repr(one).startswith(f"{name}({one.__match_args__[0]}=")
+    with pytest.raises(AttributeError):
+        setattr(one, one.__match_args__[0], None)
+    with pytest.raises(BadInput, match="nothing_known"):
+        one.replace(nothing_known=1)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_it_is_documented_and_its_json_has_its_attributes(name: str) -> None:
+    kind = getattr(_armrs, name)
+    assert all(inspect.getdoc(getattr(kind, key)) for key in (*kind.__match_args__, "replace", "to_dict"))
+    assert inspect.getdoc(kind)
+    told = made(name).to_dict()
+    assert list(told) == [key for key in kind.__match_args__ if key != "open"]
+    assert json.loads(files.json_text(told)) == told
+
+
+def test_wrong_arguments_are_refused_by_name() -> None:
+    with pytest.raises(BadInput, match=r"value: found 'much', allowed a number"):
+        made("Value", value="much")
+    with pytest.raises(BadInput, match=r"parameters: found 3, allowed a mapping of names"):
+        made("Suspect", parameters=3)
+    with pytest.raises(BadInput, match=r"known: found \(1,\), allowed a sequence"):
+        made("Fitted", known=(1,))
+
+
+def test_units_stand_in_the_repr() -> None:
+    assert "speed_rad_s=0.5 rad/s" in repr(made("Separation"))
+    assert "t_end=1.0 s" in repr(made("Open"))
+
+
+def test_an_effect_says_itself_with_units() -> None:
+    viscous = _armrs.Missing("viscous", 2, None, {"viscosity": made("Value")}, 0.0, 1.0)
+    assert str(viscous) == "viscous joint 2: viscosity = 0.4 ± 0.01 N m s/rad"
+    assert viscous.decided
+    assert viscous.alternatives == ()
+    assert str(made("Estimate")) == "m2*l2 = 0.7 ± 0.002 kg m"
+
+
+def test_what_is_no_number_is_none_in_json() -> None:
+    swings = _armrs.Alternative("tremor", 1, None, "swings these channels as much", 1.0, float("nan"))
+    assert swings.to_dict()["likeness"] is None
+    assert list(swings.to_dict())[-1] == "separation"
+
+
+def test_sums_are_those_of_numpy() -> None:
+    """Bit for bit: published digits rest on them."""
+    rng = np.random.default_rng(3)
+    for n in (1, 7, 8, 9, 127, 128, 129, 1000, 4097):
+        measured, shown = rng.normal(size=(2, n, 1))
+        trial = _armrs.SimulatedTrial("a", 0, True, 50.0, np.ones(n, dtype=bool), measured, {"given": shown}, {})
+        assert _armrs.sizes([trial], "given") == [float(np.sqrt(np.mean(np.square(shown - measured)[:, 0])))]
+        assert pickle.loads(pickle.dumps(trial)) == trial
+
+
+def test_whole_results_can_be_kept(slow_arm: Path) -> None:
+    found = armrs.identify(slow_arm, with_effects="coulomb")
+    again = pickle.loads(pickle.dumps(found.result))
+    assert again == found.result
+    assert again.to_dict() == found.to_dict()
+    assert np.array_equal(again.explained[0].measured, found.explained[0].measured)
+    doubled = found.result.replace(rank=2 * found.rank)
+    assert doubled.rank == 2 * found.rank
+    assert doubled.parameters == found.parameters
