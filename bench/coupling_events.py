@@ -16,7 +16,8 @@ import numpy as np
 
 from armrs.cosim import Slave
 from armrs.cosim.accuracy import run_checked
-from armrs.cosim.master import Coupled, run_system
+from armrs.cosim.coupled import Coupled
+from armrs.cosim.master import run_system
 from armrs.cosim.ready import Ready
 from armrs.cosim.system import System, couple
 from armrs.errors import CoupledError

@@ -12,8 +12,9 @@ import pytest
 from armrs.cosim import Slave
 from armrs.cosim.accuracy import run_checked
 from armrs.cosim.between import outliers, parts
+from armrs.cosim.coupled import Coupled
 from armrs.cosim.imported import ImportedSlave
-from armrs.cosim.master import Coupled, run_system
+from armrs.cosim.master import run_system
 from armrs.cosim.partner import Partner
 from armrs.cosim.ready import Ready, Wave
 from armrs.cosim.system import System, couple

@@ -28,7 +28,7 @@ def arm(change: Callable[[np.ndarray], np.ndarray]) -> Any:
     near, far = ROBOT.lengths
     inner = np.arccos((np.sum(hand**2, axis=1) - near**2 - far**2) / (2 * near * far))
     outer = np.arctan2(hand[:, 1], hand[:, 0]) - np.arctan2(far * np.sin(inner), near + far * np.cos(inner))
-    trial = SimpleNamespace(q=change(q), robot_q=np.column_stack([outer, inner]), force_on_arm=None, file="trial.csv")
+    trial = SimpleNamespace(q=change(q), robot_q=np.column_stack([outer, inner]), force_on_arm=None, base=None, file="trial.csv")
     return SimpleNamespace(model=MODEL, trials=(trial,))
 
 

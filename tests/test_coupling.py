@@ -17,8 +17,9 @@ import pytest
 from armrs import Contact, Joint, Model, _armrs, cli
 from armrs.cosim import Partner, Slave
 from armrs.cosim.accuracy import run_checked
+from armrs.cosim.coupled import Coupled
 from armrs.cosim.imported import ImportedSlave
-from armrs.cosim.master import Coupled, run_system
+from armrs.cosim.master import run_system
 from armrs.cosim.partner import StepResult, Variable
 from armrs.cosim.ready import Ready
 from armrs.cosim.system import couple, load_system

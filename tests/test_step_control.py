@@ -10,7 +10,8 @@ import pytest
 
 from armrs.cosim import Slave
 from armrs.cosim.accuracy import run_checked
-from armrs.cosim.master import Coupled, run_system
+from armrs.cosim.coupled import Coupled
+from armrs.cosim.master import run_system
 from armrs.cosim.pace import Pace
 from armrs.cosim.partner import Partner
 from armrs.cosim.ready import Wave

@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 import armrs
 from armrs import online, views
 from armrs.cosim.accuracy import run_checked
-from armrs.cosim.master import Coupled
+from armrs.cosim.coupled import Coupled
 from armrs.cosim.system import load_system
 from armrs.workflows import history
 from armrs.workflows.demo import true_model

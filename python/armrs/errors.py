@@ -75,7 +75,7 @@ class BadInput(ArmrsError, ValueError):
 
 
 class BadInputs(BadInput):
-    """Several inputs that cannot be used as they are; the command line prints a line for each.
+    """Several inputs that cannot be used as they are: it reads as the first of them, with the number of the others.
 
     Attributes
     ----------
@@ -94,7 +94,10 @@ class BadInputs(BadInput):
         listed = tuple(problems)
         if len(listed) == 1:
             return listed[0]
-        made = cls(f"{len(listed)} problems", Text("the first: " + str(listed[0])), "none")
+        first, others = listed[0], len(listed) - 1
+        more = f"and {others} more problem{'s' * (others > 1)}, which armrs check lists"
+        hint = f"{first.hint}; {more}" if first.hint else more
+        made = cls(first.place, first.found, first.allowed, file=first.file, hint=hint)
         made.problems = listed
         return made
 

@@ -114,10 +114,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except typer.Exit as end:
         return end.exit_code
-    except BadInputs as errors:
-        return [_refuse(str(_of_option(error))) for error in errors.problems][-1]
     except BadInput as error:
-        return _refuse(str(_of_option(error)))
+        listed = error.problems if isinstance(error, BadInputs) and given[0] in _LISTING else (error,)
+        return [_refuse(str(_of_option(one))) for one in listed][-1]
     except ArmrsError as error:
         print(f"armrs: {one_line(error)}", file=sys.stderr)
         return 1
@@ -178,6 +177,8 @@ _OPTIONS = {
     "dt, rate": "--dt, --rate-hz",
 }  # fmt: skip
 """What the command line calls an argument of a function."""
+_LISTING = ("check", "import")
+"""Commands that print a line for every problem; the others print one line."""
 _NEVER_IN_FILES = {name: f"--{name}" for name in ("coordinates", "date", "forward", "history", "points", "up")}
 """The same of arguments that are no key of any file, so that a refusal of theirs may say which file they were asked of."""
 

@@ -152,7 +152,8 @@ def fmu_run(
     or a slave failed. Exit status 1, with samples, if a slave ended the run early or the error could not be estimated.
     """
     from ..cosim.accuracy import run_checked
-    from ..cosim.master import RESULTS, run_system
+    from ..cosim.coupled import RESULTS
+    from ..cosim.master import run_system
     from ..cosim.outcome import coupled_data, write_coupled
     from ..errors import CoupledError
     from ..report import words

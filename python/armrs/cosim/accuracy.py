@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import CoupledError
-from .master import LITTLE, Coupled, run_system
+from .coupled import Coupled
+from .master import LITTLE, run_system
 from .slave import Slave
 from .system import System, family
 

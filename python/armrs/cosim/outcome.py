@@ -11,7 +11,7 @@ from ..io import files
 from ..io.samples import write_samples
 from ..report import figures, plain, plotting, results
 from ..report.view import View
-from .master import RESULTS, Coupled
+from .coupled import RESULTS, Coupled
 
 
 def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[str, Any]:

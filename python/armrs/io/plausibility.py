@@ -143,7 +143,7 @@ def hand_meets_handle(dataset: Dataset) -> bool:
 
 def _displacement(model: Model, trial: Trial) -> np.ndarray:
     """Return how far the first joint is from where the model has it, (n, 2) [m]."""
-    return np.zeros((len(trial), 2)) if trial.base is None else trial.base - np.array(model.base)
+    return np.zeros((len(trial.q), 2)) if trial.base is None else trial.base - np.array(model.base)
 
 
 def handle_path(robot: Robot, q: np.ndarray) -> np.ndarray:
