@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 import armrs
 from armrs import cli
+from armrs.workflows import demo
 from armrs.workflows.checking import check_dataset, grouped
 from test_import import KNOWN, SI, Recording, recording, repeated, table, write_text
 
@@ -57,6 +59,21 @@ def test_forces_on_another_clock_are_named(session: Path, tmp_path: Path) -> Non
     everything = {f"{name}_{k}": lambda s: late(s, -30) for name, k in TRIALS}
     lines = grouped(check_dataset(changed(session, tmp_path / "all", everything)).problems)
     assert len(lines) == 1 and lines[0].text.endswith("and 5 more: forces are about 0.3 s early against the angles")
+
+
+def test_a_robot_that_stands_elsewhere_than_the_model_says_is_told(tmp_path: Path) -> None:
+    """Two centimetres were named as play of the handle."""
+    dataset = demo.measure(demo.true_model())
+    robot = dataset.model.robot
+    assert robot is not None
+    moved = dataset.model.replace(robot=robot.replace(base=(robot.base[0] + 0.02, robot.base[1])))
+    told = [
+        [p.text for p in check_dataset(armrs.write_dataset(dataset.replace(model=model), tmp_path / name)).problems if "handle" in p.text]
+        for name, model in (("right", dataset.model), ("moved", moved))
+    ]
+    assert told[0] == [] and len(told[1]) == 1
+    # The sensors of the demonstration are off by a millimetre.
+    assert re.fullmatch(r"hand and handle: -2[01] mm forward and .[01] mm up from each other on average, allowed 10 mm", told[1][0])
 
 
 def test_every_problem_is_listed_with_its_next_step(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -127,18 +127,28 @@ def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float,
 
 def hand_meets_handle(dataset: Dataset) -> bool:
     """Whether the measured angles put the hand where the robot's put its handle, within 5 % of the arm's length, in every trial."""
-    model, robot = dataset.model, dataset.model.robot
-    if robot is None:
+    model = dataset.model
+    if model.robot is None or any(trial.robot_q is None for trial in dataset.trials):
         return False
+    reach = sum(s.length for s in model.segments)
+    return all(_rms(gap) <= _SUSPECT * reach for gap in _gaps(dataset))
+
+
+def mean_gap(dataset: Dataset) -> np.ndarray | None:
+    """Return how far the hand by the angles of the arm is from the handle by those of the robot on average, (2,) [m], if both are known."""
+    gaps = list(_gaps(dataset))
+    return np.concatenate(gaps).mean(axis=0) if gaps else None
+
+
+def _gaps(dataset: Dataset) -> Iterator[np.ndarray]:
+    """Give how far the hand is from the handle in each trial whose robot angles are known, (n, 2) [m]."""
+    model, robot = dataset.model, dataset.model.robot
     for trial in dataset.trials:
-        if trial.robot_q is None:
-            return False
+        if robot is None or trial.robot_q is None:
+            continue
         good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
         if good.any():
-            gap = hand_path(model, trial.q[good]) + _displacement(model, trial)[good] - handle_path(robot, trial.robot_q[good])
-            if _rms(gap) > _SUSPECT * sum(s.length for s in model.segments):
-                return False
-    return True
+            yield hand_path(model, trial.q[good]) + _displacement(model, trial)[good] - handle_path(robot, trial.robot_q[good])
 
 
 def _displacement(model: Model, trial: Trial) -> np.ndarray:

@@ -24,6 +24,8 @@ from .importing.clock import lateness
 
 _LATE, _LATE_BY = 0.06, 2.0
 """Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
+_APART = 0.01
+"""Mean distance of hand and handle from which on it is told [m]: ten times the default placement of the handle."""
 _SAME_RATE = 0.02
 _SLOW = 0.3
 """Joint speed up to which a movement counts as slow enough for passive moments [rad/s]."""
@@ -133,6 +135,7 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
     problems += [_warned(line) for line in (*still_angles(dataset.trials), *moving_bases(dataset.trials))]
     _plausible(dataset, problems)
     _balanced(dataset, problems)
+    problems += _apart(dataset)
     problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
     return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked), dataset)
@@ -237,6 +240,19 @@ def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
         said = {p.text for p in problems}
         found = [str(one) for one in setup.wrong_trials(dataset.model, trials, met=met)]
         problems += [Problem("warning", text, "compare with the other trials") for text in found if text not in said]
+
+
+def _apart(dataset: Dataset) -> list[Problem]:
+    """Return that hand and handle are apart on average: a base or a length is wrong by centimetres, which `gap` would name as an effect.
+
+    A soft contact gives way by millimetres.
+    """
+    gap = plausibility.mean_gap(dataset)
+    if gap is None or float(np.hypot(*gap)) < _APART:
+        return []
+    forward, up = 1e3 * gap
+    text = f"hand and handle: {forward:+.0f} mm forward and {up:+.0f} mm up from each other on average, allowed {1e3 * _APART:.0f} mm"
+    return [Problem("warning", text, "check the bases and lengths of arm and robot in the model, and the zeros of their angles")]
 
 
 def _clocks(dataset: Dataset, errors: Sequence[str]) -> Iterator[Problem]:
