@@ -15,6 +15,7 @@ import pytest
 
 import armrs
 from armrs import cli
+from armrs.cosim.process import Confined, ProcessEnded
 from armrs.io import files, tomlfile
 
 BOMBS: dict[str, Callable[[], str]] = {
@@ -216,3 +217,16 @@ def test_an_interrupt_that_a_library_swallows_is_raised_again() -> None:
     """Ctrl-C while SciPy was loaded had no effect: `armrs identify` went on to its end."""
     done = subprocess.run([sys.executable, "-c", SWALLOWED], capture_output=True, text=True, timeout=60, check=True)
     assert float(done.stdout) < 1.0 and done.stderr == ""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs fork")
+def test_a_child_that_outlives_foreign_code_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It holds the pipe open: the call hung until it ended, whatever the limit."""
+    (tmp_path / "orphaning.py").write_text("import os, time\nif os.fork() == 0:\n    time.sleep(120.0)\nos._exit(3)\n", encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    child = Confined("orphaning", tmp_path)
+    begin = time.monotonic()
+    with pytest.raises(ProcessEnded):
+        child.receive(60.0)
+    assert time.monotonic() - begin < 30.0
+    child.close()

@@ -182,6 +182,8 @@ class Confined:
                 self._kill("time")
                 return
             time.sleep(0.05)
+        # What it has started holds the pipe open, and would be waited for.
+        self._kill("")
 
 
 class Channel:

@@ -70,7 +70,7 @@ fn reflexive(latency: f64) -> ArmSpec {
     spec.effects.push(EffectSpec {
         kind: "stretch_reflex".to_owned(),
         index: 1,
-        values: vec![0.5, 0.1, 0.0, latency],
+        values: vec![0.5, 0.1, 0.0, latency, 0.0, 0.0],
     });
     spec
 }
