@@ -91,9 +91,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
         let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
         let near = clearest.into_iter().filter(|(gain, _)| *gain > NEAR * most);
+        let deviations = suspect.deviations();
         let mut explained: Vec<Explained> = near
             .map(|(_, one)| {
-                let scatter = scatter_elsewhere(one, &asked, &suspect.deviations());
+                let scatter = scatter_elsewhere(one, &asked, &deviations);
                 let answer = |effect| see((effect, self.answer_in(point, trial, effect)?));
                 let asked = timed(one.clone(), &suspect.deviation, answer);
                 let size = asked.along(&suspect.deviation) / asked.square;
@@ -387,7 +388,7 @@ fn timed(
             effect.parameters[2] += duration;
             let within = effect.parameters[1] >= 0.0
                 && (DURATION.0..=DURATION.1).contains(&effect.parameters[2]);
-            let moved = answer(effect).filter(|_| within)?;
+            let moved = within.then(|| answer(effect))??;
             (moved.gain(deviation) > best.gain(deviation)).then_some(moved)
         });
         match moved {
