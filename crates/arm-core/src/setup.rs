@@ -21,12 +21,8 @@ pub struct Setup<T, const N: usize> {
     pub base_motion: Plane<T>,
     /// First joint angle at which the base stands at `base` \[rad\].
     pub base_rest: T,
-    /// Periodic error of the robot's position: amplitude in y and z \[m\].
-    pub ripple: Plane<T>,
-    /// Its frequency \[Hz\].
-    pub ripple_frequency: T,
-    /// Its phase at time zero \[rad\].
-    pub ripple_phase: T,
+    /// Where the hand's handle is beside where the robot's angles put it.
+    pub displaced: Displaced<T>,
     /// Delay of the force channels against the angles \[s\].
     pub force_delay: T,
 }
@@ -43,9 +39,7 @@ impl<T: Scalar, const N: usize> Setup<T, N> {
             placement: [T::ZERO; 2],
             base_motion: [T::ZERO; 2],
             base_rest: T::ZERO,
-            ripple: [T::ZERO; 2],
-            ripple_frequency: T::ZERO,
-            ripple_phase: T::ZERO,
+            displaced: Displaced::nowhere(),
             force_delay: T::ZERO,
         }
     }
@@ -56,6 +50,66 @@ impl<T: Scalar, const N: usize> Setup<T, N> {
     /// [`Invalid`] where an effect has made it impossible, for example a negative mass.
     pub fn chain(&self) -> Result<Chain<T, N>, Invalid> {
         Chain::new(self.segments, self.base, self.gravity)?.with_rotor_inertia(self.rotor)
+    }
+}
+
+/// How far the handle is from where the robot's angles put it, as a function of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Displaced<T> {
+    /// Amplitude of a periodic error in y and z \[m\].
+    pub ripple: Plane<T>,
+    /// Its frequency \[Hz\].
+    pub frequency: T,
+    /// Its phase at time zero \[rad\].
+    pub phase: T,
+    /// Way of a slip in y and z \[m\].
+    pub slip: Plane<T>,
+    /// When it begins \[s\].
+    pub slip_start: T,
+}
+
+/// How long a slip of the handle takes \[s\].
+pub const SLIP_TIME: f64 = 0.1;
+
+impl<T: Scalar> Displaced<T> {
+    /// Always where the robot's angles put it.
+    pub fn nowhere() -> Self {
+        Self {
+            ripple: [T::ZERO; 2],
+            frequency: T::ZERO,
+            phase: T::ZERO,
+            slip: [T::ZERO; 2],
+            slip_start: T::ZERO,
+        }
+    }
+
+    /// Whether it is anywhere else, in any lane.
+    #[inline]
+    pub fn is_somewhere(&self) -> bool {
+        let mut ways = self.ripple.iter().chain(&self.slip);
+        !ways.all(|way| way.every(|way| way == 0.0))
+    }
+
+    /// Position \[m\], velocity \[m/s\] and acceleration \[m/s²\] beside where the robot's angles put it, at a time \[s\].
+    #[inline]
+    pub fn at(&self, time: T) -> [Plane<T>; 3] {
+        let omega = T::of(core::f64::consts::TAU) * self.frequency;
+        let (sin, cos) = (omega * time + self.phase).sin_cos();
+        let rate = T::of(1.0 / SLIP_TIME);
+        let s = ((time - self.slip_start) * rate).max(T::ZERO).min(T::ONE);
+        let rest = T::ONE - s;
+        // The polynomial of least jerk: speed and acceleration are zero where it begins and ends.
+        let part = s.squared() * s * (T::of(10.0) - s * (T::of(15.0) - T::of(6.0) * s));
+        let speed = T::of(30.0) * (s * rest).squared() * rate;
+        let gain = T::of(60.0) * s * rest * (rest - s) * rate.squared();
+        let along = |swing: T, slipped: T| -> Plane<T> {
+            core::array::from_fn(|axis| self.ripple[axis] * swing + self.slip[axis] * slipped)
+        };
+        [
+            along(sin, part),
+            along(omega * cos, speed),
+            along(-(omega.squared() * sin), gain),
+        ]
     }
 }
 

@@ -149,8 +149,9 @@ pub fn model<const N: usize>(
             }
             _ => effect.alter(&mut setup),
         }
-        let moved =
-            setup.base_motion != [0.0; 2] || setup.ripple != [0.0; 2] || setup.force_delay != 0.0;
+        let moved = setup.base_motion != [0.0; 2]
+            || setup.displaced.is_somewhere()
+            || setup.force_delay != 0.0;
         if moved {
             return Err(cannot_undo(effect));
         }

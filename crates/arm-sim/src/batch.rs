@@ -3,14 +3,14 @@
 use std::mem::discriminant;
 
 use arm_core::effect::Effect;
-use arm_core::{Contact, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup};
+use arm_core::{Contact, Displaced, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup};
 
 use crate::divided_step::step_in_pieces;
 use crate::input_buffer::{Ahead, InputBuffer};
 use crate::model::{Link, Model};
 use crate::native::{PlainSteps, diverged};
 use crate::plain::Plain;
-use crate::prepare::{Prepared, add_ripple, commands, has_ripple};
+use crate::prepare::{Prepared, commands, displace};
 use crate::recorder::{Instant, Recorder, Row};
 use crate::state::{Input, State};
 use crate::step::{Inputs, Memory, step};
@@ -86,7 +86,7 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && a.integrator() == b.integrator()
         && discriminant(&a.model.link) == discriminant(&b.model.link)
         && a.model.base.is_some() == b.model.base.is_some()
-        && has_ripple(&a.setup) == has_ripple(&b.setup)
+        && a.setup.displaced.is_somewhere() == b.setup.displaced.is_somewhere()
         && kinds(a) == kinds(b)
 }
 
@@ -139,7 +139,7 @@ struct Group<'a, const N: usize> {
     model: Model<Wide, N>,
     /// The rig, where it is plain and the integrator that of plain rigs.
     plain: Option<Plain<Wide, N>>,
-    /// Whether one drive, without ripple, is that of all lanes.
+    /// Whether one drive, without displacement, is that of all lanes.
     one_drive: bool,
     common: InputBuffer<f64, N>,
     own: InputBuffer<Wide, N>,
@@ -164,9 +164,9 @@ impl<'a, const N: usize> Group<'a, N> {
         Ok(Self {
             prepared,
             plain: first.plain().and_then(|_| model.plain()),
-            one_drive: prepared
-                .iter()
-                .all(|p| p.experiment.drive == first.experiment.drive && !has_ripple(&p.setup)),
+            one_drive: prepared.iter().all(|p| {
+                p.experiment.drive == first.experiment.drive && !p.setup.displaced.is_somewhere()
+            }),
             common: InputBuffer::new(first.integrator()),
             own: InputBuffer::new(first.integrator()),
             commanded: Default::default(),
@@ -233,7 +233,7 @@ impl<'a, const N: usize> Group<'a, N> {
             }
             for at in 0..half_steps.len() {
                 let mut input = pack_input(|i| commanded[i][at]);
-                add_ripple(&mut input, setup);
+                displace(&mut input, setup);
                 out.push(input);
             }
         });
@@ -471,9 +471,13 @@ fn pack_setup<'a, const N: usize>(lane: impl Fn(usize) -> &'a Prepared<'a, N>) -
         placement: pack_plane(|i| setup(i).placement),
         base_motion: pack_plane(|i| setup(i).base_motion),
         base_rest: pack(|i| setup(i).base_rest),
-        ripple: pack_plane(|i| setup(i).ripple),
-        ripple_frequency: pack(|i| setup(i).ripple_frequency),
-        ripple_phase: pack(|i| setup(i).ripple_phase),
+        displaced: Displaced {
+            ripple: pack_plane(|i| setup(i).displaced.ripple),
+            frequency: pack(|i| setup(i).displaced.frequency),
+            phase: pack(|i| setup(i).displaced.phase),
+            slip: pack_plane(|i| setup(i).displaced.slip),
+            slip_start: pack(|i| setup(i).displaced.slip_start),
+        },
         force_delay: pack(|i| setup(i).force_delay),
     }
 }

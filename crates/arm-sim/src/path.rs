@@ -21,7 +21,7 @@ pub struct Handle<T> {
 
 /// The commanded path of the robot's handle as a function of time.
 ///
-/// The ripple of the rig ([`Setup::ripple`](arm_core::Setup)) comes on top of it when the experiment runs.
+/// How far the handle is from there ([`Displaced`](arm_core::Displaced)) comes on top of it when the experiment runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandlePath<const N: usize> {
     source: Source<N>,

@@ -94,11 +94,11 @@ impl<'a, const N: usize> Prepared<'a, N> {
         known.iter().copied().chain(computed)
     }
 
-    /// Handle, ripple included, and torques at a time \[s\].
+    /// Handle as it stands in the hand, and torques at a time \[s\].
     #[inline]
     pub fn input(&self, time: f64) -> Input<f64, N> {
         let mut input = command(&self.experiment.drive, time);
-        add_ripple(&mut input, &self.setup);
+        displace(&mut input, &self.setup);
         input
     }
 
@@ -106,9 +106,9 @@ impl<'a, const N: usize> Prepared<'a, N> {
     pub fn inputs(&self, half_steps: &[usize], out: &mut Vec<Input<f64, N>>) {
         let from = out.len();
         commands(&self.experiment.drive, &self.schedule, half_steps, out);
-        if has_ripple(&self.setup) {
+        if self.setup.displaced.is_somewhere() {
             for input in &mut out[from..] {
-                add_ripple(input, &self.setup);
+                displace(input, &self.setup);
             }
         }
     }
@@ -125,7 +125,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
     }
 }
 
-/// What the drive commands at a time, without ripple.
+/// What the drive commands at a time.
 #[inline]
 pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64, N> {
     let mut input = Input {
@@ -195,25 +195,17 @@ impl<const N: usize> Computation for Abreast<'_, N> {
     }
 }
 
-/// Whether the robot's position has a periodic error, in any lane.
+/// Where the handle is beside where the robot's angles put it, on top of the commanded handle.
 #[inline]
-pub(crate) fn has_ripple<T: Scalar, const N: usize>(setup: &Setup<T, N>) -> bool {
-    !setup.ripple.iter().all(|a| a.every(|a| a == 0.0))
-}
-
-/// The periodic error of the robot's position on top of the commanded handle: `amplitude · sin(2π f t + phase)`.
-#[inline]
-pub(crate) fn add_ripple<T: Scalar, const N: usize>(input: &mut Input<T, N>, setup: &Setup<T, N>) {
-    if !has_ripple(setup) {
+pub(crate) fn displace<T: Scalar, const N: usize>(input: &mut Input<T, N>, setup: &Setup<T, N>) {
+    if !setup.displaced.is_somewhere() {
         return;
     }
-    let omega = T::of(core::f64::consts::TAU) * setup.ripple_frequency;
-    let (sin, cos) = (omega * input.time + setup.ripple_phase).sin_cos();
+    let [position, velocity, acceleration] = setup.displaced.at(input.time);
     for axis in 0..2 {
-        let amplitude = setup.ripple[axis];
-        input.handle.position[axis] += amplitude * sin;
-        input.handle.velocity[axis] += amplitude * omega * cos;
-        input.handle.acceleration[axis] -= amplitude * omega.squared() * sin;
+        input.handle.position[axis] += position[axis];
+        input.handle.velocity[axis] += velocity[axis];
+        input.handle.acceleration[axis] += acceleration[axis];
     }
 }
 
@@ -255,10 +247,13 @@ fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
         ("base motion", setup.base_motion[0]),
         ("base motion", setup.base_motion[1]),
         ("rest angle of the base", setup.base_rest),
-        ("ripple", setup.ripple[0]),
-        ("ripple", setup.ripple[1]),
-        ("ripple frequency", setup.ripple_frequency),
-        ("ripple phase", setup.ripple_phase),
+        ("ripple", setup.displaced.ripple[0]),
+        ("ripple", setup.displaced.ripple[1]),
+        ("ripple frequency", setup.displaced.frequency),
+        ("ripple phase", setup.displaced.phase),
+        ("slip", setup.displaced.slip[0]),
+        ("slip", setup.displaced.slip[1]),
+        ("start of the slip", setup.displaced.slip_start),
         ("force delay", setup.force_delay),
     ];
     for (name, found) in settings {

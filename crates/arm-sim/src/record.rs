@@ -17,7 +17,7 @@ pub struct Recording<const N: usize> {
     pub qdd: Vec<f64>,
     /// Position of the arm's tip, y and z \[m\], `(n, 2)`.
     pub tip: Vec<f64>,
-    /// Position of the robot's handle, ripple included \[m\], `(n, 2)`; empty without a handle.
+    /// Position of the handle as it stands in the hand, ripple and slip included \[m\], `(n, 2)`; empty without a handle.
     pub handle: Vec<f64>,
     /// Commanded joint angles of the robot \[rad\], `(n, 2)`; empty without a robot. Its encoders read these: a ripple of
     /// its position is behind them.

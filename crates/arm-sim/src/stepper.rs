@@ -8,7 +8,7 @@ use crate::experiment::altered;
 use crate::friction::{self, advance};
 use crate::model::{Link, Model};
 use crate::native::{diverged, why};
-use crate::prepare::{add_ripple, assemble};
+use crate::prepare::{assemble, displace};
 use crate::state::{Input, State};
 use crate::step::{Inputs, Memory};
 use crate::{Handle, Integrator, SimulationError, stability, start};
@@ -65,7 +65,7 @@ impl<const N: usize> Default for Outside<N> {
     }
 }
 
-/// What drives the arm at a time, `later` after the inputs were set \[s\]; ripple included.
+/// What drives the arm at a time, `later` after the inputs were set \[s\]; as it stands in the hand.
 #[inline]
 fn input<const N: usize>(
     setup: &Setup<f64, N>,
@@ -83,7 +83,7 @@ fn input<const N: usize>(
         },
         torque: outside.torque + outside.torque_rate * (outside.torque_age + later),
     };
-    add_ripple(&mut input, setup);
+    displace(&mut input, setup);
     input
 }
 
@@ -126,7 +126,7 @@ pub struct Seen<const N: usize> {
 /// An arm that is advanced by communication steps through one of its ports.
 ///
 /// It makes the steps of [`simulate`](crate::simulate): with the same inputs at the same inner steps both have the same bits.
-/// A ripple of the robot comes on top of the handle that the motion port is given, as encoders do not see it either.
+/// A ripple of the robot and a slip of the handle come on top of the handle that the motion port is given, as encoders do not see it either.
 ///
 /// ```
 /// use arm_sim::{Outside, Port, Stepper, models};

@@ -229,6 +229,7 @@ catalogue! {
     force_misalignment::ForceMisalignment,
     angle_offset::AngleOffset,
     time_delay::TimeDelay,
+    handle_slip::HandleSlip,
 }
 
 /// How many parameters of a kind its torque is linear in.

@@ -83,6 +83,8 @@ pub enum Nature {
     Rhythm,
     /// Once, in one trial.
     Burst,
+    /// Once, in one trial, and it stays.
+    Slip,
 }
 
 /// A promise of the calibration, see the table `[tolerance]` of a data set.

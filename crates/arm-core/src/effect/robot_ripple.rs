@@ -26,9 +26,9 @@ impl Law for RobotRipple {
         .of_nature(Nature::Periodic);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
-        setup.ripple[0] += p[0];
-        setup.ripple[1] += p[1];
-        setup.ripple_frequency = p[2];
-        setup.ripple_phase = p[3];
+        setup.displaced.ripple[0] += p[0];
+        setup.displaced.ripple[1] += p[1];
+        setup.displaced.frequency = p[2];
+        setup.displaced.phase = p[3];
     }
 }

@@ -12,7 +12,7 @@ const NAMES: &str = "viscous coulomb stribeck load_friction quadratic_drag angle
     relaxation thixotropy constant_moment end_range biarticular biarticular_end_range stretch_reflex tremor voluntary \
     motor_inertia added_mass gravity_moment inertia segment_length gravity_tilt shoulder_motion \
     backlash contact_compliance contact_damping robot_ripple force_bias force_drift force_gain \
-    force_misalignment angle_offset time_delay";
+    force_misalignment angle_offset time_delay handle_slip";
 
 fn rig(random: &mut Random) -> Setup<f64, 3> {
     let contact = Contact {
@@ -110,7 +110,7 @@ fn addresses_are_those_of_the_interface() {
             "force_bias" | "force_drift" | "force_gain" => Some("channel"),
             "added_mass" | "gravity_tilt" | "shoulder_motion" | "backlash"
             | "contact_compliance" | "contact_damping" | "robot_ripple" | "force_misalignment"
-            | "time_delay" => None,
+            | "time_delay" | "handle_slip" => None,
             _ => Some("joint"),
         };
         assert_eq!(
@@ -228,7 +228,7 @@ fn defaults_do_nothing() {
         let mut altered = rig;
         effect.alter(&mut altered);
         // Frequencies and the like may change where nothing has that frequency.
-        altered.ripple_frequency = rig.ripple_frequency;
+        altered.displaced.frequency = rig.displaced.frequency;
         assert_eq!(altered, rig, "{}", kind.info().kind);
         let before = reading(&mut random);
         let mut after = before;

@@ -2,8 +2,8 @@
 
 use arm_core::effect::{Effect, Kind, Local, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Joints, Load, Pose, Reading, Segment, Setup, forward_dynamics, gravity,
-    inverse_dynamics, models,
+    Chain, Contact, Displaced, Joints, Load, Pose, Reading, Segment, Setup, forward_dynamics,
+    gravity, inverse_dynamics, models,
 };
 
 use crate::common::Random;
@@ -380,9 +380,54 @@ fn contact_in_the_head() {
     assert_eq!(loose.force_on_arm([0.0005, 0.003], [0.0; 2])[0], 0.0);
     assert!((loose.force_on_arm([0.0005, 0.003], [0.0; 2])[1] - 20.0).abs() < 1e-12);
     let rippled = altered("robot_ripple", 0, &[0.001, 0.002, 3.0, 0.5]);
-    assert_eq!(rippled.ripple, [0.001, 0.002]);
-    assert_eq!((rippled.ripple_frequency, rippled.ripple_phase), (3.0, 0.5));
+    let Displaced {
+        ripple,
+        frequency,
+        phase,
+        ..
+    } = rippled.displaced;
+    assert_eq!((ripple, frequency, phase), ([0.001, 0.002], 3.0, 0.5));
     assert_eq!(altered("time_delay", 0, &[0.05]).force_delay, 0.05);
+}
+
+/// A slip and a ripple: where they begin and end, and that velocity and acceleration are the derivatives of the position.
+#[test]
+fn a_handle_slips_once_and_stays() {
+    let slip = Displaced {
+        slip: [0.003, -0.001],
+        slip_start: 2.0,
+        ..Displaced::<f64>::nowhere()
+    };
+    assert!(slip.is_somewhere() && !Displaced::<f64>::nowhere().is_somewhere());
+    let far = |time| slip.at(time)[0];
+    assert_eq!((far(0.0), far(2.0)), ([0.0; 2], [0.0; 2]));
+    let [y, z] = far(2.05);
+    assert!((y - 0.0015).abs() < 1e-15 && (z + 0.0005).abs() < 1e-15);
+    for time in [2.1, 50.0] {
+        let [position, velocity, acceleration] = slip.at(time);
+        assert!((position[0] - 0.003).abs() < 1e-17 && (position[1] + 0.001).abs() < 1e-17);
+        assert!(velocity[0].abs() < 1e-12 && acceleration[1].abs() < 1e-12);
+    }
+    let both = Displaced {
+        ripple: [1e-4, 2e-4],
+        frequency: 3.0,
+        phase: 0.4,
+        ..slip
+    };
+    let h = 1e-5;
+    for time in [1.9, 2.01, 2.04, 2.08, 2.5] {
+        let [before, now, after] = [-h, 0.0, h].map(|d| both.at(time + d));
+        for axis in 0..2 {
+            for order in 0..2 {
+                let slope = (after[order][axis] - before[order][axis]) / (2.0 * h);
+                let told = now[order + 1][axis];
+                assert!(
+                    (slope - told).abs() < 1e-4 * (1.0 + told.abs()),
+                    "{slope} {told}"
+                );
+            }
+        }
+    }
 }
 
 #[test]

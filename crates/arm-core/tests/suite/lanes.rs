@@ -150,15 +150,17 @@ fn numbers<T: Scalar>(rig: &Setup<T, 3>, reading: &Reading<T, 3>) -> Vec<T> {
         rig.base,
         rig.gravity,
         rig.base_motion,
-        rig.ripple,
+        rig.displaced.ripple,
+        rig.displaced.slip,
         reading.force_on_arm,
     ];
     all.extend(contact.iter().chain(&pairs).flatten());
     all.extend(rig.rotor.iter().chain(reading.q.iter()));
     all.extend([
         rig.base_rest,
-        rig.ripple_frequency,
-        rig.ripple_phase,
+        rig.displaced.frequency,
+        rig.displaced.phase,
+        rig.displaced.slip_start,
         rig.force_delay,
     ]);
     all.push(reading.moment_on_arm);

@@ -516,7 +516,7 @@ fn ask<const N: usize>(
     waves: &[[f64; 2]],
 ) -> Vec<Candidate> {
     let nature = plain.kind.probe().nature;
-    if matches!(nature, Nature::Rhythm | Nature::Burst) {
+    if matches!(nature, Nature::Rhythm | Nature::Burst | Nature::Slip) {
         return Vec::new();
     }
     for &p in question.free {

@@ -12,6 +12,9 @@ use crate::measurement_model::prediction::Course;
 use crate::sensitivity::linearized_run::Linear;
 use crate::threads;
 
+/// How long a disturbance is felt before and after, the low-pass and the error of its timing included \[s\].
+const AROUND: (f64, f64) = (0.5, 0.5);
+
 /// What rest takes from the comparison of a movement.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rest {
@@ -149,6 +152,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.touched.iter().any(|(touched, _, _)| *touched == trial)
     }
 
+    /// Whether a time \[s\] of a trial is left out because a disturbance has touched it.
+    pub(crate) fn is_left_out(&self, trial: usize, time: f64) -> bool {
+        let mut own = self.touched.iter().filter(|(t, _, _)| *t == trial);
+        own.any(|(_, start, end)| time >= start - AROUND.0 && time <= end + AROUND.1)
+    }
+
     /// Takes everything that disturbances have touched back in.
     pub fn take_back(&mut self) {
         self.touched.clear();
@@ -166,18 +175,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// Chooses the samples that are compared, and the trials that have any.
     pub(crate) fn cut(&mut self) {
-        /// How long a disturbance is felt before and after, the low-pass included \[s\].
-        const AROUND: (f64, f64) = (0.2, 0.5);
         for i in 0..self.courses.len() {
             let trial = &self.session.trials[i];
             let rest = self.resting.get(self.group_of[i]).cloned();
             let Rest { mut left_out, told } = rest.unwrap_or_default();
             left_out.resize(trial.len(), false);
-            for (_, start, end) in self.touched.iter().filter(|(t, _, _)| *t == i) {
-                for (k, flag) in left_out.iter_mut().enumerate() {
-                    let time = k as f64 / trial.rate;
-                    *flag |= time >= start - AROUND.0 && time <= end + AROUND.1;
-                }
+            for (k, flag) in left_out.iter_mut().enumerate() {
+                *flag |= self.is_left_out(i, k as f64 / trial.rate);
             }
             self.valid_segments[i] = ValidSegments::of(trial, &self.courses[i], &left_out, told);
         }

@@ -29,7 +29,7 @@ fn is_rhythm(effect: &Effect<f64>) -> bool {
     match effect.kind.probe().nature {
         Nature::Rhythm => true,
         Nature::Periodic => effect.parameters[shapes_of(effect.kind)[0]] > SLOW,
-        Nature::Lasting | Nature::Burst => false,
+        Nature::Lasting | Nature::Burst | Nature::Slip => false,
     }
 }
 

@@ -186,10 +186,12 @@ impl Missing {
         let size = values()
             .position(|(p, value)| value != 0.0 && !SHAPES.contains(&p.name))
             .unwrap_or(0);
+        let mut sd = one.sd.iter();
         let mut parameters: Named<_> = values()
             .enumerate()
             .map(|(k, (p, value))| {
-                let std = (k == size).then_some(one.sd);
+                let is_size = k >= size && !SHAPES.contains(&p.name);
+                let std = is_size.then(|| sd.next().copied()).flatten();
                 let value = Value::of(value, std, p.unit, (p.min, p.max));
                 (p.name.to_owned(), value)
             })

@@ -3,6 +3,8 @@
 //! The closed chain is simulated with the base that was identified from measured motion. Its numbers stay free with every question,
 //! and are judged last.
 
+use arm_core::effect::Effect;
+use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::distributions::chi_square_tail;
 
 use crate::GapError;
@@ -49,6 +51,15 @@ pub(crate) struct BaseLaw<const N: usize> {
     better: Option<Fitted<N>>,
 }
 
+/// Joints that a named spring over two joints crosses. It tells their own springs apart badly, and an arm that has it has those as well: a
+/// spring that is left out there bends the others beyond their intervals.
+fn crossed_joints<const N: usize>(named: &[Effect<f64>]) -> [bool; N] {
+    std::array::from_fn(|j| {
+        let mut crossing = named.iter().filter(|e| e.kind.crosses());
+        crossing.any(|e| e.index == j || e.index + 1 == j)
+    })
+}
+
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// The laws of the base that are not dropped, as they stand in a fitted hypothesis.
     fn base_terms(
@@ -57,6 +68,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         fitted: &Fitted<N>,
     ) -> Result<Vec<Term>, GapError> {
         let precision = self.precision(point, fitted, 1.0)?;
+        // Where a small change cannot be simulated nothing is known of any law, which is no reason to drop it.
+        let unknown = precision.sd.iter().all(|sd| sd.is_infinite());
         let first = self.session.effects.len();
         let sizes = std::iter::zip(&precision.coordinates, &precision.sd);
         Ok(sizes
@@ -65,7 +78,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     let ratio = fitted.hypothesis.get(c.target) / sd;
                     Some(Term {
                         base: e - first,
-                        gain: ratio * ratio,
+                        gain: if unknown { NAMED } else { ratio * ratio },
                     })
                 }
                 _ => None,
@@ -74,11 +87,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Drops the weakest law of each joint that stands out too little; whether there was one.
-    fn dropped_weak(&mut self, terms: &[Term], least: f64) -> bool {
-        let joint = |t: &Term| self.session.base[t.base].effect.index;
+    ///
+    /// * `least` - what a law must gain to stay
+    fn dropped_weak(&mut self, terms: &[Term], least: impl Fn(&Effect<f64>) -> f64) -> bool {
+        let law = |t: &Term| &self.session.base[t.base].effect;
         let mut weak = Vec::new();
         for j in 0..N {
-            let own = terms.iter().filter(|t| joint(t) == j && t.gain < least);
+            let own = terms
+                .iter()
+                .filter(|t| law(t).index == j && t.gain < least(law(t)));
             weak.extend(own.min_by(|a, b| a.gain.total_cmp(&b.gain)).map(|t| t.base));
         }
         for &b in &weak {
@@ -96,7 +113,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for _ in 0..TURNS {
             let terms = self.base_terms(&settled.1, &settled.0)?;
             self.start = Some(settled.0.hypothesis.clone());
-            if !self.dropped_weak(&terms, STAYS) {
+            if !self.dropped_weak(&terms, |_| STAYS) {
                 break;
             }
             self.read_anew()?;
@@ -127,7 +144,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 break;
             };
             let terms = self.base_terms(&point, &fitted)?;
-            if !self.dropped_weak(&terms, STAYS) {
+            if !self.dropped_weak(&terms, |_| STAYS) {
                 let back = std::iter::zip(&before, &self.dropped).any(|(was, is)| *was && !is);
                 if back && fitted.cost < current.cost {
                     return Ok(Some((fitted, point)));
@@ -161,7 +178,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut exchanges = 0;
         loop {
             let terms = self.base_terms(&settled.1, &settled.0)?;
-            if self.dropped_weak(&terms, NAMED * scale) {
+            let crossed = crossed_joints::<N>(&settled.0.hypothesis.named);
+            let least = |law: &Effect<f64>| match spring(law) {
+                Some(_) if crossed[law.index] => STAYS * scale,
+                _ => NAMED * scale,
+            };
+            if self.dropped_weak(&terms, least) {
                 let start = self.without_dropped(settled.0.hypothesis);
                 settled = self.settle(start, settled.0.asked)?;
                 continue;

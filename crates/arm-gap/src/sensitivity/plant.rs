@@ -2,8 +2,8 @@
 
 use arm_core::effect::{Effect, Motion, Place, States, dry_friction, resisting_besides_dry};
 use arm_core::{
-    Chain, Contact, Joints, Placement, Plane, Pose, Scalar, Setup, inverse_dynamics, jacobian,
-    joint_force, static_torque, tip,
+    Chain, Contact, Joints, Placement, Plane, Pose, Setup, inverse_dynamics, jacobian, joint_force,
+    static_torque, tip,
 };
 use arm_sim::{HandlePath, SimulationError};
 
@@ -83,14 +83,13 @@ impl<const N: usize> Plant<N> {
             + self.friction(motion, memory).component_mul(way)
     }
 
-    /// The handle with the robot's ripple on it.
+    /// The handle as it stands in the hand.
     fn handle(&self, time: f64, (mut at, mut rate): Hand) -> Hand {
-        if self.setup.ripple != [0.0; 2] {
-            let omega = core::f64::consts::TAU * self.setup.ripple_frequency;
-            let (sin, cos) = Scalar::sin_cos(omega * time + self.setup.ripple_phase);
+        if self.setup.displaced.is_somewhere() {
+            let [position, velocity, _] = self.setup.displaced.at(time);
             for axis in 0..2 {
-                at[axis] += self.setup.ripple[axis] * sin;
-                rate[axis] += self.setup.ripple[axis] * omega * cos;
+                at[axis] += position[axis];
+                rate[axis] += velocity[axis];
             }
         }
         (at, rate)

@@ -1,7 +1,7 @@
 //! What is not the same in every trial, or swings too fast for the common band: a rhythm, the robot's ripple, or a disturbance
 //! of one trial.
 
-use arm_core::effect::{Effect, Kind, Nature};
+use arm_core::effect::{Effect, Kind, MAX_PARAMETERS};
 
 /// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
 /// what a model lacks of them reach that far.
@@ -12,8 +12,8 @@ pub(crate) const SLOW: f64 = 3.0;
 pub struct TrialSpecific {
     /// The effect; for a rhythm its phase is that of the first trial.
     pub effect: Effect<f64>,
-    /// Standard deviation of its first parameter.
-    pub sd: f64,
+    /// Standard deviations of the parameters that are its size, from the first that is not zero on.
+    pub sd: Vec<f64>,
     /// The trial in which it is, for what happened once.
     pub trial: Option<usize>,
     /// What it gains, in units of twice the log-likelihood.
@@ -52,12 +52,22 @@ impl TrialSpecific {
     /// From when to when it lasts \[s\].
     pub fn span(&self) -> (f64, f64) {
         let p = &self.effect.parameters;
-        if self.effect.kind.probe().nature == Nature::Burst {
-            (p[1], p[1] + p[2])
-        } else {
-            (p[arm_core::effect::MAX_PARAMETERS - 1], f64::INFINITY)
+        match timing_of(self.effect.kind) {
+            (start, Some(duration)) => (p[start], p[start] + p[duration]),
+            (start, None) => (p[start], f64::INFINITY),
         }
     }
+}
+
+/// Positions of the start and of the duration of a kind that happens once. The start of a slip of a sensor travels in the last place, which
+/// its kind does not use.
+pub fn timing_of(kind: Kind) -> (usize, Option<usize>) {
+    let parameters = kind.info().parameters;
+    let position = |name: &str| parameters.iter().position(|p| p.name == name);
+    (
+        position("start").unwrap_or(MAX_PARAMETERS - 1),
+        position("duration"),
+    )
 }
 
 /// Positions of frequency and phase of a kind that swings.
@@ -71,6 +81,8 @@ pub fn shapes_of(kind: Kind) -> [usize; 2] {
 
 #[cfg(test)]
 mod tests {
+    use arm_core::effect::Nature;
+
     use super::*;
 
     fn rhythm(kind: Kind, frequency: f64, trial: Option<usize>) -> TrialSpecific {
@@ -78,7 +90,7 @@ mod tests {
         effect.parameters[shapes_of(kind)[0]] = frequency;
         TrialSpecific {
             effect,
-            sd: 0.0,
+            sd: Vec::new(),
             trial,
             gain: 0.0,
             rivals: Vec::new(),
@@ -123,7 +135,10 @@ mod tests {
         assert_eq!(one.span(), (2.0, 2.3));
         let slip = Kind::named("angle_offset").expect("known");
         one.effect = Effect::new(slip, 0);
-        one.effect.parameters[arm_core::effect::MAX_PARAMETERS - 1] = 1.5;
+        one.effect.parameters[MAX_PARAMETERS - 1] = 1.5;
         assert_eq!(one.span(), (1.5, f64::INFINITY));
+        let of_the_handle = Kind::named("handle_slip").expect("known");
+        one.effect = Effect::new(of_the_handle, 0).with(&[0.002, 0.001, 4.0]);
+        assert_eq!(one.span(), (4.0, f64::INFINITY));
     }
 }

@@ -3,6 +3,7 @@
 pub mod component;
 pub(crate) mod contact_identification;
 pub mod disturbance;
+mod disturbance_shape;
 pub mod slow_ripple;
 mod spectral_line;
 pub mod tremor_detection;

@@ -120,7 +120,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             .collect();
         Some(TrialSpecific {
             effect: first.effect,
-            sd: first.sd,
+            sd: vec![first.sd],
             trial: None,
             gain: first.gain,
             rivals,
@@ -230,7 +230,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                     list.extend(axes.iter().map(|&axis| vec![axis]));
                     list.push(axes);
                 }
-                Nature::Lasting | Nature::Burst => {}
+                Nature::Lasting | Nature::Burst | Nature::Slip => {}
             }
         }
         list
@@ -280,7 +280,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
         Some(TrialSpecific {
             effect,
-            sd: f64::max(explained.sd, scatter),
+            sd: vec![f64::max(explained.sd, scatter)],
             ..trial_specific.clone()
         })
     }

@@ -1,4 +1,4 @@
-//! What is not the same in every trial: a sensor that slips, the robot's ripple.
+//! What is not the same in every trial: a handle or a sensor that slips, the robot's ripple.
 
 use arm_core::effect::{Kind, Nature};
 use arm_gap::data::prepared_session::PreparedSession;
@@ -37,7 +37,32 @@ fn an_encoder_that_slips_is_found_with_its_trial_its_time_and_its_size() {
         "{found:?}"
     );
     assert!((found.span().0 - 3.0).abs() <= 0.2, "{found:?}");
-    assert!(found.sd < 0.005 && found.gain > 100.0, "{found:?}");
+    assert!(found.sd[0] < 0.005 && found.gain > 100.0, "{found:?}");
+}
+
+/// A session whose hand stands further than the robot says \[m\] from 3 s of one trial on.
+fn slipped_in_the_hand(by: [f64; 2]) -> Session<2> {
+    let mut session = session(&[], (1e-3, 0.1));
+    let handle = session.trials[1].handle.as_mut().expect("a robot");
+    for point in handle.iter_mut().skip((3.0 * RATE) as usize) {
+        *point = [0, 1].map(|axis| point[axis] - by[axis]);
+    }
+    session
+}
+
+#[test]
+fn a_handle_that_slips_is_found_with_its_trial_its_time_and_its_way() {
+    let found = disturbance(&slipped_in_the_hand([0.003, -0.002])).expect("a slip");
+    let slip = Kind::named("handle_slip").expect("known");
+    assert_eq!((found.effect.kind, found.trial), (slip, Some(1)));
+    for (axis, way) in [0.003, -0.002].into_iter().enumerate() {
+        let told = found.effect.parameters[axis];
+        assert!((told - way).abs() < 4.0 * found.sd[axis], "{found:?}");
+        assert!(found.sd[axis] < 5e-4, "{found:?}");
+    }
+    assert!((found.span().0 - 3.0).abs() <= 0.1, "{found:?}");
+    // How the handle is held differs from trial to trial by as much as that.
+    assert!(disturbance(&slipped_in_the_hand([0.0005, 0.0005])).is_none());
 }
 
 #[test]

@@ -1,0 +1,379 @@
+//! The shapes of disturbances: what the channels would show of each, and when it explains most.
+
+use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
+
+use crate::data::noise::dot;
+use crate::data::prepared_session::PreparedSession;
+use crate::measurement_model::prediction::{Channels, smooth};
+use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::trial_specific::component::timing_of;
+
+/// Time between the starts that are tried \[s\]: a third of the shortest burst.
+const EVERY: f64 = 0.1;
+
+/// A disturbance at a time, with what the channels would show for one unit of each parameter that is its size.
+pub(super) struct Shape {
+    pub effect: Effect<f64>,
+    pub columns: Vec<(usize, Channels)>,
+}
+
+impl<const N: usize> PreparedSession<'_, N> {
+    /// What the channels of a trial's movement would show of what acts or slips once.
+    pub(super) fn shape_of(
+        &self,
+        point: &LinearizationPoint<N>,
+        trial: usize,
+        effect: Effect<f64>,
+    ) -> Option<Shape> {
+        /// Sizes that are small and yet seen: of a torque \[N m\], of a way \[m\].
+        const UNIT: (f64, f64) = (1e-2, 1e-4);
+        let (sizes, unit): (&[usize], f64) = match effect.kind.probe().nature {
+            Nature::Slip => (&[0, 1], UNIT.1),
+            _ => (&[0], UNIT.0),
+        };
+        let line = point.lines.get(self.group_of[trial])?;
+        let column = |&p: &usize| {
+            let mut changed = point.hypothesis.clone();
+            let mut one = effect;
+            sizes.iter().for_each(|&size| one.parameters[size] = 0.0);
+            one.parameters[p] = unit;
+            changed.named.push(one);
+            let channels = line.response(&changed, unit, (false, false)).ok()?;
+            Some((p, channels))
+        };
+        let columns = sizes.iter().map(column).collect::<Option<Vec<_>>>()?;
+        Some(Shape { effect, columns })
+    }
+
+    /// Disturbances of a trial: bursts in every joint, slips of the handle and of every angle sensor.
+    pub(super) fn shapes_in(&self, point: &LinearizationPoint<N>, trial: usize) -> Vec<Shape> {
+        /// Durations of bursts that are tried \[s\], each twice the one before.
+        const LONG: [f64; 3] = [0.3, 0.6, 1.2];
+        if point.lines.is_empty() {
+            return Vec::new();
+        }
+        let course = &self.courses[self.references[self.group_of[trial]]];
+        let count = course.raw[0].len();
+        let starts = (count as f64 / course.rate / EVERY) as usize;
+        let of = |nature: Nature| KINDS.iter().filter(move |k| k.probe().nature == nature);
+        let mut effects: Vec<Effect<f64>> = Vec::new();
+        for (&kind, j) in of(Nature::Burst).flat_map(|k| (0..N).map(move |j| (k, j))) {
+            for long in LONG {
+                let at = |s| Effect::new(kind, j).with(&[0.0, EVERY * s as f64, long]);
+                effects.extend((0..starts).map(at));
+            }
+        }
+        // A slip within the trial; what is off from its start is how the handle is held and the sensor was put on.
+        let within = 10..starts.saturating_sub(10);
+        for &kind in of(Nature::Slip) {
+            let at = |s| Effect::new(kind, 0).with(&[0.0, 0.0, EVERY * s as f64]);
+            effects.extend(within.clone().map(at));
+        }
+        let answered = self.parallel(effects.len(), |i| self.shape_of(point, trial, effects[i]));
+        let mut shapes: Vec<Shape> = answered.into_iter().flatten().collect();
+        let sensors = KINDS
+            .iter()
+            .filter(|k| k.info().place == Place::AngleSensor);
+        for (&kind, j) in sensors.flat_map(|k| (0..N).map(move |j| (k, j))) {
+            for s in within.clone() {
+                let first = (EVERY * s as f64 * course.rate) as usize;
+                let step = (0..count).map(|i| f64::from(u8::from(i >= first)));
+                // In the band of what it is compared with.
+                let Ok(slip) = smooth(&[step.collect()], course.band, course.rate) else {
+                    continue;
+                };
+                let mut channels = vec![vec![0.0; count]; self.session.channels()];
+                channels.splice(j..=j, slip);
+                let mut effect = Effect::new(kind, j);
+                effect.parameters[timing_of(kind).0] = EVERY * s as f64;
+                let columns = vec![(0, channels)];
+                shapes.push(Shape { effect, columns });
+            }
+        }
+        shapes
+    }
+}
+
+/// A disturbance that is asked for, with what it would show.
+#[derive(Clone)]
+pub(super) struct Asked {
+    /// Its size is one, in the direction that explains most.
+    pub effect: Effect<f64>,
+    /// Parameters that are its size.
+    pub sizes: Vec<usize>,
+    /// Variances of these, where white rows have one.
+    pub variances: Vec<f64>,
+    /// Whitened, without what is usual.
+    pub row: Vec<f64>,
+    pub square: f64,
+}
+
+impl Asked {
+    /// A disturbance in the direction that explains most of a deviation; `None` where it would show nothing.
+    ///
+    /// * `rows` - what one unit of each parameter that is its size would show; one or two of them
+    pub fn along(
+        mut effect: Effect<f64>,
+        mut rows: Vec<(usize, Vec<f64>)>,
+        deviation: &[f64],
+    ) -> Option<Self> {
+        /// Part of a square that is rounding.
+        const ROUNDING: f64 = 1e-9;
+        let sizes: Vec<usize> = rows.iter().map(|(p, _)| *p).collect();
+        let (first, mut row) = rows.remove(0);
+        let mut square = dot(&row, &row);
+        effect.parameters[first] = 1.0;
+        let mut variances = vec![1.0 / square];
+        let firsts = square;
+        if let Some((second, other)) = rows.pop() {
+            let (both, own) = (dot(&row, &other), dot(&other, &other));
+            let determinant = square * own - both * both;
+            if determinant <= ROUNDING * square * own {
+                return None;
+            }
+            let (a, b) = (dot(&row, deviation), dot(&other, deviation));
+            let (x, y) = (own * a - both * b, square * b - both * a);
+            let length = libm::hypot(x, y);
+            if length <= 0.0 {
+                return None;
+            }
+            let (x, y) = (x / length, y / length);
+            (effect.parameters[first], effect.parameters[second]) = (x, y);
+            for (value, more) in row.iter_mut().zip(&other) {
+                *value = x * *value + y * more;
+            }
+            square = dot(&row, &row);
+            variances = vec![own / determinant, firsts / determinant];
+        }
+        (square > 0.0).then_some(Self {
+            effect,
+            sizes,
+            variances,
+            row,
+            square,
+        })
+    }
+
+    pub fn place(&self) -> (Kind, usize) {
+        (self.effect.kind, self.effect.index)
+    }
+
+    /// How large it is in a deviation.
+    pub fn size(&self, deviation: &[f64]) -> f64 {
+        dot(&self.row, deviation) / self.square
+    }
+
+    /// What it explains of a deviation.
+    pub fn gain(&self, deviation: &[f64]) -> f64 {
+        let along = dot(&self.row, deviation);
+        along * along / self.square
+    }
+
+    /// When it begins, and how long it lasts where it ends \[s\].
+    fn timing(&self) -> (f64, Option<f64>) {
+        let (start, duration) = timing_of(self.effect.kind);
+        let value = |p: usize| self.effect.parameters[p];
+        (value(start), duration.map(value))
+    }
+}
+
+/// A disturbance at the time at which it explains most.
+pub(super) struct Explained {
+    pub asked: Asked,
+    pub size: f64,
+    /// See [`scatter_elsewhere`].
+    pub scatter: f64,
+    pub gain: f64,
+}
+
+impl Explained {
+    /// The effect in the size that it has.
+    ///
+    /// * `shrink` - part of it that the difference of a trial from its repeats shows
+    pub fn effect(&self, shrink: f64) -> Effect<f64> {
+        let mut effect = self.asked.effect;
+        for &p in &self.asked.sizes {
+            effect.parameters[p] *= self.size / shrink;
+        }
+        effect
+    }
+
+    /// Standard deviations of its sizes.
+    ///
+    /// * `scale` - misfit for each degree of freedom
+    pub fn sd(&self, scale: f64, shrink: f64) -> Vec<f64> {
+        let one = |variance: &f64| libm::sqrt(scale * self.scatter * variance) / shrink;
+        self.asked.variances.iter().map(one).collect()
+    }
+}
+
+/// What acts or slips once with the start and the duration with which it explains most: those of the grid decide neither its size nor its
+/// place.
+///
+/// * `deviation` - what the trial differs from its repeats by
+/// * `answer` - what it would show
+pub(super) fn timed(
+    mut best: Asked,
+    deviation: &[f64],
+    answer: impl Fn(Effect<f64>) -> Option<Asked>,
+) -> Asked {
+    /// First and last change of the start \[s\].
+    const STEPS: (f64, f64) = (0.05, 0.01);
+    /// Changes of the duration, in changes of the start.
+    const LONGER: f64 = 2.0;
+    /// Shortest and longest burst \[s\].
+    const DURATION: (f64, f64) = (0.1, 3.0);
+    if !matches!(
+        best.effect.kind.probe().nature,
+        Nature::Burst | Nature::Slip
+    ) {
+        return best;
+    }
+    let (start, duration) = timing_of(best.effect.kind);
+    let mut step = STEPS.0;
+    while step > STEPS.1 {
+        let longer = LONGER * step;
+        // A burst that lasts longer about its middle starts earlier.
+        let moves = [(step, 0.0), (-step, 0.0), (-step, longer), (step, -longer)];
+        let possible = if duration.is_some() { 4 } else { 2 };
+        let moved = moves[..possible].iter().find_map(|(later, longer)| {
+            let mut effect = best.effect;
+            effect.parameters[start] += later;
+            let mut within = effect.parameters[start] >= 0.0;
+            if let Some(p) = duration {
+                effect.parameters[p] += longer;
+                within &= (DURATION.0..=DURATION.1).contains(&effect.parameters[p]);
+            }
+            let moved = within.then(|| answer(effect))??;
+            (moved.gain(deviation) > best.gain(deviation)).then_some(moved)
+        });
+        match moved {
+            Some(moved) => best = moved,
+            None => step *= 0.5,
+        }
+    }
+    best
+}
+
+/// How much more than noise the shape of a burst finds at other times of its movement, as a ratio of variances; at least one.
+///
+/// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like bursts at many times.
+///
+/// * `deviations` - of the trial and its repeats
+pub(super) fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[Vec<f64>]) -> f64 {
+    /// Nine of ten squares of a standard normal number are smaller.
+    const NINE_OF_TEN: f64 = 2.706;
+    /// How long a burst is felt around it \[s\].
+    const FELT: f64 = 1.0;
+    let (start, Some(duration)) = one.timing() else {
+        return 1.0;
+    };
+    let own = (start - FELT, start + duration);
+    let elsewhere = asked.iter().filter(|other| {
+        let (from, long) = other.timing();
+        let same = other.place() == one.place() && long == Some(duration);
+        same && (from - FELT > own.1 || from + duration < own.0)
+    });
+    let mut squares: Vec<f64> = elsewhere
+        .flat_map(|other| deviations.iter().map(|d| other.gain(d)))
+        .collect();
+    squares.sort_by(f64::total_cmp);
+    let tenth = squares.len().saturating_sub(1) * 9 / 10;
+    squares
+        .get(tenth)
+        .map_or(1.0, |s| f64::max(s / NINE_OF_TEN, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bursts of 0.5 s that start every 0.1 s of 10 s, each with a row of its own.
+    fn bursts() -> Vec<Asked> {
+        (0..95)
+            .map(|k| {
+                let mut row = vec![0.0; 95];
+                row[k] = 1.0;
+                let effect = Effect::new(Kind::Voluntary, 0).with(&[1e-2, 0.1 * k as f64, 0.5]);
+                Asked {
+                    effect,
+                    sizes: vec![0],
+                    variances: vec![1.0],
+                    row,
+                    square: 1.0,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_burst_stands_out_against_other_times_and_not_against_itself() {
+        let asked = bursts();
+        // Far more than noise from 4.0 to 5.0 s alone: that is what a burst does.
+        let once: Vec<f64> = (0..95)
+            .map(|k| if (40..50).contains(&k) { 9.0 } else { 1.0 })
+            .collect();
+        assert_eq!(
+            scatter_elsewhere(&asked[45], &asked, std::slice::from_ref(&once)),
+            1.0
+        );
+        // As much all the time is no burst.
+        let always = vec![9.0; 95];
+        let scatter = scatter_elsewhere(&asked[45], &asked, &[once, always]);
+        assert!((scatter - 81.0 / 2.706).abs() < 1e-12, "{scatter}");
+    }
+
+    #[test]
+    fn a_burst_is_timed_between_the_points_of_the_grid() {
+        // A bump over 10 s, a hundred samples a second.
+        let answer = |effect: Effect<f64>| {
+            let [_, start, duration, ..] = effect.parameters;
+            let at = |i: usize| {
+                let s = (0.01 * i as f64 - start) / duration;
+                let inside = (0.0..=1.0).contains(&s);
+                let bump = s * (1.0 - s);
+                if inside { bump * bump * bump } else { 0.0 }
+            };
+            let row: Vec<f64> = (0..1000).map(at).collect();
+            let square = dot(&row, &row);
+            Some(Asked {
+                effect,
+                sizes: vec![0],
+                variances: vec![1.0 / square],
+                row,
+                square,
+            })
+        };
+        let burst =
+            |start, duration| Effect::new(Kind::Voluntary, 0).with(&[1e-2, start, duration]);
+        let seen = answer(burst(4.28, 0.5)).expect("a row").row;
+        let coarse = answer(burst(4.4, 0.3)).expect("a row");
+        let part = coarse.gain(&seen) / dot(&seen, &seen);
+        assert!(part < 0.9, "{part}");
+        let found = timed(coarse, &seen, answer);
+        let [_, start, duration, ..] = found.effect.parameters;
+        assert!(
+            (start - 4.28).abs() < 0.03 && (duration - 0.5).abs() < 0.05,
+            "{start} {duration}"
+        );
+        assert!(found.gain(&seen) > 0.99 * dot(&seen, &seen));
+    }
+
+    #[test]
+    fn a_slip_takes_the_direction_that_explains_most() {
+        let effect = Effect::new(Kind::HandleSlip, 0).with(&[0.0, 0.0, 2.0]);
+        let rows = vec![(0, vec![2.0, 0.0, 0.0]), (1, vec![1.0, 1.0, 0.0])];
+        // Three of the first and four of the second, and something that neither shows.
+        let asked = Asked::along(effect, rows, &[10.0, 4.0, 7.0]).expect("it shows something");
+        let [y, z, start, ..] = asked.effect.parameters;
+        assert!((y - 0.6).abs() < 1e-12 && (z - 0.8).abs() < 1e-12 && start == 2.0);
+        assert!((asked.size(&[10.0, 4.0, 7.0]) - 5.0).abs() < 1e-12);
+        assert!((asked.gain(&[10.0, 4.0, 7.0]) - 116.0).abs() < 1e-9);
+        // The inverse of (4 2; 2 2).
+        assert!(
+            (asked.variances[0] - 0.5).abs() < 1e-12 && (asked.variances[1] - 1.0).abs() < 1e-12
+        );
+        let alike = vec![(0, vec![1.0, 0.0]), (1, vec![2.0, 0.0])];
+        assert!(Asked::along(effect, alike, &[1.0, 1.0]).is_none());
+    }
+}
