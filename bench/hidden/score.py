@@ -33,6 +33,8 @@ OPEN = 1.5
 """A channel of the test trials is open where what is left is more than this many times its floor."""
 SEEN = 2.0
 """An effect counts for recall where it is at least this many times as large as the answer's `would_have_seen` says."""
+SLIP_TIME = 0.5
+"""A slip is told where its start is off by less than this [s]."""
 SHAPES = [
     "rest",
     "ratio",
@@ -175,6 +177,16 @@ def names(truth: Json, named: list[Json]) -> Json:
     }
 
 
+def slip_told(truth: Json, named: list[Json]) -> bool | None:
+    """Return whether a slip of the handle or of a sensor is named as such, in its trial and near its time; None where nothing slips."""
+    slip = truth.get("slip")
+    if not slip:
+        return None
+    kind = {"handle": "handle_slip", "angle": "angle_offset"}[slip["what"]]
+    own = [n for n in named if n.get("trial") == slip["trial"] and n["kind"] == kind and n["joint"] == slip.get("joint")]
+    return any(abs(n["span"][0] - slip["start_s"]) < SLIP_TIME for n in own)
+
+
 def judge(truth: Json, answer: Json) -> Json:
     """Return how an answer of `armrs gap` compares with the truth."""
     hidden, named = truth["effects"], answer["effects"]
@@ -183,6 +195,7 @@ def judge(truth: Json, answer: Json) -> Json:
     limits = answer.get("would_have_seen") or []
     return {
         "names": names(truth, named),
+        "slip_told": slip_told(truth, named),
         "detectable": [label(t) for t in hidden if detectable(t, limits)],
         "open": left_open(answer),
         "verdict": answer["verdict"],
@@ -376,6 +389,7 @@ def counted(lines: list[Json]) -> dict[str, tuple[int, int]]:
     closed = [
         line["closure"] for line in some if line["names"]["decided"] == line["names"]["decided_right"] and line["closure"] is not None
     ]
+    slips = [line["slip_told"] for line in some if line["slip_told"] is not None]
     lost = sum(len(line["hidden"]) for line in lines if line["error"] is not None)
     return {
         "names right": (sum(n["decided_right"] for n in each), sum(n["decided"] for n in each)),
@@ -385,6 +399,7 @@ def counted(lines: list[Json]) -> dict[str, tuple[int, int]]:
         "95 % interval holds": (sum(held), len(held)),
         "“explained” or “nothing missing” above an open gap": (sum(bool(line["open"]) for line in silent), len(silent)),
         "gap closed by 90 % where no name is wrong": (sum(c >= CLOSED for c in closed), len(closed)),
+        "slip named, with its trial and time": (sum(s is True for s in slips), len(slips)),
         "answered": (len(some), len(lines)),
     }
 

@@ -1,6 +1,6 @@
 //! What a search came to.
 
-use arm_core::effect::Effect;
+use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
@@ -69,20 +69,19 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         progress("measuring what is left", 0.9)?;
         let mut precision = self.precision(&point, &amended, scale)?;
         for one in &named {
-            let missed = amended.asked[one.slot].kind().probe().missed;
-            precision.widen(
-                |t| matches!(t, Target::Named(own, _) if own == one.slot),
-                missed,
-                one.gain,
-            );
+            let missed = one.gain * amended.asked[one.slot].kind().probe().missed;
+            let is_own = |t| matches!(t, Target::Named(own, _) if own == one.slot);
+            precision.widen(is_own, Precision::ALONG * missed);
+            let joint = joint_of(&amended.hypothesis, Target::Named(one.slot, 0));
+            let is_beside = |t| joint.is_some() && joint_of(&amended.hypothesis, t) == joint;
+            precision.widen(|t| is_beside(t) && !is_own(t), Precision::BESIDE * missed);
         }
         for law in &base {
             let known = self.session.effects.len() + law.base;
-            let missed = law.question.kind().probe().missed;
+            let missed = law.gain * law.question.kind().probe().missed;
             precision.widen(
                 |t| matches!(t, Target::Known(own, _) if own == known),
-                missed,
-                law.gain,
+                Precision::ALONG * missed,
             );
         }
         let gained: Vec<f64> = base.iter().map(|law| law.gain).collect();
@@ -148,6 +147,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.in_trials((&amended.hypothesis, &rhythms)),
         ])
     }
+}
+
+/// The joint in which the law acts that a number belongs to.
+fn joint_of<const N: usize>(hypothesis: &Hypothesis<N>, target: Target) -> Option<usize> {
+    let effect = match target {
+        Target::Known(e, _) => hypothesis.known[e],
+        Target::Named(e, _) => hypothesis.named[e],
+        _ => return None,
+    };
+    (effect.kind.info().place == Place::Joint).then_some(effect.index)
 }
 
 /// Those that swing in every trial.

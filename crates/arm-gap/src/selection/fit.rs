@@ -276,16 +276,18 @@ pub struct Precision {
 
 impl Precision {
     /// Share of what a law may miss of what it shows that may lie along one of its parameters, as sums of squares.
-    const ALONG: f64 = 1.0 / 9.0;
+    pub const ALONG: f64 = 1.0 / 9.0;
+    /// The same along a parameter of another law of its joint: a third of that in size.
+    pub const BESIDE: f64 = 1.0 / 81.0;
 
-    /// Widens what is known of the parameters of an effect by what its law may miss.
+    /// Widens what is known of some numbers by what a law may miss.
     ///
-    /// * `own` - tells its parameters
-    /// * `gain` - what the effect explains, in units of twice the log-likelihood
-    pub fn widen(&mut self, own: impl Fn(Target) -> bool, missed: f64, gain: f64) {
-        let wider = libm::sqrt(1.0 + Self::ALONG * missed * gain.max(0.0));
+    /// * `of` - tells them
+    /// * `missed` - what the law may miss along one of them, in units of twice the log-likelihood
+    pub fn widen(&mut self, of: impl Fn(Target) -> bool, missed: f64) {
+        let wider = libm::sqrt(1.0 + missed.max(0.0));
         for (c, sd) in self.coordinates.iter().zip(&mut self.sd) {
-            if own(c.target) {
+            if of(c.target) {
                 *sd *= wider;
             }
         }
