@@ -5,7 +5,7 @@
 //! identified together with the segments: along the measured motion or, where a joint's speed is noise, along the simulated one.
 
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
-use arm_ident::inference::estimate::{Estimate, Quantity};
+use arm_ident::inference::estimate::{Estimate, Identified, Quantity};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::inference::start::{middle, weight_moment};
 use arm_ident::regression::trial::{Model, Role};
@@ -13,12 +13,13 @@ use arm_ident::regression::unknown::{Source, spring};
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
+use crate::data::joint_in_motion::laws_in_motion;
 use crate::data::passive_law::{Free, Passive};
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::prediction::Course;
 
 /// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
-const LIKELY: f64 = 2.0;
+pub(super) const LIKELY: f64 = 2.0;
 /// Noise of a joint's speed, as a share of the speed, above which the motion is simulated: what measured motion tells of that joint is
 /// noise. Below it is nearer than a simulation that lacks what is to be found.
 const NOISY: f64 = 0.3;
@@ -28,6 +29,17 @@ const REST_SD: f64 = 1.0;
 pub const STILL: f64 = 0.01;
 /// Furthest start of a segment from its literature values, in standard deviations.
 const FURTHEST_START: f64 = 3.0;
+
+/// The laws that were identified, each with the standard deviation of its size.
+fn estimated<const N: usize>(found: &Identified<N>) -> Vec<(Effect<f64>, f64)> {
+    let std = |place: usize| {
+        let own = |e: &&Estimate| e.quantity == Quantity::Unknown(Source::Effect(place, 0));
+        let e = found.parameters.iter().find(own);
+        e.map_or(f64::INFINITY, |e| e.std)
+    };
+    let laws = found.fitted.iter().enumerate();
+    laws.map(|(place, law)| (*law, std(place))).collect()
+}
 
 impl<const N: usize> Session<N> {
     /// The same session with the passive base of joints without any law, as measured motion has it.
@@ -61,16 +73,28 @@ impl<const N: usize> Session<N> {
         if noisy && self.comparison == ComparisonMode::Led {
             found = along(MotionSource::Auto).unwrap_or(found);
         }
-        let std = |place: usize| {
-            let own = |e: &&Estimate| e.quantity == Quantity::Unknown(Source::Effect(place, 0));
-            let e = found.parameters.iter().find(own);
-            e.map_or(f64::INFINITY, |e| e.std)
-        };
+        let mut laws = estimated(&found);
+        for own in laws.chunk_by_mut(|(a, _), (b, _)| a.index == b.index) {
+            let rubs = |(law, std): &(Effect<f64>, f64)| {
+                law.kind.smoothed_by().is_some() && law.parameters[0] > LIKELY * std
+            };
+            let Some(friction) = own.iter().find(|one| rubs(one)).copied() else {
+                continue;
+            };
+            let (joint, chain) = (own[0].0.index, &found.chain);
+            let asked = model.fitted.iter().filter(|law| law.index == joint);
+            let asked: Vec<_> = asked.copied().collect();
+            let alone =
+                laws_in_motion(chain, &self.trials, (joint, &asked, friction), found.cutoff);
+            if let Ok(Some(alone)) = alone {
+                own.copy_from_slice(&alone);
+            }
+        }
         let still = match self.comparison {
             ComparisonMode::Led => self.hardly_moving(),
             ComparisonMode::Torque => [false; N],
         };
-        for (place, law) in found.fitted.iter().enumerate() {
+        for (place, (law, std)) in laws.iter().enumerate() {
             let mut passive = self.passive(model.fitted[place]);
             if let Some(smoothing) = law.kind.smoothed_by()
                 && self.comparison == ComparisonMode::Led
@@ -86,7 +110,7 @@ impl<const N: usize> Session<N> {
                 let (low, high) = (middle - 2.0 * REST_SD, middle + 2.0 * REST_SD);
                 passive.effect.parameters[rest] = law.parameters[rest].clamp(low, high);
             }
-            passive.likely = size > 0.0 && size > LIKELY * std(place);
+            passive.likely = size > 0.0 && size > LIKELY * std;
             passive.effect.parameters[0] = if passive.likely { size } else { 0.0 };
             if still[law.index] {
                 self.hold(&mut passive);

@@ -1,6 +1,7 @@
 //! What was measured, made ready: session, repeats, the samples that are compared, noise.
 
 pub mod identified_base;
+mod joint_in_motion;
 mod measured_noise;
 pub mod noise;
 pub mod passive_law;
