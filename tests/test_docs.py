@@ -221,6 +221,12 @@ def test_the_map_of_the_architecture_is_complete() -> None:
     assert [str(p) for p in left] == []
 
 
+def test_the_map_of_the_readme_names_every_crate() -> None:
+    """It lacked two of them."""
+    named = set(re.findall(r"`crates/([a-z-]+)`", (ROOT / "README.md").read_text(encoding="utf-8")))
+    assert named == {path.parent.name for path in ROOT.glob("crates/arm-*/Cargo.toml")}
+
+
 def test_every_test_and_function_of_the_table_of_equations_exists() -> None:
     text = (ROOT / "python" / "armrs" / "thesis" / "equations.md").read_text(encoding="utf-8")
     suites: dict[str, list[str]] = {}
