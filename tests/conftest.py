@@ -6,6 +6,10 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+# Before NumPy is loaded, here and in processes that tests start. Its matrices are small here, and threads that wait for one another take
+# ten times the processor time where there are as many processes as cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 
