@@ -5,11 +5,11 @@
 //! identified together with the segments: along the measured motion or, where a joint's speed is noise, along the simulated one.
 
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
-use arm_ident::inference::estimate::{Estimate, Quantity};
+use arm_ident::inference::estimate::Estimate;
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::inference::start::{middle, weight_moment};
 use arm_ident::regression::trial::{Model, Role};
-use arm_ident::regression::unknown::{Source, spring};
+use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
@@ -61,8 +61,10 @@ impl<const N: usize> Session<N> {
         if noisy && self.comparison == ComparisonMode::Led {
             found = along(MotionSource::Auto).unwrap_or(found);
         }
-        let std = |place: usize| {
-            let own = |e: &&Estimate| e.quantity == Quantity::Unknown(Source::Effect(place, 0));
+        let std = |law: &Effect<f64>| {
+            let info = law.kind.info();
+            let named = (info.kind, Some(law.index + 1), info.parameters[0].name);
+            let own = |e: &&Estimate| (e.kind.as_str(), e.joint, e.name.as_str()) == named;
             let e = found.parameters.iter().find(own);
             e.map_or(f64::INFINITY, |e| e.std)
         };
@@ -86,7 +88,7 @@ impl<const N: usize> Session<N> {
                 let (low, high) = (middle - 2.0 * REST_SD, middle + 2.0 * REST_SD);
                 passive.effect.parameters[rest] = law.parameters[rest].clamp(low, high);
             }
-            passive.likely = size > 0.0 && size > LIKELY * std(place);
+            passive.likely = size > 0.0 && size > LIKELY * std(law);
             passive.effect.parameters[0] = if passive.likely { size } else { 0.0 };
             if still[law.index] {
                 self.hold(&mut passive);
