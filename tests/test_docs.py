@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import shlex
 from pathlib import Path
 
 import numpy as np
@@ -21,32 +20,6 @@ BLOCK = re.compile(r"^```(\w+)(?: ([^\n]+))?\n(.*?)^```", flags=re.M | re.S)
 def blocks(page: Path) -> list[tuple[str, str, str]]:
     """Return language, name and content of the blocks of a page."""
     return BLOCK.findall(page.read_text(encoding="utf-8"))
-
-
-def test_the_tutorial_runs_and_prints_what_it_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    verbs, printed = [], ""
-    for language, name, content in blocks(DOCS / "tutorial.md"):
-        if language == "toml":
-            Path(name).write_text(content, encoding="utf-8")
-        elif language == "text":
-            assert content in printed
-        else:
-            printed = ""
-            for line in content.splitlines():
-                program, *arguments = shlex.split(line, comments=True)
-                assert program == "armrs"
-                status = cli.main(arguments)
-                out, err = capsys.readouterr()
-                assert status == ("# ends with status 1" in line), err
-                verbs.append(arguments[0])
-                printed += out
-    assert set(verbs) == {"demo", "passive", "identify", "simulate", "report"}
-    for file in re.findall(r"`([a-z]+/[a-z./]+)`", (DOCS / "tutorial.md").read_text(encoding="utf-8")):
-        if not file.startswith("examples/"):
-            assert Path(file).exists(), file
 
 
 def test_three_joints_find_their_own_balance_and_two_follow() -> None:
