@@ -25,16 +25,14 @@ from armrs.io.dataset import Dataset
 from armrs.workflows.experiment import load_experiment
 from armrs.workflows.record import measure
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from patients import PERSON
+
 EXPERIMENT = """\
 name = "{name}"
 seed = {seed}
 
-[subject]
-body_mass = 77.0
-height = 1.80
-sex = "male"
-lengths_m = [0.322, 0.30]
-spread = 0.0
+{person}spread = 0.0
 
 [[joint]]
 [[joint]]
@@ -65,7 +63,7 @@ def session(name: str, values: np.ndarray, seed: int) -> Dataset:
     """Return a session of a subject with a stiffness and a dry friction."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "EXPERIMENT.toml"
-        file.write_text(EXPERIMENT.format(name=name, seed=seed, stiffness=values[0], dry=values[1]), encoding="utf-8")
+        file.write_text(EXPERIMENT.format(person=PERSON, name=name, seed=seed, stiffness=values[0], dry=values[1]), encoding="utf-8")
         return measure(load_experiment(file)).dataset
 
 

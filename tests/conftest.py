@@ -6,10 +6,14 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+# Before NumPy is loaded, here and in processes that tests start. Its matrices are small here, and threads that wait for one another take
+# ten times the processor time where there are as many processes as cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 
-LONG = ("test_reproduce.py", "test_docs.py", "test_sweep.py", "test_gap.py")
+LONG = ("test_reproduce.py", "test_pages.py", "test_fmu_defects.py", "test_gap.py", "test_demo.py", "test_import.py", "test_sweep.py")
 """Files that take longest. They come first, so that no process works on one of them alone at the end."""
 
 MODEL = """\

@@ -114,16 +114,19 @@ def written(data: Dataset, folder: Path) -> Path:
     return folder
 
 
-EXPERIMENT = """\
-name = "patient"
-seed = {seed}
-
+PERSON = """\
 [subject]
 body_mass = 77.0
 height = 1.80
 sex = "male"
 lengths_m = [0.322, 0.30]
-spread = 0.3
+"""
+"""Subject of an experiment; `spread`, the deviation of the true arm from what is expected of it, follows."""
+EXPERIMENT = """\
+name = "patient"
+seed = {seed}
+
+{person}spread = 0.3
 
 [[joint]]
 [[joint]]
@@ -170,7 +173,7 @@ LABORATORY_SPEEDS = (0.3, 1.0, 1.8, 2.7, 3.6)
 
 def recorded(patient: Patient, seed: int) -> Dataset:
     """Return a session of the virtual laboratory."""
-    said = EXPERIMENT.format(seed=seed, **dataclasses.asdict(patient))
+    said = EXPERIMENT.format(person=PERSON, seed=seed, **dataclasses.asdict(patient))
     said += "".join(STRETCH.format(number=k, speed=s, acceleration=max(4.0, 12.0 * s)) for k, s in enumerate(LABORATORY_SPEEDS))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "EXPERIMENT.toml"

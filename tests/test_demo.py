@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +15,7 @@ import armrs
 from armrs import cli, demo
 from browser import check_paper, check_screens
 from markup import assert_escaped
+from test_docs import DOCS, blocks
 
 WITHIN = 5.0
 """Largest relative error of what the data determine [%]; the thesis has 2 to 10 on the real arm."""
@@ -19,7 +23,7 @@ WITHIN = 5.0
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("demo")
+    out = tmp_path_factory.mktemp("session") / "demo"
     assert cli.main(["demo", "-o", str(out), "--json", str(out / "copy.json")]) == 0
     return out
 
@@ -136,3 +140,33 @@ def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
 def test_the_page_is_read_on_every_screen_and_on_paper(folder: Path) -> None:
     check_screens(folder / "report.html")
     check_paper(folder / "report.html")
+
+
+def test_the_tutorial_runs_and_prints_what_it_shows(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its first command is the one that the other tests here look at; it ran once."""
+    monkeypatch.chdir(tmp_path)
+    verbs, printed = [], ""
+    for language, name, content in blocks(DOCS / "tutorial.md"):
+        if language == "toml":
+            Path(name).write_text(content, encoding="utf-8")
+        elif language == "text":
+            assert content in printed
+        else:
+            printed = ""
+            for line in content.splitlines():
+                program, *arguments = shlex.split(line, comments=True)
+                assert program == "armrs"
+                verbs.append(arguments[0])
+                if arguments == ["demo", "-o", "demo"]:
+                    shutil.copytree(folder, "demo")
+                    continue
+                status = cli.main(arguments)
+                out, err = capsys.readouterr()
+                assert status == ("# ends with status 1" in line), err
+                printed += out
+    assert set(verbs) == {"demo", "passive", "identify", "simulate", "report"}
+    for file in re.findall(r"`([a-z]+/[a-z./]+)`", (DOCS / "tutorial.md").read_text(encoding="utf-8")):
+        if not file.startswith("examples/"):
+            assert Path(file).exists(), file

@@ -22,7 +22,7 @@ from test_docs import DOCS, ROOT, blocks
 
 SHELL = ("sh", "text")
 RUN_ELSEWHERE = {
-    "tutorial.md": "test_docs.py, in order",
+    "tutorial.md": "test_demo.py, in order",
     "files.md": "test_docs.py reads every file that is shown",
     "firmware.md": "scripts/walkthrough.py, by make crosscheck; test_export_c.py its first commands; its Python below",
     "index.md": "make demo, which builds",

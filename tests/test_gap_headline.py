@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from armrs._armrs import verdict_of
+from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
-from armrs.workflows.gap.found import ChannelGap, Missing
 from armrs.workflows.gap.headline import headline, still_open
 from armrs.workflows.gap.summary import marks
 from armrs.workflows.gap.words import gap, left

@@ -14,12 +14,12 @@ from matplotlib.colors import to_hex
 
 import armrs
 from armrs import _armrs, cli
+from armrs._armrs import Value
 from armrs.catalogue import catalogue
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.report import plotting
 from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, figures, separate, separating
-from armrs.workflows.gap.found import Value
 from armrs.workflows.gap.results import gap_data, write_gap
 from gap_sessions import model, session
 

@@ -15,6 +15,7 @@ import armrs
 from armrs.analysis.quantities import value_in
 from armrs.catalogue import catalogue
 from armrs.cli import main
+from armrs.workflows import demo
 from armrs.workflows.demo import BRAKES
 
 # DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
@@ -282,6 +283,21 @@ def test_a_spring_that_may_be_absent_has_no_rest_angle(slow_arm: Path) -> None:
     absent = [joint for joint, e in springs.items() if e.interval[0] <= 0.0 <= e.interval[1]]
     assert absent and sorted([*rests, *absent]) == sorted(springs)
     assert {e.joint for e in result.parameters if e.name == "stiffness*rest"} == set(springs)
+
+
+def test_the_rest_angle_of_a_spring_is_an_unknown() -> None:
+    """It was held at zero, and a third of the stiffness was found."""
+    truth = demo.true_model().replace(joints=(armrs.Joint("shoulder"), armrs.Joint("elbow", stiffness=1.5, rest=0.8)))
+    path = np.radians([[-60, 40], [-30, 100], [-60, 100], [-20, 30], [-60, 40]])
+    run = armrs.simulate(truth, armrs.Movement(path, speed=0.8, acceleration=2.0), sensors=armrs.Sensors.realistic(), seeds=range(3))
+    trials = [
+        armrs.Trial(f"{k}.csv", "large", k, "fit", read["time"], read["q"], read["force_on_arm"], None, read["robot_q"])
+        for k, read in enumerate(run.readings, start=1)
+    ]
+    found = armrs.identify(armrs.Dataset("spring", demo.handed_over(truth), tuple(trials), "robot", synthetic=True), with_effects="elastic")
+    elbow = {e.name: e for e in found.parameters if (e.kind, e.joint) == ("elastic", 2)}
+    assert elbow["stiffness"].value == pytest.approx(1.5, abs=3.0 * elbow["stiffness"].std) and elbow["stiffness"].std < 0.1
+    assert elbow["rest"].value == pytest.approx(0.8, abs=3.0 * elbow["rest"].std) and elbow["rest"].std < 0.2
 
 
 def test_a_calibration_far_beyond_its_tolerance_is_not_decided_by_the_model(slow_arm: Path) -> None:

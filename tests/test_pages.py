@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,14 @@ import patients
 from armrs import cli, online
 from armrs.report import series
 from armrs.workflows import demo, history
-from browser import check_paper, check_screens, opened
+from browser import check_paper, check_screens, opened, shared
 from test_cohort import population, table
 from test_docs import DOCS, ROOT, blocks
 from test_sweep import EXPERIMENT as ONE_ARM
 
 
 @pytest.fixture(scope="module")
-def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The report of every verb, in a folder of its name."""
     out = tmp_path_factory.mktemp("pages")
     truth, trial = str(slow_arm / "truth.toml"), str(next((slow_arm / "trials").glob("*.csv")))
@@ -70,7 +71,8 @@ def pages(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (out / "summary" / "summary.html").rename(out / "summary" / "report.html")
     both = [str(out / "simulate" / "simulated.json"), str(out / "record" / "record.json")]
     cli.main(["report", *both, "-o", str(out / "both")])
-    return out
+    with shared():
+        yield out
 
 
 def notebook(folder: Path, results: list[Any]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import colorsys
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from matplotlib.colors import to_rgb
 
 from armrs import cli
 from armrs.thesis.people import TABLE_4_10
-from browser import check_paper, check_screens, opened
+from browser import check_paper, check_screens, opened, shared
 
 NEEDED = {"3.5", "3.6", "3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
 """Tables and figures that some item has to be about."""
@@ -43,10 +44,11 @@ def numbered(text: str) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("thesis")
     assert cli.main(["reproduce", "-o", str(folder)]) == 0
-    return folder
+    with shared():
+        yield folder
 
 
 @pytest.fixture(scope="module")

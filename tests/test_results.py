@@ -157,3 +157,10 @@ def test_whole_results_can_be_kept(slow_arm: Path) -> None:
     doubled = found.result.replace(rank=2 * found.rank)
     assert doubled.rank == 2 * found.rank
     assert doubled.parameters == found.parameters
+
+
+def test_what_a_value_rests_on_is_one_of_three() -> None:
+    given = ("torque", 1, "coulomb", 0.2, 0.01, "N m", (0.18, 0.22))
+    assert [armrs.Estimate(*given, by).decided_by for by in ("data", "prior", "bound")] == ["data", "prior", "bound"]
+    with pytest.raises(armrs.BadInput, match=r"^decided_by: found 'guess', allowed data, prior or bound"):
+        armrs.Estimate(*given, "guess")

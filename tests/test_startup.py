@@ -118,3 +118,12 @@ def test_a_verb_loads_only_what_it_uses(folder: Path, line: list[str], packages:
     _, modules = loaded(line, folder=folder)
     assert modules & set(HEAVY) <= packages
     assert [name for name in modules for prefix in without if name == prefix or name.startswith(f"{prefix}.")] == []
+
+
+@pytest.mark.parametrize(("given", "taken"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_numpy_computes_in_one_thread_unless_asked_otherwise(given: dict[str, str], taken: str) -> None:
+    """Threads that waited for one another took ten times the processor time of `armrs check` on a busy machine."""
+    program = "import os, sys; from armrs.__main__ import main; sys.argv = ['armrs', '--help']\ntry: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"} | given
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60, env=environment)
+    assert done.stdout.splitlines()[-1] == taken

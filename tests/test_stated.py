@@ -13,7 +13,7 @@ from matplotlib.colors import rgb_to_hsv, to_hex, to_rgb
 import armrs
 from armrs.report import plotting
 from armrs.thesis import simulation
-from armrs.workflows import demo
+from armrs.workflows import demo, identify
 from armrs.workflows.gap import figures, maps, words
 from test_docs import ROOT, blocks
 
@@ -106,3 +106,56 @@ def test_the_documented_thresholds_are_those_of_the_code() -> None:
     texts = [*(ROOT / "docs").glob("*.md"), *(ROOT / "crates").rglob("verdict.rs")]
     said = {v for path in texts for v in re.findall(r"(?:hidden|nulls)(?:\s|///)+reach (\d\.\d)", path.read_text(encoding="utf-8"))}
     assert said == {"4.8"}
+
+
+def test_nalgebra_is_said_to_do_what_it_does() -> None:
+    """It "serves as a container" stood beside its Cholesky factorisation."""
+    methods = {"cholesky": "Cholesky", "try_inverse": "inverse", "lu": "LU", "qr": "QR", "svd": "singular", "symmetric_eigen": "eigen"}
+    users = [
+        path.parent for path in ROOT.glob("crates/*/Cargo.toml") if "\nnalgebra" in path.read_text(encoding="utf-8").partition("[dev-")[0]
+    ]
+    sources = "\n".join(path.read_text(encoding="utf-8") for crate in users for path in crate.glob("src/**/*.rs"))
+    done = {word for method, word in methods.items() if re.search(rf"\.{method}\(", sources)}
+    assert "Cholesky" in done
+    for file, place in (("docs/determinism.md", r"^- \*\*nalgebra\*\*.*?(?=^- )"), ("Cargo.toml", r"^#[^\n]*(?=\nnalgebra)")):
+        said = re.search(place, (ROOT / file).read_text(encoding="utf-8"), flags=re.M | re.S)
+        assert said is not None and {word for word in methods.values() if word in said[0]} == done, file
+
+
+def test_no_time_of_the_performance_page_is_negative() -> None:
+    """An import time of "-0.224 s" was the difference of two measurements."""
+    text = (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
+    times = re.findall(r"(?<![\w.])([-−]?)\d[\d.]* (?:ns|µs|ms|s|min)\b", text)
+    assert len(times) > 50 and set(times) == {""}
+
+
+def test_every_extra_is_imported() -> None:
+    """The extra `fmi` installed what nothing imported."""
+    extras = re.search(
+        r"^\[project.optional-dependencies\]\n(.*?)^\[", (ROOT / "pyproject.toml").read_text(encoding="utf-8"), flags=re.M | re.S
+    )
+    assert extras is not None
+    source = "\n".join(p.read_text(encoding="utf-8") for folder in ("python/armrs", "bench/hidden") for p in (ROOT / folder).rglob("*.py"))
+    listed = {name: re.findall(r'"([a-z0-9-]+)[<>=]', line) for name, line in re.findall(r"^([a-z]+) = \[(.*)\]$", extras[1], flags=re.M)}
+    assert {"cluster", "fmi", "files", "notebook"} <= set(listed)
+    for name, packages in listed.items():
+        for package in packages if name != "dev" else ():
+            used = re.search(rf"^\s*(?:import|from) {package}\b|(?:import_module|find_spec)\(\"{package}", source, flags=re.M)
+            assert used or package == "ipykernel", f"{name}: {package}"  # a notebook starts its kernel itself
+
+
+def test_tolerances_are_warned_of_at_the_multiples_that_files_md_says() -> None:
+    """It said five where the code had two, and a tolerance was one deviation here and two there."""
+    text = " ".join((ROOT / "docs" / "files.md").read_text(encoding="utf-8").split())
+    said = re.search(r"more than (\w+) its tolerance is pointed out, and one more than (\w+) times its tolerance is warned of", text)
+    assert said is not None
+    noted, warned = ({"twice": 2.0, "three": 3.0, "four": 4.0, "five": 5.0}[word] for word in said.groups())
+    tolerance = armrs.Tolerance(force_bias_N=0.1)
+
+    def told(times: float) -> tuple[int, int]:
+        """Return how many are pointed out and warned of where a bias came out so many times its tolerance."""
+        own = SimpleNamespace(name="force bias y", value=-0.1 * times, unit="N")
+        steps = ((identify._FAR, identify._BEYOND), (identify._BEYOND, np.inf))
+        return tuple(len(identify._beyond_tolerance([own], tolerance, *step)) for step in steps)  # type: ignore[return-value, list-item]
+
+    assert [told(f * by) for f in (noted, warned) for by in (0.99, 1.01)] == [(0, 0), (1, 0), (1, 0), (0, 1)]

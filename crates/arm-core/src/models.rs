@@ -25,7 +25,8 @@ pub fn mechanical_arm() -> Chain<f64, 2> {
     ])
 }
 
-/// The upper extremity of table 4.10; moments of inertia as in table 1 of appendix D.
+/// The upper extremity of table 4.10; moments of inertia as printed in table 1 of appendix D. There those of upper arm and forearm are
+/// about the long axes, three and five times smaller than about the axis of the movement.
 pub fn human_arm() -> Chain<f64, 3> {
     chain([
         segment(0.322, 0.186, 2.114, 0.005),

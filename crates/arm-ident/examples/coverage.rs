@@ -132,12 +132,12 @@ fn repetition(seed: u64, run: &Recording<2>, options: &Options, truth: [f64; 4])
     let result = identify(&assumed(), &trials, options).expect("identification succeeds");
     assert_eq!(result.rank, 6, "masses cannot be told apart");
     let friction = result.parameters.iter();
-    let friction = friction.filter(|p| p.name.contains("coulomb"));
+    let friction = friction.filter(|p| p.kind == "coulomb");
     let estimates: Vec<_> = result.combinations[..2].iter().chain(friction).collect();
     core::array::from_fn(|k| {
         let e = estimates[k];
         assert!(k > 1 || e.name == NAMES[k]);
-        let covers = e.interval[0] <= truth[k] && truth[k] <= e.interval[1];
+        let covers = e.interval.0 <= truth[k] && truth[k] <= e.interval.1;
         (e.value, e.std, covers)
     })
 }

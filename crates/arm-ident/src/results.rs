@@ -8,64 +8,9 @@ use arm_model::{Effect, Model, Refused, Segment};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-use crate::inference::estimate::{self, Quantity};
+use crate::inference::estimate;
+pub use crate::inference::estimate::Estimate;
 use crate::regression::trial::Role;
-use crate::regression::unknown::Source;
-
-/// One estimated quantity.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Estimate {
-    /// Parameter of a segment (`m2`, `m2*l2`, `l2`, `I2`) or of an effect (`torque`), or a combination of parameters.
-    pub name: String,
-    /// Joint or segment, from 1.
-    pub joint: Option<usize>,
-    /// `segment`, `combination`, `calibration`, or the kind of effect.
-    pub kind: String,
-    /// Estimate, in `unit`.
-    pub value: f64,
-    /// Standard deviation.
-    pub std: f64,
-    /// SI unit.
-    pub unit: String,
-    /// Interval at the level asked for.
-    pub interval: (f64, f64),
-    /// What the value rests on: `data`, `prior` or `bound`.
-    pub decided_by: String,
-    /// Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
-    pub caveat: Option<String>,
-}
-
-impl Estimate {
-    /// An estimate by the name that it has in files.
-    fn of(estimate: &estimate::Estimate, fitted: &[CoreEffect<f64>]) -> Self {
-        let own = estimate.name.as_str();
-        let (name, kind) = match estimate.quantity {
-            Quantity::Unknown(Source::Effect(i, p)) | Quantity::EffectParameter(i, p) => {
-                let info = fitted[i].kind.info();
-                (info.parameters[p].name, info.kind)
-            }
-            // "elastic1 stiffness*rest": the kind and the joint stand in fields of their own.
-            Quantity::Unknown(Source::RestTorque(i, _)) => (
-                own.split_once(' ').map_or(own, |(_, name)| name),
-                fitted[i].kind.info().kind,
-            ),
-            Quantity::Unknown(Source::Calibration(_)) => (own, "calibration"),
-            Quantity::Unknown(Source::Segment(..)) | Quantity::Segment => (own, "segment"),
-            Quantity::Combination => (own, "combination"),
-        };
-        Self {
-            name: name.to_owned(),
-            joint: estimate.joint.map(|j| j + 1),
-            kind: kind.to_owned(),
-            value: estimate.value,
-            std: estimate.std,
-            unit: estimate.unit.replace('·', " "),
-            interval: estimate.interval.into(),
-            decided_by: estimate.decided_by.name().to_owned(),
-            caveat: None,
-        }
-    }
-}
 
 /// How a fitted model explains one trial, after the common low-pass.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,10 +118,6 @@ impl Identification {
         result: &estimate::Identified<N>,
         asked: &Asked<'_>,
     ) -> Result<Self, Refused> {
-        let estimates = |list: &[estimate::Estimate]| {
-            let each = list.iter().map(|e| Estimate::of(e, &result.fitted));
-            each.collect::<Vec<_>>()
-        };
         let not_simulated = result.not_simulated.as_ref();
         let trials: Vec<_> = result.explained.iter().zip(asked.trials).collect();
         Ok(Self {
@@ -184,9 +125,9 @@ impl Identification {
             status: result.status.name().to_owned(),
             rank: result.rank,
             unknowns: result.unknowns,
-            parameters: estimates(&result.parameters),
-            combinations: estimates(&result.combinations),
-            calibration: estimates(&result.calibration),
+            parameters: result.parameters.clone(),
+            combinations: result.combinations.clone(),
+            calibration: result.calibration.clone(),
             contradictions: Vec::new(),
             misfits: Vec::new(),
             left_out: Vec::new(),
@@ -319,44 +260,9 @@ impl Serialize for Identification {
 
 #[cfg(test)]
 mod tests {
-    use arm_core::effect::Kind;
-    use arm_core::estimator::Decision;
     use arm_numerics::least_squares::program::Status;
 
     use super::*;
-
-    fn estimate(name: &str, quantity: Quantity) -> estimate::Estimate {
-        estimate::Estimate {
-            name: name.to_owned(),
-            quantity,
-            joint: Some(1),
-            unit: "N·m/rad",
-            value: 1.0,
-            std: 0.1,
-            interval: [0.8, 1.2],
-            decided_by: Decision::Data,
-        }
-    }
-
-    /// Once an estimate was a combination if its name contained a `+`.
-    #[test]
-    fn a_combination_is_one_by_what_it_is_and_not_by_its_name() {
-        let of = |name, quantity| Estimate::of(&estimate(name, quantity), &[]).kind;
-        assert_eq!(of("m1+m2", Quantity::Segment), "segment");
-        assert_eq!(of("m1", Quantity::Combination), "combination");
-    }
-
-    #[test]
-    fn a_spring_is_named_by_its_kind_with_the_joint_beside_it() {
-        let springs = [arm_core::effect::Effect::new(
-            Kind::named("elastic").expect("a kind"),
-            1,
-        )];
-        let torque = Quantity::Unknown(Source::RestTorque(0, 1));
-        let told = Estimate::of(&estimate("elastic2 stiffness*rest", torque), &springs);
-        let told = (told.kind.as_str(), told.name.as_str(), told.joint);
-        assert_eq!(told, ("elastic", "stiffness*rest", Some(2)));
-    }
 
     /// Once it was the lower-cased name of a variant, `almostsolved`.
     #[test]

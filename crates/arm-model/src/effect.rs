@@ -1,4 +1,4 @@
-use arm_core::effect::{Kind, Parameters, Place};
+use arm_core::effect::{Kind, Parameters};
 
 use crate::fields::{Bounds, Fields};
 use crate::number::shortened;
@@ -282,11 +282,6 @@ impl Effect {
             table.push(name, value);
         }
         table
-    }
-
-    /// Whether it acts in a joint, as a torque.
-    pub fn acts_in_joint(&self) -> bool {
-        self.kind.info().place == Place::Joint
     }
 }
 

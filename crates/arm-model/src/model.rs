@@ -134,11 +134,6 @@ impl Model {
         Ok(Self(parts))
     }
 
-    /// The parts, to change some and make another model of them.
-    pub fn into_parts(self) -> Parts {
-        self.0
-    }
-
     /// The same model with some parts changed.
     ///
     /// # Errors

@@ -86,7 +86,7 @@ fn identification(model: &Model<2>, trial: &Trial<2>) -> Outcome<u64> {
     let all = found.parameters.iter().chain(&found.combinations);
     Ok(of_values(
         all.chain(&found.calibration)
-            .flat_map(|e| [e.value, e.std, e.interval[0], e.interval[1]])
+            .flat_map(|e| [e.value, e.std, e.interval.0, e.interval.1])
             .filter(|v| v.is_finite()),
     ))
 }

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from . import students_t
 from .double_exponential import NAMES, UNITS, Course, Problem, Shape, columns
 
 LEAST_HELD = np.radians(5.0)
@@ -215,7 +216,7 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
         range=problem.ends,
         adjacent_mean=problem.mean,
         trials=len(courses),
-        p_value=_chance(mean.slope, mean.slope_std, mean.freedom),
+        p_value=students_t.chance(mean.slope, mean.slope_std, mean.freedom),
         level=level,
         residual_rms=float(np.sqrt(shape.squares / len(problem.q))),
         trial_std=line.spread,
@@ -240,9 +241,7 @@ def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:
 
 def _coefficients(shape: Shape, count: int, level: float) -> list[Coefficient]:
     """Return the numbers of a shape; of a steepness, the deviation is that of its logarithm times it."""
-    from scipy.stats import t as student
-
-    quantile = float(student.ppf(0.5 + 0.5 * level, max(count - np.count_nonzero(shape.stds), 1)))
+    quantile = students_t.quantile(level, max(count - int(np.count_nonzero(shape.stds)), 1))
     stds = shape.stds * np.where(np.char.endswith(NAMES, "steepness"), shape.values, 1.0)
     return [
         Coefficient(name, float(value), float(std), shape.interval(number, quantile), unit)
@@ -260,16 +259,12 @@ def _level(line: _Line, level: float) -> Coefficient:
 
 def _of_line(name: str, value: float, std: float, unit: str, known: tuple[float, float]) -> Coefficient:
     """Return a number of a line, `known` being its degrees of freedom and the probability of its interval."""
-    from scipy.stats import t as student
-
-    half = float(student.ppf(0.5 + 0.5 * known[1], known[0])) * std
+    half = students_t.quantile(known[1], known[0]) * std
     return Coefficient(name, value, std, (value - half, value + half), unit)
 
 
 def together(first: Dependence, second: Dependence) -> Coupling:
     """Return the coupling of two joints that were each moved while the other was held at different angles."""
-    from scipy.stats import t as student
-
     stds = np.array([first.mean_coupling.std, second.mean_coupling.std])
     values = np.array([first.mean_coupling.value, second.mean_coupling.value])
     known = (stds == 0.0).astype(float) if not stds.all() else stds**-2
@@ -277,16 +272,9 @@ def together(first: Dependence, second: Dependence) -> Coupling:
     shares = (weights * stds) ** 2
     value, std = float(weights @ values), float(np.sqrt(shares.sum()))
     freedom = float(shares.sum() ** 2 / np.sum(shares**2 / np.array([first.freedom, second.freedom]))) if std > 0.0 else first.freedom
-    half = float(student.ppf(0.5 + 0.5 * first.level, freedom)) * std
+    half = students_t.quantile(first.level, freedom) * std
     pair = (min(first.joint, second.joint), max(first.joint, second.joint))
-    return Coupling(pair, value, std, (value - half, value + half), _chance(value, std, freedom), first.level)
-
-
-def _chance(value: float, std: float, freedom: float) -> float:
-    """Return the probability of a value so far from zero by chance."""
-    from scipy.stats import t as student
-
-    return float(2.0 * student.sf(abs(value) / std, freedom)) if std > 0.0 else float(value == 0.0)
+    return Coupling(pair, value, std, (value - half, value + half), students_t.chance(value, std, freedom), first.level)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import students_t
+
 CHANCE = 0.01
 """Probability of a loop so large by chance."""
 FEWEST = 6
@@ -86,8 +88,6 @@ def _cycles(course: int, angle: np.ndarray, moment: np.ndarray, direction: np.nd
 
 def _first(cycles: Sequence[_Cycle]) -> list[Preconditioned]:
     """Return the first cycles that dissipate more than the later half, trial by trial."""
-    from scipy.stats import t as student
-
     if len(cycles) < FEWEST:
         return []
     low = max(float(way[0].min()) for c in cycles for way in (c.up, c.down))
@@ -98,7 +98,7 @@ def _first(cycles: Sequence[_Cycle]) -> list[Preconditioned]:
     loops = np.array([float(np.mean(_along(c.up, at) - _along(c.down, at))) for c in cycles])
     later = loops[len(loops) - len(loops) // 2 :]
     level, count = float(later.mean()), len(later)
-    allowed = float(student.ppf(1.0 - CHANCE, count - 1)) * float(later.std(ddof=1)) * np.sqrt(1.0 + 1.0 / count)
+    allowed = students_t.quantile(1.0 - 2.0 * CHANCE, count - 1) * float(later.std(ddof=1)) * np.sqrt(1.0 + 1.0 / count)
     larger = loops > level + max(allowed, LEAST_MORE * abs(level))
     number = int(np.argmin([*larger[: len(loops) - count], False]))
     first = cycles[:number]

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from . import students_t
 from .cluster_robust import deviations
 
 LONGEST = 0.2
@@ -234,14 +235,12 @@ class _Problem:
 
     def result(self, direction: int, shape: np.ndarray, free: int) -> Reflex:
         """Return what was found."""
-        from scipy.stats import t as student
-
         gain = self.gain(direction, shape)[0]
         column = self.column(direction, shape)
         linear = np.linalg.lstsq(self.linear, self.moment - gain * column, rcond=None)[0]
         values = np.array([gain, *shape, *linear[ELASTIC : ELASTIC + 2]])
         std, freedom = self._deviations(direction, shape, free)
-        half = student.ppf(0.5 + 0.5 * LEVEL, freedom) * std
+        half = np.array([students_t.quantile(LEVEL, f) for f in freedom]) * std
         least = np.array([0.0, 0.0, 0.0, -np.inf, 0.0, -np.inf, -np.inf])
         names, units = ("gain", *SHAPES), (*UNITS.values(), "N m s/rad", "N m")
         numbers = [

@@ -130,7 +130,6 @@ class ImportedSlave(Partner):
             if remove is not None:
                 shutil.rmtree(remove, ignore_errors=True)
             raise
-        self._handle: int | None = handle
         self._mode = mode  # callbacks live as long as the instance
         self._instance = c_void_p(handle)
         self._plans: dict[tuple[str, ...], _Plan] = {}
@@ -323,7 +322,6 @@ class ImportedSlave(Partner):
 
     def free(self) -> None:
         """Free the instance and remove the temporary folder."""
-        self._handle = None
         self._release()
 
     def call(self, name: str, *arguments: Any) -> None:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _armrs, checks
-from ..analysis import double_exponential, joint_coupling, passivity_checks, preconditioning, uncertainty
+from ..analysis import double_exponential, joint_coupling, passivity_checks, preconditioning, students_t, uncertainty
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
@@ -251,11 +251,9 @@ class PassiveMoments(Tabular):
 
 def _interval(values: np.ndarray) -> tuple[float, float]:
     """Return the interval of the mean of repeats by Student's t; NaN for fewer than two."""
-    from scipy.stats import t as student
-
     if len(values) < 2:
         return (float("nan"), float("nan"))
-    mean, half = float(values.mean()), float(student.ppf(0.5 + 0.5 * LEVEL, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values)))
+    mean, half = float(values.mean()), students_t.quantile(LEVEL, len(values) - 1) * float(values.std(ddof=1)) / np.sqrt(len(values))
     return (mean - half, mean + half)
 
 

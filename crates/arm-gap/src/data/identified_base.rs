@@ -5,11 +5,11 @@
 //! identified together with the segments: along the measured motion or, where a joint's speed is noise, along the simulated one.
 
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
-use arm_ident::inference::estimate::{Estimate, Identified, Quantity};
+use arm_ident::inference::estimate::{Estimate, Identified};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::inference::start::{middle, weight_moment};
 use arm_ident::regression::trial::{Model, Role};
-use arm_ident::regression::unknown::{Source, spring};
+use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
@@ -32,13 +32,14 @@ const FURTHEST_START: f64 = 3.0;
 
 /// The laws that were identified, each with the standard deviation of its size.
 fn estimated<const N: usize>(found: &Identified<N>) -> Vec<(Effect<f64>, f64)> {
-    let std = |place: usize| {
-        let own = |e: &&Estimate| e.quantity == Quantity::Unknown(Source::Effect(place, 0));
+    let std = |law: &Effect<f64>| {
+        let info = law.kind.info();
+        let named = (info.kind, Some(law.index + 1), info.parameters[0].name);
+        let own = |e: &&Estimate| (e.kind.as_str(), e.joint, e.name.as_str()) == named;
         let e = found.parameters.iter().find(own);
         e.map_or(f64::INFINITY, |e| e.std)
     };
-    let laws = found.fitted.iter().enumerate();
-    laws.map(|(place, law)| (*law, std(place))).collect()
+    found.fitted.iter().map(|law| (*law, std(law))).collect()
 }
 
 impl<const N: usize> Session<N> {

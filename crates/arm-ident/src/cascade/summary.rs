@@ -51,7 +51,7 @@ pub(super) fn summarise<const N: usize>(
         dof: (clusters - 1) as f64,
         level,
     };
-    let parameters = parameters(&certainty, model, steps)?;
+    let parameters = parameters(&certainty, steps)?;
     let combinations = if model.segment_uncertainty > 0.0 {
         (0..N)
             .map(|j| first_moment(&certainty, model, j))
@@ -85,21 +85,14 @@ pub(super) fn summarise<const N: usize>(
 }
 
 /// The unknowns and the centres of mass that follow from them.
-fn parameters<const N: usize>(
-    certainty: &Certainty<'_>,
-    model: &Model<N>,
-    steps: &[Step],
-) -> Result<Vec<Estimate>, IdentError> {
+fn parameters(certainty: &Certainty<'_>, steps: &[Step]) -> Result<Vec<Estimate>, IdentError> {
     let mut parameters = Vec::new();
     for (u, unknown) in certainty.unknowns[..certainty.physical].iter().enumerate() {
         let mut estimate = certainty.unknown(u)?;
-        if let Source::Effect(e, _) = unknown.source {
-            estimate.joint = Some(model.fitted[e].index);
-        }
         if steps.iter().all(|s| !s.own.contains(&u)) {
             // Nothing is known but the bounds: as spread out as an even distribution between them.
             estimate.std = (unknown.max - unknown.min) / libm::sqrt(12.0);
-            estimate.interval = [unknown.min, unknown.max];
+            estimate.interval = (unknown.min, unknown.max);
         }
         parameters.push(estimate);
         if let Source::Segment(k, Moment::Along) = unknown.source {
@@ -127,11 +120,13 @@ pub(super) fn centre_of_mass(
     let mut gradient = vec![0.0; x.len()];
     gradient[h] = 1.0 / x[m];
     gradient[m] = -x[h] / (x[m] * x[m]);
-    let estimate = certainty.nonlinear(x[h] / x[m], &gradient, format!("l{}", k + 1), "m")?;
-    Ok(Some(Estimate {
-        joint: Some(k),
-        ..estimate
-    }))
+    let named = (format!("l{}", k + 1), "m");
+    Ok(Some(certainty.nonlinear(
+        x[h] / x[m],
+        &gradient,
+        named,
+        k,
+    )?))
 }
 
 /// `X_j` as a linear function of the unknowns.
@@ -180,7 +175,7 @@ pub(super) fn first_moment<const N: usize>(
     let w = weights(certainty.unknowns, model, j);
     let (name, unit) = base_name::<N>(j);
     Ok(Estimate {
-        joint: Some(j),
+        joint: Some(j + 1),
         ..certainty.linear(&w, name, unit)?
     })
 }

@@ -36,6 +36,8 @@ pub(crate) fn unknowns<const N: usize>(model: &Model<N>, width: f64) -> Vec<Unkn
                 Unknown {
                     source: Source::Segment(k, moment),
                     name,
+                    kind: "segment",
+                    joint: Some(k + 1),
                     unit,
                     mean,
                     sd,
@@ -56,6 +58,8 @@ pub(super) fn neglected_inertia() -> Unknown {
     Unknown {
         source: Source::Calibration(Imperfection::NeglectedInertia),
         name: "neglected inertia".to_owned(),
+        kind: "calibration",
+        joint: None,
         unit: "1",
         mean: 0.0,
         sd: 1.0,

@@ -3,43 +3,46 @@
 use arm_core::effect::Effect;
 pub use arm_core::estimator::Decision;
 use arm_core::{Chain, Joints};
+use serde::{Serialize, Serializer};
 
 use crate::error::IdentError;
-use crate::regression::unknown::Source;
 use arm_numerics::least_squares::program::Status;
 
-/// What an estimate is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// An unknown of the fit.
-    Unknown(Source),
-    /// A parameter of a fitted effect that follows from several unknowns: index of the effect, index of the parameter.
-    EffectParameter(usize, usize),
-    /// A property of a segment that follows from several unknowns.
-    Segment,
-    /// A linear combination of unknowns, such as a base parameter.
-    Combination,
+/// One estimated quantity, in the terms of files.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Parameter of a segment (`m2`, `m2*l2`, `l2`, `I2`) or of an effect (`torque`), or a combination of parameters.
+    pub name: String,
+    /// Joint or segment, from 1, where it belongs to one.
+    pub joint: Option<usize>,
+    /// `segment`, `combination`, `calibration`, or the kind of effect.
+    pub kind: String,
+    /// Estimate, in `unit`.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// SI unit.
+    pub unit: String,
+    /// Interval at the level asked for.
+    pub interval: (f64, f64),
+    /// What the value rests on.
+    #[serde(serialize_with = "word")]
+    pub decided_by: Decision,
+    /// Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
+    pub caveat: Option<String>,
 }
 
-/// One estimated quantity.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
-    /// Name as printed, joints counted from one.
-    pub name: String,
-    /// What it is an estimate of.
-    pub quantity: Quantity,
-    /// Zero-based joint or segment, where it belongs to one.
-    pub joint: Option<usize>,
-    /// SI unit.
-    pub unit: &'static str,
-    /// Estimate.
-    pub value: f64,
-    /// Its standard deviation.
-    pub std: f64,
-    /// Interval at the level asked for.
-    pub interval: [f64; 2],
-    /// What decided it.
-    pub decided_by: Decision,
+fn word<S: Serializer>(decision: &Decision, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(decision.name())
+}
+
+impl Estimate {
+    /// The same, within limits that it cannot exceed.
+    pub(crate) fn within(mut self, least: f64, most: f64) -> Self {
+        let (low, high) = self.interval;
+        self.interval = (low.clamp(least, most), high.clamp(least, most));
+        self
+    }
 }
 
 /// How the model explains one trial, after filtering and decimation.

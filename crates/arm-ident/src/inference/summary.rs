@@ -2,7 +2,7 @@
 
 use crate::error::IdentError;
 use crate::inference::constraint::base_parameters;
-use crate::inference::estimate::{Decision, Estimate, Explained, Identified, Quantity};
+use crate::inference::estimate::{Decision, Estimate, Explained, Identified};
 use crate::inference::rank::{RankOptions, RankReport, analyse};
 use crate::inference::weighted_fit::{Solved, physical_columns};
 use crate::regression::trial::Model;
@@ -112,7 +112,7 @@ pub(crate) fn summarise<const N: usize>(
     for (i, (weights, _)) in base_parameters(unknowns, fit.model).iter().enumerate() {
         let (name, unit) = base_name::<N>(i);
         combinations.push(Estimate {
-            joint: Some(i % N),
+            joint: Some(i % N + 1),
             ..certainty.linear(weights, name, unit)?
         });
     }
@@ -154,7 +154,8 @@ pub(crate) fn rank_of(
     };
     let report = analyse(&physical_columns(data, unknowns), &options)?;
     let physical = unknowns[..physical(unknowns)].iter();
-    let names: Vec<&str> = physical.map(|u| u.name.as_str()).collect();
+    let names: Vec<String> = physical.map(Unknown::printed).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let trades = report.describe_trades(&names)?;
     Ok((report, trades))
 }
@@ -173,13 +174,6 @@ fn parameters<const N: usize>(
         }
         if let Source::RestTorque(e, rest) = unknown.source {
             parameters.extend(rest_angle(certainty, &model.fitted[e], (e, rest))?);
-        }
-    }
-    for e in &mut parameters {
-        if let Quantity::Unknown(Source::Effect(i, _) | Source::RestTorque(i, _))
-        | Quantity::EffectParameter(i, _) = e.quantity
-        {
-            e.joint = Some(model.fitted[i].index);
         }
     }
     Ok(parameters)
@@ -229,15 +223,12 @@ impl Certainty<'_> {
         let mut w = vec![0.0; self.unknowns.len()];
         w[u] = 1.0;
         let unknown = &self.unknowns[u];
-        let mut estimate = self.linear(&w, unknown.name.clone(), unknown.unit)?;
-        estimate.quantity = Quantity::Unknown(unknown.source);
-        estimate.interval = estimate
-            .interval
-            .map(|end| end.clamp(unknown.min, unknown.max));
-        if let Source::Segment(k, _) = unknown.source {
-            estimate.joint = Some(k);
-        }
-        Ok(estimate)
+        let estimate = self.linear(&w, unknown.name.clone(), unknown.unit)?;
+        Ok(Estimate {
+            kind: unknown.kind.to_owned(),
+            joint: unknown.joint,
+            ..estimate.within(unknown.min, unknown.max)
+        })
     }
 
     /// A linear function of the unknowns.
@@ -268,13 +259,14 @@ impl Certainty<'_> {
         };
         Ok(Estimate {
             name,
-            quantity: Quantity::Combination,
             joint: None,
-            unit,
+            kind: "combination".to_owned(),
             value,
             std,
-            interval: [value - reach, value + reach],
+            unit: unit.replace('·', " "),
+            interval: (value - reach, value + reach),
             decided_by,
+            caveat: None,
         })
     }
 
@@ -309,20 +301,21 @@ impl Certainty<'_> {
         })
     }
 
-    /// A nonlinear function through its gradient; decided by the weakest of what it rests on.
+    /// A nonlinear function through its gradient, of a segment from 0; decided by the weakest of what it rests on.
     pub(crate) fn nonlinear(
         &self,
         value: f64,
         gradient: &[f64],
-        name: String,
-        unit: &'static str,
+        (name, unit): (String, &'static str),
+        segment: usize,
     ) -> Result<Estimate, IdentError> {
         let mut estimate = self.linear(gradient, name, unit)?;
-        let [low, high] = estimate.interval;
+        let (low, high) = estimate.interval;
         let reach = 0.5 * (high - low);
         estimate.value = value;
-        estimate.quantity = Quantity::Segment;
-        estimate.interval = [value - reach, value + reach];
+        estimate.kind = "segment".to_owned();
+        estimate.joint = Some(segment + 1);
+        estimate.interval = (value - reach, value + reach);
         for (u, _) in gradient.iter().enumerate().filter(|(_, g)| **g != 0.0) {
             match self.unknown(u)?.decided_by {
                 other if estimate.decided_by == Decision::Data => estimate.decided_by = other,
@@ -345,23 +338,19 @@ fn rest_angle(
         return Ok(None);
     };
     let x = certainty.x;
-    let [low, high] = certainty.unknown(k)?.interval;
+    let (low, high) = certainty.unknown(k)?.interval;
     if low <= 0.0 && high >= 0.0 {
         return Ok(None);
     }
-    let parameter = &effect.kind.info().parameters[rest];
+    let info = effect.kind.info();
+    let parameter = &info.parameters[rest];
     let mut gradient = vec![0.0; x.len()];
     gradient[w] = 1.0 / x[k];
     gradient[k] = -x[w] / (x[k] * x[k]);
-    let name = format!(
-        "{}{} {}",
-        effect.kind.info().kind,
-        effect.index + 1,
-        parameter.name
-    );
-    let estimate = certainty.nonlinear(x[w] / x[k], &gradient, name, parameter.unit)?;
+    let named = (parameter.name.to_owned(), parameter.unit);
+    let estimate = certainty.nonlinear(x[w] / x[k], &gradient, named, effect.index)?;
     Ok(Some(Estimate {
-        quantity: Quantity::EffectParameter(e, rest),
+        kind: info.kind.to_owned(),
         ..estimate
     }))
 }
@@ -400,16 +389,11 @@ fn derived(certainty: &Certainty<'_>, k: usize, length: f64) -> Result<[Estimate
         to_inertia[place] = -2.0 * n / x[m];
     }
     let inertia = x[i] - (x[h] * x[h] + n * n) / x[m];
-    let mut list = [
-        certainty.nonlinear(com, &to_com, format!("l{}", k + 1), "m")?,
-        certainty.nonlinear(inertia, &to_inertia, format!("I{}", k + 1), "kg m^2")?,
-    ];
+    let com = certainty.nonlinear(com, &to_com, (format!("l{}", k + 1), "m"), k)?;
+    let named = (format!("I{}", k + 1), "kg m^2");
+    let inertia = certainty.nonlinear(inertia, &to_inertia, named, k)?;
     // The centre of mass is within the segment, and no inertia is negative.
-    for (estimate, most) in list.iter_mut().zip([length, f64::INFINITY]) {
-        estimate.joint = Some(k);
-        estimate.interval = estimate.interval.map(|end| end.clamp(0.0, most));
-    }
-    Ok(list)
+    Ok([com.within(0.0, length), inertia.within(0.0, f64::INFINITY)])
 }
 
 /// Name and unit of base parameter `i` of `X_1 … X_N, J_1 … J_N`.

@@ -55,8 +55,12 @@ pub enum Source {
 pub struct Unknown {
     /// What it stands for.
     pub source: Source,
-    /// Name as printed, joints counted from one.
+    /// Name as in files: of an effect's parameter without effect and joint.
     pub name: String,
+    /// `segment`, `calibration`, or the kind of effect.
+    pub kind: &'static str,
+    /// Joint or segment, from 1, where it belongs to one.
+    pub joint: Option<usize>,
     /// SI unit.
     pub unit: &'static str,
     /// Value expected beforehand.
@@ -70,13 +74,25 @@ pub struct Unknown {
 }
 
 impl Unknown {
+    /// Name by itself, among those of other effects: `coulomb1 torque`.
+    pub fn printed(&self) -> String {
+        match (self.source, self.joint) {
+            (Source::Effect(..) | Source::RestTorque(..), Some(joint)) => {
+                format!("{}{joint} {}", self.kind, self.name)
+            }
+            _ => self.name.clone(),
+        }
+    }
+
     /// A parameter of a fitted effect, of which nothing is known but its bounds.
     pub(crate) fn of_effect((number, effect): (usize, &Effect<f64>), position: usize) -> Self {
         let info = effect.kind.info();
         let parameter = &info.parameters[position];
         Self {
             source: Source::Effect(number, position),
-            name: format!("{}{} {}", info.kind, effect.index + 1, parameter.name),
+            name: parameter.name.to_owned(),
+            kind: info.kind,
+            joint: Some(effect.index + 1),
             unit: parameter.unit,
             mean: 0.0,
             sd: f64::INFINITY,
@@ -135,12 +151,11 @@ fn rest_torque<const N: usize>(model: &Model<N>, index: usize) -> Option<Unknown
     Some(Unknown {
         source: Source::RestTorque(index, rest),
         name: format!(
-            "{}{} {}*{}",
-            info.kind,
-            effect.index + 1,
-            info.parameters[amplitude].name,
-            info.parameters[rest].name
+            "{}*{}",
+            info.parameters[amplitude].name, info.parameters[rest].name
         ),
+        kind: info.kind,
+        joint: Some(effect.index + 1),
         unit: "N m",
         mean: 0.0,
         sd: f64::INFINITY,
@@ -158,6 +173,8 @@ fn segment<const N: usize>(model: &Model<N>, k: usize) -> Vec<Unknown> {
     let unknown = |moment, name: String, unit, mean: f64, sd, min, max| Unknown {
         source: Source::Segment(k, moment),
         name,
+        kind: "segment",
+        joint: Some(j),
         unit,
         mean,
         sd,
@@ -225,6 +242,8 @@ pub(crate) fn calibration<const N: usize>(
             list.push(Unknown {
                 source,
                 name,
+                kind: "calibration",
+                joint: None,
                 unit,
                 mean: 0.0,
                 sd,

@@ -94,7 +94,7 @@ fn friction_is_right_where_one_joint_rests_while_the_other_moves() {
             let mean = all().map(|e| e.value).sum::<f64>() / TRIALS as f64;
             assert!((mean - truth).abs() < 0.015 * truth, "{mean}, not {truth}");
             let covered = all()
-                .filter(|e| e.interval[0] <= *truth && *truth <= e.interval[1])
+                .filter(|e| e.interval.0 <= *truth && *truth <= e.interval.1)
                 .count();
             // 95 % of 40, less three standard deviations of the count.
             assert!(covered >= 34, "{name}: {covered} of {TRIALS}, both {both}");
@@ -117,7 +117,7 @@ fn friction_of_a_joint_that_never_moves_is_not_identified() {
     assert_eq!(moved.decided_by, Decision::Data);
     assert!((moved.value - BRAKES[0]).abs() < 0.05 * BRAKES[0]);
     assert_eq!(rested.decided_by, Decision::Prior);
-    assert_eq!((rested.value, rested.interval), (0.0, [0.0, 100.0]));
+    assert_eq!((rested.value, rested.interval), (0.0, (0.0, 100.0)));
     assert!(rested.std > 10.0);
     let said = "coulomb2 torque does not act on the data".to_owned();
     assert!(result.trades.contains(&said), "{:?}", result.trades);
@@ -167,11 +167,11 @@ fn inertia_widens_the_intervals_of_a_movement_that_is_not_quasi_static() {
         let x = truth.first_moments()[j];
         let (fast, slow) = (&fast.combinations[j], &slow.combinations[j]);
         assert!(
-            fast.interval[0] <= x && x <= fast.interval[1],
+            fast.interval.0 <= x && x <= fast.interval.1,
             "{fast:?}, not {x}"
         );
         assert!(
-            slow.interval[0] <= x && x <= slow.interval[1],
+            slow.interval.0 <= x && x <= slow.interval.1,
             "{slow:?}, not {x}"
         );
         assert!(slow.std < 0.3 * fast.std, "{slow:?} {fast:?}");

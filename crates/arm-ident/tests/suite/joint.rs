@@ -65,7 +65,7 @@ fn base_parameters_and_joint_parameters_are_recovered_from_a_wrong_start() {
         for j in 0..3 {
             let e = named(&result, &format!("{kind}{} {parameter}", j + 1));
             close(e.value, values[j][0], 50.0 * BY_SAMPLING);
-            assert_eq!((e.decided_by, e.joint), (Decision::Data, Some(j)));
+            assert_eq!((e.decided_by, e.joint), (Decision::Data, Some(j + 1)));
         }
         for (found, value) in moments(&result.chain).iter().zip(&moments(&truth)) {
             close(*found, *value, 50.0 * BY_SAMPLING);
@@ -91,9 +91,20 @@ fn the_rest_angle_of_a_spring_is_an_unknown() {
         let of = |name: &str| named(&result, &format!("elastic{} {name}", j + 1));
         close(of("stiffness").value, stiffness, 50.0 * BY_SAMPLING);
         close(of("rest").value, rest, 100.0 * BY_SAMPLING);
-        assert_eq!((of("rest").joint, of("rest").unit), (Some(j), "rad"));
+        assert_eq!(
+            (of("rest").joint, of("rest").unit.as_str()),
+            (Some(j + 1), "rad")
+        );
         assert_eq!(result.fitted[j].parameters[1], of("rest").value);
+        let torque = of("stiffness*rest");
+        assert_eq!(
+            (torque.kind.as_str(), torque.joint),
+            ("elastic", Some(j + 1))
+        );
     }
+    // By what they are, not by a `+` in the name.
+    assert_eq!(named(&result, "I1 + m1*l1^2").kind, "segment");
+    assert!(result.combinations.iter().all(|e| e.kind == "combination"));
     // A constant moment in the same joint is the same column.
     model.fitted = at_every_joint::<3>(&["elastic", "constant_moment"]);
     let result = identify(&model, &[trial], &exactly()).expect("a solution");
@@ -207,11 +218,11 @@ fn friction_that_is_not_there_is_not_found_and_never_negative() {
             .iter()
             .filter(|e| e.name.contains("cosity") || e.name.contains("torque"))
         {
-            assert!(e.value >= 0.0 && e.interval[0] >= 0.0, "{}: {e:?}", e.name);
+            assert!(e.value >= 0.0 && e.interval.0 >= 0.0, "{}: {e:?}", e.name);
             assert!(e.std > 0.0, "a bound leaves no doubt: {e:?}");
             bounds += usize::from(e.decided_by == Decision::Bound);
             assert!(e.decided_by != Decision::Bound || e.value == 0.0);
-            covered += usize::from(e.interval[0] == 0.0);
+            covered += usize::from(e.interval.0 == 0.0);
             all += 1;
         }
     }

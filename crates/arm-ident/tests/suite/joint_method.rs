@@ -24,13 +24,21 @@ pub fn human() -> Chain<f64, 3> {
     Chain::new(segments, arm.base(), arm.gravity()).expect("a valid arm")
 }
 
+/// The name of an estimate among those of all effects: `coulomb1 torque`.
+fn printed(e: &Estimate) -> String {
+    match (e.kind.as_str(), e.joint) {
+        ("segment" | "combination" | "calibration", _) | (_, None) => e.name.clone(),
+        (kind, Some(joint)) => format!("{kind}{joint} {}", e.name),
+    }
+}
+
 pub fn named<'a, const N: usize>(result: &'a Identified<N>, name: &str) -> &'a Estimate {
     result
         .parameters
         .iter()
         .chain(&result.combinations)
         .chain(&result.calibration)
-        .find(|e| e.name == name)
+        .find(|e| printed(e) == name)
         .unwrap_or_else(|| panic!("nothing is called {name}"))
 }
 

@@ -74,7 +74,7 @@ fn batch(found: &Identified<2>) -> Vec<(String, f64, f64)> {
     let effects = found
         .parameters
         .iter()
-        .filter(|e| e.name.starts_with("coulomb") || e.name.starts_with("viscous"));
+        .filter(|e| ["coulomb", "viscous"].contains(&e.kind.as_str()));
     base.chain(effects)
         .map(|e| (e.name.clone(), e.value, e.std))
         .collect()

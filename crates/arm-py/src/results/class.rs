@@ -1,5 +1,6 @@
 //! What the classes of results have in common: each wraps a type of the core, is a value, and is JSON by the serde of that type.
 
+use arm_core::estimator::Decision;
 use indexmap::IndexMap;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
@@ -42,6 +43,19 @@ plain! {
     [f64; 3]: "three numbers",
     [[f64; 2]; 2]: "two times two numbers",
     (String, Option<usize>, Option<String>): "kind, joint and channel",
+}
+
+impl Attribute for Decision {
+    const ALLOWED: &'static str = "data, prior or bound";
+    fn write<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.name().to_owned().write(py)
+    }
+    fn read(given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let word: String = given.extract()?;
+        let known = [Self::Data, Self::Prior, Self::Bound];
+        let found = known.into_iter().find(|d| d.name() == word);
+        found.ok_or_else(|| pyo3::exceptions::PyValueError::new_err(word))
+    }
 }
 
 impl<T: Attribute> Attribute for Option<T> {

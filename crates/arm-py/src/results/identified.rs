@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use arm_core::estimator::Decision;
 use arm_ident::results as core;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
@@ -27,7 +28,7 @@ result_class! {
         /// Interval at the level asked for.
         interval: (f64, f64), "";
         /// What the value rests on: "data", "prior" or "bound". A prior's value is an assumption that the data left open, not a measurement.
-        decided_by: String, "";
+        decided_by: Decision, "";
         /// Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
         caveat: Option<String>, "", or None;
     }

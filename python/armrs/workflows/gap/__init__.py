@@ -3,13 +3,11 @@
 `find_gap` does it all. Its stages by themselves: `compare`, `calibrate`, `find_gap(…, separate=False)`, which names, `separate`, `confirm`.
 """
 
-from .detecting import detectable
-from .found import (
+from ..._armrs import (
     Absorbed,
     Alternative,
     ChannelGap,
     Fitted,
-    GapFound,
     GapResult,
     Limit,
     Missing,
@@ -23,6 +21,8 @@ from .found import (
     Tried,
     Value,
 )
+from .detecting import detectable
+from .found import GapFound
 from .search import find_gap
 from .separating import separate
 from .stages import Calibrated, Compared, calibrate, compare, confirm

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ... import _armrs, checks
+from ..._armrs import Limit
 from ...catalogue import catalogue
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset
@@ -14,7 +15,6 @@ from ..movement import Movement
 from ..plan import Instruments
 from ..simulate import Channel, Sensors, simulate
 from .core_input import core_settings, core_trials
-from .found import Limit
 
 _STEP = 0.5e-3
 """Largest step of the simulation [s]."""

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._armrs import Missing, Suspect
 from ...report import plotting
 from ...report.figures import Drawn, Figures, slug
 from . import maps
 from .core_input import channel_names, is_led
-from .found import GapFound, Missing, Suspect
+from .found import GapFound
 from .headline import place_of
 from .shapes import Portrait, portrait, telling_trial
 from .summary import summary

@@ -7,48 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
-from ..._armrs import (
-    Absorbed,
-    Alternative,
-    ChannelGap,
-    Fitted,
-    GapResult,
-    Limit,
-    Missing,
-    Open,
-    Place,
-    Rung,
-    Screening,
-    Separation,
-    SimulatedTrial,
-    Suspect,
-    Tried,
-    Value,
-)
+from ..._armrs import Absorbed, ChannelGap, GapResult, Limit, Missing, Place, Rung, SimulatedTrial
 from ...io.dataset import Dataset
 from ...model import Model
 from ...tabular import Tabular, Tidy
 from ..identify import Estimate
-
-__all__ = [
-    "Absorbed",
-    "Alternative",
-    "ChannelGap",
-    "Fitted",
-    "GapFound",
-    "GapResult",
-    "Limit",
-    "Missing",
-    "Open",
-    "Place",
-    "Rung",
-    "Screening",
-    "Separation",
-    "SimulatedTrial",
-    "Suspect",
-    "Tried",
-    "Value",
-]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ... import _armrs
+from ..._armrs import Place, SimulatedTrial
 from ...io.dataset import Dataset
 from ...io.trial import Trial
-from .found import Place, SimulatedTrial
 
 _MOVING = 0.1
 """Share of a joint's fastest speed in a trial below which it counts as resting."""

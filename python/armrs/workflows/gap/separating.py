@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ... import _armrs
+from ..._armrs import Alternative, Missing, Separation
 from ...errors import ArmrsError, SimulationError
 from ...io.trial import Trial
 from ...model import Model
@@ -15,7 +16,7 @@ from ..identify import core_columns
 from ..movement import Movement
 from ..simulate import Sensors, simulate
 from .core_input import core_settings, core_trials, is_led
-from .found import Alternative, GapFound, Missing, Separation
+from .found import GapFound
 
 SPEEDS = (0.15, 1.2)
 """Largest joint speeds of the movements that are tried, as far as the limits allow [rad/s]."""

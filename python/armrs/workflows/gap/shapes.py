@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ... import _armrs
+from ..._armrs import Missing
 from ...catalogue import catalogue
 from ...model import Effect
 from . import maps
 from .core_input import channel_names, core_settings, core_trials, is_led
-from .found import GapFound, Missing
+from .found import GapFound
 
 _BINS = 24
 _FEWEST = 8

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ... import _armrs, checks
+from ..._armrs import Absorbed, ChannelGap, Place, Suspect
 from ...custom_effects import OwnEffect
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset, load_dataset, naming_trials
@@ -19,7 +20,7 @@ from ...report.figures import shown
 from ...report.plain import data_of, origin
 from . import figures, maps, suspicion
 from .core_input import channel_names, core_settings, core_trials, is_led
-from .found import Absorbed, ChannelGap, GapFound, Place, Suspect
+from .found import GapFound
 
 Source = Dataset | str | os.PathLike[str]
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._armrs import ChannelGap, Missing
 from ...catalogue import Kind, catalogue
 from ...report import plotting
 from ...report.figures import Drawn
 from ...report.sketch import sketch
 from ...report.tables import number, spread, unit
-from .found import ChannelGap, GapFound, Missing
+from .found import GapFound
 from .headline import still_open
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import _armrs
+from ..._armrs import SimulatedTrial
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.plausibility import refuse_implausible
@@ -15,7 +16,6 @@ from ...io.trial import Trial, constant
 from ..setup import refuse_wrong_setup
 from .between_samples import unresolved
 from .core_input import core_settings, core_trials
-from .found import SimulatedTrial
 
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
