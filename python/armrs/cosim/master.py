@@ -342,8 +342,8 @@ class _Run:
             self.y[places] = self.factor[places] * self.raw[places] + self.offset[places]
 
     def _advance(self, i: int, time: float, step: float) -> None:
-        self.evaluations += 1
         n = self.between.begin(i, self.slaves[i], step) if self.output_names[i] else 1
+        self.evaluations += n
         for k in range(n):
             self._make(i, time + k * (step / n), step / n)
             if k + 1 < n:
@@ -485,7 +485,7 @@ class _Run:
             residual_max=float(np.max(np.abs(off))),
             residual_rms=float(np.sqrt(np.mean(off**2))),
             energy_exchanged=float(np.max(np.abs(exchanged[:, k]))) if has_dual else None,
-            energy_created=float(created[-1, k]) if has_dual else None,
+            energy_created=float(created[-1, k]) + 0.0 if has_dual else None,
         )
 
 
