@@ -263,12 +263,12 @@ def test_the_samples_of_a_refined_run_are_of_the_run_that_is_reported(late: Path
 
 
 def test_differences_of_rounding_are_no_finding() -> None:
-    """A wave that moves nothing: the two runs are the same but for rounding."""
+    """An arm that hangs still: the two runs are the same but for rounding."""
     still = Slave(load_model(ARM), start=np.radians([-90.0, 0.0]), name="arm")
     run = run_checked(couple([still, Slot()], [("arm.handle.r[2]", "slot.r")], step=0.01, duration=0.1))
     assert run.verdict == "good"
     assert all(estimate.error == 0.0 for estimate in run.estimates)
-    assert "is the same in both runs but for rounding; an event" in run.why
+    assert "; both runs are the same but for rounding; an event" in run.why
 
 
 class Slot(Ready):

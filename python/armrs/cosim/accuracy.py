@@ -13,7 +13,7 @@ from .between import Jump
 from .coupled import Coupled
 from .master import LITTLE, run_system
 from .slave import Slave
-from .system import System, family
+from .system import System, family, parted
 
 _ROUNDING = 1e-9
 """Difference of two runs that is rounding, in units of the largest change of a variable."""
@@ -53,8 +53,6 @@ class Estimate:
     @property
     def text(self) -> str:
         """What is off, and by how much, for people."""
-        if not self.error:
-            return f"{self.name} is the same in both runs but for rounding"
         size = f"{self.error:.3g} {self.unit}".strip()
         allowed = f"allowed is {self.allowed:.3g} {self.unit}".strip()
         if self.at is None:
@@ -112,7 +110,8 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
         reason = _jumps(run, again)
         if worst.most <= worst.allowed and not reason:
-            why = f"the estimated errors are within the accuracy; at most {worst.text}{_looked(run)}"
+            most = f"at most {worst.text}" if worst.error else "both runs are the same but for rounding"
+            why = f"the estimated errors are within the accuracy; {most}{_looked(run)}"
             text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
             halved = (*system.warnings, *run.warnings, text_of_step) if halvings else run.warnings
             return dataclasses.replace(run, verdict="good", why=why, warnings=(*halved, *_computed_late(run, again)))
@@ -130,12 +129,12 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
 def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
     """Estimate the errors of a run from one with half its step."""
     connected = [".".join(c.source) for c in run.system.connections]
-    angles = [name for name in run.columns if name.partition(".")[2].startswith("q[")]
+    angles = [name for name in run.columns if parted(name, run.system.slaves)[1].startswith("q[")]
     found = []
     for name in dict.fromkeys([*connected, *angles]):
         if name not in run.columns or name not in finer.columns:
             continue
-        slave, _, variable = name.partition(".")
+        slave, variable = parted(name, run.system.slaves)
         described = run.system.slaves[slave].variable(variable)
         coarse, fine = run.columns[name], np.interp(run.t, finer.t, finer.columns[name])
         change = max(float(np.max(np.abs(fine - fine[0]))), LITTLE * abs(described.nominal))
@@ -171,7 +170,7 @@ def _beyond(t: np.ndarray, finer: np.ndarray, values: np.ndarray) -> tuple[float
 def _large_jumps(run: Coupled, finer: Coupled) -> Iterator[tuple[str, str, list[Jump]]]:
     """Give every output with jumps above the accuracy: its name, its unit, and these jumps."""
     for name, found in finer.jumps.items():
-        slave, _, variable = name.partition(".")
+        slave, variable = parted(name, run.system.slaves)
         described, values = run.system.slaves[slave].variable(variable), finer.columns[name]
         change = max(float(np.max(np.abs(values - values[0]))), LITTLE * abs(described.nominal))
         yield name, described.unit or "", [jump for jump in found if jump.size > run.system.accuracy * change]

@@ -331,9 +331,7 @@ class _Run:
             try:
                 self.slaves[i].set(self.input_names[i], values[self.into[i]])
             except SlaveError as error:
-                if error.status != Status.DISCARD:
-                    raise
-                raise _Failed(f"{self.slaves[i].name}: {error.message}") from None
+                raise self._not_done(i, error) from None
 
     def _take(self, i: int) -> None:
         if self.output_names[i]:
@@ -354,14 +352,17 @@ class _Run:
             done = self.slaves[i].do_step(time, step)
         except SlaveError as error:
             # Of a partner in another process an input that is discarded comes to light here.
-            if error.status != Status.DISCARD:
-                raise
-            raise _Failed(f"{self.slaves[i].name}: {error.message}") from None
+            raise self._not_done(i, error) from None
         if done.terminate:
             raise _Ended(f"{self.slaves[i].name} asks to end the run in the step from {time:.6g} s; the samples end there")
         if done.status == Status.DISCARD:
             reached = f", it came to {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
             raise _Failed(f"{self.slaves[i].name} discards the step from {time:.6g} s{reached}: {done.message}")
+
+    def _not_done(self, i: int, error: SlaveError) -> Exception:
+        """Name the slave of a call that it did not do."""
+        text = f"{self.slaves[i].name}: {error.message}"
+        return _Failed(text) if error.status == Status.DISCARD else SlaveError(error.function, error.status, text)
 
     # ---- what is kept
     def _record(self, time: float) -> None:

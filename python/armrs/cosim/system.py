@@ -384,10 +384,16 @@ def family(variable: Variable) -> str | None:
     return None
 
 
+def parted(text: str, slaves: Iterable[str]) -> tuple[str, str]:
+    """Return the names of slave and variable; that of a slave may contain dots, as that of a file may."""
+    name = max((known for known in slaves if text.startswith(f"{known}.")), key=len, default=text.partition(".")[0])
+    return name, text[len(name) + 1 :]
+
+
 def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str, str]]:
     """Return the variables that a name stands for: itself, or all of its indices."""
     text = checks.text(key, value)
-    name, _, variable = text.partition(".")
+    name, variable = parted(text, slaves)
     if name not in slaves:
         raise unknown_name(key, name, slaves, what="slave")
     known = slaves[name].variables
