@@ -14,6 +14,7 @@ from armrs.cosim.accuracy import run_checked
 from armrs.cosim.between import outliers, parts
 from armrs.cosim.coupled import Coupled
 from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.isolated import IsolatedSlave
 from armrs.cosim.master import run_system
 from armrs.cosim.partner import Partner
 from armrs.cosim.ready import Ready, Wave
@@ -262,6 +263,16 @@ def test_the_samples_of_a_refined_run_are_of_the_run_that_is_reported(late: Path
     assert run.evaluations == 2.0
 
 
+def test_a_partner_that_fails_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("pythonfmu")
+    text = LATE.replace("self.steps += 1.0", "self.steps = 1.0 / (0.05 - current_time if current_time < 0.05 else 0.0)")
+    (tmp_path / "pd.py").write_text(text, encoding="utf-8")
+    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "pd.py"], check=True, cwd=tmp_path, capture_output=True)
+    with IsolatedSlave(tmp_path / "Pd.fmu", name="pd") as partner, pytest.raises(CoupledError) as error:
+        run_checked(controlled(partner, 0.01))
+    assert str(error.value).startswith("failed: do_step: fatal error: pd: ")
+
+
 def test_differences_of_rounding_are_no_finding() -> None:
     """An arm that hangs still: the two runs are the same but for rounding."""
     still = Slave(load_model(ARM), start=np.radians([-90.0, 0.0]), name="arm")
@@ -342,7 +353,10 @@ def test_the_advice_names_what_the_partners_can_do(can_rollback: bool) -> None:
 
 
 def test_an_arm_that_pushes_has_its_contact_inside_already() -> None:
-    arms = [Slave(load_model(ARM), port=port, start=NEAR, rest=port == "motion", name=name) for name, port in (("led", "force"), ("leading", "motion"))]
+    arms = [
+        Slave(load_model(ARM), port=port, start=NEAR, rest=port == "motion", name=name)
+        for name, port in (("led", "force"), ("leading", "motion"))
+    ]
     lines = [("led.handle.r", "leading.robot.r"), ("led.handle.v", "leading.robot.v"), ("leading.contact.F", "led.handle.F")]
     with pytest.raises(CoupledError, match=r"take a shorter step or the iterated algorithm$"):
         run_system(couple(arms, lines, step=0.001, duration=0.5))

@@ -179,8 +179,13 @@ def _large_jumps(run: Coupled, finer: Coupled) -> Iterator[tuple[str, str, list[
 def _computed_late(run: Coupled, finer: Coupled) -> list[str]:
     """Say which outputs jump where their slaves begin: the first step is made with values that no step computed."""
     first = (finer.resolution or 0.0) * (1.0 + 1e-9)
-    late = [(name, f"{jump.size:.3g} {unit}".strip()) for name, unit, large in _large_jumps(run, finer) for jump in large if jump.time <= first]
-    return [f"{name} jumps by {size} in the first step of its slave; if its initialization does not compute it, compute it there" for name, size in late]
+    late = [
+        (name, f"{jump.size:.3g} {unit}".strip()) for name, unit, large in _large_jumps(run, finer) for jump in large if jump.time <= first
+    ]
+    return [
+        f"{name} jumps by {size} in the first step of its slave; if its initialization does not compute it, compute it there"
+        for name, size in late
+    ]
 
 
 def _jumps(run: Coupled, finer: Coupled) -> str:

@@ -123,7 +123,9 @@ class System:
             f"{name}.{v.name}"
             for name, slave in self.slaves.items()
             for v in slave.variables.values()
-            if v.causality == "input" and not v.name.startswith("der(") and not any((name, element) in driven for element in [v.name, *v.elements])
+            if v.causality == "input"
+            and not v.name.startswith("der(")
+            and not any((name, element) in driven for element in [v.name, *v.elements])
         ]
 
     @property

@@ -9,7 +9,6 @@ from ..report import console
 from .archive import archive
 from .description import read_description
 
-
 _NUMBERS = ("maxOutputDerivativeOrder", "fixedInternalStepSize", "recommendedIntermediateInputSmoothness")
 """Capabilities that are no truth values."""
 
