@@ -180,6 +180,7 @@ BOTH: dict[str, tuple[Change, str]] = {
     "variable without a name": (edit(' name="gravity"', ""), "name"),
     "two variables of one name": (edit(r'name="tau\[2\]"', 'name="tau[1]"'), "2 variables have this name"),
     "name that is not structured": (edit('name="gravity"', 'name="gravity!"'), "no structured name"),
+    "quoted name with a letter beyond ASCII": (edit('name="gravity"', "name=\"'größe'.g\""), "letters, digits and marks of ASCII"),
     "unknown causality": (edit('causality="input"', 'causality="inputs"'), "inputs"),
     "unknown variability": (edit('variability="continuous"', 'variability="smooth"'), "smooth"),
     "unknown initial": (edit('initial="exact"', 'initial="exactly"'), "exactly"),

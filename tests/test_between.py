@@ -14,6 +14,7 @@ from armrs.cosim.accuracy import run_checked
 from armrs.cosim.between import outliers, parts
 from armrs.cosim.coupled import Coupled
 from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.isolated import IsolatedSlave
 from armrs.cosim.master import run_system
 from armrs.cosim.partner import Partner
 from armrs.cosim.ready import Ready, Wave
@@ -178,11 +179,117 @@ def test_what_is_a_jump() -> None:
     assert outliers(np.array([[1.0]])).tolist() == [[0.0]]
 
 
-def test_a_jump_where_a_step_begins_is_told_from_what_the_inputs_do() -> None:
-    """0.1 ms after a communication point, of a partner whose spring follows the hand at once."""
-    run = run_checked(with_edges(0.1001, 0.1601, 0.001, spring=True))
+@pytest.mark.parametrize("begin", [0.1004, 0.1006])
+def test_a_jump_is_told_from_what_the_inputs_do(begin: float) -> None:
+    """Before and just after the middle of a communication step, of a partner whose spring follows the hand at once."""
+    run = run_checked(with_edges(begin, 0.1601, 0.001, spring=True))
     assert run.verdict == "stable"
     assert any("edges.F jumps by" in text for text in run.warnings), run.warnings
+
+
+@pytest.mark.parametrize("spring", [False, True])
+def test_two_runs_tell_what_a_jump_just_after_a_communication_point_does(spring: bool) -> None:
+    run = run_checked(with_edges(0.1001, 0.1601, 0.001, spring=spring))
+    assert run.verdict == "good"
+    fine = run_system(with_edges(0.1001, 0.1601, 2e-5, spring=spring))
+    for estimate in run.estimates:
+        truth = np.interp(run.t, fine.t, fine.columns[estimate.name])
+        assert np.abs(run.columns[estimate.name] - truth).max() <= estimate.allowed, estimate
+
+
+# ---- partners that compute their outputs in a step alone
+LATE = """
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+
+class Pd(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.q, self.w, self.u, self.on, self.steps = 0.0, 0.0, 0.0, False, 0.0
+        for name in ("q", "w"):
+            self.register_variable(Real(name, causality=Fmi2Causality.input))
+        self.register_variable(Boolean("on", causality=Fmi2Causality.input, variability=Fmi2Variability.discrete))
+        for name in ("u", "steps"):
+            self.register_variable(Real(name, causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        self.u = 40.0 * (-1.0 - self.q) - 4.0 * self.w if self.on else 0.0
+        self.steps += 1.0
+        return True
+"""
+
+
+@pytest.fixture(scope="module")
+def late(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A controller as most are written for PythonFMU: its output is computed in do_step."""
+    pytest.importorskip("pythonfmu")
+    folder = tmp_path_factory.mktemp("late")
+    (folder / "pd.py").write_text(LATE, encoding="utf-8")
+    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "pd.py"], check=True, cwd=folder, capture_output=True)
+    return folder / "Pd.fmu"
+
+
+def controlled(partner: Partner, step: float, **settings: float) -> System:
+    arm = Slave(load_model(ARM), start=np.radians([-60.0, 20.0]), name="arm")
+    lines = [("arm.q[1]", "pd.q"), ("arm.qd[1]", "pd.w"), ("pd.u", "arm.tau[1]")]
+    return couple([partner, arm], lines, step=step, duration=0.5, starts={"pd": {"on": True}}, **settings)
+
+
+def test_an_output_that_the_initialization_does_not_compute_is_named_and_its_effect_is_estimated(late: Path) -> None:
+    """It keeps its start value during the first step; the second run halves that step, too."""
+    with ImportedSlave(late, name="pd") as partner:
+        system = controlled(partner, 0.0005, accuracy=0.02)
+        run = run_checked(system)
+        partner.reset()
+        fine = run_system(controlled(partner, 2e-5))
+    assert run.verdict == "good"
+    [text] = [w for w in run.warnings if "first step" in w]
+    assert text == "pd.u jumps by 1.89 in the first step of its slave; if its initialization does not compute it, compute it there"
+    # Nothing is driven but the truth value, which was given.
+    assert system.unconnected == ["arm.handle.F[1]", "arm.handle.F[2]", "arm.tau[2]"]
+    for estimate in run.estimates:
+        # Where it begins, the output is its start value in every run.
+        truth = np.interp(run.t[1:], fine.t, fine.columns[estimate.name])
+        assert np.abs(run.columns[estimate.name][1:] - truth).max() <= estimate.most * 1.05, estimate
+
+
+def test_the_samples_of_a_refined_run_are_of_the_run_that_is_reported(late: Path) -> None:
+    """Its partner makes one step for each communication step, as in any run."""
+    with ImportedSlave(late, name="pd") as partner:
+        run = run_checked(controlled(partner, 0.004, accuracy=0.08, refine=3))
+    assert run.verdict == "good"
+    assert run.system.step < 0.004
+    assert run.columns["pd.steps"].tolist() == list(range(len(run.t)))
+    assert run.evaluations == 2.0
+
+
+def test_a_partner_that_fails_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("pythonfmu")
+    text = LATE.replace("self.steps += 1.0", "self.steps = 1.0 / (0.05 - current_time if current_time < 0.05 else 0.0)")
+    (tmp_path / "pd.py").write_text(text, encoding="utf-8")
+    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "pd.py"], check=True, cwd=tmp_path, capture_output=True)
+    with IsolatedSlave(tmp_path / "Pd.fmu", name="pd") as partner, pytest.raises(CoupledError) as error:
+        run_checked(controlled(partner, 0.01))
+    assert str(error.value).startswith("failed: do_step: fatal error: pd: ")
+
+
+def test_differences_of_rounding_are_no_finding() -> None:
+    """An arm that hangs still: the two runs are the same but for rounding."""
+    still = Slave(load_model(ARM), start=np.radians([-90.0, 0.0]), name="arm")
+    run = run_checked(couple([still, Slot()], [("arm.handle.r[2]", "slot.r")], step=0.01, duration=0.1))
+    assert run.verdict == "good"
+    assert all(estimate.error == 0.0 for estimate in run.estimates)
+    assert "; both runs are the same but for rounding; an event" in run.why
+
+
+class Slot(Ready):
+    """Takes a position and does nothing."""
+
+    def __init__(self) -> None:
+        super().__init__("slot", [("r", "m")], [("F", "N")])
+
+    def outputs(self) -> dict[str, float]:
+        return {"F": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -246,7 +353,10 @@ def test_the_advice_names_what_the_partners_can_do(can_rollback: bool) -> None:
 
 
 def test_an_arm_that_pushes_has_its_contact_inside_already() -> None:
-    arms = [Slave(load_model(ARM), port=port, start=NEAR, rest=True, name=name) for name, port in (("led", "force"), ("leading", "motion"))]
+    arms = [
+        Slave(load_model(ARM), port=port, start=NEAR, rest=port == "motion", name=name)
+        for name, port in (("led", "force"), ("leading", "motion"))
+    ]
     lines = [("led.handle.r", "leading.robot.r"), ("led.handle.v", "leading.robot.v"), ("leading.contact.F", "led.handle.F")]
     with pytest.raises(CoupledError, match=r"take a shorter step or the iterated algorithm$"):
         run_system(couple(arms, lines, step=0.001, duration=0.5))

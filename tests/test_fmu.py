@@ -276,6 +276,9 @@ def test_export_info_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     assert (data["token"], data["fmi_version"], data["capabilities"]["canGetAndSetFMUState"]) == (token, "3.0", "true")
     assert cli.main(["fmu", "info", "arm.fmu"]) == 0
     assert "contact.F[1]" in capsys.readouterr().out
+    repacked(Path("arm.fmu"), Path("one.fmu"), "modelDescription.xml", lambda data: data.replace(b'FMUState="true"', b'FMUState="1"'))
+    assert cli.main(["fmu", "info", "one.fmu"]) == 0
+    assert "canGetAndSetFMUState                    true\n" in capsys.readouterr().out
     assert cli.main(["fmu", "check", "arm.fmu"]) == 0
     assert capsys.readouterr().out == "arm.fmu: nothing wrong found\n"
     # At rest: nothing moves.

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from armrs import cli
 from armrs.cosim import Slave
 from armrs.cosim.accuracy import run_checked
-from armrs.cosim.ready import Impedance, Pid, Wave
+from armrs.cosim.ready import Impedance, Pid, Ready, Wave
 from armrs.cosim.system import couple, load_system
 from armrs.errors import BadInput
 from armrs.model import Contact, Joint, Model, Segment
@@ -139,3 +139,20 @@ def test_what_a_ready_partner_cannot_be_is_refused(table: str, message: str, tmp
         load_system(path)
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_names_with_dots_quotes_and_letters_beyond_ascii_are_ends_of_connections() -> None:
+    class Quoted(Ready):
+        def __init__(self) -> None:
+            super().__init__("my.größe", [("'länge ü.x'.r[1]", "m"), ("'länge ü.x'.r[2]", "m")], [("öl", "m")])
+
+        def outputs(self) -> dict[str, float]:
+            return {"öl": 0.0}
+
+    system = couple([Wave("constant", unit="m", name="w"), Quoted()], [("w.y", "my.größe.'länge ü.x'.r[2]")])
+    assert system.connections[0].target == ("my.größe", "'länge ü.x'.r[2]")
+    run = run_checked(system)
+    assert run.verdict == "good"
+    assert run.tidy().units["my.größe.öl"] == "m"
+    with pytest.raises(BadInput, match="unknown slave 'your'"):
+        couple([Wave("constant", name="w"), Quoted()], [("w.y", "your.größe.x")])

@@ -117,6 +117,18 @@ def test_a_system_goes_there_and_back(folder: Path) -> None:
         np.testing.assert_array_equal(found[name], values)
 
 
+def test_the_example_goes_there_and_back(folder: Path) -> None:
+    """Two arms hand in hand: energies have the same sign where they are read back."""
+    system = load_system(ARM.parent / "two-arms.toml")
+    read = load_ssp(export_ssp(system, folder / "two-arms.ssp"))
+    lines = [{(c.source, c.target, c.within, c.dual, c.sign) for c in each.connections} for each in (system, read)]
+    assert lines[0] == lines[1]
+    expected, found = ran(system), ran(read)
+    assert float(np.ptp(expected["two.contact.F[1]"])) > 1.0
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values)
+
+
 def test_the_standard_s_schema_takes_it(folder: Path) -> None:
     fmpy, etree = pytest.importorskip("fmpy"), pytest.importorskip("lxml.etree")
     system = load_system(arms(folder))

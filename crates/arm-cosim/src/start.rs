@@ -1,5 +1,7 @@
 //! Where an arm starts, found by looking at the arm.
 
+use arm_sim::SimulationError;
+
 use crate::plant::plant;
 use crate::quantity::Quantity;
 use crate::spec::ArmSpec;
@@ -18,13 +20,12 @@ impl ArmSpec {
         Ok(self)
     }
 
-    /// The same arm at rest near its start, in equilibrium with what its port gives at the start: on the spring of the
-    /// contact, or hanging from the base without a force.
+    /// The same arm at rest, in the stable equilibrium to which it comes from its start with what its port gives there: on
+    /// the spring of the contact, or without a force on it.
     ///
     /// # Errors
-    /// [`Refused`] where there is no equilibrium.
-    pub fn at_rest(mut self) -> Result<Self, Refused> {
-        self.check()?;
+    /// [`SimulationError::NoEquilibrium`] where there is none near; others for an arm that the core refuses.
+    pub fn at_rest(mut self) -> Result<Self, SimulationError> {
         let mut plant = plant(&self)?;
         for axis in 0..2 {
             plant.set_input(Quantity::RobotPosition(axis), self.start.handle[axis]);

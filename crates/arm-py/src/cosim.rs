@@ -2,7 +2,7 @@
 
 use arm_core::Chain;
 use arm_cosim::{ArmSpec, Fmi, Initial, Refused, Slave, SlaveState, Variable};
-use arm_sim::Port;
+use arm_sim::{Port, SimulationError};
 use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -47,19 +47,19 @@ impl Coupling {
         }
         spec.step = self.step;
         (spec.start.q, spec.start.qd) = (self.q.clone(), self.qd.clone());
-        let made = match self.handle {
-            Some(handle) => {
-                spec.start.handle = handle;
-                Ok(spec)
+        match self.handle {
+            Some(handle) => spec.start.handle = handle,
+            None => spec = spec.with_handle_at_tip().map_err(refused)?,
+        }
+        if !self.rest {
+            return Ok(spec);
+        }
+        spec.at_rest().map_err(|error| match error {
+            SimulationError::NoEquilibrium(why) => {
+                bad_input("start", why, "angles near which the arm can rest")
             }
-            None => spec.with_handle_at_tip(),
-        };
-        let made = if self.rest {
-            made.and_then(ArmSpec::at_rest)
-        } else {
-            made
-        };
-        made.map_err(refused)
+            other => refused(other.into()),
+        })
     }
 }
 

@@ -63,16 +63,9 @@ pub enum SimulationError {
         /// Longest reach \[m\].
         max: f64,
     },
-    /// No static equilibrium was found from the angles given.
-    #[error(
-        "start: found no static equilibrium near the given angles ({residual:.3} N m are left after {iterations} iterations), allowed angles near which the arm can rest; a joint that neither a stiffness nor the handle holds falls away"
-    )]
-    NoEquilibrium {
-        /// Largest torque left \[N m\], or gap left \[m\].
-        residual: f64,
-        /// Newton iterations made.
-        iterations: usize,
-    },
+    /// The arm does not come to rest near the angles given.
+    #[error("start: found {0}, allowed are angles near which the arm can rest")]
+    NoEquilibrium(#[from] NoRest),
     /// The tip cannot be brought to the handle.
     #[error("the tip of the arm is {gap} m from the handle that holds it rigidly")]
     Gap {
@@ -125,6 +118,58 @@ pub enum SimulationError {
         /// What was asked of it.
         what: &'static str,
     },
+}
+
+/// Why an arm has no equilibrium near given angles.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoRest {
+    /// None was found.
+    #[error(
+        "no static equilibrium near these angles ({residual:.3} N m are left after {iterations} iterations)"
+    )]
+    Unbalanced {
+        /// Largest torque left \[N m\], or gap left \[m\].
+        residual: f64,
+        /// Steps of the search.
+        iterations: usize,
+    },
+    /// A maximum or a saddle of the potential energy.
+    #[error(
+        "an equilibrium that is not stable, such as an upright arm; angles a few degrees beside it may do"
+    )]
+    Unstable,
+    /// Nothing holds a joint.
+    #[error(
+        "that joint {} turns more than twice, for nothing holds it",
+        joint + 1
+    )]
+    FallsAway {
+        /// Zero-based joint.
+        joint: usize,
+    },
+    /// It comes to rest elsewhere.
+    #[error(
+        "that joint {} comes to rest {:.0}° from its angle, more than half a turn; the arm rests at {}°",
+        joint + 1,
+        turned.to_degrees(),
+        degrees(rest)
+    )]
+    Far {
+        /// Zero-based joint.
+        joint: usize,
+        /// How far it turns \[rad\].
+        turned: f64,
+        /// Angles at which the arm rests \[rad\].
+        rest: Vec<f64>,
+    },
+}
+
+fn degrees(angles: &[f64]) -> String {
+    let listed: Vec<String> = angles
+        .iter()
+        .map(|angle| format!("{}", (angle.to_degrees() * 1e4).round() / 1e4))
+        .collect();
+    listed.join(",")
 }
 
 /// Refuses a setting that is not finite.

@@ -4,7 +4,8 @@ use arm_core::effect::{MAX_STATES, Motion, dry_friction};
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
-use crate::error::finite;
+use crate::equilibrium::Balance;
+use crate::error::{NoRest, finite};
 use crate::model::{Link, Model};
 use crate::state::{Input, State};
 
@@ -41,12 +42,34 @@ pub(crate) fn given<const N: usize>(
     Ok((state.q, state.qd))
 }
 
-/// The static equilibrium near given angles: `G + R = τ + Jᵀ F` at rest.
+/// The static equilibrium to which an arm comes from given angles: `G + R = τ + Jᵀ F` at rest, and stable.
 ///
 /// Dry friction can hold a joint in a whole range of angles. What the handle leaves free, the last joints first, stays where it
 /// was given if its friction can hold it there; the other joints come to rest as if shaken, where they need no friction. Where
 /// that is nowhere, as few joints as possible are held by friction.
+///
+/// # Errors
+/// [`SimulationError::NoEquilibrium`] where there is none within half a turn of each angle.
 pub(crate) fn equilibrium<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    near: &Joints<f64, N>,
+) -> Result<Joints<f64, N>, SimulationError> {
+    let rest = nearest(model, input, near)?;
+    let turned = |&j: &usize| (rest[j] - near[j]).abs() > core::f64::consts::PI;
+    match (0..N).find(turned) {
+        None => Ok(rest),
+        Some(joint) => Err(NoRest::Far {
+            joint,
+            turned: rest[joint] - near[joint],
+            rest: rest.iter().copied().collect(),
+        }
+        .into()),
+    }
+}
+
+/// The equilibrium with as many joints held by dry friction as it can hold.
+fn nearest<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     near: &Joints<f64, N>,
@@ -159,7 +182,7 @@ fn settled<const N: usize>(
     balanced(model, input, (&(q + along_y * y + along_z * z), held))
 }
 
-/// The equilibrium by Newton's method with halved steps: the angles, and the force of a rigid coupling.
+/// The equilibrium to which the joints come that are not held: the angles, and the force of a rigid coupling.
 ///
 /// With a rigid coupling the force on the arm is unknown too, and the gap between handle and tip must vanish.
 fn balanced<const N: usize>(
@@ -167,9 +190,8 @@ fn balanced<const N: usize>(
     input: &Input<f64, N>,
     (near, held): (&Joints<f64, N>, &[bool; N]),
 ) -> Result<Vec<f64>, SimulationError> {
-    let rigid = matches!(model.link, Link::Rigid);
     let mut x: Vec<f64> = near.iter().copied().collect();
-    if rigid {
+    if matches!(model.link, Link::Rigid) {
         x.extend([0.0; 2]);
     }
     let stiffest = match &model.link {
@@ -185,8 +207,6 @@ fn balanced<const N: usize>(
     };
     // A torque counts by the angle that it turns a joint by, where that is more than 1 rad/(N m): an arm may be light.
     let unit = stiffness(&residual, &x, N).min(1.0);
-    // A stiff contact turns the rounding of a position into a force.
-    let enough = BALANCED + 1e-15 * stiffest / unit;
     let size = |r: &[f64]| {
         let sizes = r.iter().enumerate().map(|(i, v)| {
             let torque = i < N && !held[i];
@@ -194,36 +214,14 @@ fn balanced<const N: usize>(
         });
         sizes.fold(0.0, |m: f64, v| if v <= m { m } else { v })
     };
-    let mut r = residual(&x);
-    for iteration in 0..ITERATIONS {
-        if size(&r) < enough {
-            return Ok(x);
-        }
-        let failed = SimulationError::NoEquilibrium {
-            residual: size(&r),
-            iterations: iteration,
-        };
-        let Some(step) = newton_step(&residual, &x, &r) else {
-            return Err(failed);
-        };
-        let mut fraction = 1.0;
-        loop {
-            let tried: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x - fraction * s).collect();
-            let left = residual(&tried);
-            if size(&left) < size(&r) {
-                (x, r) = (tried, left);
-                break;
-            }
-            fraction *= 0.5;
-            if fraction < 1e-6 {
-                return Err(failed);
-            }
-        }
-    }
-    Err(SimulationError::NoEquilibrium {
-        residual: size(&r),
-        iterations: ITERATIONS,
-    })
+    let balance = Balance {
+        residual: &residual,
+        held,
+        size: &size,
+        // A stiff contact turns the rounding of a position into a force.
+        enough: BALANCED + 1e-15 * stiffest / unit,
+    };
+    balance.settle(x)
 }
 
 /// Largest change of a torque with an angle \[N m/rad\]; 1 where none changes.
@@ -279,43 +277,4 @@ fn gap<const N: usize>(
     let at = model.tip(q, &Pose::new(q));
     let handle = input.handle.position;
     [handle[0] - at[0], handle[1] - at[1]]
-}
-
-/// Solution of `(∂r/∂x) s = r`, with central differences and Gaussian elimination; nothing where it is singular.
-fn newton_step(residual: &impl Fn(&[f64]) -> Vec<f64>, x: &[f64], r: &[f64]) -> Option<Vec<f64>> {
-    const SMALL: f64 = 1e-6;
-    let n = x.len();
-    let mut rows: Vec<Vec<f64>> = r
-        .iter()
-        .map(|r| [vec![0.0; n], vec![*r]].concat())
-        .collect();
-    for k in 0..n {
-        let shifted = |by: f64| {
-            let mut x = x.to_vec();
-            x[k] += by;
-            residual(&x)
-        };
-        let (more, less) = (shifted(SMALL), shifted(-SMALL));
-        for (i, row) in rows.iter_mut().enumerate() {
-            row[k] = (more[i] - less[i]) / (2.0 * SMALL);
-        }
-    }
-    for k in 0..n {
-        let largest = |a: &usize, b: &usize| rows[*a][k].abs().total_cmp(&rows[*b][k].abs());
-        let pivot = (k..n).max_by(largest)?;
-        rows.swap(k, pivot);
-        let head = rows[k].clone();
-        for row in rows.iter_mut().skip(k + 1) {
-            let factor = row[k] / head[k];
-            for (value, above) in row.iter_mut().zip(&head).skip(k) {
-                *value -= factor * above;
-            }
-        }
-    }
-    let mut step = vec![0.0; n];
-    for k in (0..n).rev() {
-        let known: f64 = (k + 1..n).map(|c| rows[k][c] * step[c]).sum();
-        step[k] = (rows[k][n] - known) / rows[k][k];
-    }
-    step.iter().all(|s| s.is_finite()).then_some(step)
 }

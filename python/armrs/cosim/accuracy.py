@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
 
 from ..errors import CoupledError
+from .between import Jump
 from .coupled import Coupled
 from .master import LITTLE, run_system
 from .slave import Slave
-from .system import System, family
+from .system import System, family, parted
 
+_ROUNDING = 1e-9
+"""Difference of two runs that is rounding, in units of the largest change of a variable."""
 _SHARE = 4.0 / 3.0
 """Error of a run in units of its difference from one with half the step, for a coupling of second order; 2 for the first order, and 1 for
 very high ones, so that this is within a factor of 1.5 of either."""
@@ -64,7 +67,8 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
     The error of every output that is connected, and of the angles of every arm, is estimated as 4/3 of the difference between the two
     runs. In the second run slaves make each step in parts no longer than the resolution of the system, so that a pulse of a partner
     between the communication points is seen. What a jump within a communication step does to the others, this does not tell: such a run
-    is stable. Where an error is too large or not known, and the system allows it, the step is halved further.
+    is stable. Where an error is too large or not known, and the system allows it, the run itself is made again with half the step, and
+    judged in the same way.
 
     Parameters
     ----------
@@ -106,29 +110,31 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
         reason = _jumps(run, again)
         if worst.most <= worst.allowed and not reason:
-            if halvings:
-                text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
-                run = dataclasses.replace(run, warnings=(*system.warnings, *run.warnings, text_of_step))
-            return dataclasses.replace(
-                run, verdict="good", why=f"the estimated errors are within the accuracy; at most {worst.text}{_looked(run)}"
-            )
+            most = f"at most {worst.text}" if worst.error else "both runs are the same but for rounding"
+            why = f"the estimated errors are within the accuracy; {most}{_looked(run)}"
+            text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
+            halved = (*system.warnings, *run.warnings, text_of_step) if halvings else run.warnings
+            return dataclasses.replace(run, verdict="good", why=why, warnings=(*halved, *_computed_late(run, again)))
         if worst.most <= worst.allowed and halvings == system.refine:
             return dataclasses.replace(run, estimates=(), warnings=(*run.warnings, f"the error is not estimated: {reason}"))
         if halvings == system.refine:
             raise _refused(run, f"{worst.text}; take a shorter step")
-        run = again
+        # In the second run slaves make their steps in parts, which is not what a run with half the step does.
+        for slave in finer.slaves.values():
+            slave.reset()
+        run = run_system(finer, progress=progress)
     raise AssertionError
 
 
 def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
     """Estimate the errors of a run from one with half its step."""
     connected = [".".join(c.source) for c in run.system.connections]
-    angles = [name for name in run.columns if name.partition(".")[2].startswith("q[")]
+    angles = [name for name in run.columns if parted(name, run.system.slaves)[1].startswith("q[")]
     found = []
     for name in dict.fromkeys([*connected, *angles]):
         if name not in run.columns or name not in finer.columns:
             continue
-        slave, _, variable = name.partition(".")
+        slave, variable = parted(name, run.system.slaves)
         described = run.system.slaves[slave].variable(variable)
         coarse, fine = run.columns[name], np.interp(run.t, finer.t, finer.columns[name])
         change = max(float(np.max(np.abs(fine - fine[0]))), LITTLE * abs(described.nominal))
@@ -137,6 +143,7 @@ def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
         most, at = 0.0, 0.0
         if name in connected:
             most, at = max(finer.beyond.get(name, (0.0, 0.0)), _beyond(run.t, finer.t, finer.columns[name]))
+        error, most = (0.0 if size <= _ROUNDING * change else size for size in (error, most))
         if family(described) == "Float" or most:
             found.append(
                 Estimate(
@@ -160,17 +167,34 @@ def _beyond(t: np.ndarray, finer: np.ndarray, values: np.ndarray) -> tuple[float
     return float(beyond[worst]), float(finer[worst])
 
 
+def _large_jumps(run: Coupled, finer: Coupled) -> Iterator[tuple[str, str, list[Jump]]]:
+    """Give every output with jumps above the accuracy: its name, its unit, and these jumps."""
+    for name, found in finer.jumps.items():
+        slave, variable = parted(name, run.system.slaves)
+        described, values = run.system.slaves[slave].variable(variable), finer.columns[name]
+        change = max(float(np.max(np.abs(values - values[0]))), LITTLE * abs(described.nominal))
+        yield name, described.unit or "", [jump for jump in found if jump.size > run.system.accuracy * change]
+
+
+def _computed_late(run: Coupled, finer: Coupled) -> list[str]:
+    """Say which outputs jump where their slaves begin: the first step is made with values that no step computed."""
+    first = (finer.resolution or 0.0) * (1.0 + 1e-9)
+    late = [
+        (name, f"{jump.size:.3g} {unit}".strip()) for name, unit, large in _large_jumps(run, finer) for jump in large if jump.time <= first
+    ]
+    return [
+        f"{name} jumps by {size} in the first step of its slave; if its initialization does not compute it, compute it there"
+        for name, size in late
+    ]
+
+
 def _jumps(run: Coupled, finer: Coupled) -> str:
     """Return which output has jumps whose effect on the others two runs cannot tell."""
     accuracy, resolution = run.system.accuracy, finer.resolution or 0.0
-    for name, found in finer.jumps.items():
-        slave, _, variable = name.partition(".")
-        described, values = run.system.slaves[slave].variable(variable), finer.columns[name]
-        change = max(float(np.max(np.abs(values - values[0]))), LITTLE * abs(described.nominal))
-        large = [jump for jump in found if jump.size > accuracy * change]
+    for name, unit, large in _large_jumps(run, finer):
         for jump in large:
             if not jump.at_point:
-                size = f"{jump.size:.3g} {described.unit or ''}".strip()
+                size = f"{jump.size:.3g} {unit}".strip()
                 where = f"within the communication step at {jump.time:.6g} s"
                 return f"{name} jumps by {size} {where}; put a communication point there, or take a shorter step"
         # How long the value between two jumps lasts is known to within the resolution at either end.

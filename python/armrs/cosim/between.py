@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -26,7 +27,8 @@ class Jump:
         End of the part of a step in which it is [s].
     size : float
     at_point : bool
-        Whether a communication point of the first run is at this end, so that the jump may be there.
+        Whether a communication point of the first run is at either end of this part, so that the jump may be there. One just after such a
+        point delays what the others get by less than a step, and by half of that in the second run: two runs tell its effect.
     """
 
     time: float
@@ -89,8 +91,8 @@ class Between:
         self._seen: dict[int, list[tuple[float, np.ndarray]]] = {}
         # Of slaves without inputs: everything that was seen, with whether a communication point of the run follows.
         self._series: dict[int, list[tuple[float, np.ndarray, bool]]] = {}
-        # Of the others: what changes where a step begins.
-        self._first: dict[int, list[tuple[float, np.ndarray]]] = {}
+        # Of the others: what changes where a step begins, and whether a communication point of the run is there.
+        self._first: dict[int, list[tuple[float, np.ndarray, bool]]] = {}
         self._is_second = False
 
     def begin(self, i: int, slave: Partner, step: float) -> int:
@@ -121,7 +123,7 @@ class Between:
                 self._keep_most(places, beyond, times)
             if self._driven[i]:
                 rows, times = np.vstack([rows, end[places]]), np.append(times, time)
-                self._first.setdefault(i, []).append((times[0], rows[0] - start[places]))
+                self._first.setdefault(i, []).append((times[0], rows[0] - start[places], not self._is_second))
                 at_point = [False] * (len(seen) - 1) + [self._is_second]
                 self._list(places, outliers(np.diff(rows, axis=0)), times[1:], at_point)
             else:
@@ -134,10 +136,11 @@ class Between:
         """Look for jumps in what was seen in several steps."""
         for i, series in self._series.items():
             found = outliers(np.diff([row for _, row, _ in series], axis=0))
-            self._list(self._out_of[i], found, [at for at, _, _ in series[1:]], [at_point for _, _, at_point in series[1:]])
+            at_point = [before or after for (_, _, before), (_, _, after) in pairwise(series)]
+            self._list(self._out_of[i], found, [at for at, _, _ in series[1:]], at_point)
         for i, first in self._first.items():
-            found = outliers(np.array([change for _, change in first]))
-            self._list(self._out_of[i], found, [at for at, _ in first], [False] * len(first))
+            found = outliers(np.array([change for _, change, _ in first]))
+            self._list(self._out_of[i], found, [at for at, _, _ in first], [at_point for _, _, at_point in first])
         for found_of in self.jumps:
             found_of.sort(key=lambda jump: jump.time)
 

@@ -11,7 +11,7 @@ import numpy as np
 from .. import views
 from ..tabular import Labelled, Series, Tidy
 from .between import Jump
-from .system import Connection, System
+from .system import Connection, System, parted
 
 RESULTS = ("stable", "good", "ended")
 """Verdicts of runs whose numbers may be used."""
@@ -97,8 +97,9 @@ class Coupled(Series):
 
     def _units(self) -> dict[str, str]:
         """Return the unit of each output."""
-        parted = {name: name.partition(".") for name in self.columns}
-        return {name: self.system.slaves[slave].variable(variable).unit or "" for name, (slave, _, variable) in parted.items()}
+        slaves = self.system.slaves
+        places = {name: parted(name, slaves) for name in self.columns}
+        return {name: slaves[slave].variable(variable).unit or "" for name, (slave, variable) in places.items()}
 
     def tidy(self) -> Tidy:
         """Return every output at every communication point."""

@@ -331,9 +331,7 @@ class _Run:
             try:
                 self.slaves[i].set(self.input_names[i], values[self.into[i]])
             except SlaveError as error:
-                if error.status != Status.DISCARD:
-                    raise
-                raise _Failed(f"{self.slaves[i].name}: {error.message}") from None
+                raise self._not_done(i, error) from None
 
     def _take(self, i: int) -> None:
         if self.output_names[i]:
@@ -342,8 +340,8 @@ class _Run:
             self.y[places] = self.factor[places] * self.raw[places] + self.offset[places]
 
     def _advance(self, i: int, time: float, step: float) -> None:
-        self.evaluations += 1
         n = self.between.begin(i, self.slaves[i], step) if self.output_names[i] else 1
+        self.evaluations += n
         for k in range(n):
             self._make(i, time + k * (step / n), step / n)
             if k + 1 < n:
@@ -354,14 +352,17 @@ class _Run:
             done = self.slaves[i].do_step(time, step)
         except SlaveError as error:
             # Of a partner in another process an input that is discarded comes to light here.
-            if error.status != Status.DISCARD:
-                raise
-            raise _Failed(f"{self.slaves[i].name}: {error.message}") from None
+            raise self._not_done(i, error) from None
         if done.terminate:
             raise _Ended(f"{self.slaves[i].name} asks to end the run in the step from {time:.6g} s; the samples end there")
         if done.status == Status.DISCARD:
             reached = f", it came to {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
             raise _Failed(f"{self.slaves[i].name} discards the step from {time:.6g} s{reached}: {done.message}")
+
+    def _not_done(self, i: int, error: SlaveError) -> Exception:
+        """Name the slave of a call that it did not do."""
+        text = f"{self.slaves[i].name}: {error.message}"
+        return _Failed(text) if error.status == Status.DISCARD else SlaveError(error.function, error.status, text)
 
     # ---- what is kept
     def _record(self, time: float) -> None:
@@ -485,7 +486,7 @@ class _Run:
             residual_max=float(np.max(np.abs(off))),
             residual_rms=float(np.sqrt(np.mean(off**2))),
             energy_exchanged=float(np.max(np.abs(exchanged[:, k]))) if has_dual else None,
-            energy_created=float(created[-1, k]) if has_dual else None,
+            energy_created=float(created[-1, k]) + 0.0 if has_dual else None,
         )
 
 

@@ -117,13 +117,15 @@ class System:
 
     @property
     def unconnected(self) -> list[str]:
-        """Inputs that nothing drives, but for derivatives of others; they keep their start values."""
-        driven = {c.target for c in self.connections}
+        """Inputs that nothing drives and that were given no start value, but for derivatives of others; they keep their own."""
+        driven = {c.target for c in self.connections} | {(name, v) for name, given in self.starts.items() for v in given}
         return [
             f"{name}.{v.name}"
             for name, slave in self.slaves.items()
             for v in slave.variables.values()
-            if v.causality == "input" and not v.name.startswith("der(") and not any((name, element) in driven for element in v.elements)
+            if v.causality == "input"
+            and not v.name.startswith("der(")
+            and not any((name, element) in driven for element in [v.name, *v.elements])
         ]
 
     @property
@@ -316,15 +318,18 @@ def _slave(table: dict[str, Any], folder: Path) -> Partner:
             raise BadInput("start_deg", degrees, "a list of numbers, one a joint")
         degrees = [np.radians(checks.number(f"start_deg[{k}]", item)) for k, item in enumerate(degrees)]
     settings = {"step": table["inner_step_s"]} if "inner_step_s" in table else {}
-    return Slave(
-        path,
-        port=table.get("port", "force"),
-        start=degrees,
-        rest=checks.flag("rest", table.get("rest", False)),
-        handle=table.get("handle_m"),
-        name=table.get("name"),
-        **settings,
-    )
+    try:
+        return Slave(
+            path,
+            port=table.get("port", "force"),
+            start=degrees,
+            rest=checks.flag("rest", table.get("rest", False)),
+            handle=table.get("handle_m"),
+            name=table.get("name"),
+            **settings,
+        )
+    except BadInput as error:
+        raise error if error.file or error.place != "start" else BadInput("start_deg", error.found, error.allowed) from None
 
 
 def _connections(table: dict[str, Any], slaves: dict[str, Partner], warnings: list[str]) -> list[Connection]:
@@ -381,10 +386,16 @@ def family(variable: Variable) -> str | None:
     return None
 
 
+def parted(text: str, slaves: Iterable[str]) -> tuple[str, str]:
+    """Return the names of slave and variable; that of a slave may contain dots, as that of a file may."""
+    name = max((known for known in slaves if text.startswith(f"{known}.")), key=len, default=text.partition(".")[0])
+    return name, text[len(name) + 1 :]
+
+
 def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str, str]]:
     """Return the variables that a name stands for: itself, or all of its indices."""
     text = checks.text(key, value)
-    name, _, variable = text.partition(".")
+    name, variable = parted(text, slaves)
     if name not in slaves:
         raise unknown_name(key, name, slaves, what="slave")
     known = slaves[name].variables
@@ -409,16 +420,17 @@ def _within(target: tuple[str, str], variable: Variable, slaves: dict[str, Partn
 def _dual(given: object, target: tuple[str, str], slaves: dict[str, Partner]) -> tuple[str | None, float]:
     """Return what makes a power with an input, for the ports of an arm without being told."""
     known = slaves[target[0]].variables
-    if given is not None:
-        name = checks.text("dual", given)
-        if name not in known:
-            raise unknown_name("dual", name, known, what=f"variable of {target[0]}")
-        one, other = slaves[target[0]].variable(target[1]).exponents, known[name].exponents
-        if one is not None and other is not None and tuple(a + b for a, b in zip(one[:3], other[:3], strict=True)) != _POWER:
-            raise BadInput("dual", name, f"a variable that makes a power with {target[1]}")
-        return name, 1.0
+    own: tuple[str | None, float] = (None, 1.0)
     for stem, dual, sign in (("handle.F", "handle.v", 1.0), ("robot.v", "contact.F", -1.0)):
         match = re.fullmatch(rf"{re.escape(stem)}(\[\d+\])", target[1])
         if match and f"{dual}{match[1]}" in known:
-            return f"{dual}{match[1]}", sign
-    return None, 1.0
+            own = f"{dual}{match[1]}", sign
+    if given is None or given == own[0]:
+        return own
+    name = checks.text("dual", given)
+    if name not in known:
+        raise unknown_name("dual", name, known, what=f"variable of {target[0]}")
+    one, other = slaves[target[0]].variable(target[1]).exponents, known[name].exponents
+    if one is not None and other is not None and tuple(a + b for a, b in zip(one[:3], other[:3], strict=True)) != _POWER:
+        raise BadInput("dual", name, f"a variable that makes a power with {target[1]}")
+    return name, 1.0

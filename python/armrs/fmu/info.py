@@ -9,6 +9,9 @@ from ..report import console
 from .archive import archive
 from .description import read_description
 
+_NUMBERS = ("maxOutputDerivativeOrder", "fixedInternalStepSize", "recommendedIntermediateInputSmoothness")
+"""Capabilities that are no truth values."""
+
 
 def about(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return what an FMU says of itself, as it is written to JSON."""
@@ -26,10 +29,15 @@ def about(path: str | os.PathLike[str]) -> dict[str, Any]:
         "token": description.token,
         "interfaces": list(description.interfaces),
         "platforms": platforms,
-        "capabilities": {key: value for key, value in description.flags.items() if key != "modelIdentifier"},
+        "capabilities": {key: _flag(key, value) for key, value in description.flags.items() if key != "modelIdentifier"},
         "experiment": description.experiment,
         "variables": [{key: getattr(v, key) for key in keys} for v in description.variables],
     }
+
+
+def _flag(key: str, value: str) -> str:
+    """Return a capability as it is written by most: XML also has 1 and 0 for truth values."""
+    return value if key in _NUMBERS else {"1": "true", "0": "false"}.get(value.strip(), value)
 
 
 def info_words(data: dict[str, Any]) -> None:
@@ -49,5 +57,12 @@ def info_words(data: dict[str, Any]) -> None:
     if data["description"]:
         print(f"\n{data['description']}")
     print()
-    rows = [(v["name"], v["causality"], v["unit"] or "-", "-" if v["start"] is None else str(v["start"])) for v in data["variables"]]
+    rows = [(v["name"], v["causality"], v["unit"] or "-", _start(v["start"])) for v in data["variables"]]
     console.table(("variable", "causality", "unit", "start"), rows, left=4)
+
+
+def _start(value: Any) -> str:
+    """Return a start value as it is written in TOML; the values of an array with spaces between them."""
+    if isinstance(value, tuple):
+        return " ".join(map(_start, value))
+    return "-" if value is None else str(value).lower() if isinstance(value, bool) else str(value)

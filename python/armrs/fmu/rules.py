@@ -16,7 +16,8 @@ from .description import Description, Unit, finite
 Broken = tuple[str, str]
 """Place and text of what is wrong."""
 
-_IDENTIFIER = r"(?:[A-Za-z_][A-Za-z0-9_]*|'(?:[^'\\]|\\.)+')"
+# Quoted names have letters, digits and marks of ASCII alone (FMI 2.0.5 section 2.2.9; FMPy takes the same rule for FMI 3.0).
+_IDENTIFIER = r"""(?:[A-Za-z_][A-Za-z0-9_]*|'(?:[A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+')"""
 _INDEX = r"\[[0-9]+(?:,[0-9]+)*\]"
 _PATH = rf"{_IDENTIFIER}(?:{_INDEX})?(?:\.{_IDENTIFIER}(?:{_INDEX})?)*"
 _STRUCTURED = re.compile(rf"(?:{_PATH}|der\({_PATH}(?:,[1-9][0-9]*)?\))")
@@ -275,7 +276,7 @@ def _variable(v: Variable, description: Description) -> Iterator[str]:
         yield "a name that is empty or holds a line end or a tabulator"
     convention = description.root.get("variableNamingConvention", "flat")
     if convention == "structured" and not _STRUCTURED.fullmatch(v.name):
-        yield "no structured name, such as body[1].m"
+        yield "no structured name, such as body[1].m or 'body 1'.m, of letters, digits and marks of ASCII"
 
 
 def _start(v: Variable) -> Iterator[str]:
