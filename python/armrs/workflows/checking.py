@@ -185,7 +185,8 @@ def _remedy(error: ArmrsError) -> str:
         return "repair the sensor and record again, or leave the trial out of dataset.toml"
     if "if read otherwise" in str(error.found):
         return "import the recordings again and let armrs import find the convention, or correct the columns"
-    if place.startswith(("column", "line", "row", "Fy", "q", "angles")):
+    of_samples = error.file is None or Path(error.file).suffix != ".toml"
+    if of_samples and place.startswith(("column", "line", "row", "Fy", "q", "angles")):
         return "correct the column: its unit, its sign, or its values"
     return "correct it in the file that it names"
 
