@@ -29,16 +29,19 @@ def faults_of(path: Path) -> list[BadInput]:
     """
     document = tomlfile.read(path)
     found: list[BadInput] = []
-    while len(found) < _MOST:
-        try:
-            Description.from_dict(document)
-        except BadInput as error:
-            found.append(error.within(file=path))
-            if not _mend(document, error):
-                break
-        else:
+    while len(found) < _MOST and (error := _first(document)) is not None:
+        found.append(error.within(file=path))
+        if not _mend(document, error):
             break
     return found
+
+
+def _first(document: dict[str, Any]) -> BadInput | None:
+    try:
+        Description.from_dict(document)
+    except BadInput as error:
+        return error
+    return None
 
 
 def _mend(document: dict[str, Any], error: BadInput) -> bool:

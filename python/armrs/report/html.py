@@ -19,6 +19,8 @@ from ..io import files
 TEMPLATES = Path(__file__).with_name("templates")
 CONTENTS = Markup("<!-- contents -->")
 """Where a part of a page has its table of contents."""
+_PHONE = 640
+"""Widest image that a phone shows whole [pixels]."""
 _HEADING = re.compile(r"<h2>(.*?)</h2>", flags=re.S)
 
 __all__ = [
@@ -44,6 +46,15 @@ class Picture:
     title: str
     text: str
     source: str | None
+
+    @property
+    def is_broad(self) -> bool:
+        """Whether a phone, which shows it at half its size, does not show all of it at once."""
+        if self.source is None:
+            return False
+        # Width and height stand behind 16 bytes of every PNG image.
+        head = base64.b64decode(self.source.partition(",")[2][:32])
+        return int.from_bytes(head[16:20], "big") > _PHONE
 
 
 def environment(*folders: Path) -> Environment:

@@ -27,6 +27,9 @@ STEPS = {
 }
 """The models that are compared: colour, name, width and dash of their lines."""
 
+_ROUNDING = 1e-9
+"""A channel [rad, N, N m] that changes by no more does not change."""
+
 
 def gap(result: GapFound) -> Figures:
     """Return the figures of what the workflow found; `section` of each is the part of the report that it belongs to."""
@@ -174,7 +177,7 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
     """Draw one effect by itself: its law along the movements with its interval, and what it changes in the channels."""
     seen = portrait(result, effect)
     rows = np.empty((0, 0)) if seen.changed is None else seen.changed
-    changed = [c for c in range(rows.shape[1]) if np.abs(rows[:, c]).max() > 0]
+    changed = [c for c in range(rows.shape[1]) if np.abs(rows[:, c]).max() > _ROUNDING]
     names = channel_names(result.dataset, is_led(result.dataset))
     panels = int(seen.torque is not None) + len({names[c].rsplit("_", 1)[1] for c in changed})
     figure = plotting.figure(6.0 if panels < 2 else 10.6, 3.2)
@@ -183,8 +186,8 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
     if seen.torque is not None:
         _law(axes.pop(0), seen, seen.torque)
         text = (
-            f"Left, the torque with which the joint resists along the fit trials against its {seen.against}; the band is the 95 % interval "
-            "of its size. Grey bars are the mean torque that was measured there beyond everything else in the model, and its scatter. "
+            f"Left, its torque against the {seen.against} along the fit trials, with the 95 % interval of its size (band), and what was "
+            "measured beyond everything else (grey: mean and scatter of trials). "
         )
     for unit in dict.fromkeys(names[c].rsplit("_", 1)[1] for c in changed):
         ax = axes.pop(0)
@@ -199,7 +202,8 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=5, columnspacing=1.2, handlelength=1.6)
     if changed:
         start = "Right, w" if seen.torque is not None else "W"
-        text += f"{start}hat it changes in the channels of {seen.trial}, simulated with it less without it."
+        which = "the trial in which it was" if effect.trial is not None else "the test trial in which it changes most"
+        text += f"{start}hat it changes in {seen.trial}, {which}: simulated with it less without it."
     if not panels:
         axes[0].set_axis_off()
         axes[0].text(0.0, 0.5, "not drawn: it cannot be simulated by itself")

@@ -104,7 +104,7 @@ def _how(alternative: Mapping[str, Any]) -> str:
     worse = alternative.get("worse")
     if worse is None:
         return str(alternative["why"])
-    return alternative["why"] + (f", misfit greater by {worse:.2g}" if worse >= 0.1 else ", misfit no greater")
+    return alternative["why"] + (f", by {worse:.2g} units less" if worse >= 0.1 else ", by no less")
 
 
 def apart(result: Mapping[str, Any]) -> list[str]:
@@ -289,5 +289,5 @@ def calibration(data: Mapping[str, Any]) -> Table:
         for a in data["calibration"]
     ]
     beyond = any(row[-1] for row in rows)
-    head = ["what", "refitted by", "known beforehand to", "unit", "but"]
+    head = ["what", "refitted by", "known beforehand to (2 σ)", "unit", "but"]
     return Table(head if beyond else head[:-1], rows if beyond else [row[:-1] for row in rows], 1)
