@@ -449,7 +449,7 @@ def _number(value: float, line: Line | None = None) -> str:
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
-_MOVING = "a joint rubs, and may stick, which the straight law of the analysis does not follow at every moment"
+_MOVING = "a joint rubs and may stick, which the analysis follows only roughly"
 
 
 def doubts(results: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -491,7 +491,8 @@ def _picture(lines: Sequence[Line], doubted: Sequence[str]) -> html.Picture | No
                 if band is not None:
                     ax.barh(row, band[1] - band[0], left=band[0], height=0.62, color=plotting.FAINT)
                 if line.interval is not None:
-                    ax.hlines(row, *line.interval, color=plotting.BLUE, lw=2.6)
+                    low = max(line.interval[0], 0.0) if line.at_limit else line.interval[0]
+                    ax.hlines(row, low, line.interval[1], color=plotting.BLUE, lw=2.6)
                 ax.plot(line.value, row, "o", color=plotting.BLUE, ms=7)
             ax.set_title(quantity.title)
             ax.set_xlabel(f"[{quantity.unit}]")

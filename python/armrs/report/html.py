@@ -48,13 +48,14 @@ class Picture:
     source: str | None
 
     @property
-    def is_broad(self) -> bool:
-        """Whether a phone, which shows it at half its size, does not show all of it at once."""
+    def shape(self) -> str:
+        """`broad` where a phone, which shows it at half its size, does not show all of it at once; `tall` where it is higher than wide."""
         if self.source is None:
-            return False
+            return ""
         # Width and height stand behind 16 bytes of every PNG image.
         head = base64.b64decode(self.source.partition(",")[2][:32])
-        return int.from_bytes(head[16:20], "big") > _PHONE
+        width, height = (int.from_bytes(head[k : k + 4], "big") for k in (16, 20))
+        return " ".join(name for name, true in (("broad", width > _PHONE), ("tall", height > width)) if true)
 
 
 def environment(*folders: Path) -> Environment:
