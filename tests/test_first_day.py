@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import subprocess
 import sys
 import time
@@ -15,7 +16,7 @@ import armrs
 from armrs import cli
 from armrs.errors import BadInput
 from armrs.io.raw.table import column
-from armrs.report import console
+from armrs.report import console, html, moving, plotting
 from armrs.workflows import demo
 from armrs.workflows.importing import handle
 from armrs.workflows.importing.columns import symbol_of
@@ -203,3 +204,37 @@ def test_work_that_no_terminal_shows_says_what_it_does(monkeypatch: pytest.Monke
         pass
     lines = capsys.readouterr().err.splitlines()
     assert lines == ["armrs: conventions, 40 %, after 0 s"]
+
+
+def test_no_colour_stands_for_two_lines() -> None:
+    """With ten torques and effects, the colours of the cycle began again, and an effect had that of gravity."""
+    effects = tuple(
+        armrs.Effect(kind, 2, parameters=values)
+        for kind, values in (
+            ("viscous", {"viscosity": 0.2}),
+            ("coulomb", {"torque": 0.2}),
+            ("elastic", {"stiffness": 1.0, "rest": 0.9}),
+            ("relaxation", {"stiffness": 0.5, "time": 0.5}),
+            ("quadratic_drag", {"drag": 0.1}),
+        )
+    )
+    model = demo.true_model()
+    n = model.n_joints
+    rest = np.array([-0.8, 0.9, 0.0])[:n]
+    path = armrs.Movement(np.array([rest, rest + 0.3, rest]), speed=0.5, acceleration=2.0)
+    live = moving.simulated(armrs.simulate(model.replace(effects=effects), path, rate=100.0))
+    assert live.series is not None
+    by_name: dict[str, set[str]] = {}
+    for panel in live.series["panels"]:
+        for line in panel["lines"]:
+            by_name.setdefault(line["name"], set()).add(line["colour"])
+    assert all(len(colours) == 1 for colours in by_name.values())
+    assert len(set.union(*by_name.values())) == len(by_name) >= 10
+
+
+@pytest.mark.parametrize(("size", "shape"), [((4.0, 3.0), ""), ((8.0, 3.0), "broad"), ((4.0, 6.0), "tall"), ((8.0, 12.0), "broad tall")])
+def test_a_picture_knows_its_shape(size: tuple[float, float], shape: str) -> None:
+    image = io.BytesIO()
+    plotting.write_png(plotting.figure(*size), image)
+    assert html.Picture("x.png", "x", "x", html.data_uri(image.getvalue())).shape == shape
+    assert html.Picture("x.png", "x", "x", None).shape == ""

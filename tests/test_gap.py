@@ -89,6 +89,8 @@ def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> Non
     assert np.corrcoef(seen.data[np.isfinite(seen.data)], seen.torque[np.isfinite(seen.data)])[0, 1] > 0.95
     assert seen.changed is not None
     assert np.abs(seen.changed[:, 2:]).max() > 0.5
+    # It shows most where the arm is fast.
+    assert seen.trial == "fast_4.csv"
 
 
 def test_a_hidden_viscosity_is_named_with_its_value_and_closes_the_gap(viscous: armrs.GapFound) -> None:

@@ -119,7 +119,7 @@ def _robot(lengths: str, base: str, elbow: Elbow) -> Robot | None:
         except ValueError:
             raise BadInput(option, text or Text("nothing"), f"two numbers [m], {what}, such as 0.47,0.45") from None
         numbers.append((first, second))
-    return Robot(*numbers, elbow.value)
+    return Robot(numbers[0], numbers[1], elbow.value)
 
 
 def _length(text: str) -> float | None:

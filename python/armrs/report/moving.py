@@ -132,7 +132,7 @@ def _measured(beside: Mapping[str, np.ndarray] | None, quantity: str, column: in
 
 def _torques(result: Simulated, joint: int) -> tuple[Line, ...]:
     """Return the torques of a joint that are anywhere different from zero, then the effects that act in it."""
-    colours = plotting.MANY
+    colours = plotting.BESIDE_RED
     visible = {key: label for key, label in TORQUES.items() if np.any(result.columns[f"torque.{key}"])}
     lines = [
         Line(label, colours[k % len(colours)], result.columns[f"torque.{key}"][:, joint]) for k, (key, label) in enumerate(visible.items())

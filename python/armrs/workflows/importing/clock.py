@@ -154,7 +154,7 @@ def _fitted(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, for
         torque = np.einsum("nij,ni->nj", jacobian[inside], force)
         whole = np.column_stack([design[inside].reshape(-1, design.shape[2]), torque.ravel()])
         # The last entry of the triangle is what the columns before leave of the torques.
-        return float(np.linalg.qr(whole, mode="r")[-1, -1] ** 2) / len(whole)  # type: ignore[index, call-overload]
+        return float(np.linalg.qr(whole, mode="r")[-1, -1] ** 2) / len(whole)  # type: ignore[call-overload]
 
     return unexplained
 
