@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from armrs import BadInput, cli
-from armrs.report import clinic, words
+from armrs.report import clinic
+from armrs.report.words import verdict
 
 NORMS = """\
 [[norm]]
@@ -160,7 +161,7 @@ def test_a_resistance_that_may_be_none_is_told_as_a_limit() -> None:
     (line,) = clinic.lines_of(result(verb="passive", curves=[other, curve], history=[]))
     assert clinic.words_of(line)[2:4] == ["none seen", "at most 0.150"]
     named = {**curve, "joint_name": "shoulder"}
-    assert words.verdict({"verb": "passive", "curves": [named]}) == "Half the width of the hysteresis: shoulder at most 0.15 N m (slow)."
+    assert verdict({"verb": "passive", "curves": [named]}) == "Half the width of the hysteresis: shoulder at most 0.15 N m (slow)."
 
 
 @pytest.mark.parametrize(
