@@ -150,9 +150,10 @@ def _ladder(result: GapFound) -> Drawn:
     for number, rung in enumerate(result.ladder, start=1):
         ax.text(0.0, y, f"round {number}", transform=ax.get_yaxis_transform(), ha="left", va="center", fontsize=9, fontweight="bold")
         y += 0.85
-        goes_on = min(rung.tried, key=lambda tried, best=rung.before - rung.after: abs(tried.gain - best))  # type: ignore[misc]
-        for tried in rung.tried:
-            ax.barh(y, max(tried.gain, 0.0), height=0.62, color=plotting.BLUE if tried is goes_on else plotting.SILVER)
+        gains = [tried.gain for tried in rung.tried]
+        goes_on = min(range(len(gains)), key=lambda k, best=rung.before - rung.after, gains=gains: abs(gains[k] - best))  # type: ignore[misc]
+        for k, tried in enumerate(rung.tried):
+            ax.barh(y, max(tried.gain, 0.0), height=0.62, color=plotting.BLUE if k == goes_on else plotting.SILVER)
             ax.text(max(tried.gain, 0.0), y, f"  {tried.gain:.0f}", va="center", fontsize=9, color=plotting.INK)
             ticks.append(y)
             labels.append(" + ".join(place_of(*e) for e in tried.effects))
@@ -165,6 +166,7 @@ def _ladder(result: GapFound) -> Drawn:
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
     ax.set_xlabel("explained, in units of twice the log-likelihood")
+    ax.xaxis.set_major_formatter(lambda value, _: f"{value:.6g}")
     text = (
         "Each round asks the whole catalogue, with segments and calibration refitted; the best few are converged by simulation and "
         "drawn here. The blue one pays best for its freedom and goes on; what no longer pays then is taken out again, so that fewer "
