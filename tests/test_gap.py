@@ -16,7 +16,8 @@ from armrs._armrs import SimulatedTrial
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.model import AddedMass
-from armrs.workflows.gap import calibrate, compare
+from armrs.report import plotting
+from armrs.workflows.gap import calibrate, compare, figures
 from armrs.workflows.gap.results import gap_data, write_gap
 from armrs.workflows.gap.shapes import portrait
 from armrs.workflows.gap.suspicion import _still_joints, examine, refuse_mislabelled
@@ -75,6 +76,15 @@ def test_a_joint_may_have_any_name(viscous: armrs.GapFound, tmp_path: Path) -> N
     written = write_gap(result, gap_data(result), tmp_path)
     assert sum(path.suffix == ".png" for path in written) == 5
     assert name in written[-1].read_text(encoding="utf-8")
+
+
+def test_of_each_round_one_contender_is_blue(viscous: armrs.GapFound) -> None:
+    """None was: the rungs of a result are made anew each time they are asked for."""
+    from matplotlib.colors import to_hex
+
+    axes = figures.gap(viscous)["ladder"]().figure.axes[0]
+    colours = [to_hex(bar.get_facecolor()) for bar in axes.patches]
+    assert colours.count(plotting.BLUE.lower()) == len(viscous.ladder) and len(colours) == sum(len(r.tried) for r in viscous.ladder)
 
 
 def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> None:
