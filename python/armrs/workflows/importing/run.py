@@ -307,9 +307,8 @@ def _origin(
     if not {"Py", "Pz"} <= {c.symbol for c in channels} or any(c.symbol == "qr1" for c in channels):
         return None
     if model.robot is None:
-        notes.append(
-            "positions of the handle: not used, since the model has no [robot] whose angles they would tell; armrs init --robot-lengths-m A,B --robot-base-m Y,Z adds it"
-        )
+        adds = "armrs init --robot-lengths-m A,B --robot-base-m Y,Z adds it"
+        notes.append(f"positions of the handle: not used, since the model has no [robot] whose angles they would tell; {adds}")
         return None
     pairs = [
         (conventions.to_model_angles(_arrays(read, channels, model.n_joints)[1], convention), _positions(read, channels)) for read in reads
