@@ -134,5 +134,5 @@ def check_paper(path: Path) -> None:
         assert seen.page.evaluate(WIDER) == []
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= A4["width"]
         parts = "[...document.querySelectorAll('figure, tr, .panels svg')]"
-        assert seen.page.evaluate(f"{parts}.every(e => getComputedStyle(e.closest('figure, table, svg')).breakInside === 'avoid')")
+        assert seen.page.evaluate(f"{parts}.every(e => getComputedStyle(e.closest('figure, tr, svg')).breakInside === 'avoid')")
         assert seen.page.evaluate(f"Math.max(0, ...{parts}.map(e => e.getBoundingClientRect().height))") <= A4["height"]

@@ -132,3 +132,68 @@ def test_a_subject_takes_the_place_of_a_model(session: Path, tmp_path: Path) -> 
     assert [p.text for p in check_dataset(folder).problems if p.level == "error"] == []
     armrs.convert(folder, tmp_path / "parquet", to="parquet")
     assert armrs.load_dataset(tmp_path / "parquet").model == made
+
+
+FAULTY = """
+name = "x"
+model = "model.toml"
+force_onn = "robot"
+sample_rate = -3
+
+[subject]
+body_mass = 7000
+heigth = 1.8
+
+[tolerance]
+angle_offset_deg = -1
+
+[[trial]]
+file = "trials/slow_1.csv"
+configuration = "slow"
+repeat = 0
+role = "fitt"
+
+[[trial]]
+file = "trials/slow_1.csv"
+configuration = "slow"
+repeat = 2
+role = "fit"
+
+[[trial]]
+configuration = "reach"
+repeat = 1
+color = 3
+"""
+
+
+def test_every_fault_of_a_description_is_told(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One was told at a time."""
+    folder = tmp_path / "set"
+    shutil.copytree(session, folder)
+    (folder / "dataset.toml").write_text(FAULTY, encoding="utf-8")
+    said = [p.text.partition("dataset.toml: ")[2].partition(", allowed")[0] for p in check_dataset(folder).problems]
+    assert said == [
+        "found unknown key 'force_onn'", "[[trial]] 1, repeat: found 0", "[[trial]] 1, role: found 'fitt'",
+        "[[trial]] 3: found unknown key 'color'", "[[trial]] 3, file: found nothing", "[[trial]] 3, role: found nothing",
+        "[[trial]] 2, file: found 'trials/slow_1.csv'", "[subject]: found unknown key 'heigth'", "[subject], body_mass: found 7000.0",
+        "sample_rate: found -3.0", "[tolerance], angle_offset_deg: found -1.0",
+    ]  # fmt: skip
+    assert cli.main(["identify", str(folder)]) == 2
+    assert "and 10 more problems, which armrs check lists" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = [", ["found Invalid value"]),
+        ("trial = 3", ["trial: found 3"]),
+        ('model = "m"\ntrial = [{file = "a", configuration = "b", repeat = 1, role = "test"}]', ["[[trial]]: found no trial with role"]),
+        ("[subject]\nheight = 18\n[[trial]]\nfile = 'a'\nconfiguration = 'b'\nrepeat = 1\nrole = 'fit'", ["[subject], height: found 18.0"]),
+        ("[added]\n[[trial]]\nfile = 'a'\nconfiguration = 'b'\nrepeat = 1\nrole = 'fi'", ["role: found 'fi'", "model: found nothing"]),
+    ],
+)
+def test_what_follows_from_a_fault_is_none(tmp_path: Path, text: str, said: list[str]) -> None:
+    (tmp_path / "dataset.toml").write_text(text, encoding="utf-8")
+    problems = check_dataset(tmp_path).problems
+    assert len(problems) == len(said) and all(part in p.text for part, p in zip(said, problems, strict=True)), problems
+    assert all(p.next_step == "correct it in the file that it names" for p in problems)

@@ -11,6 +11,7 @@ import pytest
 
 from armrs import BadInput, cli
 from armrs.report import clinic
+from armrs.report.words import verdict
 
 NORMS = """\
 [[norm]]
@@ -130,6 +131,37 @@ def test_the_verb_writes_one_page(norms: object, tmp_path: Path, capsys: pytest.
         assert words in page
     # What was found, and its course over the sessions.
     assert page.count('src="data:image/png') == 2
+
+
+def test_intervals_claim_no_more_than_holds(tmp_path: Path) -> None:
+    """They were said to hold the true value in 95 of 100 measurements, also of joints that stick."""
+    rubs = [estimate("coulomb", "torque", 1, 0.2, 0.03)]
+    for name, changes, said in (
+        ("sound", {}, "spring with resistance and friction.<"),
+        ("rubs", {"parameters": rubs}, "too narrow: a joint rubs and may stick"),
+        (
+            "poor",
+            {"warnings": ["the residual of joint 2 is 28% of the variation of its torque"]},
+            "too narrow: the analysis does not describe",
+        ),
+        ("noisy", {"parameters": [{**e, "caveat": "noise"} for e in rubs]}, "speeds are noise to a good part; a joint rubs"),
+    ):
+        source = tmp_path / f"{name}.json"
+        source.write_text(json.dumps(result(**changes)), encoding="utf-8")
+        page = clinic.write_summary([source], tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        caption = page.partition("<figcaption>")[2].partition("/figcaption>")[0]
+        assert said in caption, name
+        assert "95 of 100" not in page
+
+
+def test_a_resistance_that_may_be_none_is_told_as_a_limit() -> None:
+    curve = {"joint": 1, "configuration": "slow", "repeats": 3, "half_width_mean_Nm": 0.06, "half_width_interval_Nm": [-0.03, 0.15]}
+    # The movement with an interval is known better than one with more repeats that share no angle.
+    other = {**curve, "configuration": "fast", "repeats": 4, "half_width_mean_Nm": 0.3, "half_width_interval_Nm": [None, None]}
+    (line,) = clinic.lines_of(result(verb="passive", curves=[other, curve], history=[]))
+    assert clinic.words_of(line)[2:4] == ["none seen", "at most 0.150"]
+    named = {**curve, "joint_name": "shoulder"}
+    assert verdict({"verb": "passive", "curves": [named]}) == "Half the width of the hysteresis: shoulder at most 0.15 N m (slow)."
 
 
 @pytest.mark.parametrize(

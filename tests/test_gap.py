@@ -16,7 +16,8 @@ from armrs._armrs import SimulatedTrial
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.model import AddedMass
-from armrs.workflows.gap import calibrate, compare
+from armrs.report import plotting
+from armrs.workflows.gap import calibrate, compare, figures
 from armrs.workflows.gap.results import gap_data, write_gap
 from armrs.workflows.gap.shapes import portrait
 from armrs.workflows.gap.suspicion import _still_joints, examine, refuse_mislabelled
@@ -77,6 +78,15 @@ def test_a_joint_may_have_any_name(viscous: armrs.GapFound, tmp_path: Path) -> N
     assert name in written[-1].read_text(encoding="utf-8")
 
 
+def test_of_each_round_one_contender_is_blue(viscous: armrs.GapFound) -> None:
+    """None was: the rungs of a result are made anew each time they are asked for."""
+    from matplotlib.colors import to_hex
+
+    axes = figures.gap(viscous)["ladder"]().figure.axes[0]
+    colours = [to_hex(bar.get_facecolor()) for bar in axes.patches]
+    assert colours.count(plotting.BLUE.lower()) == len(viscous.ladder) and len(colours) == sum(len(r.tried) for r in viscous.ladder)
+
+
 def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> None:
     seen = portrait(viscous, viscous.effects[0])
     value = viscous.effects[0].parameters["viscosity"]
@@ -89,6 +99,8 @@ def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> Non
     assert np.corrcoef(seen.data[np.isfinite(seen.data)], seen.torque[np.isfinite(seen.data)])[0, 1] > 0.95
     assert seen.changed is not None
     assert np.abs(seen.changed[:, 2:]).max() > 0.5
+    # It shows most where the arm is fast.
+    assert seen.trial == "fast_4.csv"
 
 
 def test_a_hidden_viscosity_is_named_with_its_value_and_closes_the_gap(viscous: armrs.GapFound) -> None:

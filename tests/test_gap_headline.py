@@ -10,7 +10,7 @@ from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
 from armrs.workflows.gap.headline import headline, still_open
 from armrs.workflows.gap.summary import marks
-from armrs.workflows.gap.words import gap, left
+from armrs.workflows.gap.words import gap, intervals, left, missing, others
 
 
 def channel(before: float, calibrated: float, after: float, floor: float | None) -> dict[str, Any]:
@@ -137,3 +137,23 @@ def test_no_more_than_all_of_a_gap_is_closed() -> None:
 def test_the_rule_of_the_verdict(change: dict[str, Any], verdict: str) -> None:
     """Each limit from both sides: 6 standard deviations, 5 % that may be left where effects were named, twice the noise."""
     assert verdict_of(**({"named": True, "is_open": False, "z": 0.0, "ratio": 1.0, "share": 0.0} | change)) == verdict
+
+
+def test_what_has_no_interval_has_no_columns_for_it() -> None:
+    """Under two columns of dashes it was said that the intervals were widened."""
+    bare = {**DRY, "share": 0.5, "parameters": {"torque": {"value": 0.161, "std": None, "interval": None, "unit": "N m"}}}
+    table = missing(result("unexplained", bare))
+    assert list(table.head) == ["effect", "at", "share", "parameter", "value", "unit"]
+    assert list(table.rows[0]) == ["coulomb", 2, "50%", "torque", "0.161", "N m"]
+    assert intervals(result("unexplained", bare)).startswith("No intervals are given")
+    sized = {**DRY, "share": 0.5, "parameters": {"torque": {**DRY["parameters"]["torque"], "interval": [0.149, 0.173]}}}
+    assert "95 % interval" in missing(result("explained", sized)).head
+    assert intervals(result("explained", sized)) == "An interval holds if the structure of the model is right."
+
+
+def test_alternatives_are_compared_in_one_unit() -> None:
+    """It was called a misfit, as was what is left in units of the floor."""
+    rival = effect("viscous", 2, why="explains these movements nearly as well", worse=7.1)
+    assert others(result("explained", {**DRY, "alternatives": [rival]})) == [
+        "Instead of coulomb in joint 2 it may be viscous in joint 2 (explains these movements nearly as well, by 7.1 units less)."
+    ]

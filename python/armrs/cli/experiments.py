@@ -137,11 +137,14 @@ def plan(
     angles_deg: Annotated[str, typer.Option(metavar="LOW:HIGH,…", help="Range of each joint [deg], first joint first.")],
     out: MaybeFolder = None,
     with_: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--with", metavar="KIND,…", help="Kinds of joint effects (see armrs effects) to be fitted besides those of the model."
+            "--with",
+            metavar="KIND,…",
+            help="Kinds of joint effects (see armrs effects) to be fitted besides those of the model, or none. When absent, as identify: "
+            "elastic, viscous and coulomb in joints without a law.",
         ),
-    ] = "",
+    ] = None,
     speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint [rad/s].")] = 2.0,
     acceleration_rad_s2: Annotated[float, typer.Option(help="Largest acceleration of a joint [rad/s²].")] = 8.0,
     robot_speed_rad_s: Annotated[float, typer.Option(help="Largest speed of a joint of the robot [rad/s].")] = 4.0,
@@ -187,7 +190,7 @@ def plan(
         duration=duration_s,
     )
     other = None if compare is None else load_movement(compare, arm.n_joints)
-    kinds = listed(with_)
+    kinds = None if with_ is None else [kind for kind in listed(with_) if kind != "none"]
     if spasticity is not None and (other is not None or kinds):
         raise BadInput("--spasticity", Text("--compare or --with beside it"), "one of them: stretches are planned for the reflex alone")
     with console.progress("planning"):

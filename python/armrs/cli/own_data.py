@@ -15,6 +15,7 @@ from ..report import console
 from .common import JsonFile, OutFolder, Source, listed, present, writable
 
 if TYPE_CHECKING:
+    from ..model import Robot
     from ..workflows.checking import Checked
     from ..workflows.initialise import Worn
 
@@ -38,6 +39,13 @@ class Zero(str, enum.Enum):
 
     horizontal = "horizontal"
     hanging = "hanging"
+
+
+class Elbow(str, enum.Enum):
+    """Posture of a robot."""
+
+    up = "up"
+    down = "down"
 
 
 class Side(str, enum.Enum):
@@ -65,6 +73,13 @@ def init(
         str,
         typer.Option(metavar="SEGMENT:KG[@M],…", help="Masses worn on segments: number, mass [kg], distance from its joint [m]."),
     ] = "",
+    robot_lengths: Annotated[
+        str, typer.Option("--robot-lengths-m", metavar="A,B", help="Lengths of the two links of a robot that leads the hand [m].")
+    ] = "",
+    robot_base: Annotated[
+        str, typer.Option("--robot-base-m", metavar="Y,Z", help="Its base, forward and up of the first joint of the arm [m].")
+    ] = "",
+    robot_elbow: Annotated[Elbow, typer.Option(help="Whether its elbow is above or below the line from base to hand.")] = Elbow.up,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
     json: JsonFile = None,
 ) -> None:
@@ -79,8 +94,9 @@ def init(
     measured = [_length(part) for part in listed(lengths)]
     if handle:
         worn.append(Worn(len(measured), handle))
+    robot = _robot(robot_lengths, robot_base, robot_elbow)
     writable(folder, json)
-    done = initialise(folder, body_mass=body_mass, height=height, sex=sex.value, lengths=measured, worn=worn, replace=force)
+    done = initialise(folder, body_mass=body_mass, height=height, sex=sex.value, lengths=measured, worn=worn, robot=robot, replace=force)
 
     def human() -> None:
         print(f"Wrote {done.folder / 'model.toml'} and {done.folder / 'dataset.toml'}. Assumed:")
@@ -88,6 +104,22 @@ def init(
             print(f"  {line}")
 
     present(done.to_dict, json, human, f"armrs import RAW… --model {shlex.quote(str(done.folder / 'model.toml'))} -o SESSION")
+
+
+def _robot(lengths: str, base: str, elbow: Elbow) -> Robot | None:
+    """Return the robot that options describe, None where they describe none."""
+    from ..model import Robot
+
+    if not lengths and not base:
+        return None
+    numbers = []
+    for option, text, what in (("--robot-lengths-m", lengths, "lengths of both links"), ("--robot-base-m", base, "forward and up")):
+        try:
+            first, second = (float(part) for part in text.split(","))
+        except ValueError:
+            raise BadInput(option, text or Text("nothing"), f"two numbers [m], {what}, such as 0.47,0.45") from None
+        numbers.append((first, second))
+    return Robot(numbers[0], numbers[1], elbow.value)
 
 
 def _length(text: str) -> float | None:
@@ -112,8 +144,13 @@ def _worn(text: str) -> Worn:
 
 def import_(
     sources: Annotated[list[Path], typer.Argument(metavar="RAW…", help="Recordings, folders of recordings, or one import.toml.")],
-    model: Annotated[Path, typer.Option(metavar="MODEL", help="model.toml of the arm, as armrs init writes it.")],
     out: OutFolder,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL", help="model.toml of the arm, as armrs init writes it; for import.toml, the one beside it when absent."
+        ),
+    ] = None,
     columns: Annotated[
         str,
         typer.Option("--map", metavar="t=NAME,q1=NAME,Fy=-NAME,…", help="Columns not recognised by name; a minus reverses the sign."),
@@ -135,9 +172,10 @@ def import_(
     """
     from ..io.dataset import load_dataset
     from ..report.recording import write_recording
-    from ..workflows.importing import import_recordings
+    from ..workflows.importing import import_recordings, model_file
 
     writable(out, json)
+    arm = model_file(sources, model)
     joints = None if clockwise is None else [_joint(part) for part in listed(clockwise) if part != "none"]
     options = {
         "angles": angles and angles.value, "zero": zero and zero.value, "clockwise": joints,
@@ -147,17 +185,17 @@ def import_(
     if ask and not talking:
         raise BadInput("--ask", Text("no terminal"), "a terminal to ask on, or --map")
     if ask:
-        columns = ",".join(filter(None, [_asked(sources, tuple(listed(points)), model), columns]))
+        columns = ",".join(filter(None, [_asked(sources, tuple(listed(points)), arm), columns]))
     try:
         with console.progress("importing"):
-            done = import_recordings(sources, out, model=model, columns_map=columns, **options)  # type: ignore[arg-type]
+            done = import_recordings(sources, out, model=arm, columns_map=columns, **options)  # type: ignore[arg-type]
     except BadInput as error:
         if ask or columns or not talking or not _about_columns(error):
             raise
         for problem in error.problems if isinstance(error, BadInputs) else (error,):
             print(f"armrs: {problem}", file=sys.stderr)
-        columns = _asked(sources, tuple(listed(points)), model)
-        done = import_recordings(sources, out, model=model, columns_map=columns, **options)  # type: ignore[arg-type]
+        columns = _asked(sources, tuple(listed(points)), arm)
+        done = import_recordings(sources, out, model=arm, columns_map=columns, **options)  # type: ignore[arg-type]
 
     picture = write_recording(load_dataset(done.folder), done.folder)
 
@@ -225,8 +263,8 @@ def check(dataset: Source, json: JsonFile = None) -> int:
     """
     from ..workflows.checking import check_dataset, grouped
 
-    with console.progress("checking"):
-        done = check_dataset(dataset)
+    with console.stages("checking") as tell:
+        done = check_dataset(dataset, progress=tell)
 
     def human() -> None:
         for problem in grouped(done.problems):

@@ -15,9 +15,10 @@ import numpy as np
 
 from .. import checks
 from ..anthropometry import literature_model
-from ..errors import ArmrsError, BadInput, Text
+from ..errors import ArmrsError, BadInput, BadInputs, Text
 from ..model import AddedMass, Description, Model, Subject, Tolerance, TrialEntry, load_model
 from . import files
+from .faults import faults_of
 from .muscle_activity import comparable, mark_activity
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
@@ -257,7 +258,10 @@ def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     path = path / FILE if path.is_dir() else path
     with suppress(OSError):  # a data set may lie where nothing can be written
         files.recover(path.parent)
-    return path, Description.load(path)
+    try:
+        return path, Description.load(path)
+    except BadInput as first:
+        raise BadInputs.of(faults_of(path) or [first]) from None
 
 
 def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: str | None = None) -> Path:

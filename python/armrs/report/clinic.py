@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -204,7 +204,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "next": next_steps(results, lines),
             "trends": _trends(results),
             "sources": list(dict.fromkeys(line.norm.source for line in lines if line.norm is not None)),
-            "picture": _picture(lines),
+            "picture": _picture(lines, [*doubts(results)]),
             "made_by": results[0].get("made_by", {}),
         }
     except BadInput:
@@ -262,13 +262,13 @@ def _apart(lines: Sequence[Line]) -> list[str]:
 
 
 def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]]) -> list[Line]:
-    """Return what slow movements say of each joint, of the movement with most repeats, which is known best."""
+    """Return what slow movements say of each joint, of the movement with an interval and with most repeats, which is known best."""
     lines = []
     for j, joint in enumerate(result["data"]["joints"], start=1):
         own = [c for c in result["curves"] if c["joint"] == j and c.get("half_width_mean_Nm") is not None]
         if not own:
             continue
-        curve = max(own, key=lambda c: c["repeats"])
+        curve = max(own, key=lambda c: (None not in (c.get("half_width_interval_Nm") or (None,)), c["repeats"]))
         for quantity in SLOW:
             course = courses.get((quantity.kind, f"{quantity.parameter} in {curve['configuration']}", j))
             if quantity is HALF_WIDTH:
@@ -286,9 +286,8 @@ def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: M
                     continue
                 value, (low, high) = quantity.factor * found["value"], (quantity.factor * x for x in found["interval"])
             interval = None if low is None or high is None else (low, high)
-            lines.append(
-                Line(joint, quantity, value, interval, usual.get((quantity.kind, quantity.parameter, j)), _trend(course, quantity))
-            )
+            norm, none_seen = usual.get((quantity.kind, quantity.parameter, j)), quantity is HALF_WIDTH and low is not None and low <= 0.0
+            lines.append(Line(joint, quantity, value, interval, norm, _trend(course, quantity), none_seen))
     return lines
 
 
@@ -450,7 +449,24 @@ def _number(value: float, line: Line | None = None) -> str:
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
-def _picture(lines: Sequence[Line]) -> html.Picture | None:
+_MOVING = "a joint rubs and may stick, which the analysis follows only roughly"
+
+
+def doubts(results: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Give why the intervals of these results may be too narrow."""
+    for result in results:
+        estimates = [*result.get("parameters", ()), *result.get("combinations", ())] if result["verb"] == "identify" else []
+        if any(str(warning).startswith("the residual of joint") for warning in result.get("warnings", ())):
+            yield "the analysis does not describe all that was measured"
+        if any(e.get("caveat") for e in estimates):
+            yield "speeds are noise to a good part"
+        if any(e["kind"] == "coulomb" and e["decided_by"] == "data" and e["interval"][0] > 0.0 for e in estimates):
+            yield _MOVING
+        if result.get("verdict") == "unexplained":
+            yield "something acts on the arm that has no name"
+
+
+def _picture(lines: Sequence[Line], doubted: Sequence[str]) -> html.Picture | None:
     """Draw every quantity with its interval, one panel each, the usual range behind."""
     # How far a joint was moved was chosen: the table says it.
     shown = [
@@ -475,7 +491,8 @@ def _picture(lines: Sequence[Line]) -> html.Picture | None:
                 if band is not None:
                     ax.barh(row, band[1] - band[0], left=band[0], height=0.62, color=plotting.FAINT)
                 if line.interval is not None:
-                    ax.hlines(row, *line.interval, color=plotting.BLUE, lw=2.6)
+                    low = max(line.interval[0], 0.0) if line.at_limit else line.interval[0]
+                    ax.hlines(row, low, line.interval[1], color=plotting.BLUE, lw=2.6)
                 ax.plot(line.value, row, "o", color=plotting.BLUE, ms=7)
             ax.set_title(quantity.title)
             ax.set_xlabel(f"[{quantity.unit}]")
@@ -488,5 +505,7 @@ def _picture(lines: Sequence[Line]) -> html.Picture | None:
         image = io.BytesIO()
         plotting.write_png(figure, image)
     grey = " The grey bar is what is usual." if any(line.norm for line in lines) else ""
-    text = f"Points are what was measured; the true value lies within the line in 95 of 100 such measurements.{grey}"
+    sure = "The lines are 95 % intervals. They hold where the joint behaves as a spring with resistance and friction"
+    beside = f"; here they may be too narrow: {'; '.join(dict.fromkeys(doubted))}" if doubted else ""
+    text = f"Points are what was measured. {sure}{beside}.{grey}"
     return html.Picture("summary.png", "Each joint", text, html.data_uri(image.getvalue()))

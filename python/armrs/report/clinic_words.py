@@ -100,10 +100,14 @@ def quantities(result: Mapping[str, Any]) -> Table:
     for q in result["quantities"]:
         mean = f"{tables.number(q['mean'], q['mean_std'])} ± {tables.spread(q['mean_std'])}"
         between, within = (tables.number(q[name], 0.1 * q[name] if q[name] else None) for name in ("between_std", "within_std"))
-        low, high = (tables.number(x, q["mean_std"]) for x in q["norm"])
-        ends = [" … ".join(tables.number(x, q["mean_std"]) for x in q[name]) for name in ("norm_low_interval", "norm_high_interval")]
+        known = [0.25 * (q[name][1] - q[name][0]) for name in ("norm_low_interval", "norm_high_interval")]
+        low, high = (tables.number(x, std) for x, std in zip(q["norm"], known, strict=True))
+        ends = [
+            " … ".join(tables.number(x, std) for x in q[name])
+            for name, std in zip(("norm_low_interval", "norm_high_interval"), known, strict=True)
+        ]
         rows.append([q["name"], q["group"], q["unit"], q["subjects"], mean, between, within, f"{low} … {high}", *ends])
-    head = ["quantity", "group", "unit", "subjects", "mean", "between", "within", "norm band", "its lower end", "its upper end"]
+    head = ["quantity", "group", "unit", "n", "mean", "between", "within", "norm band", "its lower end", "its upper end"]
     return Table(head, rows, left=3)
 
 

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+
+FIRST_LINE = 5.0
+"""Time after which work that is not shown on a terminal says for the first time what it does [s]."""
 
 
 def warn(lines: Iterable[str]) -> None:
@@ -34,7 +39,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, left: int = 
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """Show progress of long work on standard error, when that is a terminal.
+    """Show progress of long work on standard error: a bar on a terminal, elsewhere a line now and then.
 
     Parameters
     ----------
@@ -48,41 +53,72 @@ def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], No
     callable
         Call it with the number of steps that were done since the last call.
     """
-    if not sys.stderr.isatty():
-        yield lambda steps: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    done = 0
 
-    shown = Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
-    )
-    with shown:
-        task = shown.add_task(what, total=total)
-        yield lambda steps: shown.advance(task, steps)
+    def advance(steps: int) -> None:
+        nonlocal done
+        done += steps
+        show(what, done)
+
+    with _shown(what, total) as show:
+        yield advance
 
 
 @contextmanager
 def stages(what: str) -> Iterator[Callable[[str, float], None]]:
-    """Show work that tells its stage and its share, on standard error, when that is a terminal.
+    """Show work that tells its stage and its share, on standard error, as `progress` does.
 
     Yields
     ------
     callable
         Call it with the name of the stage and the share that is done, 0 to 1.
     """
+    with _shown(what, 1.0) as show:
+        yield show
+
+
+@contextmanager
+def _shown(what: str, total: float | None) -> Iterator[Callable[[str, float], None]]:
+    """Give what is called with the name of a stage and what of the total is done."""
     if not sys.stderr.isatty():
-        yield lambda stage, share: None
+        with _lines(what, total) as show:
+            yield show
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    shown = Progress(
+    bar = Progress(
         SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
     )
-    with shown:
-        task = shown.add_task(what, total=1.0)
-        yield lambda stage, share: shown.update(task, description=stage, completed=share)
+    with bar:
+        task = bar.add_task(what, total=total)
+        yield lambda stage, done: bar.update(task, description=stage, completed=done)
+
+
+@contextmanager
+def _lines(what: str, total: float | None) -> Iterator[Callable[[str, float], None]]:
+    """Print what is being done and its share after `FIRST_LINE` and then ever more rarely, so that a log of long work stays short."""
+    state, begun, ended, wait = (what, 0.0), time.monotonic(), threading.Event(), FIRST_LINE
+
+    def show(stage: str, done: float) -> None:
+        nonlocal state
+        state = (stage, done)
+
+    def tell() -> None:
+        nonlocal wait
+        while not ended.wait(wait):
+            stage, done = state
+            share = f", {100.0 * done / total:.0f} %" if total and done else ""
+            print(f"armrs: {stage}{share}, after {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+            wait *= 2.0
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield show
+    finally:
+        ended.set()
+        teller.join()
 
 
 def _cell(item: object) -> str:

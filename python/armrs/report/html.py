@@ -19,6 +19,8 @@ from ..io import files
 TEMPLATES = Path(__file__).with_name("templates")
 CONTENTS = Markup("<!-- contents -->")
 """Where a part of a page has its table of contents."""
+_PHONE = 640
+"""Widest image that a phone shows whole [pixels]."""
 _HEADING = re.compile(r"<h2>(.*?)</h2>", flags=re.S)
 
 __all__ = [
@@ -44,6 +46,16 @@ class Picture:
     title: str
     text: str
     source: str | None
+
+    @property
+    def shape(self) -> str:
+        """`broad` where a phone, which shows it at half its size, does not show all of it at once; `tall` where it is higher than wide."""
+        if self.source is None:
+            return ""
+        # Width and height stand behind 16 bytes of every PNG image.
+        head = base64.b64decode(self.source.partition(",")[2][:32])
+        width, height = (int.from_bytes(head[k : k + 4], "big") for k in (16, 20))
+        return " ".join(name for name, true in (("broad", width > _PHONE), ("tall", height > width)) if true)
 
 
 def environment(*folders: Path) -> Environment:

@@ -132,17 +132,19 @@ def _measured(beside: Mapping[str, np.ndarray] | None, quantity: str, column: in
 
 def _torques(result: Simulated, joint: int) -> tuple[Line, ...]:
     """Return the torques of a joint that are anywhere different from zero, then the effects that act in it."""
-    colours = plotting.CYCLE
+    colours = plotting.BESIDE_RED
+    visible = {key: label for key, label in TORQUES.items() if np.any(result.columns[f"torque.{key}"])}
     lines = [
-        Line(label, colours[k % len(colours)], result.columns[f"torque.{key}"][:, joint])
-        for k, (key, label) in enumerate(TORQUES.items())
-        if np.any(result.columns[f"torque.{key}"])
+        Line(label, colours[k % len(colours)], result.columns[f"torque.{key}"][:, joint]) for k, (key, label) in enumerate(visible.items())
     ]
     acting: Sequence[tuple[str, int]] = result.columns["effects"]
     resisting = result.columns.get("resisting")
     if resisting is None:
         return tuple(lines)
+    # A kind has one colour, in whatever joint it acts.
+    kinds = list(dict.fromkeys(kind for kind, _ in acting))
     for k, (kind, index) in enumerate(acting):
         if index == joint and np.any(resisting[:, k]):
-            lines.append(Line(f"effect: {kind.replace('_', ' ')}", colours[(k + 3) % len(colours)], resisting[:, k], shown=False))
+            colour = colours[(len(visible) + kinds.index(kind)) % len(colours)]
+            lines.append(Line(f"effect: {kind.replace('_', ' ')}", colour, resisting[:, k], shown=False))
     return tuple(lines)

@@ -24,6 +24,10 @@ BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW = "#0072B2", "#E69F00", "#009E73",
 """The palette of Okabe and Ito, the two faintest darkened for thin lines."""
 INK, GREY, SILVER, FAINT = "#222222", "#767676", "#B0B0B0", "#D9D9D9"
 CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, INK)
+MANY = (*CYCLE, "#00365A", "#7A4B00", "#00523B", "#7F1D1D", "#4F1D6B", "#E377A2", "#8DB600", "#7F8FA6")
+"""For more lines than the cycle has colours."""
+BESIDE_RED = tuple(colour for colour in MANY if colour != RED)
+"""For lines that are switched together with the simulated one."""
 
 MARKERS = {"data": (BLUE, "full"), "prior": (GREY, "none"), "bound": (RED, "none")}
 """What decided a value -> colour and fill of its marker."""
@@ -251,7 +255,7 @@ def contributions(t: np.ndarray, torques: Mapping[str, np.ndarray], ax: Axes | N
     """
     ax = _axes(ax)
     for k, (name, values) in enumerate(torques.items()):
-        ax.plot(t, values, color=CYCLE[k % len(CYCLE)], ls=DASHES[(k // 2) % len(DASHES)], label=name)
+        ax.plot(t, values, color=BESIDE_RED[k % len(BESIDE_RED)], ls=DASHES[(k // 2) % len(DASHES)], label=name)
     ax.axhline(0.0, color=INK, lw=0.8)
     ax.set(title=title, ylabel="torque [N m]", xlabel="time [s]")
     _legend(ax)

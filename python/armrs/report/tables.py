@@ -250,7 +250,9 @@ def dependence(data: Mapping[str, Any]) -> Table:
         if any(c[name]["value"] != 0.0 for c in by_name)
     ]
     rows.append(["mean coupling [N m/rad]", *(_with_interval(d["mean_coupling"]) for d in found)])
-    rows.append(["coupled on average", *(f"{'yes' if d['coupled'] else 'no'} (p {_chance(d['p_value'])})" for d in found)])
+    rows.append(
+        ["coupled on average, by this joint alone", *(f"{'yes' if d['coupled'] else 'no'} (p {_chance(d['p_value'])})" for d in found)]
+    )
     rows.append(["linear law enough", *(f"{'yes' if d['linear'] else 'no'} (p {_chance(d['linear_p_value'])})" for d in found)])
     return Table(["", *(f"{d['joint_name']}, {d['adjacent_name']} held" for d in found)], rows)
 
@@ -278,14 +280,15 @@ def predictions(data: Mapping[str, Any]) -> Table:
     rows: list[list[object]] = []
     for k, p in enumerate(data["predictions"]):
         row: list[object] = [
-            course_label(p),
+            label(p),
+            where(p, data["data"]["joints"]),
             *(_known(p[key]) for key in ("value", "std", "std_of_data")),
             unit(p["unit"]),
             percent(p["relative"]),
         ]
         rows.append(row if other is None else [*row, percent(other["predictions"][k]["relative"])])
-    head = ["parameter", "value", "std to expect", "std of the data", "unit", "relative"]
-    return Table(head if other is None else [*head, "compared"], rows)
+    head = ["quantity", "where", "believed", "± std to expect", "± std of the data", "unit", "relative"]
+    return Table(head if other is None else [*head, "compared"], rows, left=2)
 
 
 def percent(share: float | None) -> str:

@@ -112,8 +112,9 @@ def _passive(result: Mapping[str, Any]) -> str:
         return "No joint moved far enough in both directions to tell its passive moment."
     parts = []
     for curve in result["curves"]:
-        half = curve["half_width_mean_Nm"]
-        parts.append(f"{curve['joint_name']} {half:.3g} N m ({curve['configuration']})")
+        low, high = curve.get("half_width_interval_Nm") or (None, None)
+        size = f"{curve['half_width_mean_Nm']:.3g}" if low is None or not low <= 0.0 else f"at most {high:.2g}"
+        parts.append(f"{curve['joint_name']} {size} N m ({curve['configuration']})")
     return f"Half the width of the hysteresis: {'; '.join(parts)}."
 
 

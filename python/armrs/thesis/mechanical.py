@@ -304,7 +304,7 @@ def expected(exact: bool) -> dict[str, float]:
     believed = people.mechanical(True).replace(segment_uncertainty=demo.TOO_HEAVY - 1.0)
     path = Movement(MECHANICAL_PATH.waypoints, speed=SPEED, acceleration=0.2)
     promised = Tolerance(0.0, 0.0, 0.0, 0.0, 0.0) if exact else Tolerance()
-    plan = forecast(believed, [path], repeats=MEASUREMENTS, instruments=Instruments(tolerance=promised))
+    plan = forecast(believed, [path], repeats=MEASUREMENTS, with_effects=(), instruments=Instruments(tolerance=promised))
     named = {p.name.replace("*", "·") if p.joint is None else f"τp{p.joint}": 100.0 * p.std / p.value for p in plan.predictions}
     return {name: named[name] for name in LIMITS}
 

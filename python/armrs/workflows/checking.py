@@ -97,13 +97,15 @@ class Checked(Tabular):
         return {"verb": "check", "problems": [dict(vars(p)) for p in self.problems], "verbs": [dict(vars(v)) for v in self.verbs]}
 
 
-def check_dataset(source: str | os.PathLike[str]) -> Checked:
+def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, float], None] | None = None) -> Checked:
     """Find every problem of a data set.
 
     Parameters
     ----------
     source : path
         The folder, or its `dataset.toml`.
+    progress : callable, optional
+        Called with the name of the stage and the share that is done, 0 to 1.
 
     Returns
     -------
@@ -117,6 +119,10 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
     """
     problems: list[Problem] = []
     checks.path("source", source)
+    if progress is not None:
+        checks.function("progress", progress)
+    tell = progress or (lambda stage, share: None)
+    tell("reading", 0.0)
     described = _caught(lambda: describe(source), problems)
     if described is None:
         return Checked(
@@ -133,9 +139,12 @@ def check_dataset(source: str | os.PathLike[str]) -> Checked:
         problems.append(_warned(NO_MODEL))
     dataset = Dataset(name_of(path, description), model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
     problems += [_warned(line) for line in (*still_angles(dataset.trials), *moving_bases(dataset.trials))]
+    tell("sensors and units", 0.2)
     _plausible(dataset, problems)
+    tell("conventions", 0.4)
     _balanced(dataset, problems)
-    problems += _apart(dataset)
+    problems += [*_apart(dataset), *_without_robot(dataset)]
+    tell("clocks", 0.6)
     problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
     return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked), dataset)
@@ -176,7 +185,8 @@ def _remedy(error: ArmrsError) -> str:
         return "repair the sensor and record again, or leave the trial out of dataset.toml"
     if "if read otherwise" in str(error.found):
         return "import the recordings again and let armrs import find the convention, or correct the columns"
-    if place.startswith(("column", "line", "row", "Fy", "q", "angles")):
+    of_samples = error.file is None or Path(error.file).suffix != ".toml"
+    if of_samples and place.startswith(("column", "line", "row", "Fy", "q", "angles")):
         return "correct the column: its unit, its sign, or its values"
     return "correct it in the file that it names"
 
@@ -255,6 +265,15 @@ def _apart(dataset: Dataset) -> list[Problem]:
     return [Problem("warning", text, "check the bases and lengths of arm and robot in the model, and the zeros of their angles")]
 
 
+def _without_robot(dataset: Dataset) -> list[Problem]:
+    """Return that angles of a robot were recorded which nothing can use, since the model does not say where the robot stands."""
+    if dataset.model.robot is not None or not any(t.robot_q is not None for t in dataset.trials):
+        return []
+    text = "[robot] in the model: found nothing, though the trials hold the robot's angles (qr1, qr2): gap compares joint torques only"
+    step = "add [robot] with lengths, base and elbow to the model, or import the recordings again: armrs import reads it off the angles"
+    return [Problem("warning", text, step)]
+
+
 def _clocks(dataset: Dataset, errors: Sequence[str]) -> Iterator[Problem]:
     """Give the trials whose forces are late or early against their angles by more than a calibration may leave.
 
@@ -303,16 +322,23 @@ def _abilities(dataset: Dataset, blocked: bool) -> tuple[Ability, ...]:
     if blocked:
         return tuple(Ability(verb, False, "correct the errors above first") for verb in ("identify", "passive", "gap"))
     efforts = [t for t in dataset.fit_trials if t.force_on_arm is not None or t.tau is not None]
-    slow = sorted({t.configuration for t in efforts if _speed(t) <= _SLOW})
     repeats = len(dataset.fit_trials) > len({t.configuration for t in dataset.fit_trials})
     lacking = [] if repeats else ["repeats to estimate the noise from"]
     lacking += [] if dataset.test_trials else ['trials with role = "test" to measure the gap on']
     how = _how_gap(dataset)
     return (
         Ability("identify", bool(efforts), f"{len(efforts)} fit trials with forces or torques" if efforts else "no forces and no torques"),
-        Ability("passive", bool(slow), f"slow movements: {', '.join(slow)}" if slow else f"no movement slower than {_SLOW:g} rad/s"),
+        Ability("passive", bool(efforts), _how_passive(efforts)),
         Ability("gap", bool(efforts), f"{how}{'; without ' + ' and '.join(lacking) if lacking else ''}"),
     )
+
+
+def _how_passive(efforts: Sequence[Trial]) -> str:
+    """Return which movements are slow enough for `passive`."""
+    slow = sorted({t.configuration for t in efforts if _speed(t) <= _SLOW})
+    if slow:
+        return f"slow movements: {', '.join(slow)}"
+    return f"no movement is slower than {_SLOW:g} rad/s: viscosity is in its moments too" if efforts else "no forces and no torques"
 
 
 def _how_gap(dataset: Dataset) -> str:

@@ -12,7 +12,15 @@ from .. import checks
 from ..anthropometry import SEGMENTS, UNCERTAINTY, Expected, literature_model, segment_expectations
 from ..errors import BadInput, Text
 from ..io import files
-from ..model import Model, Segment, Subject
+from ..model import Model, Robot, Segment, Subject
+
+_NO_ROBOT = """
+# The robot that leads the hand, for simulation and for the gap: two links, lengths and base in metres.
+# [robot]
+# lengths = [0.45, 0.45]
+# base = [1.05, -0.10]
+# elbow = "up"
+"""
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,7 @@ def initialise(
     sex: str,
     lengths: Sequence[float | None] = (None, None, None),
     worn: Sequence[Worn] = (),
+    robot: Robot | None = None,
     replace: bool = False,
 ) -> Initialised:
     """Write a commented `dataset.toml` and `model.toml` of a person whose arm is not known yet.
@@ -82,6 +91,8 @@ def initialise(
         As in `segment_expectations`; the number of lengths is that of the segments.
     worn : sequence of Worn
         Handle and parts of an orthosis; they become part of their segments.
+    robot : Robot, optional
+        The robot that leads the hand. Without it `armrs import` reads it off the angles of a robot that were recorded.
     replace : bool
         Whether existing files may be replaced.
 
@@ -102,15 +113,17 @@ def initialise(
     target = files.output_folder(folder)
     checks.flag("replace", replace)
     worn = checks.instances("worn", worn, Worn)
+    if robot is not None:
+        checks.instance("robot", robot, Robot)
     for name in ("dataset.toml", "model.toml"):
         if (target / name).exists() and not replace:
             raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)
     expected = segment_expectations(body_mass, height, sex, lengths)
-    model = literature_model(Subject(body_mass, height, sex), lengths)
+    model = literature_model(Subject(body_mass, height, sex), lengths).replace(robot=robot)
     segments = model.segments
     for item in worn:
         model = model.with_mass(item.segment, item.mass, item.at)
-    assumed = _assumed(segments, expected, lengths, worn)
+    assumed = _assumed(segments, expected, lengths, worn, robot)
 
     def write(part: Path) -> list[Path]:
         files.write_text(part / "model.toml", _model_text(model, assumed), kind=".toml")
@@ -122,7 +135,11 @@ def initialise(
 
 
 def _assumed(
-    segments: Sequence[Segment], expected: Sequence[Expected], lengths: Sequence[float | None], worn: Sequence[Worn]
+    segments: Sequence[Segment],
+    expected: Sequence[Expected],
+    lengths: Sequence[float | None],
+    worn: Sequence[Worn],
+    robot: Robot | None,
 ) -> tuple[str, ...]:
     lines = []
     for s, e, measured in zip(segments, expected, lengths, strict=True):
@@ -143,18 +160,14 @@ def _assumed(
         )
     lines.append("the grip is neutral (thumb up)")
     lines.append("joint laws are unknown: stiffness, damping and friction are left to be identified")
+    if robot is None:
+        lines.append("no robot leads the hand, unless recordings hold its angles: armrs import then reads links and base off them")
     return tuple(lines)
 
 
 def _model_text(model: Model, assumed: Sequence[str]) -> str:
     head = "".join(f"# {line}\n" for line in ("Literature values (de Leva 1996), as a first guess:", *assumed))
-    tail = """
-# The robot that leads the hand, for simulation and for the gap: two links, lengths and base in metres.
-# [robot]
-# lengths = [0.45, 0.45]
-# base = [1.05, -0.10]
-# elbow = "up"
-"""
+    tail = _NO_ROBOT if model.robot is None else ""
     return head + model.to_toml() + tail
 
 

@@ -253,7 +253,7 @@ def forecast(
     movements: Sequence[Movement],
     *,
     repeats: int = 5,
-    with_effects: Sequence[str] = (),
+    with_effects: Sequence[str] | None = None,
     instruments: Instruments = Instruments(),
 ) -> Plan:
     """Say before an experiment how well movements will show the parameters of an arm.
@@ -265,8 +265,9 @@ def forecast(
     movements : sequence of Movement
     repeats : int
         Trials of each movement.
-    with_effects : sequence of str
-        Kinds of joint effects that will be fitted at every joint besides those of the model, as for `identify`.
+    with_effects : sequence of str, optional
+        Kinds of joint effects that will be fitted at every joint besides those of the model, as for `identify`: when absent, elastic,
+        viscous and coulomb in joints without a law.
     instruments : Instruments
 
     Raises
@@ -304,7 +305,7 @@ def plan(
     speeds: Sequence[float] = (1.0, 0.3),
     waypoints: int = 6,
     repeats: int = 5,
-    with_effects: Sequence[str] = (),
+    with_effects: Sequence[str] | None = None,
     instruments: Instruments = Instruments(),
     evaluations: int = 300,
     seed: int = 1,
@@ -404,7 +405,7 @@ def write_movements(found: Plan, data: dict[str, Any], folder: Path) -> list[Pat
 class _Question:
     """What forecast and plan ask of the core."""
 
-    def __init__(self, model: Model, with_effects: Sequence[str], instruments: Instruments, repeats: int) -> None:
+    def __init__(self, model: Model, with_effects: Sequence[str] | None, instruments: Instruments, repeats: int) -> None:
         checks.instance("model", model, Model)
         checks.instance("instruments", instruments, Instruments)
         self.model, self.repeats = model, checks.whole("repeats", repeats, least=1, most=10_000)

@@ -77,7 +77,7 @@ def plan_stretches(
     expected = usual if own is None else usual | {"threshold": 0.3, "latency": 0.0} | dict(own.parameters)
     predictions = _predicted(model, movements, joint, repeats, expected, instruments)
     # What the robot can do, and the forces, are those of any planned movement.
-    possible = forecast(model, movements, repeats=repeats, instruments=instruments)
+    possible = forecast(model, movements, repeats=repeats, with_effects=(), instruments=instruments)
     return replace(possible, predictions=predictions, worst=max(p.relative for p in predictions))
 
 

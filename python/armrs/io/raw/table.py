@@ -18,6 +18,8 @@ _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>
 _AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
 _SAYS_LITTLE = re.compile(r"[xyzlr]|\d+", flags=re.IGNORECASE)
 """Names that say little by themselves."""
+_REMARKS = 5
+"""Remarks that a line holds at most."""
 _AFTER_LAST = re.compile(r"^(?P<name>.*[^_\s/])[_\s/](?P<unit>[^_\s]+)$")
 
 
@@ -115,3 +117,11 @@ def grouped(groups: Sequence[str], names: Sequence[str], units: Sequence[str]) -
         own = column(word, np.empty(0))
         names[k], units[k] = f"{own.label} {name}", units[k] or own.unit
     return names, units
+
+
+def remarks_of(name: str, cells: Sequence[str]) -> str:
+    """Return a line with what stands in a column of words, each once with the sample of its first; an empty cell says nothing."""
+    first = {text: k for k, text in reversed(list(enumerate(cells, start=1))) if text}
+    said = [f"{text!r} in sample {k}" for text, k in sorted(first.items(), key=lambda item: item[1])]
+    more = f" and {len(said) - _REMARKS} more" if len(said) > _REMARKS else ""
+    return f"{name}, a column without numbers: {', '.join(said[:_REMARKS])}{more}"

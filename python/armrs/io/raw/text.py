@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import BadInput, Text
 from .cells import number, seconds
-from .table import NoTable, RawColumn, RawTable, column, grouped
+from .table import NoTable, RawColumn, RawTable, column, grouped, remarks_of
 from .units import unit
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".xls")
@@ -80,9 +80,8 @@ def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
         raise NoTable("file", Text("no block of rows with at least two numbers each"), "a table with one row a sample")
     names, units = _header(lines, layout)
     notes = [f"text in {encoding}, cells between {_SEPARATORS[layout.separator]}, decimal {'comma' if layout.decimal == ',' else 'point'}"]
-    columns, dropped = _columns(lines[layout.first :], names, units, layout, notes)
-    if dropped:
-        notes.append(f"left out, since they hold no numbers: {', '.join(dropped)}")
+    columns, remarks = _columns(lines[layout.first :], names, units, layout, notes)
+    notes += [remarks_of(name, cells) for name, cells in remarks.items()]
     return RawTable(path, path.stem, tuple(_one_clock(columns, notes)), tuple(notes))
 
 
@@ -188,7 +187,10 @@ def _is_units(row: list[str]) -> bool:
     return bool(cells) and sum(unit(cell) is not None for cell in cells) >= 0.5 * len(cells)
 
 
-def _columns(lines: list[str], names: list[str], units: list[str], layout: _Layout, notes: list[str]) -> tuple[list[RawColumn], list[str]]:
+def _columns(
+    lines: list[str], names: list[str], units: list[str], layout: _Layout, notes: list[str]
+) -> tuple[list[RawColumn], dict[str, list[str]]]:
+    """Return the columns of numbers, and the cells of the columns that hold words alone by their names."""
     import pyarrow as pa
     from pyarrow import csv
 
@@ -211,16 +213,16 @@ def _columns(lines: list[str], names: list[str], units: list[str], layout: _Layo
     if len(skipped) > 0.01 * len(lines):
         found = Text(f"{len(skipped)} of {len(lines)} rows with another number of cells")
         raise BadInput("file", found, f"{len(names)} cells in every row")
-    columns, dropped = [], []
+    columns, remarks = [], {}
     for place, name, stated in zip(places, names, units, strict=True):
         values, unit_of_clock = _numbers(data.column(place), layout.decimal)
         if values is not None and (odd_cells := _odd_cells(data.column(place), values)):
             notes.append(f"{name}: cells without a number, which count as missing: {odd_cells}")
         if values is not None:
             columns.append(column(name, values, stated or unit_of_clock))
-        elif any(cell not in _MISSING for cell in data.column(place).to_pylist()):
-            dropped.append(name)
-    return columns, dropped
+        elif any(said := ["" if cell.strip() in _MISSING else cell.strip() for cell in data.column(place).to_pylist()]):
+            remarks[name] = said
+    return columns, remarks
 
 
 def _numbers(cells: Any, decimal: str) -> tuple[np.ndarray | None, str]:
@@ -248,7 +250,7 @@ def _odd_numbers(cells: list[str | None], decimal: str) -> tuple[np.ndarray | No
     other = "." if decimal == "," else ","
     values = [number(cell.replace(other, "").replace(decimal, ".")) if cell else math.nan for cell in cells]
     wrong = sum(value is None for value in values)
-    if wrong <= _BAD_CELLS * len(cells):
+    if wrong <= _BAD_CELLS * len(cells) and any(value is not None and math.isfinite(value) for value in values):
         return np.array([math.nan if value is None else value for value in values]), ""
     times = seconds(cells)
     return times, "" if times is None else "s"

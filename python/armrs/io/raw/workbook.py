@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ArmrsError, BadInput, Text
-from .table import NoTable, RawTable, column, grouped
+from .table import NoTable, RawTable, column, grouped, remarks_of
 from .units import unit
 
 SUFFIXES = (".xlsx", ".xlsm")
@@ -62,7 +62,7 @@ def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
         units = _words(above.pop(), width)
     names = _words(above[-1], width) if above else [""] * width
     names, units = grouped(_words(above[-2], width) if len(above) > 1 else [], names, units)
-    columns, dropped = [], []
+    columns, notes = [], []
     for k, name in enumerate(names):
         cells = [row[k] if k < len(row) else None for row in rows[start:end]]
         values = np.array([_number(cell) for cell in cells])
@@ -72,9 +72,8 @@ def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
             # Beside the seconds since a first day a float64 keeps 0.1 µs: they are counted from the first row.
             values = np.round(values - values[np.isfinite(values)][0], 6) if dated else values
             columns.append(column(label, values, units[k].strip("[]() ") or ("s" if dated else "")))
-        elif any(cell is not None for cell in cells):
-            dropped.append(label)
-    notes = [f"left out, since they hold no numbers: {', '.join(dropped)}"] if dropped else []
+        elif any(said := ["" if cell is None else str(cell).strip() for cell in cells]):
+            notes.append(remarks_of(label, said))
     return RawTable(path, path.stem, tuple(columns), tuple(notes))
 
 

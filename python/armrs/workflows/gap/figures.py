@@ -28,6 +28,9 @@ STEPS = {
 }
 """The models that are compared: colour, name, width and dash of their lines."""
 
+_ROUNDING = 1e-9
+"""A channel [rad, N, N m] that changes by no more does not change."""
+
 
 def gap(result: GapFound) -> Figures:
     """Return the figures of what the workflow found; `section` of each is the part of the report that it belongs to."""
@@ -148,9 +151,10 @@ def _ladder(result: GapFound) -> Drawn:
     for number, rung in enumerate(result.ladder, start=1):
         ax.text(0.0, y, f"round {number}", transform=ax.get_yaxis_transform(), ha="left", va="center", fontsize=9, fontweight="bold")
         y += 0.85
-        goes_on = min(rung.tried, key=lambda tried, best=rung.before - rung.after: abs(tried.gain - best))  # type: ignore[misc]
-        for tried in rung.tried:
-            ax.barh(y, max(tried.gain, 0.0), height=0.62, color=plotting.BLUE if tried is goes_on else plotting.SILVER)
+        gains = [tried.gain for tried in rung.tried]
+        goes_on = min(range(len(gains)), key=lambda k, best=rung.before - rung.after, gains=gains: abs(gains[k] - best))  # type: ignore[misc]
+        for k, tried in enumerate(rung.tried):
+            ax.barh(y, max(tried.gain, 0.0), height=0.62, color=plotting.BLUE if k == goes_on else plotting.SILVER)
             ax.text(max(tried.gain, 0.0), y, f"  {tried.gain:.0f}", va="center", fontsize=9, color=plotting.INK)
             ticks.append(y)
             labels.append(" + ".join(place_of(*e) for e in tried.effects))
@@ -163,6 +167,7 @@ def _ladder(result: GapFound) -> Drawn:
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
     ax.set_xlabel("explained, in units of twice the log-likelihood")
+    ax.xaxis.set_major_formatter(lambda value, _: f"{value:.6g}")
     text = (
         "Each round asks the whole catalogue, with segments and calibration refitted; the best few are converged by simulation and "
         "drawn here. The blue one pays best for its freedom and goes on; what no longer pays then is taken out again, so that fewer "
@@ -175,7 +180,7 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
     """Draw one effect by itself: its law along the movements with its interval, and what it changes in the channels."""
     seen = portrait(result, effect)
     rows = np.empty((0, 0)) if seen.changed is None else seen.changed
-    changed = [c for c in range(rows.shape[1]) if np.abs(rows[:, c]).max() > 0]
+    changed = [c for c in range(rows.shape[1]) if np.abs(rows[:, c]).max() > _ROUNDING]
     names = channel_names(result.dataset, is_led(result.dataset))
     panels = int(seen.torque is not None) + len({names[c].rsplit("_", 1)[1] for c in changed})
     figure = plotting.figure(6.0 if panels < 2 else 10.6, 3.2)
@@ -184,8 +189,8 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
     if seen.torque is not None:
         _law(axes.pop(0), seen, seen.torque)
         text = (
-            f"Left, the torque with which the joint resists along the fit trials against its {seen.against}; the band is the 95 % interval "
-            "of its size. Grey bars are the mean torque that was measured there beyond everything else in the model, and its scatter. "
+            f"Left, its torque against the {seen.against} along the fit trials, with the 95 % interval of its size (band), and what was "
+            "measured beyond everything else (grey: mean and scatter of trials). "
         )
     for unit in dict.fromkeys(names[c].rsplit("_", 1)[1] for c in changed):
         ax = axes.pop(0)
@@ -200,7 +205,8 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=5, columnspacing=1.2, handlelength=1.6)
     if changed:
         start = "Right, w" if seen.torque is not None else "W"
-        text += f"{start}hat it changes in the channels of {seen.trial}, simulated with it less without it."
+        which = "the trial in which it was" if effect.trial is not None else "the test trial in which it changes most"
+        text += f"{start}hat it changes in {seen.trial}, {which}: simulated with it less without it."
     if not panels:
         axes[0].set_axis_off()
         axes[0].text(0.0, 0.5, "not drawn: it cannot be simulated by itself")

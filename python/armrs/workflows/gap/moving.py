@@ -29,6 +29,7 @@ def moving(result: GapFound) -> Live:
         return NOTHING
     t, n = trial.t - trial.t[0], result.dataset.model.n_joints
     without = _without(result, trial, steps["amended"]) if "amended" in steps else {}
+    colours = [colour for colour in plotting.MANY if colour not in {STEPS[step][0] for step in steps}]
     panels = []
     for c, name in enumerate(channel_names(result.dataset, True)):
         label, factor = channel_label(name)
@@ -36,7 +37,7 @@ def moving(result: GapFound) -> Live:
         lines = [Line("measured", plotting.SILVER, np.where(trial.valid, play.measured[:, c], np.nan) * factor)]
         lines += [Line(STEPS[step][1], STEPS[step][0], course[:, c] * factor, shown=step != "given") for step, course in steps.items()]
         lines += [
-            Line(f"without {words}", plotting.CYCLE[(k + 2) % len(plotting.CYCLE)], course[:, c] * factor, shown=False)
+            Line(f"without {words}", colours[k % len(colours)], course[:, c] * factor, shown=False)
             for k, (words, course) in enumerate(without.items())
         ]
         panels.append(Panel(title, unit, tuple(lines)))

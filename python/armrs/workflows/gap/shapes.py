@@ -68,14 +68,15 @@ def telling_trial(result: GapFound) -> int:
     trials, plays = result.dataset.trials, result.trials
     simulated = {k: course for k, play in enumerate(plays) if (course := play.shown["calibrated"]) is not None}
     tests = [k for k in simulated if trials[k].role == "test"]
+    return max(tests or simulated, key=lambda k: _in_floors(result, k, simulated[k] - plays[k].measured), default=0)
+
+
+def _in_floors(result: GapFound, k: int, rows: np.ndarray) -> float:
+    """Return the mean square of what channels of trial `k` differ by, (n, n_channels), each in units of its floor."""
     names = channel_names(result.dataset, is_led(result.dataset))
     size = np.array([result.gap[n].floor or result.gap[n].calibrated or 1.0 for n in names])
-
-    def misfit(k: int) -> float:
-        rows = (simulated[k] - plays[k].measured)[trials[k].valid]
-        return float(np.mean(np.square(rows / np.maximum(size, 1e-12)))) if len(rows) else 0.0
-
-    return max(tests or simulated, key=misfit, default=0)
+    seen = rows[result.dataset.trials[k].valid]
+    return float(np.mean(np.square(seen / np.maximum(size, 1e-12)))) if len(seen) else 0.0
 
 
 def _own(result: GapFound, effect: Missing) -> Effect:
@@ -171,19 +172,23 @@ def _described(columns: list[np.ndarray], values: list[np.ndarray]) -> float:
 
 
 def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.ndarray, np.ndarray | None]:
-    """Return what the effect changes in one trial: that in which it was, else the one that shows the gap best."""
+    """Return what the effect changes in one trial: that in which it was, else the test trial in which it changes most."""
     data, led = result.dataset, is_led(result.dataset)
-    files = [t.file for t in data.trials]
-    k = files.index(effect.trial) if effect.trial is not None else telling_trial(result)
-    trial = data.trials[k]
-    t = trial.t - trial.t[0]
+    if effect.trial is None:
+        asked = [k for k, t in enumerate(data.trials) if t.role == "test"] or [telling_trial(result)]
+    else:
+        asked = [[t.file for t in data.trials].index(effect.trial)]
     others = [e for e in result.model.all_effects if e != own]
-    columns = [core_trials(data)[k] | {"role": "fit"}]
+    columns = [core_trials(data)[k] | {"role": "fit"} for k in asked]
     settings = core_settings(data, led, 1)
-    plays = []
-    for listed in ([*others, own], others):
-        given = _armrs.play(_armrs.Rig(result.model, listed), columns, settings)[0].shown["given"]
-        if given is None:
-            return trial.file, t, None
-        plays.append(given)
-    return trial.file, t, plays[0] - plays[1]
+    with_it, without = (
+        [play.shown["given"] for play in _armrs.play(_armrs.Rig(result.model, listed), columns, settings)]
+        for listed in ([*others, own], others)
+    )
+    changed = {k: a - b for k, a, b in zip(asked, with_it, without, strict=True) if a is not None and b is not None}
+    shown = max(changed, key=lambda k: _in_floors(result, k, changed[k]), default=asked[0])
+    trial = data.trials[shown]
+    t, rows = trial.t - trial.t[0], changed.get(shown)
+    if rows is not None and effect.span is not None and "sensor" in catalogue()[effect.kind].where:
+        rows = np.where(((t >= effect.span[0]) & (t <= effect.span[1]))[:, None], rows, 0.0)  # a sensor forgets
+    return trial.file, t, rows

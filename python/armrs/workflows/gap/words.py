@@ -104,7 +104,7 @@ def _how(alternative: Mapping[str, Any]) -> str:
     worse = alternative.get("worse")
     if worse is None:
         return str(alternative["why"])
-    return alternative["why"] + (f", misfit greater by {worse:.2g}" if worse >= 0.1 else ", misfit no greater")
+    return alternative["why"] + (f", by {worse:.2g} units less" if worse >= 0.1 else ", by no less")
 
 
 def apart(result: Mapping[str, Any]) -> list[str]:
@@ -211,9 +211,18 @@ def missing(data: Mapping[str, Any]) -> Table:
             if value["std"] is not None:
                 ends = " … ".join(number(end, value["std"]) for end in value["interval"])
             rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), ends, unit(value["unit"])])
-    return Table(
-        ["effect", "at", "misfit without it" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"], rows, 4
-    )
+    head = ["effect", "at", "misfit without it" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"]
+    if all(row[6] is None for row in rows):  # nothing has an interval: there are no columns for it
+        head, rows = [*head[:5], head[7]], [[*row[:5], row[7]] for row in rows]
+    return Table(head, rows, 4)
+
+
+def intervals(data: Mapping[str, Any]) -> str:
+    """Return under which condition the intervals hold, or why there are none."""
+    if data["verdict"] == "unexplained":
+        left = "something is left that no effect explains"
+        return f"No intervals are given: they would suppose that the structure of the model is right, and {left}."
+    return "An interval holds if the structure of the model is right."
 
 
 def worth(data: Mapping[str, Any]) -> str:
@@ -289,5 +298,5 @@ def calibration(data: Mapping[str, Any]) -> Table:
         for a in data["calibration"]
     ]
     beyond = any(row[-1] for row in rows)
-    head = ["what", "refitted by", "known beforehand to", "unit", "but"]
+    head = ["what", "refitted by", "known beforehand to (2 σ)", "unit", "but"]
     return Table(head if beyond else head[:-1], rows if beyond else [row[:-1] for row in rows], 1)

@@ -2,3 +2,4 @@
 
 from .run import Imported as Imported
 from .run import import_recordings as import_recordings
+from .run import model_file as model_file

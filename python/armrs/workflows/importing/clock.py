@@ -152,9 +152,9 @@ def _fitted(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, for
         inside = (grid - shift >= clock[0]) & (grid - shift <= clock[-1])
         force = np.column_stack([np.interp(grid[inside] - shift, clock, column) for column in values.T])
         torque = np.einsum("nij,ni->nj", jacobian[inside], force)
-        matrix = design[inside].reshape(-1, design.shape[2])
-        solved = np.linalg.lstsq(matrix, torque.ravel(), rcond=None)[0]
-        return float(np.mean((torque.ravel() - matrix @ solved) ** 2))
+        whole = np.column_stack([design[inside].reshape(-1, design.shape[2]), torque.ravel()])
+        # The last entry of the triangle is what the columns before leave of the torques.
+        return float(np.linalg.qr(whole, mode="r")[-1, -1] ** 2) / len(whole)  # type: ignore[call-overload]
 
     return unexplained
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from .recipe import Channel
 
 _TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed", "xvalue"}
 _JOINTS = (
-    {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral"},
-    {"elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec"},
+    {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral", "oberarm", "upperarm", "humerus"},
+    {"elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec", "unterarm", "forearm", "avantbras", "antebrazo"},
     {"wrist", "handgelenk", "poignet", "muneca", "polso", "zapestje"},
 )
 _ROBOT = {"robot", "roboter", "rob", "manipulator", "actuator"}
@@ -26,7 +27,28 @@ _ACCELERATION = {"acceleration", "beschleunigung", "accel", "acc", "ddq", "qdd"}
 _TORQUE = {"torque", "moment", "drehmoment", "tau", "couple", "trq"}
 _FORCE = {"force", "kraft", "f", "forza", "fuerza", "sila"}
 _ANGLE = {"angle", "winkel", "theta", "phi", "q", "joint", "gelenk", "flexion", "ang", "position", "pos", "j"}
-_AXES = {"x": "x", "y": "y", "z": "z", "horizontal": "y", "forward": "y", "vertical": "z", "vertikal": "z", "up": "z"}
+_FORWARD = {
+    "horizontal", "horizontale", "forward", "forwards", "vorwarts", "vorwaerts", "vorn", "vorne", "waagrecht", "waagerecht", "avant",
+    "adelante", "avanti",
+}  # fmt: skip
+_UP = {
+    "vertical",
+    "vertikal",
+    "verticale",
+    "up",
+    "upward",
+    "upwards",
+    "oben",
+    "aufwarts",
+    "aufwaerts",
+    "senkrecht",
+    "haut",
+    "arriba",
+    "alto",
+}
+_BACK = {"backward", "backwards", "ruckwarts", "rueckwarts", "rueckwaerts", "hinten", "arriere"}
+_DOWN = {"down", "downward", "downwards", "unten", "abwarts", "abwaerts", "bas", "abajo"}
+_AXES = {"x": "x", "y": "y", "z": "z", **dict.fromkeys(_FORWARD | _BACK, "y"), **dict.fromkeys(_UP | _DOWN, "z")}
 _MUSCLES = {"biceps", "triceps", "brachialis", "brachioradialis", "deltoid", "deltoideus", "pectoralis", "trapezius"}
 _CANONICAL = re.compile(r"(qr|dq|tau|q)(\d)|f([xyz])|m([xyz])|p([xyz])")
 _DIMENSION = {"t": "time", "q": "angle", "qr": "angle", "dq": "speed", "tau": "moment", "F": "force", "Mx": "moment", "P": "length"}
@@ -52,8 +74,9 @@ def words(text: str) -> list[str]:
 
 
 def _mentions(tokens: Sequence[str], names: set[str]) -> bool:
-    """Whether a word is one of the names, or a compound with a long one in it (Schulterwinkel)."""
-    return any(token in names or any(len(name) >= 5 and name in token for name in names) for token in tokens)
+    """Whether a word or two in a row (upper arm) are one of the names, or a compound with a long one in it (Schulterwinkel)."""
+    joined = (*tokens, *(a + b for a, b in pairwise(tokens)))
+    return any(token in names or any(len(name) >= 5 and name in token for name in names) for token in joined)
 
 
 def symbol_of(column: RawColumn) -> str | None:
@@ -172,7 +195,8 @@ def guess(tables: Sequence[RawTable], given: Mapping[str, tuple[str, int]], prob
             problems.append(
                 BadInput("columns", found, f"one column for {symbol}", file=table.path, hint=f"--map '{symbol}={columns[0].name}'")
             )
-        chosen[symbol] = (columns[0], 1, f"by its name {columns[0].name!r}")
+        turned = symbol[0] in "FP" and bool((_BACK | _DOWN) & set(words(columns[0].label)))
+        chosen[symbol] = (columns[0], -1 if turned else 1, f"by its name {columns[0].name!r}")
     return [
         channel for symbol, (c, sign, why) in chosen.items() if (channel := _channel(symbol, c, sign, why, tables, problems)) is not None
     ]

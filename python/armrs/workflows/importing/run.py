@@ -12,11 +12,11 @@ import numpy as np
 
 from ... import checks
 from ...errors import BadInput, BadInputs, Text
-from ...io import files, tomlfile
+from ...io import files
 from ...io.raw import RawTable
 from ...io.raw.units import unit
 from ...io.samples import write_samples
-from ...model import Model, Robot, load_model
+from ...model import Description, Model, Robot, Subject, Tolerance, TrialEntry, load_model
 from ...tabular import Tabular, Tidy
 from . import clock, columns, conventions, handle, trials
 from . import sources as raw
@@ -82,7 +82,7 @@ def import_recordings(
     sources: Sequence[str | os.PathLike[str]],
     out: str | os.PathLike[str],
     *,
-    model: Model | str | os.PathLike[str],
+    model: Model | str | os.PathLike[str] | None = None,
     columns_map: str = "",
     angles: str | None = None,
     zero: str | None = None,
@@ -100,7 +100,9 @@ def import_recordings(
     out : path
         Folder of the data set.
     model : Model or path
-        Literature values as `armrs init` writes them are enough: conventions are read off the balance.
+        Literature values as `armrs init` writes them are enough: conventions are read off the balance. `[subject]` and `[tolerance]` of a
+        `dataset.toml` beside it are kept. Only an `import.toml` needs none: then it is the `model.toml` beside that.
+        A model without a robot gets the one that the recorded angles of a robot show (`handle.robot_of`), where they do.
     columns_map : str
         `t=COLUMN,q1=COLUMN,Fy=-COLUMN,…` for columns whose names do not say what they are; a minus turns the sign.
     angles : {"relative", "absolute"}, optional
@@ -132,16 +134,64 @@ def import_recordings(
     rate = None if rate is None else checks.number("rate", rate, above=0.0, most=1e6, unit="Hz")
     if not paths:
         raise BadInput("sources", Text("nothing"), "one recording or more")
-    loaded = model if isinstance(model, Model) else load_model(model)
-    if len(paths) == 1 and paths[0].suffix.lower() == ".toml":
+    if isinstance(model, Model):
+        loaded, about = model, (Subject(), Tolerance())
+    else:
+        file = model_file(paths, model)
+        loaded, about = load_model(file), _about(file)
+    if _is_recipe(paths):
         recipe = load_recipe(paths[0])
         reads = _reread(recipe, paths[0].parent)
         notes = [f"as {paths[0]} says"]
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
         recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
-    folder = _write(files.output_folder(out), loaded, recipe, reads)
-    return Imported(folder, recipe, tuple(notes))
+    loaded, said = _led(loaded, recipe, reads)
+    folder = _write(files.output_folder(out), loaded, recipe, reads, about)
+    return Imported(folder, recipe, (*notes, *said))
+
+
+def _is_recipe(paths: Sequence[Path]) -> bool:
+    return len(paths) == 1 and paths[0].suffix.lower() == ".toml"
+
+
+def model_file(sources: Sequence[str | os.PathLike[str]], model: str | os.PathLike[str] | None) -> Path:
+    """Return the model of an import: the one given, or the `model.toml` beside the only `import.toml`."""
+    paths = [Path(source) for source in sources]
+    if model is None and not _is_recipe(paths):
+        raise BadInput("model", Text("nothing"), "--model with the model.toml of the arm, as armrs init writes it")
+    return paths[0].parent / "model.toml" if model is None else checks.path("model", model, Model)
+
+
+def _about(model: Path) -> tuple[Subject, Tolerance]:
+    """Return `[subject]` and `[tolerance]` of the data set that a model lies in, as `armrs init` writes it."""
+    path = model.parent / "dataset.toml"
+    if not path.is_file():
+        return Subject(), Tolerance()
+    found = Description.load(path)
+    mine = found.model is not None and (path.parent / found.model).resolve() == model.resolve()
+    return (found.subject, found.tolerance) if mine else (Subject(), Tolerance())
+
+
+def _led(model: Model, recipe: Recipe, reads: Sequence[_Read]) -> tuple[Model, list[str]]:
+    """Return a model with the robot that the recorded angles show, where it has none, and what is to be said of that."""
+    channels = recipe.channels
+    if model.robot is not None or not {"qr1", "qr2"} <= {c.symbol for c in channels}:
+        return model, []
+    pairs = []
+    for read in reads:
+        _, raw_angles, force = _arrays(read, channels, model.n_joints)
+        q = conventions.to_model_angles(raw_angles, recipe.convention)
+        on_arm = force if force is None or recipe.convention.force_on == "arm" else -force
+        pairs.append((q, np.column_stack([_values(read.table, _by(channels, f"qr{j}")) for j in (1, 2)]), on_arm))
+    robot, apart = handle.robot_of(model, pairs)
+    off = f"{1e3 * apart:.1f} mm (root mean square)"
+    if robot is None:
+        said = f"hand and handle are {off} apart with the robot that suits best. Are its angles counted as armrs does (docs/files.md)?"
+        return model, [f"[robot]: not in the model, and not to be read off the angles: {said}"]
+    lengths, base = (" and ".join(f"{v:.3f}" for v in values) for values in (robot.lengths, robot.base))
+    found = f"links of {lengths} m, base {base} m forward and up of that of the arm, elbow {robot.elbow}; hand and handle then {off} apart"
+    return model.replace(robot=robot), [f"[robot]: not in the model, so read off the angles: {found}. Compare it with your robot"]
 
 
 def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None, force_on: str | None, n_joints: int) -> dict[str, object]:
@@ -220,7 +270,7 @@ def _decided(
     reads = [_refined(read, channels, convention, model) for read in reads]
     origin = _origin(reads, channels, convention, model, axes)
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
-    notes = [*sources.notes, *dict.fromkeys(note for t in tables for note in t.notes), *axes]
+    notes = [*sources.notes, *_said(tables), *axes]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
@@ -257,7 +307,8 @@ def _origin(
     if not {"Py", "Pz"} <= {c.symbol for c in channels} or any(c.symbol == "qr1" for c in channels):
         return None
     if model.robot is None:
-        notes.append("positions of the handle: not used, since the model has no [robot] whose angles they would tell")
+        adds = "armrs init --robot-lengths-m A,B --robot-base-m Y,Z adds it"
+        notes.append(f"positions of the handle: not used, since the model has no [robot] whose angles they would tell; {adds}")
         return None
     pairs = [
         (conventions.to_model_angles(_arrays(read, channels, model.n_joints)[1], convention), _positions(read, channels)) for read in reads
@@ -270,6 +321,19 @@ def _origin(
 
 def _positions(read: _Read, channels: Sequence[Channel]) -> np.ndarray:
     return np.column_stack([_values(read.table, _by(channels, symbol)) for symbol in ("Py", "Pz")])
+
+
+def _said(tables: Sequence[RawTable]) -> list[str]:
+    """Return what the readers decided, each once, with the file where it does not hold for all."""
+    by_note: dict[str, list[RawTable]] = {}
+    for table in tables:
+        for note in table.notes:
+            by_note.setdefault(note, []).append(table)
+    lines = []
+    for note, those in by_note.items():
+        more = f" and {len(those) - 1} more" if len(those) > 1 else ""
+        lines.append(note if len(those) == len(tables) else f"{note}: {those[0].path}{more}")
+    return lines
 
 
 def _unused(tables: Sequence[RawTable], channels: Sequence[Channel]) -> list[str]:
@@ -434,24 +498,26 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
     clocks = {c.symbol[:1]: (c.column, 1) for c in recipe.channels if c.symbol in ("t", "t of forces")}
 
     def table_of(file: str, title: str | None, points: tuple[str, ...]) -> RawTable:
-        tables = [part for t in raw.read(folder / file, points) for part in cleaned(_renamed(t, clocks), recipe.rate, [])]
+        tables = [part for t in raw.read(Path(file), points) for part in cleaned(_renamed(t, clocks), recipe.rate, [])]
         found = next((t for t in tables if title in (t.title, None)), None)
         if found is None:
             raise BadInput("table", title, "the title of a table in it", file=file)
         return found
 
-    for trial in recipe.trials:
+    for kept in recipe.trials:
+        forces = kept.force_file and os.fspath(folder / kept.force_file)
+        trial = replace(kept, file=os.fspath(folder / kept.file), force_file=forces)
         try:
             table = table_of(trial.file, trial.table, recipe.points)
             reads.append(_Read(trial, table, table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None))
-        except BadInput as error:  # noqa: PERF203 (every file is asked)
+        except BadInput as error:
             problems.append(error)
     if problems:
         raise BadInputs.of(problems)
     return reads
 
 
-def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read]) -> Path:
+def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read], about: tuple[Subject, Tolerance]) -> Path:
     """Write the data set whole or not at all, with `import.toml` in it."""
     folder = files.output_folder(out)
     former = _former(folder)
@@ -466,11 +532,11 @@ def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read]) -> P
             (part / name).parent.mkdir(exist_ok=True)
             write_samples(part / name, list(table), list(table.values()))
             written.append(part / name)
-            entries.append({"file": name, "configuration": read.trial.configuration, "repeat": read.trial.repeat, "role": read.trial.role})
+            entries.append(TrialEntry(name, read.trial.configuration, read.trial.repeat, read.trial.role))
         model.write(part / "model.toml")
-        head = {"name": folder.resolve().name, "model": "model.toml", "force_on": recipe.convention.force_on}
-        blocks = ["\n".join(tomlfile.lines(head)), *("\n".join(["[[trial]]", *tomlfile.lines(e)]) for e in entries)]
-        files.write_text(part / "dataset.toml", "\n\n".join(blocks) + "\n", kind=".toml")
+        side, (subject, tolerance) = recipe.convention.force_on, about
+        content = Description(folder.resolve().name, "model.toml", entries, force_on=side, subject=subject, tolerance=tolerance)
+        files.write_text(part / "dataset.toml", content.to_toml(), kind=".toml")
         files.write_text(part / FILE, kept.to_toml(), kind=".toml")
         return [*written, part / "model.toml", part / "dataset.toml", part / FILE]
 
