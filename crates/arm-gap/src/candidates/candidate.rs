@@ -296,7 +296,9 @@ impl Library {
         let motions = motions(prepared, point);
         let mut candidates = Vec::new();
         for kind in prepared.session.kinds() {
-            for index in places(prepared.session, kind).filter(|&i| is_asked(kind, i)) {
+            // What the passive base has is no question any more.
+            let new = |&i: &usize| is_asked(kind, i) && !prepared.has_in_base(kind, i);
+            for index in places(prepared.session, kind).filter(new) {
                 for asked in kind.probe().questions.iter().enumerate() {
                     let mut plain = Effect::new(kind, index);
                     hypothesis.share_rest(&mut plain);

@@ -13,7 +13,7 @@ use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
-use crate::data::joint_in_motion::laws_in_motion;
+use crate::data::joint_in_motion::{WithStd, laws_in_motion};
 use crate::data::passive_law::{Free, Passive};
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::prediction::Course;
@@ -31,7 +31,7 @@ pub const STILL: f64 = 0.01;
 const FURTHEST_START: f64 = 3.0;
 
 /// The laws that were identified, each with the standard deviation of its size.
-fn estimated<const N: usize>(found: &Identified<N>) -> Vec<(Effect<f64>, f64)> {
+fn estimated<const N: usize>(found: &Identified<N>) -> Vec<WithStd> {
     let std = |law: &Effect<f64>| {
         let info = law.kind.info();
         let named = (info.kind, Some(law.index + 1), info.parameters[0].name);
@@ -76,12 +76,17 @@ impl<const N: usize> Session<N> {
         }
         let mut laws = estimated(&found);
         for own in laws.chunk_by_mut(|(a, _), (b, _)| a.index == b.index) {
-            let rubs = |(law, std): &(Effect<f64>, f64)| {
+            let rubs = |(law, std): &WithStd| {
                 law.kind.smoothed_by().is_some() && law.parameters[0] > LIKELY * std
             };
+            let springs =
+                |(law, std): &WithStd| spring(law).is_some() && law.parameters[0] > LIKELY * std;
             let Some(friction) = own.iter().find(|one| rubs(one)).copied() else {
                 continue;
             };
+            if own.iter().any(springs) {
+                continue;
+            }
             let (joint, chain) = (own[0].0.index, &found.chain);
             let asked = model.fitted.iter().filter(|law| law.index == joint);
             let asked: Vec<_> = asked.copied().collect();

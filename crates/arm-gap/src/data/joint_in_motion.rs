@@ -63,7 +63,7 @@ pub(super) fn laws_in_motion<const N: usize>(
 }
 
 /// A law with the standard deviation of its size.
-type WithStd = (Effect<f64>, f64);
+pub(super) type WithStd = (Effect<f64>, f64);
 
 fn moving<const N: usize>(
     chain: &Chain<f64, N>,

@@ -75,17 +75,8 @@ impl<const N: usize> Session<N> {
 
     /// Trials on which things are chosen and fitted.
     pub fn fit_trials(&self) -> Vec<usize> {
-        self.of_role(Role::Fit)
-    }
-
-    /// Trials that are kept apart.
-    pub fn test_trials(&self) -> Vec<usize> {
-        self.of_role(Role::Test)
-    }
-
-    fn of_role(&self, role: Role) -> Vec<usize> {
         (0..self.trials.len())
-            .filter(|&i| self.trials[i].role == role)
+            .filter(|&i| self.trials[i].role == Role::Fit)
             .collect()
     }
 

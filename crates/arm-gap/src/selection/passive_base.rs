@@ -3,7 +3,7 @@
 //! The closed chain is simulated with the base that was identified from measured motion. Its numbers stay free with every question,
 //! and are judged last.
 
-use arm_core::effect::Effect;
+use arm_core::effect::{Effect, Kind, Place};
 use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::distributions::chi_square_tail;
 
@@ -155,6 +155,45 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         self.dropped = before;
         Ok(None)
+    }
+
+    /// Laws of the base that were dropped, in the place of a named effect of their joint with shapes of its own, where that shows no more
+    /// than they do: a reflex without threshold and latency is a viscosity. `None` where nothing is.
+    pub(crate) fn with_base_instead(
+        &mut self,
+        current: &Fitted<N>,
+    ) -> Result<Option<Settled<'a, N>>, GapError> {
+        let before = self.dropped.clone();
+        for (slot, own) in current.asked.iter().enumerate() {
+            let in_joint = own.kind().info().place == Place::Joint && own.shapes() > 0.0;
+            let mut back = false;
+            for (dropped, law) in self.dropped.iter_mut().zip(&self.session.base) {
+                let here = in_joint && law.effect.index == own.effect.index;
+                if *dropped && here && !law.free.is_empty() {
+                    (*dropped, back) = (false, true);
+                }
+            }
+            if !back {
+                continue;
+            }
+            let (mut start, mut asked) = (current.hypothesis.clone(), current.asked.clone());
+            start.named.remove(slot);
+            asked.remove(slot);
+            let price = self.price_of_shapes(std::slice::from_ref(own));
+            if let Ok((fitted, point)) = self.settle(start, asked)
+                && fitted.cost < current.cost + price
+            {
+                return Ok(Some((fitted, point)));
+            }
+            self.dropped.clone_from(&before);
+        }
+        Ok(None)
+    }
+
+    /// Whether a law of the base acts that is not dropped.
+    pub(crate) fn has_in_base(&self, kind: Kind, joint: usize) -> bool {
+        let mut kept = std::iter::zip(&self.dropped, &self.session.base).filter(|(d, _)| !**d);
+        kept.any(|(_, law)| (law.effect.kind, law.effect.index) == (kind, joint))
     }
 
     /// Chooses the samples and reads the noise anew from where the next calibration starts.

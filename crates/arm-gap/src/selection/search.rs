@@ -163,14 +163,18 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(state)
     }
 
-    /// Goes on from laws of the passive base that came back once something else was named.
+    /// Goes on from laws of the passive base that came back once something else was named, or that stand in for it.
     fn with_base_reconsidered(
         &mut self,
         mut state: SearchState<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
-        let Some(revived) = self.with_base_revived(&state.current)? else {
+        let revived = match self.with_base_revived(&state.current)? {
+            None => self.with_base_instead(&state.current)?,
+            revived => revived,
+        };
+        let Some(revived) = revived else {
             return Ok(state);
         };
         let known = revived.0.hypothesis.known.clone();
