@@ -102,13 +102,14 @@ impl<T: Scalar> Displaced<T> {
         let part = s.squared() * s * (T::of(10.0) - s * (T::of(15.0) - T::of(6.0) * s));
         let speed = T::of(30.0) * (s * rest).squared() * rate;
         let gain = T::of(60.0) * s * rest * (rest - s) * rate.squared();
-        let along = |swing: T, slipped: T| -> Plane<T> {
-            core::array::from_fn(|axis| self.ripple[axis] * swing + self.slip[axis] * slipped)
+        let and_slip = |swing: Plane<T>, slipped: T| -> Plane<T> {
+            core::array::from_fn(|axis| swing[axis] + self.slip[axis] * slipped)
         };
+        let faster = omega.squared();
         [
-            along(sin, part),
-            along(omega * cos, speed),
-            along(-(omega.squared() * sin), gain),
+            and_slip(self.ripple.map(|a| a * sin), part),
+            and_slip(self.ripple.map(|a| a * omega * cos), speed),
+            and_slip(self.ripple.map(|a| -(a * faster * sin)), gain),
         ]
     }
 }
