@@ -179,8 +179,8 @@ def names(truth: Json, named: list[Json]) -> Json:
 
 def slip_told(truth: Json, named: list[Json]) -> bool | None:
     """Return whether a slip of the handle or of a sensor is named as such, in its trial and near its time; None where nothing slips."""
-    slip = truth.get("slip")
-    if not slip:
+    slip = truth.get("slip") or {}
+    if "what" not in slip:
         return None
     kind = {"handle": "handle_slip", "angle": "angle_offset"}[slip["what"]]
     own = [n for n in named if n.get("trial") == slip["trial"] and n["kind"] == kind and n["joint"] == slip.get("joint")]

@@ -311,10 +311,8 @@ impl Library {
                 }
             }
         }
-        let changes: Vec<_> = candidates
-            .iter()
-            .flat_map(|c| c.changes(prepared.session, hypothesis))
-            .collect();
+        let changes = |c: &Candidate| c.changes(prepared.session, hypothesis);
+        let changes: Vec<_> = candidates.iter().flat_map(changes).collect();
         let mut all = prepared.each_response(point, &changes).into_iter();
         let mut kept = Vec::new();
         let mut responses = Vec::new();

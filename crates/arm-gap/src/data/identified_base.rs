@@ -14,12 +14,10 @@ use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
 use crate::data::joint_in_motion::{WithStd, laws_in_motion};
-use crate::data::passive_law::{Free, Passive};
+use crate::data::passive_law::{Free, LIKELY, Passive};
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::prediction::Course;
 
-/// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
-pub(super) const LIKELY: f64 = 2.0;
 /// Noise of a joint's speed, as a share of the speed, above which the motion is simulated: what measured motion tells of that joint is
 /// noise. Below it is nearer than a simulation that lacks what is to be found.
 const NOISY: f64 = 0.3;
@@ -74,28 +72,7 @@ impl<const N: usize> Session<N> {
         if noisy && self.comparison == ComparisonMode::Led {
             found = along(MotionSource::Auto).unwrap_or(found);
         }
-        let mut laws = estimated(&found);
-        for own in laws.chunk_by_mut(|(a, _), (b, _)| a.index == b.index) {
-            let rubs = |(law, std): &WithStd| {
-                law.kind.smoothed_by().is_some() && law.parameters[0] > LIKELY * std
-            };
-            let springs =
-                |(law, std): &WithStd| spring(law).is_some() && law.parameters[0] > LIKELY * std;
-            let Some(friction) = own.iter().find(|one| rubs(one)).copied() else {
-                continue;
-            };
-            if own.iter().any(springs) {
-                continue;
-            }
-            let (joint, chain) = (own[0].0.index, &found.chain);
-            let asked = model.fitted.iter().filter(|law| law.index == joint);
-            let asked: Vec<_> = asked.copied().collect();
-            let alone =
-                laws_in_motion(chain, &self.trials, (joint, &asked, friction), found.cutoff);
-            if let Ok(Some(alone)) = alone {
-                own.copy_from_slice(&alone);
-            }
-        }
+        let laws = self.hidden_by_friction(estimated(&found), (&found, &model));
         let still = match self.comparison {
             ComparisonMode::Led => self.hardly_moving(),
             ComparisonMode::Torque => [false; N],
@@ -136,6 +113,35 @@ impl<const N: usize> Session<N> {
             .map(|change| change.clamp(-far, far));
         }
         self
+    }
+
+    /// Laws that were identified; those of a joint whose spring does not show beside its dry friction are read off the samples in which it
+    /// moves.
+    fn hidden_by_friction(
+        &self,
+        mut laws: Vec<WithStd>,
+        (found, model): (&Identified<N>, &Model<N>),
+    ) -> Vec<WithStd> {
+        let shows = |(law, std): &WithStd| law.parameters[0] > LIKELY * std;
+        for own in laws.chunk_by_mut(|(a, _), (b, _)| a.index == b.index) {
+            let mut dry = own.iter().filter(|(l, _)| l.kind.smoothed_by().is_some());
+            let mut springs = own.iter().filter(|(law, _)| spring(law).is_some());
+            let Some(&friction) = dry.find(|law| shows(law)) else {
+                continue;
+            };
+            if springs.any(shows) {
+                continue;
+            }
+            let (joint, chain) = (own[0].0.index, &found.chain);
+            let asked = model.fitted.iter().filter(|law| law.index == joint);
+            let asked: Vec<_> = asked.copied().collect();
+            let alone =
+                laws_in_motion(chain, &self.trials, (joint, &asked, friction), found.cutoff);
+            if let Ok(Some(alone)) = alone {
+                own.copy_from_slice(&alone);
+            }
+        }
+        laws
     }
 
     /// Whether the model has a law of a joint.

@@ -11,7 +11,7 @@ use arm_ident::regression::unknown::spring;
 use nalgebra::{DMatrix, DVector};
 
 use crate::GapError;
-use crate::data::identified_base::LIKELY;
+use crate::data::passive_law::LIKELY;
 
 /// Speed above which a joint moves \[rad/s\]: three times the default smoothing of dry laws, 0.01 rad/s, which are whole by then.
 const MOVES: f64 = 0.03;

@@ -2,6 +2,9 @@
 
 use arm_core::effect::Effect;
 
+/// Standard deviations from zero beyond which a law that was identified from measured motion is simulated.
+pub(super) const LIKELY: f64 = 2.0;
+
 /// A law of a joint that the model leaves without one.
 #[derive(Clone, Debug)]
 pub struct Passive {
