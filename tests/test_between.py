@@ -83,7 +83,7 @@ def test_a_pulse_between_the_points_of_both_runs_is_seen(at: float, width: float
     [found] = [e for e in run.estimates if e.at is not None]
     assert (found.name, found.error) == ("pulse.F", 40.0)
     assert at <= found.at < at + width
-    assert run.why.startswith(f"pulse.F goes 40 beyond its values at the communication points at {found.at:.6g} s")
+    assert run.why.startswith(f"pulse.F goes 40 beyond its values at the neighbouring communication points at {found.at:.6g} s")
 
 
 def test_a_pulse_shorter_than_the_resolution_is_seen_with_a_finer_one(pulse: Path) -> None:
@@ -279,7 +279,7 @@ def test_differences_of_rounding_are_no_finding() -> None:
     run = run_checked(couple([still, Slot()], [("arm.handle.r[2]", "slot.r")], step=0.01, duration=0.1))
     assert run.verdict == "good"
     assert all(estimate.error == 0.0 for estimate in run.estimates)
-    assert "; both runs are the same but for rounding; an event" in run.why
+    assert "; both runs are equal except for rounding; an event" in run.why
 
 
 class Slot(Ready):
@@ -347,9 +347,7 @@ def test_the_advice_names_what_the_partners_can_do(can_rollback: bool) -> None:
     if can_rollback:
         assert str(error.value).endswith(f"take a shorter step, the iterated algorithm or {advice}")
     else:
-        assert str(error.value).endswith(
-            f"take a shorter step or {advice} (spring cannot go back to a state, so that nothing can be iterated)"
-        )
+        assert str(error.value).endswith(f"take a shorter step or {advice} (no iteration is possible: no rollback in spring)")
 
 
 def test_an_arm_that_pushes_has_its_contact_inside_already() -> None:

@@ -141,8 +141,8 @@ def test_what_the_arm_received_is_compared_with_what_was_given(arm: Rig, robot: 
     assert arm.error(refused.value.run) > 1e-2
     run = arm.run(robot, "motion", "gauss-seidel", 0.02)
     assert 3e-4 < arm.error(run) < 4e-4
-    assert any("off what the communication points say" in text for text in run.warnings)
-    assert not any("off what" in text for text in arm.run(robot, "motion", "gauss-seidel", 0.01).warnings)
+    assert any("the work of its partners at the communication points differs by" in text for text in run.warnings)
+    assert not any("the work of its partners" in text for text in arm.run(robot, "motion", "gauss-seidel", 0.01).warnings)
 
 
 def test_an_explicit_master_that_is_good_is_as_near_as_the_page_says(arm: Rig, robot: Path) -> None:
@@ -165,7 +165,7 @@ def test_iterating_needs_partners_that_can_go_back(arm: Rig, robot: Path) -> Non
     with ImportedSlave(robot, name="robot") as partner:
         partner.can_rollback = False
         slave = Slave(arm.model, port="force", start=arm.q)
-        with pytest.raises(BadInput, match="robot cannot go back to a state"):
+        with pytest.raises(BadInput, match="robot does not support rollback"):
             run_system(couple([slave, partner], FORCE, algorithm="iterated", step=0.01, duration=0.1))
         # Through the motion port nothing comes back, so that there is nothing to iterate.
         slave = Slave(arm.model, port="motion", start=arm.q)
@@ -179,7 +179,7 @@ def test_what_another_tool_made_is_checked_too(robot: Path) -> None:
     from armrs.fmu.check import check_fmu
 
     found = [str(f) for f in check_fmu(robot)]
-    assert any("F_y is calculated at the start and is not listed as InitialUnknown" in f for f in found)
+    assert any("F_y is calculated at initialization but is not listed as InitialUnknown" in f for f in found)
     assert not any("crash" in f for f in found)
 
 
@@ -235,7 +235,7 @@ def test_a_partner_that_asks_to_end_ends_the_run() -> None:
 
     run = run_checked(couple([Ending("y", 1.0, 1.0)], [], step=0.01, duration=1.0))
     assert run.verdict == "ended"
-    assert "wall asks to end the run in the step from 0.06 s" in run.why
+    assert "wall requests the end of the run in the step from 0.06 s" in run.why
     assert run.t[-1] == pytest.approx(0.06)
     assert len(run.columns["wall.F[1]"]) == len(run.t)
 
@@ -389,7 +389,7 @@ def test_a_run_that_is_no_result_writes_its_diagnosis_alone(folder: Path, capsys
         ("[-150.0, 20.0]", '[-150.0, 20.0]\nstart = { "body[1].m" = [1, 2] }', "body[1].m: found [1, 2], allowed a finite number"),
         ("[-150.0, 20.0]", "[-150.0, 20.0]\nstart = { mass = 1.0 }", "unknown variable 'mass'"),
         ('name = "wall"', 'name = "wall"\nstart = { "r[1]" = "abc" }', "r[1]: found 'abc', allowed a finite number"),
-        ('to = "arm.handle.F"', 'to = "arm.handle.F"\ndual = "handle.F[1]"', "a variable that makes a power with handle.F[1]"),
+        ('to = "arm.handle.F"', 'to = "arm.handle.F"\ndual = "handle.F[1]"', "a variable whose product with handle.F[1] is a power"),
         ("step_s = 0.002", "step_s = 1e-300", "at most 10000000 steps of 1e-300 s"),
     ],
 )

@@ -173,8 +173,8 @@ def backslashed(files: Files) -> Files:
 
 OUTPUT = '<Float64 name="handle.r[1]"'
 MUTANTS: dict[str, tuple[Callable[[Files], Files], str]] = {
-    "no binary": (without("binaries/"), "no library for any machine"),
-    "wrong modelIdentifier": (xml('modelIdentifier="ArmRs"', 'modelIdentifier="Other"'), "wanted is Other"),
+    "no binary": (without("binaries/"), "no library for any platform"),
+    "wrong modelIdentifier": (xml('modelIdentifier="ArmRs"', 'modelIdentifier="Other"'), "expected Other"),
     "negative internal step": (xml('fixedInternalStepSize="', 'fixedInternalStepSize="-'), "fixedInternalStepSize: -0.00025"),
     "start outside min and max": (xml(r'(name="body\[1\].m".*?min=)"[^"]*"', r'\1"100.0"'), "variable body[1].m: start is 1.4"),
     "typing error in a capability": (xml("canGetAndSetFMUState", "canGetAndSetFMUStat"), "nearest known: canGetAndSetFMUState"),
@@ -182,7 +182,7 @@ MUTANTS: dict[str, tuple[Callable[[Files], Files], str]] = {
     "broken terminals": (terminals("</Terminals>", ""), "terminalsAndIcons.xml: cannot be read"),
     "terminal of an unknown variable": (
         terminals('variableName="handle.F[1]"', 'variableName="handle.G[1]"'),
-        "'handle.G[1]' is no variable",
+        "'handle.G[1]' is not a variable",
     ),
     "LZMA": (lambda files: files, "compressed with lzma"),
     "missing function": (renamed_symbol, "fmi3SetTime"),
@@ -190,7 +190,7 @@ MUTANTS: dict[str, tuple[Callable[[Files], Files], str]] = {
     "start that differs from the library": (xml(r'(name="body\[1\].m".*?start=")1', r"\g<1>2"), "in the description and"),
     "InitialUnknown missing": (xml(r"    <InitialUnknown [^>]*/>\n", ""), "not listed as InitialUnknown"),
     "undefined unit": (xml(r'(name="handle.F\[1\]".*?unit=")N"', r'\1lbf"'), "the unit 'lbf' is not defined"),
-    "illegal structured name": (xml('name="gravity"', 'name="gravity acceleration"'), "no structured name"),
+    "illegal structured name": (xml('name="gravity"', 'name="gravity acceleration"'), "not a structured name"),
     "no independent variable": (xml(r"    <Float64 name=\"time\".*?/>\n", ""), "0 independent variables"),
     "backslash in a path": (backslashed, "a backslash in a name"),
     "Output missing": (xml(r"    <Output [^>]*/>\n", ""), "is not listed"),
@@ -280,7 +280,7 @@ def test_export_info_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     assert cli.main(["fmu", "info", "one.fmu"]) == 0
     assert "canGetAndSetFMUState                    true\n" in capsys.readouterr().out
     assert cli.main(["fmu", "check", "arm.fmu"]) == 0
-    assert capsys.readouterr().out == "arm.fmu: nothing wrong found\n"
+    assert capsys.readouterr().out == "arm.fmu: no errors found\n"
     # At rest: nothing moves.
     slave = ImportedSlave("arm.fmu")
     slave.enter_initialization_mode()
@@ -345,7 +345,7 @@ def test_a_library_that_crashes_is_a_finding(folder: Path, tmp_path: Path) -> No
     place, suffix = platform_folder(3)
     path = repacked(folder / "force3.fmu", tmp_path / "crash.fmu", f"binaries/{place}/ArmRs{suffix}", lambda _: library.read_bytes())
     found = check_fmu(path)
-    assert any(" when making an instance" in f.text for f in found)
+    assert any(" while creating an instance" in f.text for f in found)
     assert sys.platform != "linux" or any("is killed by signal 6 (SIGABRT)" in f.text for f in found)
 
 

@@ -283,7 +283,7 @@ def test_a_description_beyond_all_sizes_is_refused_unread(tmp_path: Path) -> Non
 def test_devices_are_no_files(place: str) -> None:
     if not Path(place).exists():
         pytest.skip(f"no {place}")
-    with pytest.raises(BadInput, match="no regular file"):
+    with pytest.raises(BadInput, match="not a regular file"):
         check_fmu(place)
 
 

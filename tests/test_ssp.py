@@ -256,7 +256,7 @@ def test_systems_within_systems_mappings_and_transformations(folder: Path) -> No
     [line] = system.connections
     assert (line.source, line.target, line.factor, line.offset) == (("first", "y"), ("inner/last", "u"), 20.0, 31.0)
     assert system.starts == {"inner/last": {"k": 7.0}, "first": {"u": 2.0, "n": 3}}
-    assert [w for w in system.warnings if "nothing" in w] == ["first: the parameter nothing is no variable of the FMU, and is left out"]
+    assert [w for w in system.warnings if "nothing" in w] == ["first: the parameter nothing matches no variable of the FMU and is ignored"]
     # 2 · 3 · 2 comes out of the first, 20 · 12 + 31 goes into the last.
     assert ran(system)["inner/last.y"][-1] == 7.0 * 271.0
 
@@ -272,7 +272,7 @@ def test_systems_within_systems_mappings_and_transformations(folder: Path) -> No
         ('factor="4"', 'factor="four"', "factor: found four, allowed a number"),
         ('<ssv:Real value="0.5"/>', '<ssv:Enumeration value="a"/>', "found Enumeration"),
         ('source="start"', 'source="begin"', "allowed a parameter of the binding"),
-        ('endElement="inner" endConnector="k"', 'endElement="inner" endConnector="in"', "a second one to this end"),
+        ('endElement="inner" endConnector="k"', 'endElement="inner" endConnector="in"', "a second connection to this input"),
         ('startElement="first" startConnector="y"', 'startElement="first" startConnector="z"', "z"),
         (
             '<ssd:System name="inner">',

@@ -49,14 +49,14 @@ def fmu_export(
     version: Annotated[Fmi, typer.Option("--fmi", help="Version of the standard: FMI 2.0 or 3.0.")] = Fmi.three,
     port: Annotated[Port, typer.Option(help="Input: force on the arm [N], or motion of the robot's handle [m, m/s].")] = Port.force,
     start_deg: Annotated[str, typer.Option(metavar="Q1,…", help="Joint angles at the start [deg]; 0 when absent.")] = "",
-    rest: Annotated[bool, typer.Option("--rest", help="Start in equilibrium near these angles.")] = False,
+    rest: Annotated[bool, typer.Option("--rest", help="Start at the equilibrium reached from these angles.")] = False,
     dt: Annotated[float, typer.Option(help="Inner step [s], above 0.")] = 0.25e-3,
     library: Libraries = None,
     json: JsonFile = None,
 ) -> None:
     """Export an arm as a functional mock-up unit (FMU) for co-simulation and Model Exchange; no compiler is needed.
 
-    Exports of the same model are equal to the byte. The FMU contains the parameters of the arm, unencrypted; its token detects edits.
+    Exports of the same model are byte-identical. The FMU contains the parameters of the arm as plain text; its token reveals edits.
     """
     from ..cosim.slave import Slave
     from ..fmu.export import export_fmu
@@ -104,14 +104,14 @@ def fmu_info(
 @app.command("check", short_help="Check file, description and library of an FMU.")
 def fmu_check(
     file: File,
-    library: Annotated[bool, typer.Option(help="Load and try the library, which runs its native code with your rights.")] = True,
+    library: Annotated[bool, typer.Option(help="Load and test the library; its native code runs with your rights.")] = True,
     json: JsonFile = None,
 ) -> int:
     """Check an FMU: file, description and library against the standard and against one another.
 
     The library runs in a separate process with limits on memory, output and time. On Linux 5.13 and later it may write only to its
     temporary folder and to devices; it may read your files and use the network. Check files from strangers with --no-library first.
-    Exit status 1 if an error is found.
+    The exit status is 1 if an error is found.
     """
     import dataclasses
 
@@ -125,7 +125,7 @@ def fmu_check(
     def human() -> None:
         for finding in found:
             print(finding)
-        print(f"{file.name}: {wrong} wrong" if wrong else f"{file.name}: nothing wrong found")
+        print(f"{file.name}: {wrong} {'error' if wrong == 1 else 'errors'} found" if wrong else f"{file.name}: no errors found")
 
     present(lambda: {"verb": "fmu check", "file": file, "findings": [dataclasses.asdict(f) for f in found]}, json, human)
     return 1 if wrong else 0
@@ -146,10 +146,10 @@ def fmu_run(
 
     FMUs run their native code with your rights, each in a separate process with limits on memory, output and time.
 
-    The error is estimated from a second run with half the step, which also looks at the partners between the communication points. A run
-    is good if the error of every connected output and of every arm's angles is within the accuracy. Exit status 1, without samples, if
-    the run is no result: it is not accurate, is not resolved, or diverged; the coupling created energy; the iteration did not converge;
-    or a slave failed. Exit status 1, with samples, if a slave ended the run early or the error could not be estimated.
+    The error is estimated from a second run with half the step, which also reads the outputs between the communication points. A run is
+    good if the error of every connected output and of every arm's angles is within the accuracy. The exit status is 1, without samples,
+    if the run gives no result: it is not accurate, not resolved, or diverged; the coupling created energy; the iteration did not
+    converge; or a slave failed. It is 1, with samples, if a slave ended the run early or the error could not be estimated.
     """
     from ..cosim.accuracy import run_checked
     from ..cosim.coupled import RESULTS
@@ -191,7 +191,7 @@ def fmu_ssp(
 ) -> None:
     """Write a system as an .ssp archive of SSP 1.0, for OMSimulator, libcosim, ecos, FMPy and others.
 
-    Arms are exported as FMUs, FMUs are copied. Walls, signals and controllers are refused, because no other tool could run them.
+    Arms are exported as FMUs; FMUs are copied. Walls, signals and controllers are refused, because no other tool could run them.
     """
     from ..cosim.ssp_export import export_ssp
 

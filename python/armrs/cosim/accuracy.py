@@ -56,8 +56,8 @@ class Estimate:
         size = f"{self.error:.3g} {self.unit}".strip()
         allowed = f"allowed is {self.allowed:.3g} {self.unit}".strip()
         if self.at is None:
-            return f"{self.name} is off by about {size} (at most {self.most:.3g}), {allowed}"
-        return f"{self.name} goes {size} beyond its values at the communication points at {self.at:.6g} s, {allowed}"
+            return f"{self.name} has an error of about {size} (at most {self.most:.3g}), {allowed}"
+        return f"{self.name} goes {size} beyond its values at the neighbouring communication points at {self.at:.6g} s, {allowed}"
 
 
 def run_checked(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
@@ -110,7 +110,7 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
         reason = _jumps(run, again)
         if worst.most <= worst.allowed and not reason:
-            most = f"at most {worst.text}" if worst.error else "both runs are the same but for rounding"
+            most = f"the largest: {worst.text}" if worst.error else "both runs are equal except for rounding"
             why = f"the estimated errors are within the accuracy; {most}{_looked(run)}"
             text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
             halved = (*system.warnings, *run.warnings, text_of_step) if halvings else run.warnings

@@ -64,7 +64,7 @@ class _Plan:
             variable, element = found
             kind = variable.type
             if kind not in C_TYPES or (slave.fmi == 2 and kind not in NAMES_IN_2):
-                raise BadInput(f"{slave.name}, {name}", Text(f"a variable of type {kind}"), "a number, truth value or text")
+                raise BadInput(f"{slave.name}, {name}", Text(f"a variable of type {kind}"), "a number, Boolean or string")
             by_type.setdefault(kind, []).append((place, variable, element))
         self.groups = [_Group(slave, kind, variables) for kind, variables in by_type.items()]
         self.count = len(names)
@@ -363,7 +363,7 @@ class ImportedSlave(Partner):
 def describe(slave: Any, path: Path, description: Description, name: str | None, interface: str = "CoSimulation") -> None:
     """Give a slave the attributes of a `Partner` from the description of its FMU."""
     if interface not in description.interfaces:
-        raise BadInput("modelDescription.xml", Text(f"{' and '.join(description.interfaces)} alone"), "an FMU for co-simulation", file=path)
+        raise BadInput("modelDescription.xml", Text(f"{' and '.join(description.interfaces)} only"), "an FMU for co-simulation", file=path)
     slave.name = path.stem if name is None else checks.text("name", name)
     slave.variables = {v.name: v for v in description.variables}
     slave.can_rollback = description.flag(f"canGetAndSetFMU{'S' if description.fmi == 3 else 's'}tate")

@@ -137,7 +137,7 @@ class Library:
 
     def last_message(self) -> str:
         """Return what the FMU logged last."""
-        return self.messages[-1][2] if self.messages else "the FMU says nothing of it"
+        return self.messages[-1][2] if self.messages else "the FMU gives no reason"
 
     def _keep(self, status: int, category: bytes | None, text: bytes | None) -> None:
         # A slave that complains in every step must not fill the memory.
@@ -177,7 +177,7 @@ def library_path(folder: Path, description: Description, file: str | os.PathLike
     identifier = description.interfaces[interface].get("modelIdentifier", "") if interface else description.identifier
     if not _C_NAME.fullmatch(identifier):
         # A path here would load a library from outside the archive.
-        raise BadInput("modelIdentifier", identifier, "a name as in C", file=file)
+        raise BadInput("modelIdentifier", identifier, "a C identifier", file=file)
     place, suffix = platform_folder(description.fmi)
     path = folder / "binaries" / place / f"{identifier}{suffix}"
     if not path.is_file():

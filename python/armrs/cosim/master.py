@@ -127,7 +127,7 @@ class _Run:
             return
         for slave in self.slaves[self._loop]:
             if not slave.can_rollback:
-                found = Text(f"iterated, and {slave.name} cannot go back to a state (canGetAndSetFMUState is not true)")
+                found = Text(f"iterated, and {slave.name} does not support rollback (canGetAndSetFMUState is not true)")
                 raise BadInput("[system], algorithm", found, "jacobi or gauss-seidel, or a partner that can")
 
     @property
@@ -354,9 +354,9 @@ class _Run:
             # Of a partner in another process an input that is discarded comes to light here.
             raise self._not_done(i, error) from None
         if done.terminate:
-            raise _Ended(f"{self.slaves[i].name} asks to end the run in the step from {time:.6g} s; the samples end there")
+            raise _Ended(f"{self.slaves[i].name} requests the end of the run in the step from {time:.6g} s; the samples end there")
         if done.status == Status.DISCARD:
-            reached = f", it came to {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
+            reached = f", after reaching {done.last_successful_time:.6g} s" if done.last_successful_time > time else ""
             raise _Failed(f"{self.slaves[i].name} discards the step from {time:.6g} s{reached}: {done.message}")
 
     def _not_done(self, i: int, error: SlaveError) -> Exception:
@@ -427,7 +427,7 @@ class _Run:
             made, went = (np.nansum(energy[:, places], axis=1) for energy in (created, exchanged))
             most, through = float(np.max(np.abs(made))), max(float(np.max(np.abs(went))), _LITTLE)
             steps_made, steps_went = (float(np.sum(np.abs(np.diff(energy)))) for energy in (made, went))
-            text = f"the coupling creates {most:.3g} J at {self.slaves[i].name}, through which {through:.3g} J go"
+            text = f"the coupling creates {most:.3g} J at {self.slaves[i].name}, where {through:.3g} J are transferred"
             # A coupling far beyond its limit throws energy about in both directions: then the sum over steps tells.
             if most > MOST_CREATED * through or steps_made > MOST_IN_STEPS * max(steps_went, _LITTLE):
                 return "unstable", f"{text}; take {self._stabler(i)}", []
@@ -440,7 +440,8 @@ class _Run:
             places = [k for k in places if self._input(k).startswith(_PORT_INPUTS)]
             went = np.nansum(exchanged[:, places], axis=1)
             off, through = float(np.max(np.abs(inside - went))), max(float(np.max(np.abs(inside))), _LITTLE)
-            text = f"{self.slaves[i].name} receives {through:.3g} J through its port, {off:.3g} J off what the communication points say"
+            differs = f"the work of its partners at the communication points differs by {off:.3g} J"
+            text = f"{self.slaves[i].name} receives {through:.3g} J through its port; {differs}"
             if off > MOST_CREATED * through:
                 return "not resolved", f"{text}; take a shorter step", []
             if off > WORTH_A_WARNING * through:
@@ -459,7 +460,7 @@ class _Run:
         if isinstance(slave, Slave) and slave.port == "force" and not any(isinstance(self.slaves[k], Slave) for k in givers):
             found.append(f"for a contact that is a spring and a damper, the motion port of {slave.name}")
         listing = " or ".join([", ".join(found[:-1]), found[-1]]) if len(found) > 1 else found[0]
-        cannot = f" ({' and '.join(stuck)} cannot go back to a state, so that nothing can be iterated)" if stuck else ""
+        cannot = f" (no iteration is possible: no rollback in {' and '.join(stuck)})" if stuck else ""
         return f"{listing}{cannot}"
 
     def _input(self, k: int) -> str:
@@ -494,7 +495,7 @@ def _refused_start(slave: Partner, given: Mapping[str, Any], error: SlaveError) 
     """Name the slave of a refusal before the first step: the start values of a system are an input."""
     if error.status == Status.FATAL or not given:
         return SlaveError(error.function, error.status, f"{slave.name}: {error.message}")
-    return BadInput(f"{slave.name}, [slave.start]", Text(error.message), "values that the slave takes")
+    return BadInput(f"{slave.name}, [slave.start]", Text(error.message), "values that the slave accepts")
 
 
 def _differences(residual: Callable[[np.ndarray], np.ndarray], at: np.ndarray, r: np.ndarray, by: np.ndarray) -> np.ndarray:

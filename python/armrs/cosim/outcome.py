@@ -110,13 +110,13 @@ def _drawn(run: Coupled) -> figures.Drawn:
             if places[k].dual is not None:
                 created.plot(run.t, run.created[:, k], label=".".join(places[k].target))
         held.set(title="Inputs held in each step", ylabel="value")
-        off.set(title="What they were off at the interface", ylabel="magnitude")
+        off.set(title="Coupling residual", ylabel="magnitude")
         created.set(title="Energy created by the coupling", ylabel="energy [J]", xlabel="time [s]")
         for ax in (held, off, created):
             if ax.get_legend_handles_labels()[0]:
                 ax.legend(loc="best")
     text = (
-        "Above, what the slaves were given. In the middle, how far that is from what they should have been given, known after the step. "
-        "Below, what they received more than was given: a coupling that creates energy is not to be believed."
+        "Top: the inputs held in each step. Middle: the coupling residual, by which the held inputs differ from the correct ones; it is "
+        "known only after the step. Bottom: the energy created by the coupling, received minus given; if it is large, do not trust the run."
     )
     return figures.Drawn("interface", "Interface", text, figure)

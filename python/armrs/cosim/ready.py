@@ -168,7 +168,7 @@ class Recorded(Ready):
             raise BadInput("columns", Text(", ".join(table)), "a column t_s, the time")
         self._t = checks.numbers("t_s", table["t_s"], "s", shape=(None,))
         if len(self._t) < 2 or not np.all(np.diff(self._t) > 0):
-            raise BadInput("t_s", Text("times that do not grow"), "two times or more, each later than the one before")
+            raise BadInput("t_s", Text("times that do not increase"), "two times or more, each later than the one before")
         named = {column: _split(column) for column in table if column != "t_s"}
         super().__init__(name, (), named.values())
         self._columns = {n: checks.numbers(c, table[c], shape=(len(self._t),)) for c, (n, _) in named.items()}

@@ -139,7 +139,7 @@ def _load(root: ElementTree.Element, flat: _Flat, made: list[Partner], asked: tu
             lines.append(line | found.more)
     for name, component in flat.components.items():
         starts[name], unknown = _starts(slaves[name], component, flat.factors)
-        warnings += [f"{name}: the parameter {parameter} is no variable of the FMU, and is left out" for parameter in unknown]
+        warnings += [f"{name}: the parameter {parameter} matches no variable of the FMU and is ignored" for parameter in unknown]
     warnings += [f"the system's own input {connector} is not driven" for _, connector in sorted(flat.inputs)]
     system = couple(made, lines, starts=starts, **settings)
     return replace(system, warnings=(*system.warnings, *warnings))
@@ -152,7 +152,7 @@ def _numbers(edge: _Edge) -> dict[str, float]:
 def _take(system: ElementTree.Element, path: str, flat: _Flat, depth: int) -> None:
     """Take a system and all within it apart."""
     if depth > _DEEPEST:
-        raise BadInput(f"System {path}", Text(f"more than {_DEEPEST} systems within one another"), "fewer")
+        raise BadInput(f"System {path}", Text(f"more than {_DEEPEST} nested systems"), "fewer")
     for child in system.iterfind("ssd:Elements/*", NAMESPACES):
         tag, name = child.tag.rpartition("}")[2], _attribute(child, "name")
         inner = f"{path}/{name}" if path else name
@@ -196,7 +196,7 @@ def _connect(element: ElementTree.Element, path: str, flat: _Flat) -> None:
     start, end = node("start"), node("end")
     label = f"Connection {'.'.join(start)} -> {'.'.join(end)}"
     if end in flat.edges:
-        raise BadInput(label, Text("a second one to this end"), "one for each input")
+        raise BadInput(label, Text("a second connection to this input"), "one for each input")
     factor, offset = 1.0, 0.0
     for child in element:
         tag = child.tag.rpartition("}")[2]

@@ -271,9 +271,9 @@ def _check_value(place: str, variable: Variable, value: object) -> None:
     """Refuse a value of another kind than a variable."""
     kind = variable.type
     if kind in ("Binary", "Clock"):
-        raise BadInput(place, Text(f"a variable of type {kind}"), "numbers, truth values and texts")
+        raise BadInput(place, Text(f"a variable of type {kind}"), "numbers, Booleans and strings")
     if variable.causality == "structuralParameter":
-        raise BadInput(place, Text("a structural parameter"), "variables that change no size of an array")
+        raise BadInput(place, Text("a structural parameter"), "variables that do not change the size of an array")
     if kind == "String":
         if not isinstance(value, str):
             raise BadInput(place, value, "a text")
@@ -353,9 +353,9 @@ def _connection(
         raise BadInput("to", Text(f"{'.'.join(target)}, {given.causality}"), "an input")
     for end, variable in zip(ends, (output, given), strict=True):
         if family(variable) is None:
-            raise BadInput("from, to", Text(f"{'.'.join(end)}, {variable.type}"), "numbers or truth values")
+            raise BadInput("from, to", Text(f"{'.'.join(end)}, {variable.type}"), "numbers or Booleans")
     if family(output) != family(given):
-        raise BadInput("from, to", Text(f"{output.type} and {given.type}"), "the same sort of value at both ends")
+        raise BadInput("from, to", Text(f"{output.type} and {given.type}"), "the same kind of value at both ends")
     label = f"{'.'.join(source)} -> {'.'.join(target)}"
     if family(given) == "Float" and (output.exponents is None or given.exponents is None):
         warnings.append(f"{label}: units not checked, one of them is not described")
@@ -371,7 +371,7 @@ def _connection(
     within = table.get("within")
     if family(given) != "Float":
         if (factor, offset) != (1.0, 0.0):
-            raise BadInput("factor, offset", Text(f"with {output.type}"), "neither, but between floating point numbers")
+            raise BadInput("factor, offset", Text(f"with {output.type}"), "neither, except between floating point numbers")
         # Between whole numbers there is nothing to hold.
         return Connection(source, target, checks.choice("within", "start" if within is None else within, ("start", "end")))
     within = _within(target, given, slaves) if within is None else checks.choice("within", within, WITHIN)
@@ -432,5 +432,5 @@ def _dual(given: object, target: tuple[str, str], slaves: dict[str, Partner]) ->
         raise unknown_name("dual", name, known, what=f"variable of {target[0]}")
     one, other = slaves[target[0]].variable(target[1]).exponents, known[name].exponents
     if one is not None and other is not None and tuple(a + b for a, b in zip(one[:3], other[:3], strict=True)) != _POWER:
-        raise BadInput("dual", name, f"a variable that makes a power with {target[1]}")
+        raise BadInput("dual", name, f"a variable whose product with {target[1]} is a power")
     return name, 1.0

@@ -34,14 +34,14 @@ def archive(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
     try:
         source = checks.path("path", path)
         if source.exists() and not source.is_file():
-            raise BadInput("file", Text("no regular file"), "an FMU, which is a zip archive", file=path)
+            raise BadInput("file", Text("not a regular file"), "an FMU, which is a zip archive", file=path)
         files = zipfile.ZipFile(source)
     except zipfile.BadZipFile as error:
         raise BadInput("archive", Text(str(error)), "an FMU, which is a zip archive", file=path) from None
     except BadInput:
         raise
     except (OSError, ValueError, NotImplementedError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error) or "a name no file can have"
+        reason = getattr(error, "strerror", None) or str(error) or "not a valid file name"
         raise BadInput("file", Text(reason), "a file that can be read", file=path) from None
     with files:
         if len(files.infolist()) > MOST_FILES:
@@ -95,7 +95,7 @@ def unpack(path: str | os.PathLike[str], folder: Path) -> None:
                 if isinstance(error, BadInput):
                     raise
                 reason = getattr(error, "strerror", None) or str(error)
-                raise BadInput("archive", Text(f"the name {name!r}: {reason}"), "names that a file can have", file=path) from None
+                raise BadInput("archive", Text(f"the name {name!r}: {reason}"), "valid file names", file=path) from None
 
 
 def _unpack_one(files: zipfile.ZipFile, info: zipfile.ZipInfo, folder: Path, path: str | os.PathLike[str]) -> None:

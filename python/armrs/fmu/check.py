@@ -99,7 +99,7 @@ def _refused(error: BadInput) -> Finding:
 def _schemas(files: zipfile.ZipFile, content: bytes, path: str | os.PathLike[str]) -> Iterator[Finding]:
     """Validate what has a schema."""
     if not schema.available():
-        text = "not validated with the standard's schemas: they come with FMPy, pip install 'armrs[fmi]'"
+        text = "not validated against the schemas of the standard, which FMPy ships: pip install 'armrs[fmi]'"
         yield Finding("note", DESCRIPTION, text)
         return
     head = content[: content.find(b">", content.find(b"<fmiModelDescription")) + 1]
@@ -122,7 +122,7 @@ def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Findin
     names = [name.replace("\\", "/") for name in files.namelist()]
     binaries = [name for name in names if name.startswith("binaries/") and not name.endswith("/")]
     if not binaries and not any(name.startswith("sources/") for name in names):
-        yield Finding("error", "binaries", "no library for any machine, and no sources")
+        yield Finding("error", "binaries", "no library for any platform, and no sources")
         return
     place, suffix = platform_folder(description.fmi)
     here = [name for name in binaries if name.startswith(f"binaries/{place}/")]
@@ -130,7 +130,7 @@ def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Findin
         if f"binaries/{place}/{identifier}{suffix}" not in binaries:
             there = ", ".join(here[:5]) or "nothing"
             level = "error" if here else "note"
-            yield Finding(level, f"binaries/{place}", f"{there}, wanted is {identifier}{suffix}, named as modelIdentifier says")
+            yield Finding(level, f"binaries/{place}", f"found {there}, expected {identifier}{suffix}, the name that modelIdentifier gives")
 
 
 def _tried(path: Path, seconds: float, part: int | None) -> list[Finding]:
@@ -152,7 +152,7 @@ def _tried(path: Path, seconds: float, part: int | None) -> list[Finding]:
                 found.append(_finding(record))
     except ProcessEnded as error:
         printed = f"; it printed: {error.printed[:200]}" if error.printed else ""
-        found.append(Finding("error", "library", f"{error.how} when {step}{printed}"))
+        found.append(Finding("error", "library", f"{error.how} while {step}{printed}"))
     except BadInput as error:
         found.append(_refused(error))
     finally:

@@ -94,22 +94,22 @@ def broken(description: Description) -> Iterator[Broken]:
     for clock in known:
         place = f"clock {clock.name}"
         if clock.kind != "triggered" and clock.causality != "input":
-            yield place, f"causality {clock.causality} of a clock that ticks by time, allowed is input"
+            yield place, f"causality {clock.causality} of a time-based clock, allowed is input"
         if clock.kind == "constant" and clock.interval is None:
-            yield place, "no interval; a constant clock has one"
+            yield place, "no interval, which a constant clock requires"
         if clock.interval is not None and not clock.interval > 0.0:
             yield place, f"interval {clock.interval:g} s, allowed is a positive number"
         if clock.shift is not None and clock.shift < 0.0:
             yield place, f"shift {clock.shift:g} s, allowed is a number from 0"
         if "ScheduledExecution" in description.interfaces and clock.causality == "input" and clock.priority is None:
-            yield place, "no priority; an input clock has one in scheduled execution"
+            yield place, "no priority, which an input clock requires in scheduled execution"
         if clock.causality == "output" and clock.priority is not None:
             yield place, f"priority {clock.priority} of an output clock, allowed is none"
     references = {str(clock.reference) for clock in known}
     for element in description.root.iterfind("ModelVariables/*"):
         for reference in (element.get("clocks") or "").split():
             if reference not in references:
-                yield f"variable {element.get('name')}", f"clocks refers to {reference}, which is no clock"
+                yield f"variable {element.get('name')}", f"clocks refers to {reference}, which is not a clock"
 
 
 def intervals(trial: Trial, call: Call, when: str, kinds: tuple[str, ...] = (*_PERIODIC, "changing", "countdown")) -> dict[str, float]:
@@ -163,7 +163,7 @@ class _Scheduler:
             ticking(self.trial, self.slave.call)
             self.countdown |= intervals(self.trial, self.slave.call, "in a clock update", ("countdown",))
         except SlaveError as error:
-            self.trial.find("ScheduledExecution", f"a clock update: {error}", sort="clock update")
+            self.trial.find("ScheduledExecution", f"a clock update fails: {error}", sort="clock update")
 
     def lock(self) -> None:
         """Begin what must not be interrupted."""
@@ -179,7 +179,7 @@ def scheduled_execution(trial: Trial) -> None:
     flags = trial.description.interfaces.get("ScheduledExecution")
     if flags is None or flags.get("needsExecutionTool") in ("true", "1"):
         return
-    trial.step("making an instance for scheduled execution")
+    trial.step("creating an instance for scheduled execution")
     scheduler = _Scheduler(trial)
     without = ctypes.CFUNCTYPE(None)
     callbacks = (UPDATE_CLOCKS_3(scheduler.update), without(scheduler.lock), without(scheduler.unlock))
@@ -230,7 +230,7 @@ def _activate(trial: Trial, scheduler: _Scheduler, time: float, clock: Clock) ->
     except SlaveError as error:
         trial.find(f"clock {clock.name}", f"its partition cannot be activated at {time:g} s: {error}", sort="partition")
     if scheduler.locked:
-        text = f"its partition returns with preemption locked {scheduler.locked} times more than unlocked"
+        text = f"its partition returns with {scheduler.locked} more preemption locks than unlocks"
         trial.find(f"clock {clock.name}", text, sort="preemption")
 
 

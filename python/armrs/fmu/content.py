@@ -27,7 +27,7 @@ def in_archive(files: zipfile.ZipFile) -> Iterator[Broken]:
         if "\\" in name:
             yield name, "a backslash in a name of the archive, allowed is / between folders"
         if name.startswith(("/", "./")) or ".." in name.split("/") or re.match("[A-Za-z]:", name):
-            yield name, "a name that begins with /, ./ or a drive, or holds .., allowed are plain relative names"
+            yield name, "a name that begins with /, ./ or a drive, or contains .., allowed are plain relative names"
         if any(ord(c) < 32 for c in name):
             yield name, "a control character in a name of the archive"
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
@@ -40,10 +40,10 @@ def in_archive(files: zipfile.ZipFile) -> Iterator[Broken]:
     for name, count in Counter(names).items():
         # Importers differ in which of two files they take; where both are the same that does not matter.
         if count > 1 and len({(i.CRC, i.file_size) for i in files.infolist() if i.filename == name}) > 1:
-            yield name, "stands more than once in the archive, with different contents"
+            yield name, "occurs more than once in the archive, with different contents"
     lower = Counter(name.lower() for name in set(names))
     for name in sorted(n for n in set(names) if lower[n.lower()] > 1):
-        yield name, "differs from another name in capitals alone, which some systems cannot hold"
+        yield name, "differs from another name only in case, which some file systems do not distinguish"
     if (total := sum(info.file_size for info in files.infolist())) > MOST_BYTES:
         yield "archive", f"{total} bytes unpacked, at most {MOST_BYTES} are read here"
 
@@ -87,7 +87,7 @@ def _members(root: ElementTree.Element, known: set[str]) -> Iterator[str]:
         for key in ("variableName", "inStreamVariableName", "outStreamVariableName"):
             name = element.get(key)
             if name is not None and name not in known:
-                yield f"{key} {name!r} is no variable of this FMU"
+                yield f"{key} {name!r} is not a variable of this FMU"
         if element.tag == "Terminal":
             if element.get("name") in seen:
                 yield f"two terminals have the name {element.get('name')!r}"
@@ -96,4 +96,4 @@ def _members(root: ElementTree.Element, known: set[str]) -> Iterator[str]:
             if element.get("matchingRule") in ("plug", "bus"):
                 yield from (f"two members of {element.get('name')} have the name {name!r}" for name, n in members.items() if n > 1)
                 if any(not m.get("memberName") for m in element.iterfind("TerminalMemberVariable")):
-                    yield f"a member of {element.get('name')} without memberName, which the matching rule needs"
+                    yield f"a member of {element.get('name')} without memberName, which the matching rule requires"

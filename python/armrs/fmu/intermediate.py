@@ -58,7 +58,7 @@ class _Watch:
         if wants:
             self._each(self.settable, "set", lambda slave, v: slave.set(v.name, v.start))
         if can_return and not self.early:
-            self._find("it offers to return early, which was not allowed when the instance was made")
+            self._find("it offers early return, which was not allowed at instantiation")
         elif can_return and asked and at and self.asked is None and time > self.begin:
             self.asked = at[0] = time
             asked[0] = True
@@ -88,13 +88,13 @@ def intermediate_update(trial: Trial) -> None:
     """Make steps with a callback for intermediate updates where they are promised; compare them with steps without."""
     if trial.fmi == 2 or trial.wants_events or not trial.flag(_UPDATE):
         return
-    trial.step("making an instance with an intermediate update")
+    trial.step("creating an instance with an intermediate update")
     expected = None if trial.only_once else _without(trial)
     watch = _watched(trial, early=False)
     if watch is None or watch.slave is None:
         return
     trial.begin(watch.slave)
-    trial.step("making a step with an intermediate update")
+    trial.step("doing a step with an intermediate update")
     watch.step(trial.start, trial.size)
     if not watch.times:
         trial.find(f"CoSimulation, {_UPDATE}", f"the callback is not called in a step of {trial.size:g} s", level="note")
@@ -118,12 +118,12 @@ def early_return(trial: Trial) -> None:
     """Make an instance that may return early where that is promised, ask it to where it can, and go on from where it came to."""
     if trial.fmi == 2 or trial.wants_events or not (trial.flag(_EARLY) or trial.flag(_ON_REQUEST)):
         return
-    trial.step("making an instance that may return early")
+    trial.step("creating an instance that may return early")
     watch = _watched(trial, early=True)
     if watch is None or watch.slave is None:
         return
     trial.begin(watch.slave)
-    trial.step("making steps that may return early")
+    trial.step("doing steps that may return early")
     time = trial.start
     offered = False
     for _ in range(_MOST_STEPS):
@@ -150,10 +150,10 @@ def _wrong(trial: Trial, watch: _Watch, done: StepResult) -> tuple[str, str] | N
     if done.early_return and not watch.begin < reached <= watch.end + trial.lag:
         return place, f"it returns early from the step from {watch.begin:g} s to {watch.end:g} s with lastSuccessfulTime {reached:g} s"
     if watch.asked is not None and not done.early_return and watch.asked < watch.end - trial.lag - _LATE * abs(watch.end):
-        return f"CoSimulation, {_ON_REQUEST}", f"it was asked at {watch.asked:g} s to return early, which it had offered, and did not"
+        return f"CoSimulation, {_ON_REQUEST}", f"it offered early return but did not return early when requested at {watch.asked:g} s"
     if done.early_return and watch.asked is None and not trial.flag(_EARLY):
         # It was allowed to: an importer that reads the description alone would not have expected it.
-        trial.find(f"CoSimulation, {_EARLY}", "is not true, and it returns early without being asked", level="note")
+        trial.find(f"CoSimulation, {_EARLY}", "is not true, but it returns early without a request", level="note")
     return None
 
 

@@ -66,7 +66,7 @@ def _symbols_of(trial: Trial, interfaces: list[str]) -> bool:
         return False
     version = (library.function("GetVersion", ctypes.c_char_p)() or b"").decode(errors="replace")
     if version.split(".")[0] != str(fmi):
-        trial.find("library, GetVersion", f"{version!r}, the description has {trial.description.version}")
+        trial.find("library, GetVersion", f"{version!r}, but fmiVersion is {trial.description.version}")
     if fmi == 2 and (platform := library.function("GetTypesPlatform", ctypes.c_char_p)()) != b"default":
         trial.find("library, GetTypesPlatform", f"{platform!r}, allowed is 'default'")
     return True
@@ -76,16 +76,16 @@ def _life(trial: Trial) -> None:
     """Make an instance, compare its start values, step it, go back, reset it."""
     if "CoSimulation" not in trial.description.interfaces:
         return
-    trial.step("making an instance")
+    trial.step("creating an instance")
     try:
         slave = trial.make()
     except SlaveError as error:
         if trial.flag("needsExecutionTool"):
-            trial.find("CoSimulation, needsExecutionTool", f"it needs the tool that made it: not tried ({error})", level="note")
+            trial.find("CoSimulation, needsExecutionTool", f"it needs the tool that exported it: not tested ({error})", level="note")
             trial.needs_tool = True
             return
         if trial.fmi == 3 and trial.flag("hasEventMode") and _made_with_events(trial):
-            text = "an instance that does not use the event mode is refused: not tried, and no partner for armrs"
+            text = "an instance without event mode is refused: not tested, and armrs cannot couple this FMU"
             trial.find("CoSimulation, hasEventMode", text, level="note")
             trial.wants_events = True
             return
@@ -123,20 +123,20 @@ def _made_with_events(trial: Trial) -> bool:
 
 def _steps(trial: Trial, slave: ImportedSlave) -> dict[str, list[Any]]:
     """Make a step, twice where the FMU can go back; return the outputs after the first."""
-    trial.step("making a step")
+    trial.step("doing a step")
     state = slave.get_state() if slave.can_rollback else None
     first = _advance(trial, slave, trial.start, trial.size)
     if state is None:
-        trial.find("CoSimulation", "states cannot be kept: it takes part in no iterated coupling", level="note")
+        trial.find("CoSimulation", "states cannot be saved and restored, so the FMU cannot take part in an iterated coupling", level="note")
     else:
         word = f"GetFMU{'S' if trial.fmi == 3 else 's'}tate"
-        trial.step("going back to a state")
+        trial.step("restoring a state")
         _disturb(trial, slave)
         slave.set_state(state)
-        trial.compare(f"library, {word}", first, _advance(trial, slave, trial.start, trial.size), "after going back and making it again")
+        trial.compare(f"library, {word}", first, _advance(trial, slave, trial.start, trial.size), "from the restored state")
         _serialized(trial, slave, state, first)
         slave.free_state(state)
-    trial.step("making steps of other lengths")
+    trial.step("doing steps of other lengths")
     if slave.can_vary_step:
         middle = trial.start + trial.size
         _advance(trial, slave, middle, 0.5 * trial.size)
@@ -160,29 +160,29 @@ def _disturb(trial: Trial, slave: ImportedSlave) -> None:
 def _serialized(trial: Trial, slave: ImportedSlave, state: Any, first: dict[str, list[Any]]) -> None:
     if not trial.flag(f"canSerializeFMU{'S' if trial.fmi == 3 else 's'}tate"):
         return
-    trial.step("writing a state as bytes")
+    trial.step("serializing a state")
     content = slave.serialize_state(state)
     if not content:
-        trial.find("library, SerializeFMUState", "a state of no bytes")
+        trial.find("library, SerializeFMUState", "the serialized state is empty")
     copy = slave.deserialize_state(content)
     slave.set_state(copy)
     slave.free_state(copy)
-    trial.compare("library, SerializeFMUState", first, _advance(trial, slave, trial.start, trial.size), "from the state read back")
+    trial.compare("library, SerializeFMUState", first, _advance(trial, slave, trial.start, trial.size), "from the deserialized state")
 
 
 def _advance(trial: Trial, slave: ImportedSlave, time: float, size: float) -> dict[str, list[Any]]:
     done = slave.do_step(time, size)
     place, end = "library, DoStep", time + size
     if done.terminate:
-        trial.find(place, f"it asks to end the run after the step from {time:g} s", level="note")
+        trial.find(place, f"it requests the end of the run after the step from {time:g} s", level="note")
     elif done.status > Status.WARNING:
         trial.find(place, f"the step of {size:g} s from {time:g} s is discarded: {done.message}")
     elif done.early_return:
-        trial.find(place, "it returns early, which was not allowed when the instance was made")
+        trial.find(place, "it returns early, which was not allowed at instantiation")
     elif abs(done.last_successful_time - end) > 1e-6 * size + 1e-12 * abs(end) + trial.lag:
         trial.find(place, f"lastSuccessfulTime is {done.last_successful_time:g} s after a step to {end:g} s")
     if done.event and not trial.flag("hasEventMode"):
-        trial.find(place, "it asks for event handling and has no event mode")
+        trial.find(place, "it requests event handling but has no event mode")
     values = trial.outputs(slave)
     for name, found in values.items():
         for value in found:
@@ -226,7 +226,7 @@ def _second_instance(trial: Trial, slave: ImportedSlave) -> None:
     """Make a second instance: it begins where the first began, and does not touch it."""
     if trial.only_once:
         return
-    trial.step("making a second instance beside the first")
+    trial.step("creating a second instance beside the first")
     before = trial.outputs(slave)
     try:
         other = trial.make()
@@ -238,7 +238,7 @@ def _second_instance(trial: Trial, slave: ImportedSlave) -> None:
     values.starts(trial, other)
     other.exit_initialization_mode()
     other.do_step(trial.start, trial.size)
-    trial.compare("library, instantiate", before, trial.outputs(slave), "after a second instance made one")
+    trial.compare("library, instantiate", before, trial.outputs(slave), "after a step of a second instance")
     other.free()
 
 

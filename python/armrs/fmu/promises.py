@@ -67,7 +67,7 @@ def directional_derivatives(trial: Trial, slave: ImportedSlave) -> None:
         difference = (values[0] - values[1]) / (2.0 * size)
         for name, found, expected in zip(unknowns, derivative, difference, strict=True):
             if not abs(found - expected) <= _DERIVATIVE_OFF * max(1.0, abs(expected)):
-                text = f"the derivative of {name} by {known.name} is {found:.6g}, finite differences give {expected:.6g}"
+                text = f"the derivative of {name} with respect to {known.name} is {found:.6g}, finite differences give {expected:.6g}"
                 trial.find("library, GetDirectionalDerivative", text, sort="derivatives")
 
 
@@ -84,23 +84,23 @@ def adjoint_derivatives(trial: Trial, slave: ImportedSlave) -> None:
         row = slave.get_adjoint_derivative([unknown], knowns, [1.0])
         for known, found, column in zip(knowns, row, columns, strict=True):
             if not abs(found - column[k]) <= _NOISE * max(1.0, abs(column[k])):
-                text = f"the derivative of {unknown} by {known} is {found:.6g}, GetDirectionalDerivative gives {column[k]:.6g}"
+                text = f"the derivative of {unknown} with respect to {known} is {found:.6g}, GetDirectionalDerivative gives {column[k]:.6g}"
                 trial.find("library, GetAdjointDerivative", text, sort="adjoint")
 
 
 def configuration(trial: Trial) -> None:
-    """Set structural parameters to their start values in the configuration mode, which an FMU that has some must offer."""
+    """Set structural parameters to their start values in configuration mode, which an FMU that has some must offer."""
     structural = [v for v in trial.readable("structuralParameter") if v.start is not None and not v.dimensions]
     if not structural or trial.wants_events or "CoSimulation" not in trial.description.interfaces:
         return
-    trial.step("setting structural parameters in the configuration mode")
+    trial.step("setting structural parameters in configuration mode")
     slave = trial.make()
     slave.call("EnterConfigurationMode")
     try:
         for v in structural:
             slave.set(v.name, v.start)
     except SlaveError as error:
-        trial.find(f"variable {v.name}", f"its own start value cannot be set in the configuration mode: {error}")
+        trial.find(f"variable {v.name}", f"its own start value cannot be set in configuration mode: {error}")
     else:
         slave.call("ExitConfigurationMode")
         trial.begin(slave)
@@ -130,13 +130,13 @@ def event_mode(trial: Trial) -> None:
     """Go through the event mode where it is promised."""
     if trial.fmi == 2 or not trial.flag("hasEventMode"):
         return
-    trial.step("making an instance that uses the event mode")
+    trial.step("creating an instance that uses the event mode")
     try:
         slave = trial.make(event_mode=True)
     except SlaveError as error:
         trial.find("CoSimulation, hasEventMode", f"an instance that uses the event mode is refused: {error}")
         return
-    trial.step("going through the event mode")
+    trial.step("running event mode")
     slave.enter_initialization_mode(trial.start)
     clocks.intervals(trial, slave.call, "in the initialization")
     slave.exit_initialization_mode()
@@ -167,7 +167,7 @@ def model_exchange(trial: Trial) -> None:
     flags = trial.description.interfaces.get("ModelExchange")
     if flags is None or flags.get("needsExecutionTool") in ("true", "1"):
         return
-    trial.step("making an instance for Model Exchange")
+    trial.step("creating an instance for Model Exchange")
     library = Library(library_path(trial.folder, trial.description, trial.path, "ModelExchange"), trial.fmi)
     resources = trial.folder / "resources"
     handle = library.instantiate_model_exchange("tried", trial.description.token, resources)

@@ -63,7 +63,7 @@ def _top(description: Description) -> Iterator[Broken]:
         yield "modelName", "missing"
     for kind, attributes in description.interfaces.items():
         if not _C_NAME.fullmatch(attributes.get("modelIdentifier", "")):
-            yield f"{kind}, modelIdentifier", f"{attributes.get('modelIdentifier', '')!r}, allowed is a name as in C"
+            yield f"{kind}, modelIdentifier", f"{attributes.get('modelIdentifier', '')!r}, allowed is a C identifier"
     for kind, known in (("CoSimulation", names.CO_SIMULATION[fmi]), ("ModelExchange", names.MODEL_EXCHANGE[fmi])):
         for key in description.interfaces.get(kind, ()):
             if key not in known and ":" not in key and not key.startswith("{") and (hint := nearest(key, known)):
@@ -134,9 +134,9 @@ def _references(description: Description) -> Iterator[Broken]:
         if derivative is not None and name in variables:
             state = _state(derivative, description, by_reference)
             if state is None:
-                yield f"variable {name}", f"derivative refers to {derivative}, which is no variable"
+                yield f"variable {name}", f"derivative refers to {derivative}, which is not a variable"
             elif not state.type.startswith("Float"):
-                yield f"variable {name}", f"derivative of {state.name}, which is no floating point number"
+                yield f"variable {name}", f"derivative of {state.name}, which is not a floating point number"
 
 
 def _state(text: str, description: Description, by_reference: dict[str, Variable]) -> Variable | None:
@@ -159,7 +159,7 @@ def _refers(
             inner = next(iter(t), t) if fmi == 2 else t
             tag = inner.tag if fmi == 2 else inner.tag.removesuffix("Type")
             if tag != typed.tag:
-                yield f"declaredType {declared!r} is one of {tag}, the variable is {typed.tag}"
+                yield f"declaredType {declared!r} is a type of {tag}, but the variable is {typed.tag}"
     elif typed.tag == "Enumeration":
         yield "an Enumeration without declaredType"
     unit = typed.get("unit") or (None if inner is None else inner.get("unit"))
@@ -265,18 +265,18 @@ def _variable(v: Variable, description: Description) -> Iterator[str]:
         kinds = " or ".join(initials) or "none"
         yield f"initial {v.initial} with causality {v.causality} and variability {v.variability}, allowed is {kinds}"
     if v.variability == "continuous" and not v.type.startswith("Float"):
-        yield f"variability continuous of the type {v.type}, allowed are floating point numbers"
+        yield f"variability continuous for type {v.type}, allowed only for floating point numbers"
     if v.causality == "independent" and not v.type.startswith("Float"):
-        yield f"the independent variable is of the type {v.type}, allowed are floating point numbers"
+        yield f"the independent variable is of type {v.type}, allowed is a floating point number"
     if v.type not in ("Clock", "Binary"):
         yield from _start(v)
     if v.unit is not None and v.unit not in description.units:
         yield f"the unit {v.unit!r} is not defined"
     if not v.name or any(c in v.name for c in "\r\n\t"):
-        yield "a name that is empty or holds a line end or a tabulator"
+        yield "a name that is empty or contains a line break or a tab"
     convention = description.root.get("variableNamingConvention", "flat")
     if convention == "structured" and not _STRUCTURED.fullmatch(v.name):
-        yield "no structured name, such as body[1].m or 'body 1'.m, of letters, digits and marks of ASCII"
+        yield "not a structured name such as body[1].m or 'body 1'.m, with ASCII letters, digits and punctuation only"
 
 
 def _start(v: Variable) -> Iterator[str]:
@@ -286,11 +286,11 @@ def _start(v: Variable) -> Iterator[str]:
         initial = "exact" if exact else ("none" if v.causality in ("input", "independent") else "calculated")
     needs = v.causality in ("input", "parameter", "structuralParameter") or initial in ("exact", "approx")
     if needs and v.start is None:
-        yield f"no start value; {v.causality} with initial {initial} has one"
+        yield f"no start value, which causality {v.causality} with initial {initial} requires"
     if v.start is not None and (initial == "calculated" or v.causality == "independent"):
         yield f"start is {v.start}, allowed is none where the value is calculated"
     if v.dimensions and v.start is not None and len(v.start) not in (1, v.size):
-        yield f"start has {len(v.start)} values, its dimensions say {v.size}"
+        yield f"start has {len(v.start)} values, but its dimensions require {v.size}"
     yield from _limits(v)
 
 
@@ -307,7 +307,7 @@ def _limits(v: Variable) -> Iterator[str]:
         bits, signed = int(v.type.lstrip("UInt")), v.type.startswith("I")
         least = -(2 ** (bits - 1)) if signed else 0
         if not least <= v.start < least + 2**bits:
-            yield f"start is {v.start}, a number of the type {v.type} is {least} to {least + 2**bits - 1}"
+            yield f"start is {v.start}, allowed for type {v.type} is {least} to {least + 2**bits - 1}"
 
 
 def _positive(text: str) -> bool:

@@ -29,7 +29,7 @@ def broken(description: Description) -> Iterator[Broken]:
             if count > 1 and name != "?":
                 yield "ModelStructure", f"{name} is listed {count} times as {kind}"
             if name == "?":
-                yield "ModelStructure", f"an {kind} that is no variable"
+                yield "ModelStructure", f"an {kind} that is not a variable"
 
 
 def _outputs(description: Description) -> Iterator[Broken]:
@@ -41,7 +41,7 @@ def _outputs(description: Description) -> Iterator[Broken]:
         if name not in listed and not (description.fmi == 2 and reference in references):
             yield "ModelStructure", f"the output {name} is not listed"
     for name in sorted(listed - set(outputs) - {"?"}):
-        yield "ModelStructure", f"{name} is listed as output and is none"
+        yield "ModelStructure", f"{name} is listed as output but is not one"
 
 
 def _derivatives(description: Description, variables: dict[str, Variable]) -> Iterator[Broken]:
@@ -51,7 +51,7 @@ def _derivatives(description: Description, variables: dict[str, Variable]) -> It
     for unknown in description.unknowns("ContinuousStateDerivative"):
         element = named.get(unknown.name)
         if unknown.name in variables and (element is None or element.get("derivative") is None):
-            yield "ModelStructure", f"{unknown.name} is listed as derivative and has no attribute derivative"
+            yield "ModelStructure", f"{unknown.name} is listed as derivative but has no attribute derivative"
 
 
 def _initial_unknowns(description: Description) -> Iterator[Broken]:
@@ -69,10 +69,10 @@ def _initial_unknowns(description: Description) -> Iterator[Broken]:
     references = {by_name[name].reference for name in known if name in by_name}
     for name in sorted(wanted - known - clocked):
         if not (description.fmi == 2 and by_name[name].reference in references):
-            yield "ModelStructure", f"{name} is calculated at the start and is not listed as InitialUnknown"
+            yield "ModelStructure", f"{name} is calculated at initialization but is not listed as InitialUnknown"
     allowed = wanted | {v.name for v in description.variables if _is_free(v)}
     for name in sorted(known - allowed - {"?"}):
-        yield "ModelStructure", f"{name} is listed as InitialUnknown and is not calculated at the start"
+        yield "ModelStructure", f"{name} is listed as InitialUnknown but is not calculated at initialization"
 
 
 def _is_free(v: Variable) -> bool:
@@ -97,10 +97,10 @@ def _dependencies(unknown: Unknown, description: Description, variables: dict[st
         if kind not in _KINDS[description.fmi]:
             yield f"dependenciesKind {kind!r}, allowed are {', '.join(_KINDS[description.fmi])}"
         elif unknown.kind == "InitialUnknown" and kind in ("fixed", "tunable", "discrete"):
-            yield f"dependenciesKind {kind!r}, which is not allowed in the initialization"
+            yield f"dependenciesKind {kind!r}, which is not allowed in initialization mode"
     for name in given or ():
         if name == "?":
-            yield "it depends on what is no variable"
+            yield "it depends on something that is not a variable"
         elif name == unknown.name and unknown.kind == "InitialUnknown":
             yield "it depends on itself"
     if given is not None and len(set(given)) != len(given):

@@ -48,7 +48,7 @@ def starts(trial: Trial, slave: ImportedSlave) -> None:
         if len(said) == 1:
             said = said * len(found)
         if len(said) != len(found):
-            trial.find(f"variable {v.name}", f"start has {len(said)} values, its dimensions say {len(found)}", sort="start size")
+            trial.find(f"variable {v.name}", f"start has {len(said)} values, but its dimensions require {len(found)}", sort="start size")
         elif not all(_as_said(v, a, b) for a, b in zip(found, said, strict=True)):
             shown = (v.start, found) if v.dimensions else (v.start, found[0])
             trial.find(f"variable {v.name}", f"start is {shown[0]!r} in the description and {shown[1]!r} in the library", sort="start")

@@ -187,7 +187,7 @@ def connections(data: Mapping[str, Any]) -> Table:
     """Return what each connection did: how far inputs were off, and the energy that went through and was created."""
     keys = ("residual_max", "residual_rms", "unit", "energy_exchanged_J", "energy_created_J")
     rows = [[f"{c['from']} -> {c['to']}", c["within"], *(c[key] for key in keys)] for c in data["connections"]]
-    return Table(["connection", "held", "off, most", "rms", "unit", "went through [J]", "created [J]"], rows, left=2)
+    return Table(["connection", "held at", "residual, max", "rms", "unit", "transferred [J]", "created [J]"], rows, left=2)
 
 
 def coupling_errors(data: Mapping[str, Any]) -> Table:
