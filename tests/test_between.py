@@ -253,6 +253,16 @@ def test_an_output_that_the_initialization_does_not_compute_is_named_and_its_eff
         assert np.abs(run.columns[estimate.name][1:] - truth).max() <= estimate.most * 1.05, estimate
 
 
+@pytest.mark.parametrize("refine", [0, 1])
+def test_a_run_that_is_not_accurate_names_the_output_that_begins_too_late(late: Path, refine: int) -> None:
+    """A shorter step alone would not tell where the error comes from."""
+    with ImportedSlave(late, name="pd") as partner, pytest.raises(CoupledError, match="not accurate") as refused:
+        run_checked(controlled(partner, 0.004, accuracy=0.001, refine=refine))
+    run = refused.value.run
+    assert run is not None
+    assert [w for w in run.warnings if w.startswith("pd.u jumps by 1.89 in the first step of its slave")]
+
+
 def test_the_samples_of_a_refined_run_are_of_the_run_that_is_reported(late: Path) -> None:
     """Its partner makes one step for each communication step, as in any run."""
     with ImportedSlave(late, name="pd") as partner:
@@ -343,7 +353,7 @@ def test_the_advice_names_what_the_partners_can_do(can_rollback: bool) -> None:
     lines = [("arm.handle.r[1]", "spring.r"), ("spring.F", "arm.handle.F[1]")]
     with pytest.raises(CoupledError, match="unstable") as error:
         run_system(couple([arm, Stiff(can_rollback=can_rollback)], lines, step=0.005, duration=1.0))
-    advice = "for a contact that is a spring and a damper, the motion port of arm"
+    advice = "the motion port of arm for a contact that is a spring and a damper"
     if can_rollback:
         assert str(error.value).endswith(f"take a shorter step, the iterated algorithm or {advice}")
     else:

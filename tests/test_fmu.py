@@ -196,7 +196,7 @@ MUTANTS: dict[str, tuple[Callable[[Files], Files], str]] = {
     "Output missing": (xml(r"    <Output [^>]*/>\n", ""), "is not listed"),
     "duplicate name": (xml('name="tau\\[2\\]"', 'name="tau[1]"'), "2 variables have this name"),
     "duplicate value reference": (xml('valueReference="2"', 'valueReference="1"'), "share the value reference 1"),
-    "input without start": (xml(r'(name="handle.F\[1\]".*?) start="0.0"', r"\1"), "no start value; input"),
+    "input without start": (xml(r'(name="handle.F\[1\]".*?) start="0.0"', r"\1"), "no start value, which causality input"),
     "illegal causality and variability": (
         xml(r'(name="gravity".*?)variability="fixed"', r'\1variability="continuous"'),
         "causality parameter with variability continuous",

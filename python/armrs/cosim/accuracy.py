@@ -103,7 +103,8 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
             raise _refused(run, f"with half the step, {finer.step:g} s, {parts}, the run is {error}") from None
         if reason := _differs_at_the_start(run, again):
             return dataclasses.replace(run, warnings=(*run.warnings, f"the error is not estimated: {reason}"))
-        run = dataclasses.replace(run, estimates=estimates(run, again), resolution=again.resolution)
+        told = (*run.warnings, *_computed_late(run, again))
+        run = dataclasses.replace(run, estimates=estimates(run, again), resolution=again.resolution, warnings=told)
         worst = max(run.estimates, key=lambda e: e.most / e.allowed, default=None)
         if worst is None:
             reason = "no floating point number is connected, and there is no arm whose angles could be compared"
@@ -114,7 +115,7 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
             why = f"the estimated errors are within the accuracy; {most}{_looked(run)}"
             text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
             halved = (*system.warnings, *run.warnings, text_of_step) if halvings else run.warnings
-            return dataclasses.replace(run, verdict="good", why=why, warnings=(*halved, *_computed_late(run, again)))
+            return dataclasses.replace(run, verdict="good", why=why, warnings=halved)
         if worst.most <= worst.allowed and halvings == system.refine:
             return dataclasses.replace(run, estimates=(), warnings=(*run.warnings, f"the error is not estimated: {reason}"))
         if halvings == system.refine:

@@ -458,7 +458,7 @@ class _Run:
         slave, givers = self.slaves[i], {int(self.source[k]) for k in self.into[i]}
         # An arm that pushes has its contact inside already.
         if isinstance(slave, Slave) and slave.port == "force" and not any(isinstance(self.slaves[k], Slave) for k in givers):
-            found.append(f"for a contact that is a spring and a damper, the motion port of {slave.name}")
+            found.append(f"the motion port of {slave.name} for a contact that is a spring and a damper")
         listing = " or ".join([", ".join(found[:-1]), found[-1]]) if len(found) > 1 else found[0]
         cannot = f" (no iteration is possible: no rollback in {' and '.join(stuck)})" if stuck else ""
         return f"{listing}{cannot}"
