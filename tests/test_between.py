@@ -16,11 +16,11 @@ from armrs.cosim.coupled import Coupled
 from armrs.cosim.imported import ImportedSlave
 from armrs.cosim.isolated import IsolatedSlave
 from armrs.cosim.master import run_system
-from armrs.cosim.partner import Partner
+from armrs.cosim.partner import Partner, Status
 from armrs.cosim.ready import Ready, Wave
 from armrs.cosim.system import System, couple
 from armrs.cosim.wall import Wall
-from armrs.errors import BadInput, CoupledError
+from armrs.errors import BadInput, CoupledError, SlaveError
 from armrs.model import load_model
 
 ARM = Path(__file__).parents[1] / "examples" / "cosim" / "arm.toml"
@@ -368,3 +368,45 @@ def test_an_arm_that_pushes_has_its_contact_inside_already() -> None:
     lines = [("led.handle.r", "leading.robot.r"), ("led.handle.v", "leading.robot.v"), ("leading.contact.F", "led.handle.F")]
     with pytest.raises(CoupledError, match=r"take a shorter step or the iterated algorithm$"):
         run_system(couple(arms, lines, step=0.001, duration=0.5))
+
+
+def test_what_ends_with_an_error_keeps_the_run_that_was_made() -> None:
+    wave = smooth()
+
+    def hang() -> None:
+        raise SlaveError("terminate", Status.FATAL, "it does not return within 3 s")
+
+    wave.terminate = hang  # type: ignore[method-assign]
+    with pytest.raises(CoupledError) as error:
+        run_system(pushed(wave, 0.01))
+    run: Coupled = error.value.run
+    assert run.verdict == "failed"
+    assert "wave: it does not return within 3 s" in str(error.value)
+    assert len(run.t) == 21
+
+
+COUNTER = """
+from pythonfmu3 import Fmi3Causality, Fmi3Slave, Fmi3Variability, Int32, Int64
+
+
+class Counter(Fmi3Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.taken, self.given = 0, 3_000_000_000
+        settings = {"variability": Fmi3Variability.discrete}
+        self.register_variable(Int32("taken", causality=Fmi3Causality.input, start=0, **settings))
+        self.register_variable(Int64("given", causality=Fmi3Causality.output, start=3_000_000_000, **settings))
+
+    def do_step(self, current_time, step_size):
+        return True
+"""
+
+
+def test_an_integer_that_its_input_cannot_hold_is_refused_and_not_wrapped(tmp_path: Path) -> None:
+    pytest.importorskip("pythonfmu3")
+    (tmp_path / "counter.py").write_text(COUNTER, encoding="utf-8")
+    subprocess.run([sys.executable, "-m", "pythonfmu3", "build", "-f", "counter.py"], check=True, cwd=tmp_path, capture_output=True)
+    with ImportedSlave(tmp_path / "Counter.fmu", name="a") as a, ImportedSlave(tmp_path / "Counter.fmu", name="b") as b:
+        system = couple([a, b], [("a.given", "b.taken")], step=0.1, duration=0.2)
+        with pytest.raises((CoupledError, SlaveError), match="3000000000, allowed is an integer from -2147483648 to 2147483647"):
+            run_system(system)

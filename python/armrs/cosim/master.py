@@ -13,7 +13,7 @@ from .coupled import RESULTS, ConnectionReport, Coupled
 from .pace import Pace
 from .partner import Partner, Status
 from .slave import Slave
-from .system import System, family
+from .system import System, family, whole_range
 
 MOST_CREATED = 0.02
 """Largest magnitude of the energy that the coupling may have created, against the largest that went through, before a run is unstable."""
@@ -94,6 +94,7 @@ class _Run:
         self.out_of = [np.flatnonzero(self.source == i) for i in range(len(self.slaves))]
         self.between = Between(self.out_of, [len(places) > 0 for places in self.into], len(connections), resolution)
         self.input_names = [[connections[k].target[1] for k in places] for places in self.into]
+        self.ranges = [self._ranges(i, places) for i, places in enumerate(self.into)]
         self.output_names = [[connections[k].source[1] for k in places] for places in self.out_of]
         self.dual_of = [k for k, c in enumerate(connections) if c.dual is not None]
         # What goes back from a later slave to an earlier one, or to itself: only there the iteration has something to find.
@@ -181,7 +182,11 @@ class _Run:
             if self.stopped is not None:
                 return
             progress(pace.go_on(error))
-        self._terminate()
+        try:
+            self._terminate()
+        except (SlaveError, _Failed) as error:
+            # Every step was made: what was recorded stands.
+            self.stopped = ("failed", f"after the last step: {error}")
 
     def _step(self, begin: float, end: float) -> None:
         """Make a step, or say why it cannot be made."""
@@ -235,8 +240,12 @@ class _Run:
             slave.free_state(state)
 
     def _terminate(self) -> None:
-        for slave in self.slaves:
-            slave.terminate()
+        i = 0
+        try:
+            for i in range(len(self.slaves)):
+                self.slaves[i].terminate()
+        except SlaveError as error:
+            raise self._not_done(i, error) from None
 
     # ---- algorithms: each returns what the inputs were held at
     def _jacobi(self, time: float, step: float) -> np.ndarray:
@@ -326,7 +335,16 @@ class _Run:
         self.stopped = ("not converged", f"at {time:.6g} s the iteration leaves {abs(r[worst]):.3g} in {label}")
 
     # ---- one slave
+    def _ranges(self, i: int, places: np.ndarray) -> list[tuple[int, int, int]]:
+        """Return the integer inputs of a slave: connection, smallest and largest value."""
+        kinds = [(int(k), self.slaves[i].variable(name).type) for k, name in zip(places, self.input_names[i], strict=True)]
+        return [(k, *whole_range(kind)) for k, kind in kinds if kind.startswith(("Int", "UInt"))]
+
     def _give(self, i: int, values: np.ndarray) -> None:
+        for k, least, most in self.ranges[i]:
+            if not least <= values[k] <= most:
+                text = f"{self.system.connections[k].label}: {values[k]:.0f}, allowed is an integer from {least} to {most}"
+                raise SlaveError("set", Status.ERROR, text)
         if self.input_names[i]:
             try:
                 self.slaves[i].set(self.input_names[i], values[self.into[i]])

@@ -267,6 +267,13 @@ def _check_start(slave: Partner, name: str, value: object) -> None:
             _check_value(f"{place}, {element}", variable, item)
 
 
+def whole_range(kind: str) -> tuple[int, int]:
+    """Return the smallest and the largest value of a type of integers, such as "Int8"."""
+    bits, signed = int(kind.lstrip("UInt")), kind.startswith("Int")
+    least = -(2 ** (bits - 1)) if signed else 0
+    return least, least + 2**bits - 1
+
+
 def _check_value(place: str, variable: Variable, value: object) -> None:
     """Refuse a value of another kind than a variable."""
     kind = variable.type
@@ -280,9 +287,8 @@ def _check_value(place: str, variable: Variable, value: object) -> None:
     elif kind == "Boolean":
         checks.flag(place, value)
     elif kind.startswith(("Int", "UInt")):
-        bits, signed = int(kind.lstrip("UInt")), kind.startswith("Int")
-        least = -(2 ** (bits - 1)) if signed else 0
-        checks.whole(place, value, least=least, most=least + 2**bits - 1)
+        least, most = whole_range(kind)
+        checks.whole(place, value, least=least, most=most)
     else:
         checks.number(place, value)
 
