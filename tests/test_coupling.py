@@ -488,3 +488,12 @@ def test_steps_inside_of_a_partner_that_stay_as_they_are_are_not_estimated() -> 
     run = run_checked(couple([arm, wall], [("arm.handle.r", "wall.r"), ("wall.F", "arm.handle.F")], step=0.01, duration=0.1))
     assert run.verdict == "stable"
     assert "the error is not estimated: half the step is less than the inner step of wall, 0.1 s" in run.warnings
+
+
+def test_the_handle_of_an_arm_with_a_force_port_is_refused(tmp_path: Path) -> None:
+    example = EXAMPLES / "cosim" / "wall.toml"
+    text = example.read_text(encoding="utf-8").replace('model = "', f'model = "{example.parent}/', 1)
+    system = tmp_path / "system.toml"
+    system.write_text(text.replace('name = "arm"', 'name = "arm"\nhandle_m = [0.1, 0.0]', 1), encoding="utf-8")
+    with pytest.raises(BadInput, match=r'handle_m.*none with port = "force"'):
+        load_system(system)

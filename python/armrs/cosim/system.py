@@ -318,6 +318,8 @@ def _slave(table: dict[str, Any], folder: Path) -> Partner:
         return IsolatedSlave(path, name=checks.text("name", table["name"]) if "name" in table else None, **settings)
     optional = ["name", "port", "start", "start_deg", "rest", "inner_step_s", "handle_m"]
     checks.keys("", table, required=["model"], optional=optional)
+    if "handle_m" in table and table.get("port", "force") == "force":
+        raise BadInput("handle_m", table["handle_m"], 'none with port = "force": the handle belongs to the motion port')
     degrees = table.get("start_deg")
     if degrees is not None:
         if not isinstance(degrees, list):
