@@ -25,12 +25,11 @@ impl<const N: usize> PreparedSession<'_, N> {
         trial: usize,
         effect: Effect<f64>,
     ) -> Option<Shape> {
-        /// Sizes that are small and yet seen: of a torque \[N m\], of a way \[m\].
-        const UNIT: (f64, f64) = (1e-2, 1e-4);
-        let (sizes, unit): (&[usize], f64) = match effect.kind.probe().nature {
-            Nature::Slip => (&[0, 1], UNIT.1),
-            _ => (&[0], UNIT.0),
-        };
+        /// Torque that is small and yet seen \[N m\].
+        const TORQUE: f64 = 1e-2;
+        let question = effect.kind.probe().questions.first()?;
+        let (sizes, unit) = (question.free, question.step);
+        let unit = if unit > 0.0 { unit } else { TORQUE };
         let line = point.lines.get(self.group_of[trial])?;
         let column = |&p: &usize| {
             let mut changed = point.hypothesis.clone();
