@@ -97,6 +97,10 @@ macro_rules! catalogue {
                 if !self.on { return None; }
                 match self.kind { $(Kind::$law => $module::$law::affine(&self.parameters),)* Kind::Own(_) => None }
             }
+            /// Whether it is a constant moment, which is what the rest angle of a spring in its joint stands for too.
+            pub fn is_constant(&self) -> bool {
+                self.kind.is_rate_independent() && self.affine().is_some()
+            }
             /// Largest torque of its dry friction: what it resists with in motion, and holds at most at rest \[N m\].
             #[inline]
             pub fn dry(&self, at: &Local<T>) -> T {

@@ -139,8 +139,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             *dropped = current.asked.iter().any(|c| c.is_same_effect(&law.effect));
         }
         let mut start = current.hypothesis.clone();
+        let mut asked = current.asked.clone();
+        // What the rest angle of a spring that comes back stands for is not named beside it.
+        for slot in (0..asked.len()).rev() {
+            let named = &start.named[slot];
+            if named.is_constant() && self.has_in_base(named.kind, named.index) {
+                start.named.remove(slot);
+                asked.remove(slot);
+            }
+        }
         for _ in 0..TURNS {
-            let Ok((fitted, point)) = self.settle(start, current.asked.clone()) else {
+            let Ok((fitted, point)) = self.settle(start, asked.clone()) else {
                 break;
             };
             let terms = self.base_terms(&point, &fitted)?;
@@ -190,10 +199,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(None)
     }
 
-    /// Whether a law of the base acts that is not dropped.
+    /// Whether a law of the base acts that is not dropped, or stands for it: a spring with its rest angle stands for a constant moment.
     pub(crate) fn has_in_base(&self, kind: Kind, joint: usize) -> bool {
+        let is_constant = Effect::<f64>::new(kind, joint).is_constant();
+        let stands = |e: &Effect<f64>| e.kind == kind || is_constant && spring(e).is_some();
         let mut kept = std::iter::zip(&self.dropped, &self.session.base).filter(|(d, _)| !**d);
-        kept.any(|(_, law)| (law.effect.kind, law.effect.index) == (kind, joint))
+        kept.any(|(_, law)| law.effect.index == joint && stands(&law.effect))
     }
 
     /// Chooses the samples and reads the noise anew from where the next calibration starts.

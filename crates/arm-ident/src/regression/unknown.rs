@@ -140,9 +140,8 @@ pub fn spring(effect: &Effect<f64>) -> Option<(usize, usize)> {
 fn rest_torque<const N: usize>(model: &Model<N>, index: usize) -> Option<Unknown> {
     let effect = &model.fitted[index];
     let (amplitude, rest) = spring(effect)?;
-    let is_constant = |e: &Effect<f64>| e.kind.is_rate_independent() && e.affine().is_some();
     let spans =
-        |(i, e): (usize, &Effect<f64>)| i != index && e.kind == effect.kind || is_constant(e);
+        |(i, e): (usize, &Effect<f64>)| i != index && e.kind == effect.kind || e.is_constant();
     let mut others = model.fitted.iter().enumerate();
     if others.any(|(i, e)| e.index == effect.index && spans((i, e))) {
         return None;
