@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import copy
 import dataclasses
 import json
+import pickle
 import re
 import sys
 from collections.abc import Iterator
@@ -129,6 +131,28 @@ def test_every_result_draws_and_writes_the_figures_of_its_report(
         pictures = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
         assert pictures and all(base64.b64decode(text).startswith(b"\x89PNG") for text in pictures)
         assert "<h1>" in page and not re.search(r"\bnan\b|None|Markup", page)
+
+
+def test_whatever_is_public_can_be_kept_and_copied(
+    identified: armrs.Identified, run: armrs.Simulated, tmp_path: Path
+) -> None:
+    model = true_model()
+    one_of_each = [
+        *results(identified, run, tmp_path).values(), identified.dataset, identified.dataset.trials[0], model,
+        armrs.Arm.from_model(model), armrs.check_dataset(identified.dataset.folder), identified.dataset.tolerance,
+    ]  # fmt: skip
+    for one in one_of_each:
+        for again in (pickle.loads(pickle.dumps(one)), copy.copy(one), copy.deepcopy(one)):
+            assert type(again) is type(one) and repr(again).split(" at 0x")[0] == repr(one).split(" at 0x")[0]
+    trial = pickle.loads(pickle.dumps(identified.dataset.trials[0]))
+    assert np.array_equal(trial.q, identified.dataset.trials[0].q) and not trial.q.flags.writeable
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        trial.emg["biceps"] = trial.t
+    arm = armrs.Arm([0.3, 0.2], [2.0, 1.0], [0.1, 0.1], [0.01, 0.02], gravity=1.6, com_normals=[0.01, 0.0], base=(0.1, 0.2))
+    angles = np.array([0.3, 0.4])
+    for again in (pickle.loads(pickle.dumps(arm)), copy.deepcopy(arm)):
+        assert np.array_equal(again.gravity(angles), arm.gravity(angles))
+        assert np.array_equal(again.forward_kinematics(angles), arm.forward_kinematics(angles))
 
 
 def test_a_figure_is_chosen_by_its_name(identified: armrs.Identified) -> None:

@@ -3,6 +3,7 @@
 use arm_core::{Chain, Invalid, Segment};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::convert::{Numbers, Rows, over_rows};
 use crate::errors::{bad_input, invalid};
@@ -220,6 +221,23 @@ impl Arm {
     fn from_model(model: &Bound<'_, PyAny>) -> PyResult<Self> {
         let of = |m: &crate::model::Model| Self::of(m.inner());
         crate::model::one("model", model, of)?
+    }
+
+    /// What makes an equal arm, for `copy` and `pickle`.
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        each_length!(&self.chain, c => {
+            let of = |part: fn(&Segment<f64>) -> f64| -> Vec<f64> { c.segments().iter().map(part).collect() };
+            let named = PyDict::new(py);
+            named.set_item("com_normals", of(|s| s.com[1]))?;
+            named.set_item("gravity", -c.gravity()[1])?;
+            named.set_item("base", (c.base()[0], c.base()[1]))?;
+            named.set_item("rotor_inertia", c.rotor_inertia().to_vec())?;
+            let parts = [of(|s| s.length), of(|s| s.mass), of(|s| s.com[0]), of(|s| s.inertia)];
+            Ok((PyTuple::new(py, parts)?, named))
+        })
     }
 
     /// Number of joints.

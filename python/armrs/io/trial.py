@@ -30,6 +30,7 @@ SHORTEST, FASTEST = 0.5, 2e-4
 STILL = 1e-9
 """A channel that varies by no more than this says nothing: noise alone is more."""
 _TURN = 2.0 * np.pi
+_TABLES = ("emg", "filled_columns", "original")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,13 +125,23 @@ class Trial:
             object.__setattr__(self, "valid", np.logical_and.reduce(rows))
         if self.active.size == 0:
             object.__setattr__(self, "active", np.zeros(n, dtype=bool))
-        for name in ("emg", "filled_columns", "original"):
+        self._freeze()
+
+    def _freeze(self) -> None:
+        for name in _TABLES:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         arrays = [value for value in vars(self).values() if isinstance(value, np.ndarray)]
-        for table in (self.emg, self.filled_columns, self.original):
-            arrays += table.values()
+        for name in _TABLES:
+            arrays += getattr(self, name).values()
         for array in arrays:
             array.flags.writeable = False
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**vars(self), **{name: dict(getattr(self, name)) for name in _TABLES}}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        vars(self).update(state)
+        self._freeze()
 
     def __len__(self) -> int:
         return len(self.t)
