@@ -133,9 +133,7 @@ def test_every_result_draws_and_writes_the_figures_of_its_report(
         assert "<h1>" in page and not re.search(r"\bnan\b|None|Markup", page)
 
 
-def test_whatever_is_public_can_be_kept_and_copied(
-    identified: armrs.Identified, run: armrs.Simulated, tmp_path: Path
-) -> None:
+def test_whatever_is_public_can_be_kept_and_copied(identified: armrs.Identified, run: armrs.Simulated, tmp_path: Path) -> None:
     model = true_model()
     one_of_each = [
         *results(identified, run, tmp_path).values(), identified.dataset, identified.dataset.trials[0], model,
