@@ -9,4 +9,5 @@ pub mod statistics;
 pub use error::NumericsError;
 pub use least_squares::condense::Condenser;
 pub use least_squares::factor::Factor;
+pub use linalg::cholesky::Cholesky;
 pub use linalg::matrix::Matrix;

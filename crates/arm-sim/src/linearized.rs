@@ -1,7 +1,7 @@
 //! The equation of motion linearised along a run, `M δq̈ + D δq̇ + K δq = p`, and its solution step by step.
 //!
-//! Identification asks it how unknowns move an arm that its robot does not hold, the gap search how the sensors answer a change. It is
-//! solved implicitly, so that a stiff contact and dry friction need no short steps.
+//! The one place that solves it. Identification asks how unknowns move an arm that its robot does not hold, the gap search how the sensors
+//! answer a change; each has its own equation of motion. It is solved implicitly, so that a stiff contact and dry friction need no short steps.
 
 use arm_core::{Joints, Plane};
 use nalgebra::SMatrix;

@@ -8,7 +8,8 @@ use arm_core::{Chain, Joints, Pose, inverse_dynamics, static_torque};
 use arm_ident::regression::measured_motion::measured;
 use arm_ident::regression::trial::{Role, Trial};
 use arm_ident::regression::unknown::spring;
-use nalgebra::{DMatrix, DVector};
+use arm_numerics::linalg::matrix::{add_scaled, dot};
+use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
 use crate::data::passive_law::LIKELY;
@@ -160,11 +161,15 @@ impl Moving {
         if independent < FEWEST * columns.len() as f64 {
             return None;
         }
-        let a = DMatrix::from_fn(count, columns.len(), |i, k| columns[k][i]);
-        let b = DVector::from_column_slice(&self.torque);
-        let inverse = (a.transpose() * &a).cholesky()?.inverse();
-        let x = &inverse * (a.transpose() * &b);
-        let squares = (&a * &x - &b).norm_squared();
+        let a = Matrix::from_fn(count, columns.len(), |i, k| columns[k][i]);
+        let factor = Cholesky::new(a.transpose_product(&a))?;
+        let (x, inverse) = (
+            factor.solve(&a.transpose_times(&self.torque)),
+            factor.inverse(),
+        );
+        let mut left = a.times(&x);
+        add_scaled(&mut left, -1.0, &self.torque);
+        let squares = dot(&left, &left);
         let variance = squares / (independent - columns.len() as f64) / count as f64 * independent;
         let fitted = |(k, law): (usize, &Effect<f64>)| {
             let mut law = *law;

@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use arm_numerics::statistics::extent::extent;
-use nalgebra::{DMatrix, DVector};
+use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
 use crate::data::noise::{Noise, Thinned, dot};
 use crate::data::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
-use crate::sensitivity::normal_equations::factor;
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// Reads the noise anew: what repeats differ in, or without repeats what a hypothesis leaves.
@@ -97,7 +96,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 let each = columns.iter().map(|c| noise.whiten_thinned(c));
                 let whitened: Vec<Vec<f64>> = each.collect();
                 let k = known.len();
-                let gram = DMatrix::from_fn(k, k, |a, b| {
+                let gram = Matrix::from_fn(k, k, |a, b| {
                     let own = if a == b {
                         1.0 / (known[a] * known[a])
                     } else {
@@ -105,13 +104,15 @@ impl<const N: usize> PreparedSession<'_, N> {
                     };
                     dot(&whitened[a], &whitened[b]) + own
                 });
-                let score = DVector::from_fn(k, |a, _| dot(&whitened[a], &row));
-                let Some(solver) = factor(gram) else { continue };
-                add(deviation, columns, (-solver.solve(&score)).as_slice());
+                let score: Vec<f64> = whitened.iter().map(|w| -dot(w, &row)).collect();
+                let Some(solver) = Cholesky::new(gram) else {
+                    continue;
+                };
+                add(deviation, columns, &solver.solve(&score));
                 taken.extend(solver.spread().iter().map(|shares| {
                     let mut series = deviation.clone();
                     series.channels.iter_mut().for_each(|c| c.fill(0.0));
-                    add(&mut series, columns, shares.as_slice());
+                    add(&mut series, columns, shares);
                     series
                 }));
             }

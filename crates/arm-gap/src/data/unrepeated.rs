@@ -1,5 +1,7 @@
 //! The noise of a data set without repeats.
 
+use arm_numerics::Matrix;
+
 use crate::GapError;
 use crate::candidates::candidate::Library;
 use crate::data::noise::{Noise, dot};
@@ -95,8 +97,8 @@ impl<const N: usize> PreparedSession<'_, N> {
             (list, rows(&point.residuals[i], trial))
         });
         let count = columns.len();
-        let mut gram = nalgebra::DMatrix::zeros(count, count);
-        let mut score = nalgebra::DVector::zeros(count);
+        let mut gram = Matrix::zeros(count, count);
+        let mut score = vec![0.0; count];
         for (list, residual) in &matrices {
             for a in 0..count {
                 for b in 0..count {

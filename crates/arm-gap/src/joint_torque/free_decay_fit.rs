@@ -5,11 +5,12 @@
 //! and the angles are compared. A law that is not exact near rest then still takes the energy that the arm loses.
 
 use arm_core::Joints;
+use arm_numerics::linalg::matrix::{add_scaled, dot};
 use arm_numerics::statistics::autoregressive::effective_samples;
-use nalgebra::{DMatrix, DVector};
+use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::prepared_session::PreparedSession;
-use crate::joint_torque::free_run::{CHANGE, State};
+use crate::joint_torque::free_run::{CHANGE, State, slope_into};
 use crate::measurement_model::hypothesis::priors;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::prediction::Channels;
@@ -32,9 +33,9 @@ type Window = (usize, usize, usize);
 
 /// A run linearised: what its own start leaves of the residual and of the columns, and how the start follows.
 struct Piece {
-    slopes: DMatrix<f64>,
-    starts: DMatrix<f64>,
-    residual: DVector<f64>,
+    slopes: Matrix,
+    starts: Matrix,
+    residual: Vec<f64>,
 }
 
 /// A step tried from where the runs were linearised.
@@ -42,9 +43,9 @@ struct Step<const N: usize> {
     /// What is fitted afterwards, and the share of the cost that it gains; `None` where no step lowers the cost.
     next: Option<(Swing<N>, f64)>,
     /// Normal equations of what is common to all runs.
-    gram: DMatrix<f64>,
+    gram: Matrix,
     /// What each run adds to their right-hand side.
-    scores: Vec<DVector<f64>>,
+    scores: Vec<Vec<f64>>,
 }
 
 /// What is fitted.
@@ -52,7 +53,7 @@ struct Step<const N: usize> {
 struct Swing<const N: usize> {
     hypothesis: Hypothesis<N>,
     states: Vec<State<N>>,
-    residuals: Vec<DVector<f64>>,
+    residuals: Vec<Vec<f64>>,
 }
 
 impl<const N: usize> PreparedSession<'_, N> {
@@ -91,12 +92,12 @@ impl<const N: usize> PreparedSession<'_, N> {
             }
         }
         let (gram, scores) = last?;
-        let inverse = crate::sensitivity::normal_equations::factor(gram)?.inverse();
+        let inverse = Cholesky::new(gram)?.inverse();
         let sd = (0..coordinates.len())
             .map(|i| {
-                let row = inverse.row(i).transpose();
+                let row = inverse.column(i);
                 // Runs differ by more than their noise where the model is not exact.
-                let between: f64 = scores.iter().map(|s| row.dot(s) * row.dot(s)).sum();
+                let between: f64 = scores.iter().map(|s| dot(row, s)).map(|d| d * d).sum();
                 libm::sqrt(f64::max(inverse[(i, i)], between))
             })
             .collect();
@@ -129,7 +130,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         hypothesis: &Hypothesis<N>,
         &(trial, start, count): &Window,
         state: &State<N>,
-    ) -> Option<DVector<f64>> {
+    ) -> Option<Vec<f64>> {
         let course = &self.courses[trial];
         let shown: Channels = self
             .session
@@ -138,7 +139,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let q = &self.session.trials[trial].q;
         let each = (0..N).flat_map(|j| (0..count).map(move |i| (j, i)));
         let rows = each.map(|(j, i)| q[start + i][j] - shown[j][i]);
-        let rows = DVector::from_iterator(N * count, rows);
+        let rows: Vec<f64> = rows.collect();
         rows.iter().all(|v| v.is_finite()).then_some(rows)
     }
 
@@ -167,7 +168,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     ) -> Option<Vec<Piece>> {
         let one = |w: usize| {
             let (window, state, residual) = (&windows[w], &swing.states[w], &swing.residuals[w]);
-            let mut starts = DMatrix::zeros(residual.len(), 2 * N);
+            let mut starts = Matrix::zeros(residual.len(), 2 * N);
             for column in 0..2 * N {
                 let (mut moved, change) = (*state, CHANGE[column / N]);
                 let part = if column < N {
@@ -177,9 +178,9 @@ impl<const N: usize> PreparedSession<'_, N> {
                 };
                 part[column % N] += change;
                 let other = self.left(&swing.hypothesis, window, &moved)?;
-                starts.set_column(column, &((residual - other) / change));
+                slope_into(starts.column_mut(column), residual, &other, change);
             }
-            let mut slopes = DMatrix::zeros(residual.len(), coordinates.len());
+            let mut slopes = Matrix::zeros(residual.len(), coordinates.len());
             for (column, c) in coordinates.iter().enumerate() {
                 let value = swing.hypothesis.get(c.target);
                 let change = if value + c.step > c.upper {
@@ -189,7 +190,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 };
                 let moved = swing.hypothesis.clone().with(c.target, value + change);
                 let other = self.left(&moved, window, state)?;
-                slopes.set_column(column, &((residual - other) / change));
+                slope_into(slopes.column_mut(column), residual, &other, change);
             }
             Some(Piece {
                 slopes,
@@ -201,24 +202,26 @@ impl<const N: usize> PreparedSession<'_, N> {
     }
 
     /// One over the variance of each run's joints, larger by as much as the residual is correlated in time; repeated by sample.
-    fn weights(&self, windows: &[Window], swing: &Swing<N>) -> Option<Vec<DVector<f64>>> {
+    fn weights(&self, windows: &[Window], swing: &Swing<N>) -> Option<Vec<Vec<f64>>> {
         let square = |w: usize, j: usize| {
             let count = windows[w].2;
-            swing.residuals[w].rows(j * count, count).norm_squared() / count as f64
+            let own = &swing.residuals[w][j * count..(j + 1) * count];
+            dot(own, own) / count as f64
         };
         let mean: Vec<f64> = (0..N)
             .map(|j| (0..windows.len()).map(|w| square(w, j)).sum::<f64>() / windows.len() as f64)
             .collect();
         let one = |w: usize| {
             let count = windows[w].2;
-            let mut out = DVector::zeros(N * count);
+            let mut out = vec![0.0; N * count];
             for j in 0..N {
-                let own = swing.residuals[w].rows(j * count, count);
-                let effective = effective_samples(own.as_slice()).ok()?.max(1.0);
+                let samples = j * count..(j + 1) * count;
+                let own = &swing.residuals[w][samples.clone()];
+                let effective = effective_samples(own).ok()?.max(1.0);
                 // No run is trusted a hundred times as much as the mean of them.
                 let variance = square(w, j) + 0.01 * mean[j] + LEAST * LEAST;
                 let weight = effective / count as f64 / variance;
-                out.rows_mut(j * count, count).fill(weight);
+                out[samples].fill(weight);
             }
             Some(out)
         };
@@ -230,28 +233,23 @@ impl<const N: usize> PreparedSession<'_, N> {
         &self,
         windows: &[Window],
         swing: &Swing<N>,
-        (coordinates, pieces, weights): (&[Coordinate], &[Piece], &[DVector<f64>]),
+        (coordinates, pieces, weights): (&[Coordinate], &[Piece], &[Vec<f64>]),
     ) -> Option<Step<N>> {
         let n = coordinates.len();
-        let mut gram = DMatrix::<f64>::zeros(n, n);
-        let mut score = DVector::<f64>::zeros(n);
+        let mut gram = Matrix::zeros(n, n);
+        let mut score = vec![0.0; n];
         let (mut scores, mut followers) = (Vec::new(), Vec::new());
         for (piece, weight) in std::iter::zip(pieces, weights) {
-            let weigh = |m: &DMatrix<f64>| {
-                let mut m = m.clone();
-                for mut column in m.column_iter_mut() {
-                    column.component_mul_assign(weight);
-                }
-                m
-            };
-            let own = weigh(&piece.starts);
-            let solver = own.tr_mul(&piece.starts).cholesky()?;
-            let follow = solver.solve(&own.tr_mul(&piece.slopes));
-            let free = solver.solve(&own.tr_mul(&piece.residual));
-            let common = weigh(&(&piece.slopes - &piece.starts * &follow));
-            gram += common.tr_mul(&piece.slopes);
-            let part = common.tr_mul(&piece.residual);
-            score += &part;
+            let own = piece.starts.scaled_rows(weight);
+            let solver = Cholesky::new(own.transpose_product(&piece.starts))?;
+            let follow = solver.solve_columns(&own.transpose_product(&piece.slopes));
+            let free = solver.solve(&own.transpose_times(&piece.residual));
+            let mut common = piece.slopes.clone();
+            common.add_scaled(-1.0, &piece.starts.product(&follow));
+            let common = common.scaled_rows(weight);
+            gram.add_scaled(1.0, &common.transpose_product(&piece.slopes));
+            let part = common.transpose_times(&piece.residual);
+            add_scaled(&mut score, 1.0, &part);
             scores.push(part);
             followers.push((follow, free));
         }
@@ -269,7 +267,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             (c.lower - value, c.upper - value)
         };
         let (steps, _) = solve(&gram, &score, &usable, &bounds)?;
-        let mut whole = DVector::zeros(n);
+        let mut whole = vec![0.0; n];
         for (&i, step) in usable.iter().zip(steps) {
             whole[i] = step;
         }
@@ -292,8 +290,10 @@ impl<const N: usize> PreparedSession<'_, N> {
             }
             let states = std::iter::zip(&swing.states, &followers)
                 .map(|((q, qd), (follow, free))| {
-                    let moved = (free - follow * &whole) * share;
-                    let part = |from: usize| Joints::from_fn(|j, _| moved[from + j]);
+                    let followed = follow.times(&whole);
+                    let part = |from: usize| {
+                        Joints::from_fn(|j, _| share * (free[from + j] - followed[from + j]))
+                    };
                     (q + part(0), qd + part(N))
                 })
                 .collect();

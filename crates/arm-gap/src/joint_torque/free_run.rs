@@ -4,8 +4,9 @@
 //! trial. A driven arm does not: small errors of torques add up to any angle, so that it starts anew every second.
 
 use arm_core::Joints;
+use arm_numerics::linalg::matrix::dot;
+use arm_numerics::{Cholesky, Matrix};
 use arm_sim::{Drive, Experiment, Interpolation, Series, SimulationError, Start, simulate};
-use nalgebra::{DMatrix, DVector};
 
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::Hypothesis;
@@ -20,6 +21,13 @@ pub(crate) const CHANGE: [f64; 2] = [1e-5, 1e-4];
 
 /// Angles and speeds at which a run starts.
 pub(crate) type State<const N: usize> = (Joints<f64, N>, Joints<f64, N>);
+
+/// Writes the slope of a residual when something changes it to another.
+pub(super) fn slope_into(slope: &mut [f64], residual: &[f64], other: &[f64], change: f64) {
+    for ((slope, here), there) in slope.iter_mut().zip(residual).zip(other) {
+        *slope = (here - there) / change;
+    }
+}
 
 impl<const N: usize> Session<N> {
     /// Angles that the encoders would read of the arm left to itself or to its motors, `[joint][sample]`; empty for a led arm.
@@ -74,15 +82,15 @@ impl<const N: usize> Session<N> {
         let count = span.min(end - start);
         let run =
             |state: &State<N>, count: usize| self.angles(hypothesis, course, (start, count), state);
-        let left = |shown: &Channels| -> DVector<f64> {
+        let left = |shown: &Channels| -> Vec<f64> {
             let each = (0..N).flat_map(|j| (0..count).map(move |i| (j, i)));
-            let rows = each.map(|(j, i)| motion.q[start + i][j] - shown[j][i]);
-            DVector::from_iterator(N * count, rows)
+            each.map(|(j, i)| motion.q[start + i][j] - shown[j][i])
+                .collect()
         };
         let mut state = (motion.q[start], motion.qd[start]);
         let mut residual = left(&run(&state, count)?);
         for _ in 0..TURNS {
-            let mut slopes = DMatrix::zeros(N * count, 2 * N);
+            let mut slopes = Matrix::zeros(N * count, 2 * N);
             for column in 0..2 * N {
                 let mut moved = state;
                 let change = CHANGE[column / N];
@@ -93,20 +101,22 @@ impl<const N: usize> Session<N> {
                 };
                 part[column % N] += change;
                 let changed = left(&run(&moved, count)?);
-                slopes.set_column(column, &((&residual - changed) / change));
+                slope_into(slopes.column_mut(column), &residual, &changed, change);
             }
-            let gram = slopes.tr_mul(&slopes);
-            let Some(solver) = gram.cholesky() else { break };
-            let step = solver.solve(&slopes.tr_mul(&residual));
+            let Some(solver) = Cholesky::new(slopes.transpose_product(&slopes)) else {
+                break;
+            };
+            let step = solver.solve(&slopes.transpose_times(&residual));
             let q = Joints::from_fn(|j, _| step[j]);
             let qd = Joints::from_fn(|j, _| step[N + j]);
             let next = (state.0 + q, state.1 + qd);
             let better = left(&run(&next, count)?);
-            let gained = residual.norm_squared() - better.norm_squared();
+            let before = dot(&residual, &residual);
+            let gained = before - dot(&better, &better);
             if gained <= 0.0 {
                 break;
             }
-            let done = gained < 1e-6 * residual.norm_squared();
+            let done = gained < 1e-6 * before;
             (state, residual) = (next, better);
             if done {
                 break;

@@ -7,8 +7,8 @@
 use std::sync::Arc;
 
 use arm_core::effect::{Effect, Nature};
+use arm_numerics::Matrix;
 use arm_sim::SimulationError;
-use nalgebra::{DMatrix, DVector};
 
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
@@ -186,12 +186,12 @@ fn sizes<const N: usize>(
             .collect()
         };
         let rows: Vec<Vec<f64>> = columns.iter().map(weighed).collect();
-        let gram = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+        let gram = Matrix::from_fn(columns.len(), columns.len(), |a, b| {
             let known = sd[a].filter(|_| a == b).map_or(0.0, |sd| 1.0 / (sd * sd));
             dot(&rows[a], &rows[b]) + known
         });
         let left = weighed(left);
-        let score = DVector::from_fn(columns.len(), |a, _| dot(&rows[a], &left));
+        let score: Vec<f64> = rows.iter().map(|row| dot(row, &left)).collect();
         let bounds = |i: usize| {
             let furthest = sd[i].map_or(f64::INFINITY, |sd| FURTHEST * sd);
             (-furthest, furthest)

@@ -1,6 +1,6 @@
 //! Fitting a hypothesis to the fit trials: Gauss and Newton's method, damped where it must be, near a simulated one.
 
-use nalgebra::DMatrix;
+use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
@@ -9,7 +9,7 @@ use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target, depar
 use crate::measurement_model::prediction::Channels;
 use crate::selection::score_variance::spread;
 use crate::sensitivity::linearization_point::LinearizationPoint;
-use crate::sensitivity::normal_equations::{Cluster, Normal, factor, solve};
+use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
 use crate::sensitivity::response::Response;
 
 /// Most steps of a fit.
@@ -253,7 +253,7 @@ pub(crate) fn stepped<const N: usize>(
 
 /// Shapes that the data hardly decide move no further than their own size in one step.
 pub fn regularise<const N: usize>(
-    gram: &mut DMatrix<f64>,
+    gram: &mut Matrix,
     hypothesis: &Hypothesis<N>,
     coordinates: &[Coordinate],
 ) {
@@ -331,10 +331,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 (inside || c.prior.is_some()) && normal.gram[(i, i)] > 0.0
             })
             .collect();
-        let left = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-            normal.gram[(free[a], free[b])]
-        });
-        if let Some(factor) = factor(left) {
+        if let Some(factor) = Cholesky::new(normal.gram.select(&free, &free)) {
             let inverse = factor.inverse();
             for (a, &i) in free.iter().enumerate() {
                 let row = free.iter().enumerate();

@@ -1,6 +1,7 @@
 //! What each candidate would explain, to first order: with everything refitted that was never exact.
 
-use nalgebra::{DMatrix, DVector};
+use arm_numerics::linalg::matrix::add_scaled;
+use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
 use crate::candidates::candidate::{Library, Twin, price};
@@ -9,15 +10,15 @@ use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, priors};
 use crate::selection::fit::{Fitted, regularise};
 use crate::selection::score_variance::{spread, unlike};
 use crate::sensitivity::linearization_point::LinearizationPoint;
-use crate::sensitivity::normal_equations::{Normal, factor, solve};
+use crate::sensitivity::normal_equations::{Normal, solve};
 use crate::sensitivity::response::Response;
 
 /// The candidates' normal equations after everything else was projected off.
 pub struct ScoreTest {
     /// Products of the candidates' columns.
-    gram: DMatrix<f64>,
+    gram: Matrix,
     /// Their products with the residual.
-    score: DVector<f64>,
+    score: Vec<f64>,
     /// Columns of each candidate.
     columns: Vec<std::ops::Range<usize>>,
     /// How much more the score of each candidate scatters between repeats than the noise allows; at least one.
@@ -69,21 +70,17 @@ impl ScoreTest {
         let base = projected_off(&normal, &known, hypothesis);
         let first = known.len();
         let count = asked.len();
-        let left = DMatrix::from_fn(base.len(), base.len(), |a, b| {
-            normal.gram[(base[a], base[b])]
-        });
-        let solver = factor(left).ok_or(GapError::Singular {
+        let solver = Cholesky::new(normal.gram.select(&base, &base)).ok_or(GapError::Singular {
             unknowns: base.len(),
         })?;
-        let mut share = DMatrix::zeros(count, base.len());
-        for c in 0..count {
-            let right = DVector::from_fn(base.len(), |a, _| normal.gram[(base[a], first + c)]);
-            share.set_row(c, &solver.solve(&right).transpose());
-        }
-        let cross = DMatrix::from_fn(base.len(), count, |a, c| normal.gram[(base[a], first + c)]);
-        let gram = normal.gram.view((first, first), (count, count)) - &share * cross;
-        let score = normal.score.rows(first, count)
-            - &share * DVector::from_fn(base.len(), |a, _| normal.score[base[a]]);
+        let asked: Vec<usize> = (first..first + count).collect();
+        let cross = normal.gram.select(&base, &asked);
+        let share = solver.solve_columns(&cross);
+        let mut gram = normal.gram.select(&asked, &asked);
+        gram.add_scaled(-1.0, &share.transpose_product(&cross));
+        let of_base: Vec<f64> = base.iter().map(|&i| normal.score[i]).collect();
+        let mut score = normal.score[first..first + count].to_vec();
+        add_scaled(&mut score, -1.0, &share.transpose_times(&of_base));
 
         let mut ranges = Vec::with_capacity(library.candidates.len());
         let mut bounds = Vec::with_capacity(count);
@@ -119,7 +116,7 @@ impl ScoreTest {
             let own = found.iter().map(|(c, b)| (first + c, *b));
             let others = base.iter().enumerate().map(|(a, &i)| {
                 let sum = found.iter();
-                (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(*c, a)]))
+                (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(a, *c)]))
             });
             let weights: Vec<(usize, f64)> = own.chain(others).collect();
             score_test.spread[index] = spread(&clusters, &weights);
@@ -154,10 +151,10 @@ impl ScoreTest {
     /// How well a candidate stands for a named effect: its part of what that one shows, and its coefficients.
     pub fn stand_in(&self, candidate: usize, twin: &Twin) -> Option<(f64, Choice)> {
         let shown = self.columns[twin.place].clone().zip(&twin.sizes);
-        let mut score = DVector::zeros(self.score.len());
+        let mut score = vec![0.0; self.score.len()];
         let mut all = 0.0;
         for (column, size) in shown.clone() {
-            score += self.gram.column(column) * *size;
+            add_scaled(&mut score, *size, self.gram.column(column));
         }
         for (column, size) in shown {
             all += score[column] * size;
@@ -167,7 +164,7 @@ impl ScoreTest {
     }
 
     /// What some candidates explain of something with the given products with their columns.
-    fn answer(&self, members: &[usize], score: &DVector<f64>) -> Option<Choice> {
+    fn answer(&self, members: &[usize], score: &[f64]) -> Option<Choice> {
         let columns: Vec<usize> = members
             .iter()
             .flat_map(|&m| self.columns[m].clone())

@@ -75,7 +75,7 @@ pub fn spread(clusters: &[Cluster], weights: &[(usize, f64)]) -> f64 {
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::{DMatrix, DVector};
+    use arm_numerics::Matrix;
 
     use super::*;
 
@@ -84,8 +84,8 @@ mod tests {
         const INFORMATION: f64 = 25.0;
         let one = |(configuration, size): (usize, &f64)| Cluster {
             configuration,
-            gram: Arc::new(DMatrix::from_element(1, 1, INFORMATION)),
-            score: DVector::from_element(1, INFORMATION * size),
+            gram: Arc::new(Matrix::diagonal(&[INFORMATION])),
+            score: vec![INFORMATION * size],
             square: 0.0,
             rows: 1,
         };

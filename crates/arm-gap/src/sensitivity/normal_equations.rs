@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use arm_numerics::linalg::matrix::add_scaled;
+use arm_numerics::{Cholesky, Matrix};
 
 /// Whitened rows of one trial condensed: `gram = AᵀA`, `score = Aᵀr`, `square = rᵀr`.
 #[derive(Clone, Debug)]
@@ -10,9 +11,9 @@ pub struct Cluster {
     /// The movement; repeats share it.
     pub configuration: usize,
     /// Products of columns.
-    pub gram: Arc<DMatrix<f64>>,
+    pub gram: Arc<Matrix>,
     /// Products of columns and residual.
-    pub score: DVector<f64>,
+    pub score: Vec<f64>,
     /// Square of the residual.
     pub square: f64,
     /// Number of rows.
@@ -23,9 +24,9 @@ pub struct Cluster {
 #[derive(Clone, Debug)]
 pub struct Normal {
     /// `Σ AᵀA + Λ`.
-    pub gram: DMatrix<f64>,
+    pub gram: Matrix,
     /// `Σ Aᵀr + Λ (prior − x)`.
-    pub score: DVector<f64>,
+    pub score: Vec<f64>,
     /// `Σ rᵀr` and what the present values cost against their priors.
     pub square: f64,
     /// Number of rows of the data.
@@ -39,14 +40,14 @@ impl Normal {
     pub fn new(clusters: &[Cluster], priors: &[Option<(f64, f64)>]) -> Self {
         let n = priors.len();
         let mut sum = Self {
-            gram: DMatrix::zeros(n, n),
-            score: DVector::zeros(n),
+            gram: Matrix::zeros(n, n),
+            score: vec![0.0; n],
             square: 0.0,
             rows: 0,
         };
         for cluster in clusters {
-            sum.gram += &*cluster.gram;
-            sum.score += &cluster.score;
+            sum.gram.add_scaled(1.0, &cluster.gram);
+            add_scaled(&mut sum.score, 1.0, &cluster.score);
             sum.square += cluster.square;
             sum.rows += cluster.rows;
         }
@@ -68,8 +69,8 @@ impl Normal {
 /// go of its bound when that reduces it further. Returns the steps and the reduction of the cost; `None` where the equations
 /// are singular.
 pub fn solve(
-    gram: &DMatrix<f64>,
-    score: &DVector<f64>,
+    gram: &Matrix,
+    score: &[f64],
     columns: &[usize],
     bounds: &dyn Fn(usize) -> (f64, f64),
 ) -> Option<(Vec<f64>, f64)> {
@@ -87,9 +88,9 @@ pub fn solve(
         let free: Vec<usize> = (0..n).filter(|&i| !held[i]).collect();
         let mut aim = Vec::new();
         if !free.is_empty() {
-            let right = DVector::from_fn(free.len(), |a, _| left(&steps, free[a]));
-            let matrix = DMatrix::from_fn(free.len(), free.len(), |a, b| entry(free[a], free[b]));
-            aim = factor(matrix)?.solve(&right).iter().copied().collect();
+            let right: Vec<f64> = free.iter().map(|&i| left(&steps, i)).collect();
+            let matrix = Matrix::from_fn(free.len(), free.len(), |a, b| entry(free[a], free[b]));
+            aim = Cholesky::new(matrix)?.solve(&right);
         }
         // As far as the first bound in the way.
         let mut share = 1.0;
@@ -141,66 +142,6 @@ pub fn solve(
     Some((steps, reduction))
 }
 
-/// Cholesky factor after scaling to a unit diagonal, so that units do not matter.
-pub struct Scaled {
-    factor: Cholesky<f64, Dyn>,
-    scale: Vec<f64>,
-}
-
-/// Factorises a symmetric matrix; `None` unless it is safely positive definite.
-pub fn factor(mut matrix: DMatrix<f64>) -> Option<Scaled> {
-    /// Columns closer to a combination of the others than this (squared sine) are not told apart.
-    const LEAST: f64 = 1e-9;
-    let n = matrix.nrows();
-    let scale: Vec<f64> = (0..n)
-        .map(|i| matrix[(i, i)])
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 })
-        .collect();
-    if scale.iter().any(|s| !s.is_finite() || *s == 0.0) {
-        return None;
-    }
-    for a in 0..n {
-        for b in 0..n {
-            matrix[(a, b)] *= scale[a] * scale[b];
-        }
-    }
-    let factor = Cholesky::new(matrix)?;
-    if (0..n).any(|i| {
-        let pivot = factor.l_dirty()[(i, i)];
-        pivot * pivot < LEAST
-    }) {
-        return None;
-    }
-    Some(Scaled { factor, scale })
-}
-
-impl Scaled {
-    /// Solves for one right-hand side.
-    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
-        let mut x = DVector::from_fn(right.len(), |i, _| right[i] * self.scale[i]);
-        self.factor.solve_mut(&mut x);
-        DVector::from_fn(right.len(), |i, _| x[i] * self.scale[i])
-    }
-
-    /// The inverse.
-    pub fn inverse(&self) -> DMatrix<f64> {
-        let n = self.scale.len();
-        let inverse = self.factor.inverse();
-        DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] * self.scale[a] * self.scale[b])
-    }
-
-    /// Vectors whose outer products add up to the inverse.
-    pub fn spread(&self) -> Vec<DVector<f64>> {
-        let n = self.scale.len();
-        let unit = |k: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == k)));
-        let solved = (0..n).map(|k| self.factor.l_dirty().tr_solve_lower_triangular(&unit(k)));
-        let scale = DVector::from_column_slice(&self.scale);
-        solved
-            .map(|x| x.unwrap_or_else(|| DVector::zeros(n)).component_mul(&scale))
-            .collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -219,25 +160,13 @@ mod tests {
     }
 
     #[test]
-    fn outer_products_of_the_spread_are_the_inverse() {
-        let a = DMatrix::from_vec(8, 4, numbers(7, 32));
-        let gram = a.transpose() * &a;
-        let solver = factor(gram.clone()).unwrap();
-        let sum = solver
-            .spread()
-            .iter()
-            .fold(DMatrix::zeros(4, 4), |sum, v| sum + v * v.transpose());
-        assert!((sum * gram - DMatrix::identity(4, 4)).amax() < 1e-12);
-    }
-
-    #[test]
     fn bounded_steps_meet_the_conditions_of_an_optimum() {
         let mut bounded = 0;
         for seed in 1..300 {
             let n = 2 + seed as usize % 6;
-            let a = DMatrix::from_vec(2 * n, n, numbers(seed, 2 * n * n));
-            let gram = a.transpose() * &a;
-            let score = DVector::from_vec(numbers(seed + 1000, n)) * 3.0;
+            let a = Matrix::from_row_major(2 * n, n, &numbers(seed, 2 * n * n)).unwrap();
+            let gram = a.transpose_product(&a);
+            let score: Vec<f64> = numbers(seed + 1000, n).iter().map(|v| 3.0 * v).collect();
             let limits: Vec<(f64, f64)> = numbers(seed + 2000, n)
                 .iter()
                 .map(|v| (-0.3 * v.abs(), if *v > 0.0 { 0.2 } else { 0.0 }))
@@ -245,8 +174,8 @@ mod tests {
             let columns: Vec<usize> = (0..n).collect();
             let (steps, reduction) = solve(&gram, &score, &columns, &|i| limits[i]).unwrap();
             assert!(reduction >= 0.0);
-            let x = DVector::from_vec(steps.clone());
-            let left = &score - &gram * &x;
+            let taken = gram.times(&steps);
+            let left: Vec<f64> = std::iter::zip(&score, taken).map(|(s, t)| s - t).collect();
             for i in 0..n {
                 let (lower, upper) = limits[i];
                 assert!(steps[i] >= lower && steps[i] <= upper);
@@ -266,27 +195,29 @@ mod tests {
         // The squared sine between both columns is just above and just below 1e-9.
         let gram = |sine: f64| {
             let cosine = (1.0 - sine * sine).sqrt();
-            DMatrix::from_row_slice(2, 2, &[4.0, 6.0 * cosine, 6.0 * cosine, 9.0])
+            Matrix::from_row_major(2, 2, &[4.0, 6.0 * cosine, 6.0 * cosine, 9.0]).unwrap()
         };
-        assert!(factor(gram(4e-5)).is_some() && factor(gram(2.5e-5)).is_none());
-        assert!(factor(DMatrix::zeros(1, 1)).is_none());
         let bounds = |_: usize| (f64::NEG_INFINITY, f64::INFINITY);
-        let none = solve(&gram(0.0), &DVector::zeros(2), &[0, 1], &bounds);
+        let none = solve(&gram(2.5e-5), &[0.0; 2], &[0, 1], &bounds);
         assert!(none.is_none());
+        let some = solve(&gram(4e-5), &[0.0; 2], &[0, 1], &bounds);
+        assert!(some.is_some());
     }
 
     #[test]
     fn clusters_and_what_is_known_beforehand_add_up() {
         let cluster = |value: f64| Cluster {
             configuration: 0,
-            gram: Arc::new(DMatrix::repeat(1, 1, value)),
-            score: DVector::repeat(1, 2.0 * value),
+            gram: Arc::new(Matrix::diagonal(&[value])),
+            score: vec![2.0 * value],
             square: value,
             rows: 3,
         };
         // 0.5 from where it is expected, to 0.1: a weight of 100.
         let sum = Normal::new(&[cluster(1.0), cluster(2.0)], &[Some((0.5, 0.1))]);
-        assert!((sum.gram[0] - 103.0).abs() < 1e-9 && (sum.score[0] - (6.0 - 50.0)).abs() < 1e-9);
+        assert!(
+            (sum.gram[(0, 0)] - 103.0).abs() < 1e-9 && (sum.score[0] - (6.0 - 50.0)).abs() < 1e-9
+        );
         assert!((sum.square - (3.0 + 25.0)).abs() < 1e-9 && sum.rows == 6);
     }
 }

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use arm_numerics::linalg::matrix::add_scaled;
+use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
-use crate::sensitivity::normal_equations::{Cluster, factor};
+use crate::sensitivity::normal_equations::Cluster;
 use crate::sensitivity::response::Response;
 
 /// Parts of a trial that are predicted from each other where no movement is repeated.
@@ -29,7 +30,7 @@ struct Class {
     /// Whitened columns: first those whose coefficients belong to each trial alone, then the common ones.
     columns: Vec<Vec<f64>>,
     /// Their products.
-    products: DMatrix<f64>,
+    products: Matrix,
 }
 
 /// Whitened columns of the fitted trials.
@@ -66,7 +67,7 @@ impl Rows {
                         valid_segments: part,
                         members: vec![m],
                         columns: Vec::new(),
-                        products: DMatrix::zeros(0, 0),
+                        products: Matrix::zeros(0, 0),
                     });
                 }
                 continue;
@@ -87,7 +88,7 @@ impl Rows {
                     valid_segments: valid_segments.clone(),
                     members: vec![m],
                     columns: Vec::new(),
-                    products: DMatrix::zeros(0, 0),
+                    products: Matrix::zeros(0, 0),
                 }),
             }
         }
@@ -112,14 +113,14 @@ impl Rows {
 
     /// The same without some of the common columns.
     pub fn without(&self, columns: &[usize]) -> Self {
-        let places: Vec<usize> = columns.iter().map(|c| self.own.len() + c).collect();
+        let own = self.own.len();
         let classes = self.classes.iter().map(|class| {
-            let kept =
-                |(i, column): (usize, &Vec<f64>)| (!places.contains(&i)).then(|| column.clone());
-            let products = class.products.clone();
+            let kept: Vec<usize> = (0..class.columns.len())
+                .filter(|&i| i < own || !columns.contains(&(i - own)))
+                .collect();
             Class {
-                columns: class.columns.iter().enumerate().filter_map(kept).collect(),
-                products: products.remove_columns_at(&places).remove_rows_at(&places),
+                columns: kept.iter().map(|&i| class.columns[i].clone()).collect(),
+                products: class.products.select(&kept, &kept),
                 ..class.clone()
             }
         });
@@ -171,7 +172,7 @@ impl Rows {
                 .iter()
                 .map(|&m| class.white(prepared, &residuals[m]))
                 .collect();
-            let gram = class.products.view((0, 0), (k, k)).into_owned();
+            let gram = class.products.block(0..k, 0..k);
             self.condense(class, (&class.columns[..k], &[]), gram, &residuals)
         });
         squares.into_iter().flatten().collect()
@@ -182,24 +183,21 @@ impl Rows {
         &self,
         class: &Class,
         (first, more): (&[Vec<f64>], &[Vec<f64>]),
-        mut gram: DMatrix<f64>,
+        mut gram: Matrix,
         residuals: &[Vec<f64>],
     ) -> Vec<Cluster> {
         let k = self.own.len();
-        let n = gram.nrows() - k;
+        let all = gram.rows();
         for (i, sd) in self.own.iter().enumerate() {
             gram[(i, i)] += 1.0 / (sd * sd);
         }
-        let solver = factor(gram.view((0, 0), (k, k)).into_owned());
-        let mut reduced = gram.view((k, k), (n, n)).into_owned();
+        let solver = Cholesky::new(gram.block(0..k, 0..k));
+        let mut reduced = gram.block(k..all, k..all);
         // What a unit of each common column takes of the trial's own.
-        let mut share = DMatrix::zeros(k, n);
+        let mut share = Matrix::zeros(k, all - k);
         if let Some(solver) = &solver {
-            for column in 0..n {
-                let right = gram.view((0, k + column), (k, 1)).column(0).into_owned();
-                share.set_column(column, &solver.solve(&right));
-            }
-            reduced -= gram.view((k, 0), (n, k)) * &share;
+            share = solver.solve_columns(&gram.block(0..k, k..all));
+            reduced.add_scaled(-1.0, &gram.block(k..all, 0..k).product(&share));
         }
         let reduced = Arc::new(reduced);
         residuals
@@ -207,12 +205,12 @@ impl Rows {
             .map(|residual| {
                 let all = first.iter().chain(more);
                 let score: Vec<f64> = all.map(|c| dot(c, residual)).collect();
-                let own = DVector::from_column_slice(&score[..k]);
-                let mut common = DVector::from_column_slice(&score[k..]);
+                let (own, common) = score.split_at(k);
+                let mut common = common.to_vec();
                 let mut square = dot(residual, residual);
                 if let Some(solver) = &solver {
-                    common -= share.tr_mul(&own);
-                    square -= own.dot(&solver.solve(&own));
+                    add_scaled(&mut common, -1.0, &share.transpose_times(own));
+                    square -= dot(own, &solver.solve(own));
                 }
                 Cluster {
                     configuration: class.group,
@@ -249,20 +247,19 @@ impl Class {
 }
 
 /// Products of all columns of a class and further ones.
-fn bordered(class: &Class, more: &[Vec<f64>]) -> DMatrix<f64> {
+fn bordered(class: &Class, more: &[Vec<f64>]) -> Matrix {
     let (n, m) = (class.columns.len(), more.len());
-    let mut gram = DMatrix::zeros(n + m, n + m);
-    gram.view_mut((0, 0), (n, n)).copy_from(&class.products);
+    let mut gram = Matrix::zeros(n + m, n + m);
     let mixed = products(&class.columns, more, false);
-    gram.view_mut((0, n), (n, m)).copy_from(&mixed);
-    gram.view_mut((n, 0), (m, n)).copy_from(&mixed.transpose());
-    gram.view_mut((n, n), (m, m))
-        .copy_from(&products(more, more, true));
+    gram.set_block((0, 0), &class.products);
+    gram.set_block((0, n), &mixed);
+    gram.set_block((n, 0), &mixed.transpose());
+    gram.set_block((n, n), &products(more, more, true));
     gram
 }
 
-fn products(a: &[Vec<f64>], b: &[Vec<f64>], symmetric: bool) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(a.len(), b.len());
+fn products(a: &[Vec<f64>], b: &[Vec<f64>], symmetric: bool) -> Matrix {
+    let mut out = Matrix::zeros(a.len(), b.len());
     for i in 0..a.len() {
         for j in if symmetric { i } else { 0 }..b.len() {
             out[(i, j)] = dot(&a[i], &b[j]);

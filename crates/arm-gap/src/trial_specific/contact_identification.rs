@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use arm_core::effect::Effect;
-use nalgebra::{DMatrix, DVector};
+use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
@@ -15,7 +15,7 @@ use crate::measurement_model::hypothesis::departure;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, away_from_gaps, difference, margin, smooth};
 use crate::selection::fit::stepped;
-use crate::sensitivity::normal_equations::{Cluster, Scaled, factor};
+use crate::sensitivity::normal_equations::Cluster;
 use crate::trial_specific::component::shapes_of;
 
 /// Most steps of Gauss and Newton's method.
@@ -155,10 +155,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         let slopes: Vec<Left> = coordinates.iter().map(slope).collect::<Option<_>>()?;
         let cluster = Cluster {
             configuration: 0,
-            gram: Arc::new(DMatrix::from_fn(slopes.len(), slopes.len(), |a, b| {
+            gram: Arc::new(Matrix::from_fn(slopes.len(), slopes.len(), |a, b| {
                 dot(&slopes[a], &slopes[b])
             })),
-            score: DVector::from_fn(slopes.len(), |a, _| dot(&slopes[a], &at.left)),
+            score: slopes.iter().map(|s| dot(s, &at.left)).collect(),
             square: dot(&at.left, &at.left),
             rows: at.left.len(),
         };
@@ -221,7 +221,7 @@ impl<const N: usize> PreparedSession<'_, N> {
 /// Swings of fixed frequencies whose sizes and phases change slowly, as those of a trembling arm do that is led elsewhere.
 struct Swings {
     columns: Vec<Vec<f64>>,
-    solver: Option<Scaled>,
+    solver: Option<Cholesky>,
 }
 
 impl Swings {
@@ -248,9 +248,9 @@ impl Swings {
             })
             .collect();
         let count = columns.len();
-        let gram = DMatrix::from_fn(count, count, |a, b| dot(&columns[a], &columns[b]));
+        let gram = Matrix::from_fn(count, count, |a, b| dot(&columns[a], &columns[b]));
         Self {
-            solver: factor(gram).filter(|_| count > 0),
+            solver: Cholesky::new(gram).filter(|_| count > 0),
             columns,
         }
     }
@@ -258,7 +258,7 @@ impl Swings {
     fn take_out(&self, channels: &mut Channels) {
         let Some(solver) = &self.solver else { return };
         for channel in channels {
-            let score = DVector::from_fn(self.columns.len(), |a, _| dot(&self.columns[a], channel));
+            let score: Vec<f64> = self.columns.iter().map(|c| dot(c, channel)).collect();
             for (column, size) in std::iter::zip(&self.columns, &solver.solve(&score)) {
                 for (value, swing) in std::iter::zip(channel.iter_mut(), column) {
                     *value -= size * swing;

@@ -1,6 +1,6 @@
 //! A line in the spectra of residuals: the noise beside it, its share, and what swings explain of it.
 
-use nalgebra::{DMatrix, DVector};
+use arm_numerics::Matrix;
 
 use crate::measurement_model::prediction::Channels;
 use arm_numerics::signal::spectrum::coefficient;
@@ -33,12 +33,12 @@ impl SpectralLine {
         residual: &Channels,
         swings: &[Channels],
         noise: &[f64],
-    ) -> (DMatrix<f64>, DVector<f64>) {
+    ) -> (Matrix, Vec<f64>) {
         let k = swings.len();
         let at_line =
             |column: &Channels, c: usize| coefficient(&column[c], self.frequency, self.rate);
-        let mut gram = DMatrix::zeros(2 * k, 2 * k);
-        let mut score = DVector::zeros(2 * k);
+        let mut gram = Matrix::zeros(2 * k, 2 * k);
+        let mut score = vec![0.0; 2 * k];
         for (c, noise) in noise.iter().enumerate() {
             let seen = at_line(residual, c);
             let turned: Vec<[f64; 2]> = swings
@@ -74,6 +74,8 @@ impl SpectralLine {
 #[cfg(test)]
 mod tests {
     use core::f64::consts::TAU;
+
+    use arm_numerics::Cholesky;
 
     use super::*;
 
@@ -111,10 +113,10 @@ mod tests {
         // Three times as large, and a quarter of a period earlier.
         let seen = vec![swing(6.0, 4.0, 0.25 * TAU)];
         let (gram, score) = LINE.normal_equations(&seen, &[shown], &[1.0]);
-        let size = gram.cholesky().expect("two columns").solve(&score);
+        let size = Cholesky::new(gram).expect("two columns").solve(&score);
         assert!(
             size[0].abs() < 1e-6 && (size[1].abs() - 3.0).abs() < 1e-6,
-            "{size}"
+            "{size:?}"
         );
     }
 }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
 use arm_core::{Contact, Joints, Pose, jacobian};
-use nalgebra::DVector;
+use arm_numerics::Cholesky;
+use arm_numerics::linalg::matrix::dot;
 
 use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
@@ -12,7 +13,6 @@ use crate::data::repeats::same_rate;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
-use crate::sensitivity::normal_equations::factor;
 use crate::trial_specific::component::{TrialSpecific, shapes_of};
 use crate::trial_specific::spectral_line::SpectralLine;
 use arm_numerics::signal::spectrum::{Sum, line};
@@ -322,8 +322,8 @@ impl<const N: usize> PreparedSession<'_, N> {
             let swings = answers[self.group_of[trial]].as_ref()?;
             let (gram, score) = line.normal_equations(residual, swings, &noise);
             information += gram[(0, 0)];
-            let solution = factor(gram)?.solve(&score);
-            gain += 2.0 * solution.dot(&score);
+            let solution = Cholesky::new(gram)?.solve(&score);
+            gain += 2.0 * dot(&solution, &score);
             sizes.push(solution);
         }
         let share = (0..noise.len())
@@ -335,7 +335,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             sd: 1.0 / libm::sqrt(2.0 * information.max(1e-300)),
             gain,
             locked,
-            sizes: sizes.iter().map(|s| s.iter().copied().collect()).collect(),
+            sizes,
             columns: columns.to_vec(),
             share,
         })
@@ -347,12 +347,12 @@ impl<const N: usize> PreparedSession<'_, N> {
 /// * `sizes` - of each trial, two for each column: turned by 0 and by 90°
 fn common_swing(
     columns: &[Effect<f64>],
-    sizes: &[DVector<f64>],
+    sizes: &[Vec<f64>],
     frequency: f64,
 ) -> (Effect<f64>, bool) {
     let n = sizes.len() as f64;
     let size = |a: usize| {
-        let square = |s: &DVector<f64>| s[2 * a] * s[2 * a] + s[2 * a + 1] * s[2 * a + 1];
+        let square = |s: &Vec<f64>| s[2 * a] * s[2 * a] + s[2 * a + 1] * s[2 * a + 1];
         libm::sqrt(sizes.iter().map(square).sum::<f64>() / n)
     };
     let mean = |i: usize| sizes.iter().map(|s| s[i]).sum::<f64>() / n;

@@ -204,9 +204,9 @@ fn a_number_that_is_held_is_no_unknown_and_the_others_answer_as_before() {
     let after = held.rows.clusters(&prepared, &[], &point.residuals);
     for (before, after) in std::iter::zip(&before, &after) {
         let kept = |n: usize| (0..n).filter(|&i| i != place_before);
-        for (a, i) in kept(before.gram.nrows()).enumerate() {
+        for (a, i) in kept(before.gram.rows()).enumerate() {
             assert_eq!(before.score[i], after.score[a]);
-            for (b, j) in kept(before.gram.nrows()).enumerate() {
+            for (b, j) in kept(before.gram.rows()).enumerate() {
                 assert_eq!(before.gram[(i, j)], after.gram[(a, b)]);
             }
         }

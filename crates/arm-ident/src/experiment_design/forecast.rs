@@ -439,7 +439,7 @@ fn covariance(
         .collect();
     let known = bread.with_prior(&zero, &sd)?;
     let spread = meat.with_prior(&zero, &sd)?;
-    let score = spread.r.transpose().product(&spread.r);
+    let score = spread.r.transpose_product(&spread.r);
     Ok(SandwichCovariance::new(&known.r, &[])?.sandwich(&score)?)
 }
 

@@ -1,7 +1,7 @@
 //! A small dense matrix, column-major, with a fixed order of operations.
 
 use crate::error::{NumericsError, check_len};
-use std::ops::{Index, IndexMut};
+use std::ops::{Index, IndexMut, Range};
 
 /// A dense matrix of `rows × cols` numbers, stored column after column.
 ///
@@ -99,6 +99,36 @@ impl Matrix {
         Self::from_fn(self.rows, columns.len(), |i, j| self[(i, columns[j])])
     }
 
+    /// The elements of the chosen rows and columns, in the chosen order.
+    ///
+    /// # Panics
+    /// If an index is outside the matrix.
+    pub fn select(&self, rows: &[usize], columns: &[usize]) -> Self {
+        Self::from_fn(rows.len(), columns.len(), |i, j| {
+            self[(rows[i], columns[j])]
+        })
+    }
+
+    /// The elements of a range of rows and of columns.
+    ///
+    /// # Panics
+    /// If a range ends outside the matrix.
+    pub fn block(&self, rows: Range<usize>, columns: Range<usize>) -> Self {
+        Self::from_fn(rows.len(), columns.len(), |i, j| {
+            self[(rows.start + i, columns.start + j)]
+        })
+    }
+
+    /// Writes a matrix over a block whose first element is `(row, column)`.
+    ///
+    /// # Panics
+    /// If the block does not lie in the matrix.
+    pub fn set_block(&mut self, (row, column): (usize, usize), block: &Matrix) {
+        for j in 0..block.cols {
+            self.column_mut(column + j)[row..row + block.rows].copy_from_slice(block.column(j));
+        }
+    }
+
     /// `A S`: column `j` times `scale[j]`.
     ///
     /// # Panics
@@ -106,6 +136,15 @@ impl Matrix {
     pub fn scaled_columns(&self, scale: &[f64]) -> Self {
         assert_eq!(scale.len(), self.cols, "one scale a column");
         Self::from_fn(self.rows, self.cols, |i, j| self[(i, j)] * scale[j])
+    }
+
+    /// `S A`: row `i` times `scale[i]`.
+    ///
+    /// # Panics
+    /// If `scale` has not [`Matrix::rows`] elements.
+    pub fn scaled_rows(&self, scale: &[f64]) -> Self {
+        assert_eq!(scale.len(), self.rows, "one scale a row");
+        Self::from_fn(self.rows, self.cols, |i, j| self[(i, j)] * scale[i])
     }
 
     /// `A x`.
@@ -145,26 +184,27 @@ impl Matrix {
         out
     }
 
-    /// `A + B`.
+    /// `Aᵀ B`.
+    ///
+    /// # Panics
+    /// If the numbers of rows differ.
+    pub fn transpose_product(&self, other: &Matrix) -> Self {
+        let mut out = Self::zeros(self.cols, other.cols);
+        for j in 0..other.cols {
+            let column = self.transpose_times(other.column(j));
+            out.column_mut(j).copy_from_slice(&column);
+        }
+        out
+    }
+
+    /// `A ← A + f B`.
     ///
     /// # Panics
     /// If the sizes differ.
-    pub fn plus(&self, other: &Matrix) -> Self {
-        assert_eq!(
-            (self.rows, self.cols),
-            (other.rows, other.cols),
-            "equal sizes"
-        );
-        Self {
-            rows: self.rows,
-            cols: self.cols,
-            data: self
-                .data
-                .iter()
-                .zip(&other.data)
-                .map(|(a, b)| a + b)
-                .collect(),
-        }
+    pub fn add_scaled(&mut self, f: f64, other: &Matrix) {
+        let sizes = (self.rows, self.cols);
+        assert_eq!(sizes, (other.rows, other.cols), "equal sizes");
+        add_scaled(&mut self.data, f, &other.data);
     }
 
     /// Largest absolute value of an element; 0 for an empty matrix.

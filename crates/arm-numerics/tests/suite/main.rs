@@ -2,6 +2,7 @@
 
 mod autoregressive;
 mod bits;
+mod cholesky;
 mod condense;
 mod derivative;
 mod distributions;
