@@ -2,6 +2,7 @@
 
 use arm_core::effect::Effect;
 use arm_core::{Chain, Contact, Invalid, Segment, Setup};
+use arm_ident::regression::unknown::spring;
 
 /// A belief about the rig from which every channel follows by simulation.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,6 +91,39 @@ impl<const N: usize> Hypothesis<N> {
         };
         *place = value;
         self
+    }
+
+    /// The hypothesis after a step of some numbers, within their bounds.
+    ///
+    /// The torque of a spring is linear in its stiffness and in stiffness · rest, not in its rest angle: a step to first order means a
+    /// change of that product. Where data decide both badly, a step in the angle itself would have to be many times shorter.
+    pub fn moved(&self, steps: &[(&Coordinate, f64)]) -> Self {
+        let to = |h: Self, c: &Coordinate, step: f64| {
+            let value = self.get(c.target) + step;
+            h.with(c.target, value.clamp(c.lower, c.upper))
+        };
+        let is_rest = |c: &Coordinate| self.spring_that_rests(c.target).is_some();
+        let (rests, others): (Vec<_>, Vec<_>) = steps.iter().partition(|(c, _)| is_rest(c));
+        let others = others.into_iter();
+        let stepped = others.fold(self.clone(), |h, (c, step)| to(h, c, step));
+        rests.into_iter().fold(stepped, |h, (c, step)| {
+            let amplitudes = [self, &h].map(|of| of.spring_that_rests(c.target));
+            let share = amplitudes[0].zip(amplitudes[1]).map(|(b, a)| b / a);
+            // A spring that vanishes or turns over has no such angle.
+            let share = share.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(1.0);
+            to(h, c, share * step)
+        })
+    }
+
+    /// The amplitude of the spring whose rest angle a number is.
+    pub fn spring_that_rests(&self, target: Target) -> Option<f64> {
+        let (effect, parameter) = match target {
+            Target::Known(e, p) => (&self.known[e], p),
+            Target::Named(e, p) => (&self.named[e], p),
+            _ => return None,
+        };
+        let (amplitude, rest) = spring(effect)?;
+        (parameter == rest).then_some(effect.parameters[amplitude])
     }
 
     /// Hands what calibration stands in for a sensor over to a named fault of the same sensor: the two are one sum, and the fault is
@@ -185,16 +219,56 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn a_named_fault_takes_over_the_calibration_of_its_own_sensor_alone() {
-        let with = |kind, index, size: f64| Effect::<f64>::new(kind, index).with(&[size]);
-        let before = Hypothesis::<2> {
+    fn with(kind: Kind, index: usize, size: f64) -> Effect<f64> {
+        Effect::new(kind, index).with(&[size])
+    }
+
+    fn plain() -> Hypothesis<2> {
+        Hypothesis {
             segments: [[0.0; 3]; 2],
             contact: [[0.0; 2]; 2],
             shift: [0.0; 2],
             placement: [0.0; 2],
             eccentricity: [[0.0; 2]; 2],
             known: Vec::new(),
+            calibration: Vec::new(),
+            named: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_step_of_a_spring_changes_the_product_of_stiffness_and_rest_as_to_first_order() {
+        let spring = Effect::new(Kind::Elastic, 0).with(&[0.5, 0.1]);
+        let before = Hypothesis {
+            known: vec![spring],
+            ..plain()
+        };
+        let number = |parameter, most| Coordinate {
+            target: Target::Known(0, parameter),
+            prior: None,
+            lower: -7.0,
+            upper: most,
+            step: 1e-3,
+        };
+        let (stiffness, rest) = (number(0, 0.8), number(1, 7.0));
+        let product = |h: &Hypothesis<2>| h.known[0].parameters[0] * h.known[0].parameters[1];
+        // The rest angle stands before the stiffness: their order says nothing.
+        let after = before.moved(&[(&rest, -1.7), (&stiffness, 0.2)]);
+        let first_order = 0.5 * 0.1 + 0.2 * 0.1 - 0.5 * 1.7;
+        assert!((product(&after) - first_order).abs() < 1e-12);
+        assert_eq!(after.known[0].parameters[0], 0.7);
+        // A stiffness that meets its bound changes the product by what is left of its step.
+        let bounded = before.moved(&[(&stiffness, 1.0), (&rest, -1.7)]);
+        assert_eq!(bounded.known[0].parameters[0], 0.8);
+        assert!((bounded.known[0].parameters[1] - (0.1 - 1.7 * 0.5 / 0.8)).abs() < 1e-12);
+        // A spring that turns over keeps the step of its angle.
+        let over = before.moved(&[(&stiffness, -0.9), (&rest, -1.7)]);
+        assert!((over.known[0].parameters[1] + 1.6).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_named_fault_takes_over_the_calibration_of_its_own_sensor_alone() {
+        let before = Hypothesis {
             calibration: vec![
                 with(Kind::ForceBias, 0, 0.1),
                 with(Kind::ForceBias, 1, -0.2),
@@ -204,6 +278,7 @@ mod tests {
                 with(Kind::ForceBias, 1, 3.0),
                 with(Kind::TimeDelay, 0, 0.03),
             ],
+            ..plain()
         };
         let after = before.handed_over();
         let sizes = |list: &[Effect<f64>]| list.iter().map(|e| e.parameters[0]).collect::<Vec<_>>();

@@ -16,7 +16,7 @@ use crate::sensitivity::response::Response;
 const STEPS: usize = 6;
 /// Damping of the steps that are tried, as a share of the diagonal of the normal equations (Levenberg and Marquardt): what the data
 /// decide well moves on where a whole step leads astray.
-const DAMPING: [f64; 5] = [0.0, 0.01, 0.1, 1.0, 10.0];
+const DAMPING: [f64; 6] = [0.0, 1e-3, 0.01, 0.1, 1.0, 10.0];
 /// A step that gains less than this, in units of the noise, is the last,
 const ENOUGH: f64 = 0.2;
 /// and where the model is far from the data, less than this share of what the cost exceeds the number of rows by.
@@ -24,7 +24,7 @@ const SHARE: f64 = 1e-4;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
 /// Times that a fit is simulated anew from where it ended.
-const AGAIN: usize = 4;
+const AGAIN: usize = 8;
 
 /// A hypothesis fitted to the fit trials.
 #[derive(Clone, Debug)]
@@ -137,12 +137,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let (coordinates, clusters) = self.equations_with(point, &fitted, &each);
             let damped = |damping: &f64| {
                 let (usable, step) = stepped(&clusters, hypothesis, &coordinates, *damping)?;
-                let moved =
-                    std::iter::zip(&usable, step).fold(hypothesis.clone(), |h, (&i, step)| {
-                        let c = &coordinates[i];
-                        let value = hypothesis.get(c.target) + step;
-                        h.with(c.target, value.clamp(c.lower, c.upper))
-                    });
+                let steps = std::iter::zip(usable.iter().map(|&i| &coordinates[i]), step);
+                let moved = hypothesis.moved(&steps.collect::<Vec<_>>());
                 let next = self.state(point, moved, fitted.asked.clone()).ok()?;
                 (next.cost < fitted.cost).then_some(next)
             };
@@ -251,15 +247,20 @@ pub(crate) fn stepped<const N: usize>(
     Some((usable, steps))
 }
 
-/// Shapes that the data hardly decide move no further than their own size in one step.
+/// Shapes that the data hardly decide move no further than their own size in one step. An angle has no size of its own.
 pub fn regularise<const N: usize>(
     gram: &mut Matrix,
     hypothesis: &Hypothesis<N>,
     coordinates: &[Coordinate],
 ) {
+    /// Least size of a rest angle \[rad\].
+    const ANGLE: f64 = 1.0;
     for (i, c) in coordinates.iter().enumerate() {
         if c.prior.is_none() {
-            let size = hypothesis.get(c.target).abs().max(10.0 * c.step);
+            let least = hypothesis
+                .spring_that_rests(c.target)
+                .map_or(10.0 * c.step, |_| ANGLE);
+            let size = hypothesis.get(c.target).abs().max(least);
             gram[(i, i)] += 1.0 / (size * size);
         }
     }
