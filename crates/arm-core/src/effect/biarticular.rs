@@ -22,7 +22,7 @@ impl Law for Biarticular {
         formula: "R = stiffness · (q + ratio · q_proximal − rest), R_proximal = ratio · R",
         reference: "Hogan 1985",
         parameters: &[
-            Parameter::linear("stiffness", "N m/rad", -10.0, 1000.0, 0.0),
+            Parameter::linear("stiffness", "N m/rad", 0.0, 1000.0, 0.0),
             Parameter::shape("ratio", "1", -5.0, 5.0, 1.0),
             Parameter::shape("rest", "rad", -14.0, 14.0, 0.0),
         ],

@@ -308,39 +308,57 @@ impl<const N: usize> PreparedSession<'_, N> {
         fitted: &Fitted<N>,
         scale: f64,
     ) -> Result<Precision, GapError> {
-        let hypothesis = &fitted.hypothesis;
-        let (coordinates, clusters) = match self.equations(point, fitted, &[]) {
+        match self.equations(point, fitted, &[]) {
             // Where a small change of what was found cannot be simulated, nothing can be said of how well it is known.
             Err(GapError::Simulation { .. }) => {
                 let mut coordinates = point.coordinates.clone();
                 coordinates.extend(fitted.named());
                 let sd = vec![f64::INFINITY; coordinates.len()];
-                return Ok(Precision { coordinates, sd });
+                Ok(Precision { coordinates, sd })
             }
-            other => other?,
-        };
-        let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
-        regularise(&mut normal.gram, hypothesis, &coordinates);
-        let mut sd = vec![f64::INFINITY; coordinates.len()];
-        // A size at the limit of its kind is held there: the others are known as if it were exact. What was known before is
-        // known no better where it met the end of what is refitted.
-        let free: Vec<usize> = (0..coordinates.len())
-            .filter(|&i| {
-                let c = &coordinates[i];
-                let value = hypothesis.get(c.target);
-                let inside = value > c.lower && value < c.upper;
-                (inside || c.prior.is_some()) && normal.gram[(i, i)] > 0.0
-            })
-            .collect();
-        if let Some(factor) = Cholesky::new(normal.gram.select(&free, &free)) {
-            let inverse = factor.inverse();
-            for (a, &i) in free.iter().enumerate() {
-                let row = free.iter().enumerate();
-                let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
-                let widen = f64::max(scale, spread(&clusters, &weights));
-                sd[i] = (inverse[(a, a)] * widen).sqrt();
-            }
+            other => Ok(precision_of(fitted, other?, scale)),
         }
-        Ok(Precision { coordinates, sd })
     }
+
+    /// How well everything but the numbers of the named effects is known, as if those were exact.
+    pub(crate) fn precision_beside_named(
+        &self,
+        point: &LinearizationPoint<N>,
+        fitted: &Fitted<N>,
+    ) -> Precision {
+        let clusters = point.rows.clusters(self, &[], &fitted.residuals);
+        precision_of(fitted, (point.coordinates.clone(), clusters), 1.0)
+    }
+}
+
+/// See [`PreparedSession::precision`].
+fn precision_of<const N: usize>(
+    fitted: &Fitted<N>,
+    (coordinates, clusters): (Vec<Coordinate>, Vec<Cluster>),
+    scale: f64,
+) -> Precision {
+    let hypothesis = &fitted.hypothesis;
+    let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
+    regularise(&mut normal.gram, hypothesis, &coordinates);
+    let mut sd = vec![f64::INFINITY; coordinates.len()];
+    // A size at the limit of its kind is held there: the others are known as if it were exact. What was known before is
+    // known no better where it met the end of what is refitted.
+    let free: Vec<usize> = (0..coordinates.len())
+        .filter(|&i| {
+            let c = &coordinates[i];
+            let value = hypothesis.get(c.target);
+            let inside = value > c.lower && value < c.upper;
+            (inside || c.prior.is_some()) && normal.gram[(i, i)] > 0.0
+        })
+        .collect();
+    if let Some(factor) = Cholesky::new(normal.gram.select(&free, &free)) {
+        let inverse = factor.inverse();
+        for (a, &i) in free.iter().enumerate() {
+            let row = free.iter().enumerate();
+            let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
+            let widen = f64::max(scale, spread(&clusters, &weights));
+            sd[i] = (inverse[(a, a)] * widen).sqrt();
+        }
+    }
+    Precision { coordinates, sd }
 }

@@ -35,22 +35,22 @@ const EXCHANGES: usize = 4;
 /// looks like something else.
 const ELSEWHERE: f64 = 0.25;
 
-/// What an effect may explain, as a sum of squares, without being there: what the law of a named one misses of what it shows.
+/// What an effect may explain, as a sum of squares, without being there: what the law of another one misses of what it shows.
 ///
-/// * `gain` - what the named one explains
-fn mimicked(effect: &Effect<f64>, named: &Candidate, gain: f64) -> f64 {
+/// * `gain` - what the other one explains
+fn mimicked(effect: &Effect<f64>, by: &Effect<f64>, gain: f64) -> f64 {
     let joints = |e: &Effect<f64>| match e.kind.info().place {
         Place::Joint => e.index + 1 - usize::from(e.kind.crosses())..e.index + 2,
         _ => 0..0,
     };
-    let (own, other) = (joints(effect), joints(&named.effect));
+    let (own, other) = (joints(effect), joints(by));
     let is_near = own.start < other.end && other.start < own.end;
-    named.kind().probe().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
+    by.kind.probe().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
 }
 
 /// The most that an effect may explain without being there beside named ones that together explain so much.
 pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explained: f64) -> f64 {
-    let each = named.iter().map(|c| mimicked(effect, c, explained));
+    let each = named.iter().map(|c| mimicked(effect, &c.effect, explained));
     each.fold(0.0, f64::max)
 }
 
@@ -147,6 +147,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             // Not a number without repeats, which `max` passes over.
             let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &point, &fitted).excess;
             let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
+            let base = self.gains_of_base(&point, &fitted)?;
             let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &point));
             let without = without.collect::<Result<Vec<_>, _>>()?;
             let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
@@ -163,10 +164,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 {
                     gain = gain.min(self.foretold(&point, &less)? - with);
                 }
-                // Less may be the imperfect shape of another one.
+                // Less may be the imperfect shape of another one, or of a law of the base.
                 let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
+                let others = others.map(|o| (&fitted.asked[o].effect, gains[o]));
                 let least = others
-                    .map(|o| mimicked(&fitted.asked[slot].effect, &fitted.asked[o], gains[o]))
+                    .chain(base.iter().map(|(law, gain)| (law, *gain)))
+                    .map(|(other, gain)| mimicked(&candidate.effect, other, gain))
                     .fold(floor, f64::max);
                 let worth = gain / scale - candidate.price * candidate.spread;
                 let worth = if gain < least {

@@ -67,9 +67,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
     ) -> Result<Vec<Term>, GapError> {
-        let precision = self.precision(point, fitted, 1.0)?;
-        // Where a small change cannot be simulated nothing is known of any law, which is no reason to drop it.
-        let unknown = precision.sd.iter().all(|sd| sd.is_infinite());
+        let mut precision = self.precision(point, fitted, 1.0)?;
+        if precision.sd.iter().all(|sd| sd.is_infinite()) {
+            precision = self.precision_beside_named(point, fitted);
+        }
         let first = self.session.effects.len();
         let sizes = std::iter::zip(&precision.coordinates, &precision.sd);
         Ok(sizes
@@ -78,12 +79,26 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     let ratio = fitted.hypothesis.get(c.target) / sd;
                     Some(Term {
                         base: e - first,
-                        gain: if unknown { NAMED } else { ratio * ratio },
+                        gain: ratio * ratio,
                     })
                 }
                 _ => None,
             })
             .collect())
+    }
+
+    /// The laws of the base with what each explains, in units of the noise.
+    pub(crate) fn gains_of_base(
+        &self,
+        point: &LinearizationPoint<N>,
+        fitted: &Fitted<N>,
+    ) -> Result<Vec<(Effect<f64>, f64)>, GapError> {
+        if self.session.base.is_empty() {
+            return Ok(Vec::new());
+        }
+        let terms = self.base_terms(point, fitted)?;
+        let with_law = |t: Term| (self.session.base[t.base].effect, t.gain);
+        Ok(terms.into_iter().map(with_law).collect())
     }
 
     /// Drops the weakest law of each joint that stands out too little; whether there was one.
