@@ -16,7 +16,7 @@ use crate::sensitivity::response::Response;
 const STEPS: usize = 6;
 /// Damping of the steps that are tried, as a share of the diagonal of the normal equations (Levenberg and Marquardt): what the data
 /// decide well moves on where a whole step leads astray.
-const DAMPING: [f64; 6] = [0.0, 1e-3, 0.01, 0.1, 1.0, 10.0];
+const DAMPING: [f64; 7] = [0.0, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
 /// A step that gains less than this, in units of the noise, is the last,
 const ENOUGH: f64 = 0.2;
 /// and where the model is far from the data, less than this share of what the cost exceeds the number of rows by.
@@ -125,6 +125,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ) -> Result<Fitted<N>, GapError> {
         let mut fitted = self.state(point, start, asked)?;
         let mut slopes: Option<Vec<Response>> = None;
+        let mut lightest: usize = 0;
         for _ in 0..STEPS {
             let hypothesis = &fitted.hypothesis;
             let old = slopes.is_some();
@@ -143,12 +144,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 (next.cost < fitted.cost).then_some(next)
             };
             // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands.
-            let Some(next) = DAMPING.iter().find_map(damped) else {
+            let from = lightest.saturating_sub(1);
+            let found = (from..DAMPING.len()).find_map(|d| Some((d, damped(&DAMPING[d])?)));
+            let Some((damping, next)) = found else {
                 if old {
                     continue;
                 }
                 break;
             };
+            // The next step tries what helped this one, and less.
+            lightest = damping;
             let gained = fitted.cost - next.cost;
             fitted = next;
             if gained < fitted.enough() {

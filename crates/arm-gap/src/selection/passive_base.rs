@@ -51,12 +51,22 @@ pub(crate) struct BaseLaw<const N: usize> {
     better: Option<Fitted<N>>,
 }
 
-/// Joints that a named spring over two joints crosses. It tells their own springs apart badly, and an arm that has it has those as well: a
-/// spring that is left out there bends the others beyond their intervals.
+/// What a law of the base must gain: a spring that a named spring over two joints crosses need only be there.
+///
+/// * `otherwise` - of every other law
+fn least_of<const N: usize>(law: &Effect<f64>, crossed: &[bool; N], otherwise: f64) -> f64 {
+    match spring(law) {
+        Some(_) if crossed[law.index] => f64::MIN_POSITIVE,
+        _ => otherwise,
+    }
+}
+
+/// Joints that a named spring over two joints crosses. Movements tell the stiffness matrix of both joints, three numbers, not the three
+/// springs and a ratio that make it: an own spring that is left out there is one of infinitely many choices, stated as if it were known.
 fn crossed_joints<const N: usize>(named: &[Effect<f64>]) -> [bool; N] {
     std::array::from_fn(|j| {
         let mut crossing = named.iter().filter(|e| e.kind.crosses());
-        crossing.any(|e| e.index == j || e.index + 1 == j)
+        crossing.any(|e| e.index == j || e.index == j + 1)
     })
 }
 
@@ -168,7 +178,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 break;
             };
             let terms = self.base_terms(&point, &fitted)?;
-            if !self.dropped_weak(&terms, |_| STAYS) {
+            let crossed = crossed_joints::<N>(&fitted.hypothesis.named);
+            if !self.dropped_weak(&terms, |law| least_of(law, &crossed, STAYS)) {
                 let back = std::iter::zip(&before, &self.dropped).any(|(was, is)| *was && !is);
                 if back && fitted.cost < current.cost {
                     return Ok(Some((fitted, point)));
@@ -244,11 +255,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         loop {
             let terms = self.base_terms(&settled.1, &settled.0)?;
             let crossed = crossed_joints::<N>(&settled.0.hypothesis.named);
-            let least = |law: &Effect<f64>| match spring(law) {
-                Some(_) if crossed[law.index] => STAYS * scale,
-                _ => NAMED * scale,
-            };
-            if self.dropped_weak(&terms, least) {
+            if self.dropped_weak(&terms, |law| least_of(law, &crossed, NAMED * scale)) {
                 let start = self.without_dropped(settled.0.hypothesis);
                 settled = self.settle(start, settled.0.asked)?;
                 continue;
@@ -450,5 +457,24 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             (fitted, lack)
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spring_over_two_joints_keeps_the_springs_of_the_joint_it_is_named_after_and_of_the_one_before()
+     {
+        let of = |kind, index| Effect::<f64>::new(kind, index).with(&[1.0]);
+        let crossed = crossed_joints::<3>(&[of(Kind::Biarticular, 1), of(Kind::EndRange, 2)]);
+        assert_eq!(crossed, [true, true, false]);
+        assert_eq!(
+            least_of(&of(Kind::Elastic, 0), &crossed, NAMED),
+            f64::MIN_POSITIVE
+        );
+        assert_eq!(least_of(&of(Kind::Elastic, 2), &crossed, NAMED), NAMED);
+        assert_eq!(least_of(&of(Kind::Viscous, 0), &crossed, NAMED), NAMED);
     }
 }
