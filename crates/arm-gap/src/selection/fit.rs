@@ -21,6 +21,8 @@ const DAMPING: [f64; 7] = [0.0, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
 const ENOUGH: f64 = 0.2;
 /// and where the model is far from the data, less than this share of what the cost exceeds the number of rows by.
 const SHARE: f64 = 1e-4;
+/// The same to first order, as a share of that.
+const LITTLE: f64 = 0.25;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
 /// Times that a fit is simulated anew from where it ended.
@@ -136,16 +138,20 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             let each: Vec<&Response> = responses.iter().collect();
             let (coordinates, clusters) = self.equations_with(point, &fitted, &each);
-            let damped = |damping: &f64| {
-                let (usable, step) = stepped(&clusters, hypothesis, &coordinates, *damping)?;
-                let steps = std::iter::zip(usable.iter().map(|&i| &coordinates[i]), step);
-                let moved = hypothesis.moved(&steps.collect::<Vec<_>>());
+            let step = |damping: f64| stepped(&clusters, hypothesis, &coordinates, damping);
+            let next = |step: &Step| {
+                let along = step.usable.iter().map(|&i| &coordinates[i]);
+                let along = std::iter::zip(along, step.sizes.iter().copied());
+                let moved = hypothesis.moved(&along.collect::<Vec<_>>());
                 let next = self.state(point, moved, fitted.asked.clone()).ok()?;
                 (next.cost < fitted.cost).then_some(next)
             };
-            // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands.
-            let from = lightest.saturating_sub(1);
-            let found = (from..DAMPING.len()).find_map(|d| Some((d, damped(&DAMPING[d])?)));
+            // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands. A step that gains too
+            // little to first order need not be tried, nor any that is damped more.
+            let found = (lightest.saturating_sub(1)..DAMPING.len())
+                .filter_map(|d| Some((d, step(DAMPING[d])?)))
+                .take_while(|(_, step)| step.gain > LITTLE * fitted.enough())
+                .find_map(|(d, step)| Some((d, next(&step)?)));
             let Some((damping, next)) = found else {
                 if old {
                     continue;
@@ -183,11 +189,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .filter(|(i, _)| *i != out)
                 .map(|(_, c)| c.clone())
                 .collect();
-            let (usable, steps) =
+            let Step { usable, sizes, .. } =
                 stepped(&others, hypothesis, &coordinates, 0.0).unwrap_or_default();
             sum += cluster.square;
-            for (&i, a) in usable.iter().zip(&steps) {
-                let row = usable.iter().zip(&steps);
+            for (&i, a) in usable.iter().zip(&sizes) {
+                let row = usable.iter().zip(&sizes);
                 let product = row.fold(0.0, |s, (&j, b)| s + cluster.gram[(i, j)] * b);
                 sum += a * (product - 2.0 * cluster.score[i]);
             }
@@ -227,15 +233,26 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 }
 
-/// The unknowns that the equations decide anything about, and the step of each that lowers the cost most within its bounds;
-/// `None` where they are singular.
+/// A step of the unknowns that the equations decide anything about.
+#[derive(Default)]
+pub(crate) struct Step {
+    /// Their places among the coordinates.
+    pub usable: Vec<usize>,
+    /// Change of each.
+    pub sizes: Vec<f64>,
+    /// By how much it lowers the cost, to first order.
+    pub gain: f64,
+}
+
+/// The step that lowers the cost most within bounds; `None` where the equations are singular.
 pub(crate) fn stepped<const N: usize>(
     clusters: &[Cluster],
     hypothesis: &Hypothesis<N>,
     coordinates: &[Coordinate],
     damping: f64,
-) -> Option<(Vec<usize>, Vec<f64>)> {
+) -> Option<Step> {
     let mut normal = Normal::new(clusters, &priors(hypothesis, coordinates));
+    let plain = normal.gram.clone();
     let usable: Vec<usize> = (0..coordinates.len())
         .filter(|&i| normal.gram[(i, i)] > 0.0)
         .collect();
@@ -248,8 +265,20 @@ pub(crate) fn stepped<const N: usize>(
         let value = hypothesis.get(c.target);
         (c.lower - value, c.upper - value)
     };
-    let (steps, _) = solve(&normal.gram, &normal.score, &usable, &bounds)?;
-    Some((usable, steps))
+    let (sizes, _) = solve(&normal.gram, &normal.score, &usable, &bounds)?;
+    let gain = usable.iter().zip(&sizes).map(|(&i, a)| {
+        let bent: f64 = usable
+            .iter()
+            .zip(&sizes)
+            .map(|(&j, b)| plain[(i, j)] * b)
+            .sum();
+        a * (2.0 * normal.score[i] - bent)
+    });
+    Some(Step {
+        gain: gain.sum(),
+        usable,
+        sizes,
+    })
 }
 
 /// Shapes that the data hardly decide move no further than their own size in one step. An angle has no size of its own.
