@@ -18,7 +18,7 @@ from ...io.raw.units import unit
 from ...io.samples import write_samples
 from ...model import Description, Model, Robot, Subject, Tolerance, TrialEntry, load_model
 from ...tabular import Tabular, Tidy
-from . import clock, columns, conventions, handle, trials
+from . import clock, columns, conventions, handle, remarks, trials
 from . import sources as raw
 from .columns import symbol_of
 from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
@@ -146,6 +146,8 @@ def import_recordings(
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
         recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
+    reads = [replace(read, trial=replace(read.trial, remarks=_remarks(read, recipe.channels))) for read in reads]
+    recipe = replace(recipe, trials=tuple(replace(t, remarks=r.trial.remarks) for t, r in zip(recipe.trials, reads, strict=True)))
     loaded, said = _led(loaded, recipe, reads)
     folder = _write(files.output_folder(out), loaded, recipe, reads, about)
     return Imported(folder, recipe, (*notes, *said))
@@ -270,7 +272,7 @@ def _decided(
     reads = [_refined(read, channels, convention, model) for read in reads]
     origin = _origin(reads, channels, convention, model, axes)
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
-    notes = [*sources.notes, *_said(tables), *axes]
+    notes = [*sources.notes, *remarks.said(tables), *axes]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
@@ -321,19 +323,6 @@ def _origin(
 
 def _positions(read: _Read, channels: Sequence[Channel]) -> np.ndarray:
     return np.column_stack([_values(read.table, _by(channels, symbol)) for symbol in ("Py", "Pz")])
-
-
-def _said(tables: Sequence[RawTable]) -> list[str]:
-    """Return what the readers decided, each once, with the file where it does not hold for all."""
-    by_note: dict[str, list[RawTable]] = {}
-    for table in tables:
-        for note in table.notes:
-            by_note.setdefault(note, []).append(table)
-    lines = []
-    for note, those in by_note.items():
-        more = f" and {len(those) - 1} more" if len(those) > 1 else ""
-        lines.append(note if len(those) == len(tables) else f"{note}: {those[0].path}{more}")
-    return lines
 
 
 def _unused(tables: Sequence[RawTable], channels: Sequence[Channel]) -> list[str]:
@@ -456,6 +445,14 @@ def _refined(read: _Read, channels: Sequence[Channel], convention: Convention, m
         one_file=read.trial.force_file == read.trial.file,
     )
     return replace(read, trial=replace(read.trial, force_shift=shift))
+
+
+def _remarks(read: _Read, channels: Sequence[Channel]) -> tuple[str, ...]:
+    """Return the remarks beside the samples of a trial, on the clock of its angles."""
+    own = remarks.timed(read.table, _values(read.table, _by(channels, "t")))
+    if read.forces is None:
+        return own
+    return (*own, *remarks.timed(read.forces, _values(read.forces, _by(channels, "t of forces")) + read.trial.force_shift))
 
 
 def _by(channels: Sequence[Channel], symbol: str) -> Channel:
