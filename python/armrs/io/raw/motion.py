@@ -11,7 +11,7 @@ from .. import c3d
 from ..markers import markers_of
 from ..opensim import read_motion, read_trc
 from ..samples import parquet_table
-from .table import RawTable, column, remarks_of
+from .table import RawTable, Remark, column, remarks_of
 
 PARQUET_SUFFIXES = (".parquet",)
 MOTION_SUFFIXES = (".mot", ".sto")
@@ -26,7 +26,8 @@ def read_parquet(path: Path) -> RawTable:
     import pyarrow as pa
 
     table = parquet_table(path)
-    columns, remarks = [], []
+    columns = []
+    remarks: list[Remark] = []
     for name in table.column_names:
         kind = table.schema.field(name).type
         if pa.types.is_floating(kind) or pa.types.is_integer(kind):

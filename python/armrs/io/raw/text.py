@@ -212,7 +212,8 @@ def _columns(
     if len(skipped) > 0.01 * len(lines):
         found = Text(f"{len(skipped)} of {len(lines)} rows with another number of cells")
         raise BadInput("file", found, f"{len(names)} cells in every row")
-    columns, remarks = [], []
+    columns = []
+    remarks: list[Remark] = []
     for place, name, stated in zip(places, names, units, strict=True):
         values, unit_of_clock = _numbers(data.column(place), layout.decimal)
         if values is not None and (odd_cells := _odd_cells(data.column(place), values)):

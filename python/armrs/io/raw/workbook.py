@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ArmrsError, BadInput, Text
-from .table import NoTable, RawTable, column, grouped, remarks_of
+from .table import NoTable, RawTable, Remark, column, grouped, remarks_of
 from .units import unit
 
 SUFFIXES = (".xlsx", ".xlsm")
@@ -62,7 +62,8 @@ def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
         units = _words(above.pop(), width)
     names = _words(above[-1], width) if above else [""] * width
     names, units = grouped(_words(above[-2], width) if len(above) > 1 else [], names, units)
-    columns, remarks = [], []
+    columns = []
+    remarks: list[Remark] = []
     for k, name in enumerate(names):
         cells = [row[k] if k < len(row) else None for row in rows[start:end]]
         values = np.array([_number(cell) for cell in cells])
