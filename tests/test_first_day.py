@@ -22,7 +22,7 @@ from armrs.io.raw import RawTable, read_raw
 from armrs.io.raw.table import Remark, column, remarks_of
 from armrs.report import console, html, moving, plotting
 from armrs.workflows import demo
-from armrs.workflows.importing import handle
+from armrs.workflows.importing import clock, handle
 from armrs.workflows.importing.columns import symbol_of
 from armrs.workflows.importing.recipe import load_recipe
 from armrs.workflows.importing.remarks import timed
@@ -136,6 +136,22 @@ def test_import_toml_alone_repeats_an_import_anywhere(imported: Path, tmp_path: 
         assert (tmp_path / "third" / name).read_bytes() == (imported / name).read_bytes()
     with pytest.raises(BadInput, match="as armrs init writes it"):
         armrs.import_recordings([imported / "trials"], tmp_path / "none")
+
+
+@pytest.mark.parametrize(("apart", "within"), [(0.0, 0.015), (0.7, 0.035)])
+def test_forces_on_their_own_clock_share_the_laws_of_the_arm(world: Path, apart: float, within: float) -> None:
+    """Started by one trigger, or each at another time; of another session of this world each trial by itself was up to 0.2 s off."""
+    data = armrs.load_dataset(world / "m060310" / "data")
+    offsets = 1.3 + apart * np.sin(np.arange(len(data.trials)))
+    recordings = []
+    for trial, offset in zip(data.trials, offsets, strict=True):
+        assert trial.force_on_arm is not None
+        found = clock.align(trial.t, trial.q, trial.t + offset, trial.force_on_arm)
+        near = min((shift.seconds for shift in found), key=lambda seconds: abs(seconds + offset))
+        recordings.append(clock.Recording(trial.t, trial.q, trial.t + offset, trial.force_on_arm, near))
+    shifts = np.array(clock.refine(data.model, recordings))
+    assert np.abs(shifts + offsets).max() < within
+    assert (np.ptp(shifts) == 0.0) == (apart == 0.0)
 
 
 def test_a_column_of_remarks_is_told(world: Path, imported: Path, tmp_path: Path) -> None:
