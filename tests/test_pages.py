@@ -183,10 +183,11 @@ def test_a_sketch_of_the_arm_heads_the_report(pages: Path, verb: str) -> None:
 
 @pytest.mark.parametrize("verb", [*EVERY, "notebook"])
 def test_no_number_has_ten_digits(pages: Path, verb: str) -> None:
+    """But seeds, which are exact."""
     with opened(pages / verb / "report.html") as seen:
         seen.page.evaluate("document.querySelectorAll('code').forEach(e => e.remove())")
         cells = seen.page.evaluate("[...document.querySelectorAll('p, li, td, th, figcaption')].map(e => e.innerText)")
-        assert [cell for cell in cells if re.search(r"\d[\d.]{9,}", cell)] == []
+        assert [cell for cell in cells if re.search(r"\d[\d.]{9,}", cell) and not cell.isdecimal()] == []
 
 
 SYMBOLS = {

@@ -137,6 +137,12 @@ def test_without_axes_a_figure_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     pyplot.close(made.figure)
 
 
+def test_files_of_figures_keep_their_letters_and_stay_apart() -> None:
+    """`épaule` was `paule`, and two names of another script were one file."""
+    assert [figures.slug(name) for name in ("épaule 1", "vérification", "slow/fast")] == ["epaule-1", "verification", "slow-fast"]
+    assert len({figures.slug(name) for name in ("快", "慢")}) == 2
+
+
 def test_the_style_leaves_no_trace() -> None:
     before = dict(matplotlib.rcParams)
     with plotting.style():
