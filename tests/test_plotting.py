@@ -12,6 +12,7 @@ from matplotlib.text import Text
 
 from armrs import plotting
 from armrs.io.trial import Trial
+from armrs.report import figures
 from armrs.report.sketch import sketch
 from armrs.workflows import demo
 
