@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import armrs
+import results
 from armrs import cli, demo
-from browser import check_paper, check_screens
-from markup import assert_escaped
+from browser import faults_on_paper, faults_on_screens
+from markup import unescaped
 from test_docs import DOCS, blocks
 
 WITHIN = 5.0
@@ -22,10 +23,24 @@ WITHIN = 5.0
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, armrs.Demonstration]:
+    """What the command wrote, and what the function that it calls returned."""
     out = tmp_path_factory.mktemp("session") / "demo"
-    assert cli.main(["demo", "-o", str(out), "--json", str(out / "copy.json")]) == 0
-    return out
+    returned: list[armrs.Demonstration] = []
+    run = demo.run_demo
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demo, "run_demo", lambda *args, **kwargs: returned.append(run(*args, **kwargs)) or returned[0])
+        assert cli.main(["demo", "-o", str(out), "--json", str(out / "copy.json")]) == 0
+    return out, returned[0]
+
+
+@pytest.fixture(scope="module")
+def folder(made: tuple[Path, armrs.Demonstration]) -> Path:
+    return made[0]
+
+
+def test_the_result_is_a_line_a_table_json_a_figure_and_a_page(made: tuple[Path, armrs.Demonstration], tmp_path: Path) -> None:
+    results.check(made[1], tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +123,7 @@ def test_the_report_stands_alone_and_says_synthetic(folder: Path) -> None:
 
 
 def test_no_string_of_the_result_becomes_markup(folder: Path, tmp_path: Path) -> None:
-    assert_escaped(folder / "demo.json", tmp_path)
+    assert unescaped(folder / "demo.json", tmp_path) == []
 
 
 def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
@@ -138,8 +153,8 @@ def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
 
 
 def test_the_page_is_read_on_every_screen_and_on_paper(folder: Path) -> None:
-    check_screens(folder / "report.html")
-    check_paper(folder / "report.html")
+    assert faults_on_screens(folder / "report.html") == []
+    assert faults_on_paper(folder / "report.html") == []
 
 
 def test_the_tutorial_runs_and_prints_what_it_shows(

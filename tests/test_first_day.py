@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import armrs
 from armrs import cli
 from armrs.errors import BadInput
-from armrs.io.raw.table import column
+from armrs.io.raw import RawTable, read_raw
+from armrs.io.raw.table import Remark, column, remarks_of
 from armrs.report import console, html, moving, plotting
 from armrs.workflows import demo
-from armrs.workflows.importing import handle
+from armrs.workflows.importing import clock, handle
 from armrs.workflows.importing.columns import symbol_of
+from armrs.workflows.importing.recipe import load_recipe
+from armrs.workflows.importing.remarks import timed
+from armrs.workflows.importing.samples import cleaned
+from test_import_sources import on_a_terminal
 
 ROOT = Path(__file__).resolve().parents[1]
 PERSON = ["--body-mass-kg", "63", "--height-m", "1.75", "--sex", "male"]
@@ -130,11 +138,56 @@ def test_import_toml_alone_repeats_an_import_anywhere(imported: Path, tmp_path: 
         armrs.import_recordings([imported / "trials"], tmp_path / "none")
 
 
+@pytest.mark.parametrize(("apart", "within"), [(0.0, 0.015), (0.7, 0.035)])
+def test_forces_on_their_own_clock_share_the_laws_of_the_arm(world: Path, apart: float, within: float) -> None:
+    """Started by one trigger, or each at another time; of another session of this world each trial by itself was up to 0.2 s off."""
+    data = armrs.load_dataset(world / "m060310" / "data")
+    offsets = 1.3 + apart * np.sin(np.arange(len(data.trials)))
+    recordings = []
+    for trial, offset in zip(data.trials, offsets, strict=True):
+        assert trial.force_on_arm is not None
+        found = clock.align(trial.t, trial.q, trial.t + offset, trial.force_on_arm)
+        near = min((shift.seconds for shift in found), key=lambda seconds: abs(seconds + offset))
+        recordings.append(clock.Recording(trial.t, trial.q, trial.t + offset, trial.force_on_arm, near))
+    shifts = np.array(clock.refine(data.model, recordings))
+    assert np.abs(shifts + offsets).max() < within
+    assert (np.ptp(shifts) == 0.0) == (apart == 0.0)
+
+
 def test_a_column_of_remarks_is_told(world: Path, imported: Path, tmp_path: Path) -> None:
-    """One remark among numbers' empty cells was a column of missing numbers, and was offered as an angle."""
+    """One remark among numbers' empty cells was a column of missing numbers, and was offered as an angle; then it was printed and lost."""
     done = armrs.import_recordings([world / "raw"], tmp_path / "set", model=imported / "model.toml")
-    assert "Bemerkung, a column without numbers: 'hustet' in sample 8" in done.notes
+    assert "Bemerkung, a column of words, kept as remarks: 'hustet' in sample 8" in done.notes
     assert not [note for note in done.notes if note.startswith("not used")]
+    t = armrs.load_dataset(done.folder).trials[0].t
+    for recipe in (done.recipe, load_recipe(imported / "import.toml"), load_recipe(done.folder / "import.toml")):
+        assert {trial.remarks for trial in recipe.trials} == {(f"{t[7]:.3f} s, Bemerkung: hustet",)}
+    assert json.loads(done.to_json())["trials"][0]["remarks"] == [f"{t[7]:.3f} s, Bemerkung: hustet"]
+
+
+def test_a_remark_keeps_its_sample_where_rows_are_left_out(tmp_path: Path) -> None:
+    """Remarks of a workbook, a Parquet file and a text; two rows without a time stand before the second remark."""
+    words = [""] * 12
+    words[2], words[3], words[9] = "start", "start", 'he said "ouch"'
+    t = np.array([0.0, 0.1, 0.2, 0.3, np.nan, np.nan, *np.arange(0.4, 1.0, 0.1)])
+    found = cleaned(RawTable(Path("a.csv"), "a", (column("t_s", t), column("q1", t)), remarks=remarks_of("note", words)), None, [])
+    assert [timed(table, table.columns[0].values) for table in found] == [("0.200 s, note: start", '0.700 s, note: he said "ouch"')]
+
+
+def test_remarks_of_every_kind_of_table_are_kept(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    rows = [[0.01 * k, 0.1 * k, "cough" if k == 4 else None] for k in range(9)]
+    book = openpyxl.Workbook()
+    for row in (["t_s", "q1_rad", "note"], *rows):
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    t, q, words = (list(cells) for cells in zip(*rows, strict=True))
+    pq.write_table(pa.table({"t_s": t, "q1_rad": q, "note": words}), tmp_path / "a.parquet")
+    lines = ["t_s,q1_rad,note", *(",".join("" if cell is None else str(cell) for cell in row) for row in rows)]
+    (tmp_path / "a.csv").write_text("\n".join(lines), encoding="utf-8")
+    for name in ("a.xlsx", "a.parquet", "a.csv"):
+        (table,) = read_raw(tmp_path / name)
+        assert table.remarks == (Remark("note", 4, "cough"),), name
 
 
 def test_robot_angles_that_do_not_hold_the_hand_are_told(tmp_path: Path) -> None:
@@ -167,11 +220,23 @@ def test_init_takes_a_robot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         assert said in capsys.readouterr().err and not (tmp_path / "c").exists()
 
 
+def test_init_asks_on_a_terminal_and_nowhere_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["init", str(tmp_path / "a"), "--height-m", "1.75"]) == 2
+    said = "--body-mass-kg, --sex: found nothing, allowed these options, or a terminal to ask on"
+    assert said in capsys.readouterr().err and not (tmp_path / "a").exists()
+    said = on_a_terminal(["init", str(tmp_path / "a"), "--height-m", "1.75"], b"heavy\n63\nm\nmale\n0.283,0.270,0.087\n")
+    assert "Height" not in said and "found 'm', allowed male or female" in said
+    assert cli.main(["init", str(tmp_path / "b"), *PERSON, "--lengths-m", "0.283,0.270,0.087"]) == 0
+    assert (tmp_path / "a" / "model.toml").read_bytes() == (tmp_path / "b" / "model.toml").read_bytes()
+
+
 NAMES = {
     "Winkel Oberarm": "q1", "Winkel Oberarm zur Senkrechten [°]": "q1", "upper arm angle (deg)": "q1", "Winkel Unterarm [Grad]": "q2",
     "avant-bras (deg)": "q2", "Kraft vorwärts [N]": "Fy", "Kraft vorwaerts": "Fy", "Kraft nach oben (N)": "Fz", "Kraft senkrecht [N]": "Fz",
     "Handkraft oben [N]": "Fz", "Kraft seitlich [N]": None, "Griff vorwärts [mm]": "Py", "Winkelgeschwindigkeit Oberarm [°/s]": "dq1",
-    "Umfang Oberarm [mm]": None, "Bemerkung": None,
+    "Umfang Oberarm [mm]": None, "Bemerkung": None, "Winkel Hand [°]": "q3", "Handwinkel": "q3", "hand angle (deg)": "q3",
+    "angle main (deg)": "q3", "angle bras (deg)": "q1", "angle avant-bras (deg)": "q2", "Hand z [mm]": "Pz", "Hand": None,
+    "Handkraft vorwärts [N]": "Fy", "Grip force [N]": None, "Force up (lbs)": "Fz", "F horiz. [N]": "Fy", "main [mm]": None,
 }  # fmt: skip
 
 

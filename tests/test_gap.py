@@ -23,7 +23,7 @@ from armrs.workflows.gap.shapes import portrait
 from armrs.workflows.gap.suspicion import _still_joints, examine, refuse_mislabelled
 from browser import opened
 from gap_sessions import session
-from markup import assert_escaped
+from markup import unescaped
 
 
 def look(report: Path, *, figures: int, headings: set[str]) -> str:
@@ -66,7 +66,7 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
     # A tie is said first: a reflex whose threshold is passed throughout is a viscosity.
     assert verdict.startswith("The model lacks viscous or stretch reflex in joint 2 (elbow), which these movements cannot tell apart")
     assert verdict.count(". ") == 0 and "on held-out trials falls from" in verdict
-    assert_escaped(tmp_path / "gap.json", tmp_path)
+    assert unescaped(tmp_path / "gap.json", tmp_path) == []
 
 
 def test_a_joint_may_have_any_name(viscous: armrs.GapFound, tmp_path: Path) -> None:

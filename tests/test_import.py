@@ -327,17 +327,21 @@ def _written(path: Path, content: bytes) -> Path:
 
 
 @pytest.mark.parametrize("case", HOPELESS)
-def test_a_hopeless_recording_is_refused_and_nothing_written(case: str, recording: Recording, tmp_path: Path) -> None:
+def test_a_hopeless_recording_is_refused_with_all_problems_at_once(case: str, recording: Recording, tmp_path: Path) -> None:
+    """Each beside a file of words: neither hides the other's problems, also those that only the balance of the arm shows."""
     if case == "no workbook":
         pytest.importorskip("openpyxl")
     write, words = HOPELESS[case]
     path = write(recording, tmp_path)
-    sources = sorted(path.iterdir()) if path.is_dir() else [path]
+    sources = [*(sorted(path.iterdir()) if path.is_dir() else [path]), _written(tmp_path / "words.csv", b"hello\nworld\n")]
     with pytest.raises(BadInput) as refused:
         armrs.import_recordings(sources, tmp_path / "session", model=KNOWN)
-    listed = [str(p) for p in (refused.value.problems if isinstance(refused.value, BadInputs) else (refused.value,))]
-    assert [said for said in words if not any(said in line for line in listed)] == [], listed
-    assert all(str(path) in line or "angles and forces" in line for line in listed)
+    assert isinstance(refused.value, BadInputs)
+    listed = [str(problem) for problem in refused.value.problems]
+    expected = (*words, f"{tmp_path / 'words.csv'}: file: found no block of rows")
+    assert [said for said in expected if not any(said in line for line in listed)] == [], listed
+    assert len(listed) == len(expected), listed
+    assert all(str(tmp_path) in line or "angles and forces" in line for line in listed)
     assert not (tmp_path / "session").exists()
 
 

@@ -12,6 +12,7 @@ from matplotlib.text import Text
 
 from armrs import plotting
 from armrs.io.trial import Trial
+from armrs.report import figures
 from armrs.report.sketch import sketch
 from armrs.workflows import demo
 
@@ -135,6 +136,12 @@ def test_without_axes_a_figure_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     made = plotting.force(T, np.column_stack([T, T]))
     assert isinstance(made.figure, Figure)
     pyplot.close(made.figure)
+
+
+def test_files_of_figures_keep_their_letters_and_stay_apart() -> None:
+    """`épaule` was `paule`, and two names of another script were one file."""
+    assert [figures.slug(name) for name in ("épaule 1", "vérification", "slow/fast")] == ["epaule-1", "verification", "slow-fast"]
+    assert len({figures.slug(name) for name in ("快", "慢")}) == 2
 
 
 def test_the_style_leaves_no_trace() -> None:

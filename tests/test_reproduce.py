@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgb
 
 from armrs import cli
 from armrs.thesis.people import TABLE_4_10
-from browser import check_paper, check_screens, opened, shared
+from browser import faults_on_paper, faults_on_screens, opened, shared
 
 NEEDED = {"3.5", "3.6", "3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
 """Tables and figures that some item has to be about."""
@@ -265,5 +265,5 @@ def test_a_file_in_the_way_is_refused(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_the_page_is_read_on_every_screen_and_on_paper(made: Path) -> None:
-    check_screens(made / "report.html")
-    check_paper(made / "report.html")
+    assert faults_on_screens(made / "report.html") == []
+    assert faults_on_paper(made / "report.html") == []

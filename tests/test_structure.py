@@ -81,7 +81,7 @@ def test_folders_do_not_know_what_is_above_them() -> None:
         "cli": {"__main__"},
         "montecarlo": {"cli"},
     }
-    below = {"io": {"io", "model", "checks", "errors", "catalogue", "custom_effects", "views", "anthropometry"}}
+    below = {"io": {"io", "model", "checks", "errors", "catalogue", "custom_effects", "views", "anthropometry", "tabular", "telling"}}
     for name, used in structure.python_imports(PACKAGE).items():
         room = name.split(".")[1]
         for other in used:

@@ -8,7 +8,9 @@ import dataclasses
 import json
 import pickle
 import re
+import shutil
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,13 +21,14 @@ import pytest
 from matplotlib.axes import Axes
 
 import armrs
-from armrs import online, views
+from armrs import cli, views
 from armrs.cosim.accuracy import run_checked
-from armrs.cosim.coupled import Coupled
 from armrs.cosim.system import load_system
+from armrs.tabular import Framed, Tabular
 from armrs.workflows import history
 from armrs.workflows.demo import true_model
 from browser import opened
+from results import check_series, kinds, returned
 from test_docs import DOCS, ROOT, blocks
 
 
@@ -184,22 +187,66 @@ def test_tables_of_a_report_fit_on_a4(identified: armrs.Identified, tmp_path: Pa
         assert widths and all(table <= room for table, room in widths), widths
 
 
-RESULTS = (
-    armrs.Identified, armrs.GapFound, armrs.Simulated, armrs.Recorded, armrs.Plan, armrs.PassiveMoments, armrs.Cohort, armrs.Spasticity,
-    armrs.Swept, armrs.Demonstration, armrs.Checked, armrs.Imported, Coupled, online.Replay, history.History,
-)  # fmt: skip
+@pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.__name__)
+def test_every_kind_of_result_has_its_own_words_and_a_page(kind: type) -> None:
+    assert kind.__repr__ is not object.__repr__ and kind.tidy is not Tabular.tidy and callable(kind.to_dict)
+    assert views._load(views.DRAWN_BY[kind.__name__]).report
 
 
-@pytest.mark.parametrize("kind", RESULTS, ids=lambda kind: kind.__name__)
-def test_every_kind_of_result_has_the_same_methods(kind: type) -> None:
-    for name in ("_repr_html_", "to_dataframe", "__iter__", "plot", "report", "to_json", "to_dict"):
-        assert callable(getattr(kind, name))
-    assert kind.__repr__ is not object.__repr__
-    assert views._load(next(views.DRAWN_BY[k.__name__] for k in kind.__mro__ if k.__name__ in views.DRAWN_BY)).report
-    assert hasattr(kind, "to_xarray") == (kind in (armrs.Simulated, Coupled, online.Replay))
+@pytest.mark.parametrize("name", returned())
+def test_what_public_functions_return_is_a_table_in_notebooks(name: str) -> None:
+    assert issubclass(returned()[name], Framed)
 
 
-def test_a_check_an_import_a_recording_and_a_coupled_run_are_shown_like_the_others(slow_arm: Path, tmp_path: Path) -> None:
+def test_a_data_set_is_a_table_of_trials_and_labelled_samples(slow_arm: Path) -> None:
+    dataset = armrs.load_dataset(slow_arm)
+    frame = dataset.to_dataframe()
+    assert list(frame["role"]) == ["fit", "fit", "fit", "test"] and frame.attrs["units"] == {"rate": "Hz", "duration": "s"}
+    assert "trials/slow_4.csv" in dataset._repr_html_() and len(dataset.plot()) > 4
+    short = dataset.replace(trials=(*dataset.trials[:3], cut(dataset.trials[3], 100)))
+    check_series(short)
+    samples = short.to_xarray()
+    assert np.array_equal(samples["q"].sel(trial="trials/slow_1.csv", joint="elbow"), dataset.trials[0].q[:, 1])
+    assert np.isnan(samples["force_on_arm"].sel(trial="trials/slow_4.csv")[100:]).all() and samples["force_on_arm"].attrs["units"] == "N"
+    with pytest.raises(armrs.BadInput, match="trials: found none"):
+        dataset.replace(trials=()).plot()
+
+
+def cut(trial: armrs.Trial, n: int) -> armrs.Trial:
+    """Return the first samples of a trial."""
+    return armrs.Trial(trial.file, trial.configuration, trial.repeat, trial.role, trial.t[:n], trial.q[:n], trial.force_on_arm[:n])
+
+
+def test_fits_and_first_models_are_tables(tmp_path: Path) -> None:
+    made = armrs.initialise(tmp_path / "subject", body_mass=78.0, height=1.80, sex="male")
+    assert list(made.to_dataframe()["name"]) == ["upper arm", "forearm", "hand"] and "forearm" in made._repr_html_()
+    fit = armrs.SimulationFit({"coulomb1 torque": 0.2}, {"coulomb1 torque": 0.01}, ("coulomb1 torque",), 1.0, 3, True, ())
+    assert fit.to_dataframe().to_dict("records") == [{"name": "coulomb1 torque", "value": 0.2, "std": 0.01, "at_bound": True}]
+
+
+def test_what_a_result_warns_of_is_a_warning_once(slow_arm: Path, tmp_path: Path) -> None:
+    """Warnings stood in `warnings` of the result alone, where nobody looked."""
+    folder = tmp_path / "set"
+    shutil.copytree(slow_arm, folder)
+    text = (folder / "dataset.toml").read_text(encoding="utf-8").replace('role = "test"', 'role = "fit"')
+    subject = '[subject]\nbody_mass = 78.0\nheight = 1.80\nsex = "male"\nlengths_m = [0.322, 0.264]\n\n[[trial]]'
+    text = re.sub(r"^model = .*\n", "", re.sub(r"(?ms)^\[subject\].*?(?=^\[)", "", text), flags=re.M).replace("[[trial]]", subject, 1)
+    (folder / "dataset.toml").write_text(text, encoding="utf-8")
+    with pytest.warns(armrs.ArmrsWarning, match="no model is named") as first:
+        dataset = armrs.load_dataset(folder)
+    assert [str(w.message) for w in first] == list(dataset.warnings) and {w.filename for w in first} == {__file__}
+    with warnings.catch_warnings(record=True) as given:
+        warnings.simplefilter("always")
+        found = armrs.identify(dataset)
+    with warnings.catch_warnings(record=True) as read:
+        warnings.simplefilter("always")
+        armrs.identify(folder)
+        assert cli.main(["identify", str(folder), "--json", str(tmp_path / "i.json")]) in (0, 1)
+    assert [str(w.message) for w in given] == list(found.warnings)
+    assert [str(w.message) for w in read] == [*dataset.warnings, *found.warnings]
+
+
+def test_the_tables_of_a_check_an_import_a_recording_and_a_coupled_run(slow_arm: Path, tmp_path: Path) -> None:
     files = sorted((slow_arm / "trials").glob("*.csv"))
     imported = armrs.import_recordings(files, tmp_path / "set", model=slow_arm / "model.toml")
     checked = armrs.check_dataset(imported.folder)
@@ -212,9 +259,3 @@ def test_a_check_an_import_a_recording_and_a_coupled_run_are_shown_like_the_othe
     assert recorded.to_dataframe()["tracking_error"].max() < 0.1
     series = coupled.to_xarray()
     assert series.sizes["time"] == len(coupled.t) and series["arm.q[1]"].attrs["units"] == "rad"
-    for result in (imported, checked, recorded, coupled):
-        assert len(repr(result)) < 500 and "\n" not in repr(result)
-        assert len(result._repr_html_()) < 20_000 and json.loads(result.to_json())["verb"]
-        assert len(result.plot()) > 0
-        page = result.report(tmp_path / f"{type(result).__name__}.html").read_text(encoding="utf-8")
-        assert "data:image/png;base64," in page and "<h1>" in page

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .custom_effects import OwnEffect as OwnEffect
     from .custom_effects import own_effect as own_effect
     from .errors import ArmrsError as ArmrsError
+    from .errors import ArmrsWarning as ArmrsWarning
     from .errors import BadInput as BadInput
     from .errors import IdentificationError as IdentificationError
     from .errors import SimulationError as SimulationError
@@ -111,7 +112,7 @@ _HOMES = {
     "workflows.demo": ("Demonstration", "run_demo"),
     "workflows.firmware": ("FirmwareSource", "export_c"),
     "workflows.gap": ("GapFound", "find_gap"),
-    "errors": ("ArmrsError", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
+    "errors": ("ArmrsError", "ArmrsWarning", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
     "analysis.fitting": ("SimulationFit", "fit_by_simulation"),
     "fmu.check": ("check_fmu",),
     "fmu.export": ("export_fmu",),

@@ -23,6 +23,10 @@ class ArmrsError(Exception):
     trial: int | None = None
 
 
+class ArmrsWarning(UserWarning):
+    """What a reader of a result should know. Results hold these lines in `warnings`, too; the command line prints them."""
+
+
 class BadInput(ArmrsError, ValueError):
     """An input that cannot be used as it is. The command line ends with status 2 and writes nothing.
 

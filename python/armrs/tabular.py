@@ -51,8 +51,8 @@ class Tidy:
         return max(map(len, self.columns.values()), default=0)
 
 
-class Tabular:
-    """A result that is also a table. Subclasses say which by `tidy`; those with `to_dict` are also JSON. `views` names what draws them."""
+class Framed:
+    """What is also a table: a data frame, and rows in a notebook. Subclasses say which by `tidy`."""
 
     symbols: ClassVar[str] = ""
     """What the symbols in the names mean, for readers of the table."""
@@ -77,6 +77,27 @@ class Tabular:
         frame = pandas.DataFrame(dict(table.columns))
         frame.attrs["units"] = dict(table.units)
         return frame
+
+    def _repr_html_(self) -> str:
+        """Return the summary line and the first rows, for notebooks."""
+        table = self.tidy()
+        names = list(table.columns)
+        head = "".join(f"<th>{_text(name)}{_text(_unit(table.units.get(name)))}</th>" for name in names)
+        shown = min(table.n_rows, _SHOWN)
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{_text(_cell(table.columns[name][k], name))}</td>" for name in names) + "</tr>" for k in range(shown)
+        )
+        more = f"<p>{table.n_rows - shown} more rows: to_dataframe()</p>" if table.n_rows > shown else ""
+        meaning = f"<p>{_text(self.symbols)}</p>" if self.symbols else ""
+        table_html = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        # A table wider than the page is scrolled by itself, also with keys.
+        label = _text(f"table of {type(self).__name__}")
+        scrolled = f'<div role="region" tabindex="0" aria-label="{label}" style="overflow-x: auto">{table_html}</div>'
+        return f"<p>{_text(repr(self))}</p>{scrolled}{meaning}{more}"
+
+
+class Tabular(Framed):
+    """The result of a verb: a table, a picture, a page and JSON. Subclasses have `to_dict`; `views` names what draws them."""
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Give the rows of the table, so that `pandas.DataFrame(result)` works."""
@@ -123,23 +144,6 @@ class Tabular:
             files.write_json(path, data)
         return files.json_text(data)
 
-    def _repr_html_(self) -> str:
-        """Return the summary line and the first rows, for notebooks."""
-        table = self.tidy()
-        names = list(table.columns)
-        head = "".join(f"<th>{_text(name)}{_text(_unit(table.units.get(name)))}</th>" for name in names)
-        shown = min(table.n_rows, _SHOWN)
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{_text(_cell(table.columns[name][k], name))}</td>" for name in names) + "</tr>" for k in range(shown)
-        )
-        more = f"<p>{table.n_rows - shown} more rows: to_dataframe()</p>" if table.n_rows > shown else ""
-        meaning = f"<p>{_text(self.symbols)}</p>" if self.symbols else ""
-        table_html = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-        # A table wider than the page is scrolled by itself, also with keys.
-        label = _text(f"table of {type(self).__name__}")
-        scrolled = f'<div role="region" tabindex="0" aria-label="{label}" style="overflow-x: auto">{table_html}</div>'
-        return f"<p>{_text(repr(self))}</p>{scrolled}{meaning}{more}"
-
 
 @dataclass(frozen=True)
 class Labelled:
@@ -150,8 +154,8 @@ class Labelled:
     unit: str
 
 
-class Series(Tabular):
-    """A result whose table is a series over time, of quantities that have several components."""
+class Series:
+    """What holds series over time, of quantities that have several components."""
 
     def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
         """Return coordinates by dimension, and quantities by name."""
@@ -174,6 +178,34 @@ class Series(Tabular):
         made = xarray.Dataset(variables, coords=dict(coordinates))
         made["time"].attrs["units"] = "s"
         return made
+
+
+def over_trials(times: Sequence[np.ndarray], series: Mapping[str, Sequence[np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return series of trials of different length as arrays over trial and sample; what lies behind the end of a trial is NaN.
+
+    Parameters
+    ----------
+    times : sequence of ndarray, shape (n_samples_of_trial,)
+        [s]
+    series : mapping of str to sequence of ndarray, shape (n_samples_of_trial, …)
+        One array for each trial.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_trials, n_samples, …)
+        The times are under `time`.
+    """
+    import numpy as np
+
+    most = max(map(len, times), default=0)
+
+    def stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:
+        whole = np.full((len(arrays), most, *np.shape(arrays[0])[1:]), np.nan)
+        for k, values in enumerate(arrays):
+            whole[k, : len(values)] = values
+        return whole
+
+    return {name: stacked(arrays) for name, arrays in {"time": times, **series}.items() if arrays}
 
 
 def _text(value: object) -> str:

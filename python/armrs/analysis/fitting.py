@@ -14,12 +14,13 @@ from ..catalogue import catalogue
 from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
+from ..tabular import Framed, Tidy
 from ..workflows.movement import Movement
 from ..workflows.simulate import DEFAULT_DT, DEFAULT_RATE, driven
 
 
 @dataclass(frozen=True, eq=False)
-class SimulationFit:
+class SimulationFit(Framed):
     """What a fit by simulation found.
 
     Attributes
@@ -46,6 +47,12 @@ class SimulationFit:
     rounds: int
     settled: bool
     effects: tuple[Effect, ...] = field(repr=False)
+
+    def tidy(self) -> Tidy:
+        """Return the free parameters, one a row."""
+        names = list(self.values)
+        columns = {"value": [self.values[n] for n in names], "std": [self.sd[n] for n in names]}
+        return Tidy({"name": names, **columns, "at_bound": [n in self.at_bound for n in names]}, {})
 
 
 def fit_by_simulation(

@@ -102,6 +102,11 @@ def _is_inside(path: Path, folder: Path) -> bool:
     return path.resolve().is_relative_to(folder.resolve())
 
 
+def on_a_terminal() -> bool:
+    """Whether somebody is there who can answer a question; scripts are asked nothing."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
 def command_line(context: typer.Context) -> str:
     """Return the command as it was given, for the origin of a result."""
     return shlex.join(["armrs", *(context.find_root().obj or [])])

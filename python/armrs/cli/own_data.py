@@ -5,19 +5,25 @@ from __future__ import annotations
 import enum
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 from ..errors import BadInput, BadInputs, Text
 from ..report import console
-from .common import JsonFile, OutFolder, Source, listed, present, writable
+from .common import JsonFile, OutFolder, Source, listed, on_a_terminal, present, writable
 
 if TYPE_CHECKING:
     from ..model import Robot
     from ..workflows.checking import Checked
     from ..workflows.initialise import Worn
+
+
+_Read = TypeVar("_Read")
+_SCALED = "?,?,?"
+"""Three segments whose lengths are scaled with height."""
 
 
 class Sex(str, enum.Enum):
@@ -57,9 +63,9 @@ class Side(str, enum.Enum):
 
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the data set; created if it does not exist.")],
-    body_mass: Annotated[float, typer.Option("--body-mass-kg", help="Body mass [kg].")],
-    height: Annotated[float, typer.Option("--height-m", help="Height [m].")],
-    sex: Annotated[Sex, typer.Option(help="Which table of the literature is used.")],
+    body_mass: Annotated[float | None, typer.Option("--body-mass-kg", help="Body mass [kg].")] = None,
+    height: Annotated[float | None, typer.Option("--height-m", help="Height [m].")] = None,
+    sex: Annotated[Sex | None, typer.Option(help="Which table of the literature is used.")] = None,
     lengths: Annotated[
         str,
         typer.Option(
@@ -67,7 +73,7 @@ def init(
             metavar="L,L[,L]",
             help="Lengths of upper arm, forearm and hand [m], or of upper arm and elbow to handle; ? is scaled with height.",
         ),
-    ] = "?,?,?",
+    ] = _SCALED,
     handle: Annotated[float, typer.Option("--handle-kg", help="Mass of the handle in the hand [kg].")] = 0.0,
     orthosis: Annotated[
         str,
@@ -86,10 +92,12 @@ def init(
     """Write a commented data set and model of a person from body mass, height, sex and lengths.
 
     Masses, centres of mass and inertias come from the literature (de Leva 1996). The model has no joint laws: identify and gap
-    determine stiffness, damping and friction.
+    determine stiffness, damping and friction. On a terminal, body mass, height and sex are asked for where they are not given.
     """
     from ..workflows.initialise import Worn, initialise
 
+    if body_mass is None or height is None or sex is None:
+        body_mass, height, sex, lengths = _person(body_mass, height, sex, lengths)
     worn = [_worn(part) for part in listed(orthosis)]
     measured = [_length(part) for part in listed(lengths)]
     if handle:
@@ -104,6 +112,34 @@ def init(
             print(f"  {line}")
 
     present(done.to_dict, json, human, f"armrs import RAW… --model {shlex.quote(str(done.folder / 'model.toml'))} -o SESSION")
+
+
+def _person(body_mass: float | None, height: float | None, sex: Sex | None, lengths: str) -> tuple[float, float, Sex, str]:
+    """Return what describes a person: what is missing is asked for on a terminal, and refused elsewhere."""
+    given = {"--body-mass-kg": body_mass, "--height-m": height, "--sex": sex}
+    missing = [option for option, value in given.items() if value is None]
+    if not on_a_terminal():
+        raise BadInput(", ".join(missing), Text("nothing"), "these options, or a terminal to ask on")
+    if body_mass is None:
+        body_mass = _answer("Body mass [kg]", float, "a number")
+    if height is None:
+        height = _answer("Height [m]", float, "a number")
+    if sex is None:
+        sex = _answer("Sex, for the table of the literature", Sex, "male or female")
+    if lengths == _SCALED:
+        asked = "Lengths of upper arm, forearm and hand [m], or of upper arm and elbow to handle; ? is scaled with height"
+        lengths = typer.prompt(asked, default=_SCALED, err=True)
+    return body_mass, height, sex, lengths
+
+
+def _answer(question: str, read: Callable[[str], _Read], allowed: str) -> _Read:
+    """Ask until the answer can be read."""
+    while True:
+        given = str(typer.prompt(question, err=True)).strip()
+        try:
+            return read(given)
+        except ValueError:
+            print(f"found {given!r}, allowed {allowed}", file=sys.stderr)
 
 
 def _robot(lengths: str, base: str, elbow: Elbow) -> Robot | None:
@@ -181,7 +217,7 @@ def import_(
         "angles": angles and angles.value, "zero": zero and zero.value, "clockwise": joints,
         "force_on": force_on and force_on.value, "points": listed(points), "rate": rate_hz,
     }  # fmt: skip
-    talking = sys.stdin.isatty() and sys.stderr.isatty()
+    talking = on_a_terminal()
     if ask and not talking:
         raise BadInput("--ask", Text("no terminal"), "a terminal to ask on, or --map")
     if ask:

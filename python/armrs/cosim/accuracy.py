@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import CoupledError
+from ..telling import telling
 from .between import Jump
 from .coupled import Coupled
 from .master import LITTLE, run_system
@@ -60,6 +61,7 @@ class Estimate:
         return f"{self.name} goes {size} beyond its values at the neighbouring communication points at {self.at:.6g} s, {allowed}"
 
 
+@telling
 def run_checked(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
     """Run a system, and once more with half the step; only a run whose largest error is below the accuracy of the system is good.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import views
-from ..tabular import Labelled, Series, Tidy
+from ..tabular import Labelled, Series, Tabular, Tidy
 from .between import Jump
 from .system import Connection, System, parted
 
@@ -43,7 +43,7 @@ class ConnectionReport:
 
 
 @dataclass(frozen=True, eq=False)
-class Coupled(Series):
+class Coupled(Tabular, Series):
     """A run of a system.
 
     Attributes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +17,8 @@ from .. import checks
 from ..anthropometry import literature_model
 from ..errors import ArmrsError, BadInput, BadInputs, Text
 from ..model import AddedMass, Description, Model, Subject, Tolerance, TrialEntry, load_model
+from ..tabular import Framed, Labelled, Series, Tidy, over_trials
+from ..telling import telling
 from . import files
 from .faults import faults_of
 from .muscle_activity import comparable, mark_activity
@@ -27,8 +29,15 @@ FILE = "dataset.toml"
 NO_MODEL = "no model is named: the arm is that of the subject by the literature (de Leva 1996)"
 
 
+_CHANNELS = {
+    "q": ("joint", "rad"), "dq": ("joint", "rad/s"), "tau": ("joint", "N m"), "force_on_arm": ("axis", "N"), "base": ("axis", "m"),
+    "moment_on_arm": ("", "N m"), "robot_q": ("robot_joint", "rad"),
+}  # fmt: skip
+"""What trials hold: the dimension beside that of samples, and the unit."""
+
+
 @dataclass(frozen=True, eq=False)
-class Dataset:
+class Dataset(Framed, Series):
     """A model and the trials that challenge it.
 
     Attributes
@@ -99,9 +108,45 @@ class Dataset:
         """Trials on which nothing is chosen or fitted."""
         return tuple(trial for trial in self.trials if trial.role == "test")
 
+    @property
+    def most_moving(self) -> Trial:
+        """The trial whose joints move most."""
+        if not self.trials:
+            raise BadInput("trials", Text("none"), "a data set with trials")
+        return max(self.trials, key=lambda t: float(np.sum(np.ptp(t.q[t.valid], axis=0))))
+
     def __repr__(self) -> str:
         counts = f"{len(self.fit_trials)} fit and {len(self.test_trials)} test trials"
         return f"Dataset({self.name!r}, {self.model.n_joints} joints, {counts}, {len(self.warnings)} warnings)"
+
+    def tidy(self) -> Tidy:
+        """Return the trials, one a row."""
+        columns: dict[str, list[Any]] = {n: [getattr(t, n) for t in self.trials] for n in ("file", "configuration", "repeat", "role")}
+        columns |= {"samples": [len(t) for t in self.trials], "rate": [t.rate for t in self.trials]}
+        columns |= {"duration": [float(t.t[-1] - t.t[0]) for t in self.trials], "missing": [int((~t.valid).sum()) for t in self.trials]}
+        held = [[name for name in _CHANNELS if getattr(t, name) is not None] for t in self.trials]
+        columns["channels"] = [", ".join([*names, *t.emg]) for names, t in zip(held, self.trials, strict=True)]
+        return Tidy(columns, {"rate": "Hz", "duration": "s"})
+
+    def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
+        """Return the channels that any trial has, over trial and sample; NaN where a trial lacks one. Forces act on the arm."""
+        size = {"joint": self.model.n_joints, "axis": 2, "robot_joint": 2}
+        found = {"time": Labelled(("trial", "sample"), over_trials([t.t for t in self.trials], {})["time"], "s")}
+        for name, (dimension, unit) in _CHANNELS.items():
+            columns = [getattr(t, name) for t in self.trials]
+            if all(values is None for values in columns):
+                continue
+            shape = (size[dimension],) if dimension else ()
+            filled = [np.full((len(t), *shape), np.nan) if v is None else v for t, v in zip(self.trials, columns, strict=True)]
+            dims = ("trial", "sample", dimension) if dimension else ("trial", "sample")
+            found[name] = Labelled(dims, over_trials([t.t for t in self.trials], {name: filled})[name], unit)
+        coordinates: dict[str, Any] = {"trial": [t.file for t in self.trials], "joint": [j.name for j in self.model.joints]}
+        axes = {"axis": ["y", "z"], "robot_joint": [1, 2]}
+        return coordinates | {name: values for name, values in axes.items() if any(name in q.dims for q in found.values())}, found
+
+    def plot(self) -> np.ndarray:
+        """Draw the trial whose joints move most, with the arm in five instants, where notebooks and windows show it; returns the Axes."""
+        return self.most_moving.plot(self.model)
 
     def model_of(self, configuration: str) -> Model:
         """Return the model with what was worn in a configuration."""
@@ -135,6 +180,7 @@ def refuse_added(dataset: Dataset) -> None:
         raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
 
 
+@telling
 def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     """Read a data set: check it, bring it to SI units, to forces on the arm, and to uniform time.
 

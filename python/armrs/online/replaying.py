@@ -13,7 +13,7 @@ from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Model, load_model
-from ..tabular import Labelled, Series, Tidy
+from ..tabular import Labelled, Series, Tabular, Tidy
 from .estimator import STATUSES, Estimator, OnlineEstimate
 from .log import Log, load_log
 from .settings import Settings, default_settings
@@ -24,7 +24,7 @@ NO_REFUSAL = ("taken", "resting", "settling")
 
 
 @dataclass(frozen=True, eq=False)
-class Replay(Series):
+class Replay(Tabular, Series):
     """What an estimator made of a log; rows are states, recorded at some of the control periods.
 
     Attributes

@@ -35,12 +35,12 @@ def verdict(result: Mapping[str, Any]) -> str:
     errors = sum(p["level"] == "error" for p in result["problems"])
     warnings = len(result["problems"]) - errors
     able = [v["verb"] for v in result["verbs"] if v["able"]]
-    found = "No problem was found" if not result["problems"] else f"{_count(errors, 'error')} and {_count(warnings, 'warning')} were found"
+    found = f"{_count(errors, 'error')} and {_count(warnings, 'warning')}" if result["problems"] else "No problem was found"
     return f"{found}; {', '.join(able) or 'no verb'} can use the data."
 
 
 def _count(number: int, what: str) -> str:
-    return f"{number or 'no'} {what}{'s' * (number != 1)}"
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def problems(result: Mapping[str, Any]) -> list[str]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import re
+import unicodedata
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -424,4 +426,6 @@ def known(rows: Sequence[Mapping[str, Any]], joints: Sequence[str], level: float
 
 def slug(name: str) -> str:
     """Turn a name into one that every file system takes."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.") or "figure"
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    # Of other scripts nothing is left: names stay apart by their sums.
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", plain).strip("-.") or f"figure-{zlib.crc32(name.encode()):08x}"

@@ -82,7 +82,7 @@ def _chains(
     if robot_q is not None and model.robot is not None:
         chains = {"robot": (plotting.BLUE, _whole(robot_points(model, np.asarray(robot_q))))} | chains
         text += " and the robot that leads its hand"
-    return f"{text}, seen from the side. Drag the slider, or stop and play; thin lines are poses on the way.", t, chains
+    return f"{text}, seen from the side.", t, chains
 
 
 def compared(model: Model, t: np.ndarray, arms: Mapping[str, np.ndarray], robot_q: np.ndarray | None) -> Mapping[str, object]:

@@ -64,7 +64,7 @@ def plot(trial: Trial, model: Model | None) -> np.ndarray:
 
 def write_recording(dataset: Dataset, folder: Path) -> Path:
     """Write `recording.png` below a folder: the trial of a data set whose joints move most."""
-    trial = max(dataset.trials, key=lambda t: float(np.sum(np.ptp(t.q[t.valid], axis=0))))
+    trial = dataset.most_moving
     target = folder / "recording.png"
     files.may_replace(target, ".png")
     with plotting.style():

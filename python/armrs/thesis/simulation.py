@@ -124,7 +124,7 @@ def _film(comparison: Comparison, title: str) -> dict[str, object]:
     arm_colour, robot_colour = plotting.RED, plotting.BLUE
     return film(
         title,
-        "The robot (blue) and the arm (orange) of figure 3.14. Drag the slider, or stop and play; thin lines are poses on the way.",
+        "The robot (blue) and the arm (orange) of figure 3.14.",
         run.t,
         {"robot": (robot_colour, robot_points(model, run.columns["robot_q"])), "arm": (arm_colour, points(model, run.q))},
     )

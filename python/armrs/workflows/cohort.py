@@ -21,6 +21,7 @@ from ..io import files
 from ..io.tomlfile import read_text
 from ..report.plain import passive_data
 from ..tabular import Tabular, Tidy
+from ..telling import telling
 from .history import holm, session_date, without_date
 from .passive import passive_moments
 
@@ -167,6 +168,7 @@ ALL = "all"
 """The group of those of whom none is stated."""
 
 
+@telling
 def cohort(source: str | os.PathLike[str], *, groups: str | os.PathLike[str] | None = None) -> Cohort:
     """Summarise a table of values, or a folder of results or data sets.
 

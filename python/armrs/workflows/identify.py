@@ -20,7 +20,8 @@ from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_added
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Effect, Model, Tolerance
-from ..tabular import SYMBOLS, Tabular, Tidy
+from ..tabular import SYMBOLS, Labelled, Series, Tabular, Tidy, over_trials
+from ..telling import telling
 from .setup import refuse_wrong_setup
 
 
@@ -44,7 +45,7 @@ class Explained:
 
 
 @dataclass(frozen=True, eq=False)
-class Identified(Tabular):
+class Identified(Tabular, Series):
     """The result of an identification.
 
     Attributes
@@ -203,6 +204,16 @@ class Identified(Tabular):
         columns |= {name: [getattr(e, name) for _, e in rows] for name in ("unit", "decided_by")}
         return Tidy(columns, {})
 
+    def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
+        """Return the joint torques of every trial, as measured and as the model has them, after the common low-pass."""
+        explained = self.explained
+        series = {name: [getattr(e, name) for e in explained] for name in ("measured", "fitted")}
+        stacked = over_trials([e.t for e in explained], series)
+        over = ("trial", "sample")
+        quantities = {name: Labelled((*over, "joint"), stacked[name], "N m") for name in series}
+        coordinates = {"trial": [e.trial.file for e in explained], "joint": [j.name for j in self.dataset.model.joints]}
+        return coordinates, {"time": Labelled(over, stacked["time"], "s")} | quantities
+
     @property
     def is_sound(self) -> bool:
         """Whether the solver got there, the result is possible, and nothing is known against what the data decided."""
@@ -219,6 +230,7 @@ class Identified(Tabular):
         return self.result.to_dict()
 
 
+@telling
 def identify(
     dataset: Dataset | str | os.PathLike[str],
     *,

@@ -13,6 +13,7 @@ from ..anthropometry import SEGMENTS, UNCERTAINTY, Expected, literature_model, s
 from ..errors import BadInput, Text
 from ..io import files
 from ..model import Model, Robot, Segment, Subject
+from ..tabular import Framed, Tidy
 
 _NO_ROBOT = """
 # The robot that leads the hand, for simulation and for the gap: two links, lengths and base in metres.
@@ -49,7 +50,7 @@ class Worn:
 
 
 @dataclass(frozen=True)
-class Initialised:
+class Initialised(Framed):
     """What `armrs init` wrote, and what it assumed.
 
     Attributes
@@ -63,6 +64,12 @@ class Initialised:
     folder: Path
     model: Model
     assumed: tuple[str, ...]
+
+    def tidy(self) -> Tidy:
+        """Return the segments, one a row."""
+        names = ("name", "length", "mass", "com", "inertia")
+        columns = {name: [getattr(s, name) for s in self.model.segments] for name in names}
+        return Tidy(columns, {"length": "m", "mass": "kg", "com": "m", "inertia": "kg m^2"})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data."""

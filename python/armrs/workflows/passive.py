@@ -17,6 +17,7 @@ from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..tabular import Tabular, Tidy
+from ..telling import telling
 from .identify import Estimate
 from .setup import find_wrong_setup
 
@@ -263,6 +264,7 @@ def _estimate(name: str, joint: int | None, interval: tuple[float, float], unit:
     return Estimate(name, joint, "passive", 0.5 * (interval[0] + interval[1]), half / 1.96, unit, interval, "data")
 
 
+@telling
 def passive_moments(
     dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEFAULT_CUTOFF, bins: int = DEFAULT_BINS
 ) -> PassiveMoments:

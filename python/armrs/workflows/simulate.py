@@ -17,7 +17,8 @@ from ..catalogue import catalogue
 from ..errors import BadInput, SimulationError, Text
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Model, load_model
-from ..tabular import Labelled, Series, Tidy
+from ..tabular import Labelled, Series, Tabular, Tidy
+from ..telling import telling
 from .accuracy import EnergyBalance, energy_balance
 from .movement import Movement
 
@@ -126,7 +127,7 @@ class Run(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated(Series):
+class Simulated(Tabular, Series):
     """A recorded run; rows are samples.
 
     Attributes
@@ -300,6 +301,7 @@ def runaway(pieces: Iterable[Simulated]) -> tuple[str, ...]:
     return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)
 
 
+@telling
 def simulate(
     model: Model | str | os.PathLike[str],
     drive: Movement | Trial | None = None,

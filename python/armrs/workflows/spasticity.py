@@ -19,6 +19,7 @@ from ..io.muscle_activity import co_contraction, onset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import Trial
 from ..tabular import Tabular, Tidy
+from ..telling import telling
 from .identify import Estimate
 from .passive import LEAST_RANGE, TrialMoments, trial_moments
 
@@ -161,6 +162,7 @@ class Spasticity(Tabular):
         return {"effects": effects, "besides": besides, "stretches": stretched, "cutoff_Hz": self.cutoff, "warnings": list(self.warnings)}
 
 
+@telling
 def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEFAULT_CUTOFF) -> Spasticity:
     """Find the stretch reflex of every joint that was stretched at several speeds: threshold, gain and latency with intervals.
 

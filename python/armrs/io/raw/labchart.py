@@ -30,4 +30,4 @@ def read(path: Path, lines: Sequence[str]) -> RawTable:
     named = [f"{title} [{units[k]}]" if k < len(units) and units[k] not in ("", "*") else title for k, title in enumerate(titles)]
     rows = [line for line in lines if "=" not in line]
     table = table_of(path, ["\t".join(["Time [s]", *named]), *rows], "the encoding of the export")
-    return RawTable(path, table.title, table.columns, ("export of LabChart", *table.notes[1:]))
+    return RawTable(path, table.title, table.columns, ("export of LabChart", *table.notes[1:]), remarks=table.remarks)

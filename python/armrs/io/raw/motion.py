@@ -11,7 +11,7 @@ from .. import c3d
 from ..markers import markers_of
 from ..opensim import read_motion, read_trc
 from ..samples import parquet_table
-from .table import RawTable, column, remarks_of
+from .table import RawTable, Remark, column, remarks_of
 
 PARQUET_SUFFIXES = (".parquet",)
 MOTION_SUFFIXES = (".mot", ".sto")
@@ -26,15 +26,16 @@ def read_parquet(path: Path) -> RawTable:
     import pyarrow as pa
 
     table = parquet_table(path)
-    columns, notes = [], []
+    columns = []
+    remarks: list[Remark] = []
     for name in table.column_names:
         kind = table.schema.field(name).type
         if pa.types.is_floating(kind) or pa.types.is_integer(kind):
             values = table.column(name).cast(pa.float64()).to_numpy()
             columns.append(column(name, np.ascontiguousarray(values, dtype=np.float64)))
         else:
-            notes.append(remarks_of(name, ["" if cell is None else str(cell) for cell in table.column(name).to_pylist()]))
-    return RawTable(path, path.stem, tuple(columns), tuple(notes))
+            remarks += remarks_of(name, ["" if cell is None else str(cell) for cell in table.column(name).to_pylist()])
+    return RawTable(path, path.stem, tuple(columns), remarks=tuple(remarks))
 
 
 def read_motion_table(path: Path) -> RawTable:

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,6 @@ _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>
 _AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
 _SAYS_LITTLE = re.compile(r"[xyzlr]|\d+", flags=re.IGNORECASE)
 """Names that say little by themselves."""
-_REMARKS = 5
-"""Remarks that a line holds at most."""
 _AFTER_LAST = re.compile(r"^(?P<name>.*[^_\s/])[_\s/](?P<unit>[^_\s]+)$")
 
 
@@ -54,6 +53,15 @@ class RawColumn:
     values: np.ndarray
 
 
+@dataclass(frozen=True)
+class Remark:
+    """Words that somebody wrote beside a sample: the name of their column, the row from 0, the text."""
+
+    column: str
+    row: int
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class RawTable:
     """The numeric columns of one recording.
@@ -66,9 +74,11 @@ class RawTable:
         The file's name without its suffix; the sheet is appended where a workbook has several.
     columns : tuple of RawColumn
     notes : tuple of str
-        What the reader decided: encoding, separator, decimal mark, columns left out.
+        What the reader decided: encoding, separator, decimal mark.
     markers : Markers or None
         Trajectories of markers, where the recording has them; the columns may be on another clock.
+    remarks : tuple of Remark
+        What the columns of words say.
     """
 
     path: Path
@@ -76,6 +86,7 @@ class RawTable:
     columns: tuple[RawColumn, ...]
     notes: tuple[str, ...] = field(default=())
     markers: Markers | None = None
+    remarks: tuple[Remark, ...] = ()
 
     @property
     def n_rows(self) -> int:
@@ -119,9 +130,10 @@ def grouped(groups: Sequence[str], names: Sequence[str], units: Sequence[str]) -
     return names, units
 
 
-def remarks_of(name: str, cells: Sequence[str]) -> str:
-    """Return a line with what stands in a column of words, each once with the sample of its first; an empty cell says nothing."""
-    first = {text: k for k, text in reversed(list(enumerate(cells, start=1))) if text}
-    said = [f"{text!r} in sample {k}" for text, k in sorted(first.items(), key=lambda item: item[1])]
-    more = f" and {len(said) - _REMARKS} more" if len(said) > _REMARKS else ""
-    return f"{name}, a column without numbers: {', '.join(said[:_REMARKS])}{more}"
+def remarks_of(name: str, cells: Sequence[str]) -> tuple[Remark, ...]:
+    """Return what stands in a column of words, once where rows one after the other say the same; an empty cell says nothing.
+
+    >>> [(remark.row, remark.text) for remark in remarks_of("note", ["", "cough", "cough", "", "cough"])]
+    [(1, 'cough'), (4, 'cough')]
+    """
+    return tuple(Remark(name, row, text) for row, (before, text) in enumerate(pairwise(["", *cells])) if text and text != before)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import BadInput, Text
 from .cells import number, seconds
-from .table import NoTable, RawColumn, RawTable, column, grouped, remarks_of
+from .table import NoTable, RawColumn, RawTable, Remark, column, grouped, remarks_of
 from .units import unit
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".xls")
@@ -81,8 +81,7 @@ def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
     names, units = _header(lines, layout)
     notes = [f"text in {encoding}, cells between {_SEPARATORS[layout.separator]}, decimal {'comma' if layout.decimal == ',' else 'point'}"]
     columns, remarks = _columns(lines[layout.first :], names, units, layout, notes)
-    notes += [remarks_of(name, cells) for name, cells in remarks.items()]
-    return RawTable(path, path.stem, tuple(_one_clock(columns, notes)), tuple(notes))
+    return RawTable(path, path.stem, tuple(_one_clock(columns, notes)), tuple(notes), remarks=tuple(remarks))
 
 
 def _one_clock(columns: list[RawColumn], notes: list[str]) -> list[RawColumn]:
@@ -189,8 +188,8 @@ def _is_units(row: list[str]) -> bool:
 
 def _columns(
     lines: list[str], names: list[str], units: list[str], layout: _Layout, notes: list[str]
-) -> tuple[list[RawColumn], dict[str, list[str]]]:
-    """Return the columns of numbers, and the cells of the columns that hold words alone by their names."""
+) -> tuple[list[RawColumn], list[Remark]]:
+    """Return the columns of numbers, and what the columns that hold words alone say."""
     import pyarrow as pa
     from pyarrow import csv
 
@@ -213,7 +212,8 @@ def _columns(
     if len(skipped) > 0.01 * len(lines):
         found = Text(f"{len(skipped)} of {len(lines)} rows with another number of cells")
         raise BadInput("file", found, f"{len(names)} cells in every row")
-    columns, remarks = [], {}
+    columns = []
+    remarks: list[Remark] = []
     for place, name, stated in zip(places, names, units, strict=True):
         values, unit_of_clock = _numbers(data.column(place), layout.decimal)
         if values is not None and (odd_cells := _odd_cells(data.column(place), values)):
@@ -221,7 +221,7 @@ def _columns(
         if values is not None:
             columns.append(column(name, values, stated or unit_of_clock))
         elif any(said := ["" if cell.strip() in _MISSING else cell.strip() for cell in data.column(place).to_pylist()]):
-            remarks[name] = said
+            remarks += remarks_of(name, said)
     return columns, remarks
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ArmrsError, BadInput, Text
-from .table import NoTable, RawTable, column, grouped, remarks_of
+from .table import NoTable, RawTable, Remark, column, grouped, remarks_of
 from .units import unit
 
 SUFFIXES = (".xlsx", ".xlsm")
@@ -45,7 +45,7 @@ def read_workbook(path: Path) -> list[RawTable]:
         f"; no table in {', '.join(left)}" if left else ""
     )
     titled = [(path.stem if len(tables) == 1 else f"{path.stem} {title}", table) for title, table in tables.items()]
-    return [RawTable(path, title, table.columns, (said, *table.notes)) for title, table in titled]
+    return [RawTable(path, title, table.columns, (said, *table.notes), remarks=table.remarks) for title, table in titled]
 
 
 def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
@@ -62,7 +62,8 @@ def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
         units = _words(above.pop(), width)
     names = _words(above[-1], width) if above else [""] * width
     names, units = grouped(_words(above[-2], width) if len(above) > 1 else [], names, units)
-    columns, notes = [], []
+    columns = []
+    remarks: list[Remark] = []
     for k, name in enumerate(names):
         cells = [row[k] if k < len(row) else None for row in rows[start:end]]
         values = np.array([_number(cell) for cell in cells])
@@ -73,8 +74,8 @@ def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
             values = np.round(values - values[np.isfinite(values)][0], 6) if dated else values
             columns.append(column(label, values, units[k].strip("[]() ") or ("s" if dated else "")))
         elif any(said := ["" if cell is None else str(cell).strip() for cell in cells]):
-            notes.append(remarks_of(label, said))
-    return RawTable(path, path.stem, tuple(columns), tuple(notes))
+            remarks += remarks_of(label, said)
+    return RawTable(path, path.stem, tuple(columns), remarks=tuple(remarks))
 
 
 def _is_sample(row: list[Any]) -> bool:

@@ -7,15 +7,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
+import numpy as np
+
+from ... import _armrs
 from ..._armrs import Absorbed, ChannelGap, GapResult, Limit, Missing, Place, Rung, SimulatedTrial
 from ...io.dataset import Dataset
 from ...model import Model
-from ...tabular import Tabular, Tidy
+from ...tabular import Labelled, Series, Tabular, Tidy, over_trials
 from ..identify import Estimate
 
 
 @dataclass(frozen=True, eq=False)
-class GapFound(Tabular):
+class GapFound(Tabular, Series):
     """The result of the gap workflow.
 
     Attributes
@@ -144,6 +147,27 @@ class GapFound(Tabular):
         columns |= {"parameter": [name for _, name, _ in rows]}
         columns |= {name: [getattr(value, name) for _, _, value in rows] for name in ("value", "std", "unit")}
         return Tidy(columns | {"p_value": [e.p_value for e, _, _ in rows], "share": [e.share for e, _, _ in rows]}, {})
+
+    def labelled(self) -> tuple[Mapping[str, Any], Mapping[str, Labelled]]:
+        """Return the channels of every trial, as measured and as simulated with each model; units stand in the names of the channels."""
+        models = list(dict.fromkeys(name for trial in self.trials for name in trial.shown))
+        nothing = [np.full_like(trial.measured, np.nan) for trial in self.trials]
+        shown = {
+            name: [
+                empty if (course := trial.shown.get(name)) is None else course for trial, empty in zip(self.trials, nothing, strict=True)
+            ]
+            for name in models
+        }
+        stacked = over_trials([t.t - t.t[0] for t in self.dataset.trials], {"measured": [t.measured for t in self.trials], **shown})
+        n_joints, n_channels = self.dataset.model.n_joints, stacked["measured"].shape[-1]
+        # Angles and forces, or joint torques: also of a session with a robot, where the closed chain cannot be simulated.
+        names = next(names for led in (True, False) if len(names := _armrs.channel_names(n_joints, led)) == n_channels)
+        over = ("trial", "sample")
+        quantities = {"time": Labelled(over, stacked["time"], "s"), "measured": Labelled((*over, "channel"), stacked["measured"], "")}
+        if models:
+            simulated = np.stack([stacked[name] for name in models])
+            quantities["simulated"] = Labelled(("model", *over, "channel"), simulated, "")
+        return {"trial": [t.file for t in self.trials], "channel": names, "model": models}, quantities
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as it is written to JSON."""

@@ -10,11 +10,13 @@ from ... import _armrs, checks
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
+from ...telling import telling
 from . import maps, separating, suspicion
 from .core_input import core_settings, core_trials, is_led
 from .found import GapFound
 
 
+@telling
 def find_gap(
     dataset: Dataset | str | os.PathLike[str],
     *,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +13,14 @@ from ...model import Model
 
 _RATE = 50.0
 """Rate at which signals are compared [Hz]."""
-_COARSE, _FINE = 0.04, 0.002
-"""Steps of the shift [s]: first over all shifts, then about the best."""
-_NEAR = 0.15
+_COARSE = 0.04
+"""Steps of the shift over all shifts [s]."""
+_NEAR = 0.35
 """The posture alone tells the shift to this [s]; within it the equation of motion is asked."""
+_STEP, _LONGEST, _SETTLED, _ROUNDS = 0.01, 0.05, 1e-5, 40
+"""Steps of the shift [s]: over which slopes are taken, the longest in one round, and the one that ends the rounds."""
+_TOGETHER = 1.1
+"""One shift holds for all recordings where it leaves at most so many times what a shift for each does."""
 _SMOOTH = 0.06
 """Angles are averaged over this before they are differentiated [s]."""
 _CREEP = 0.02
@@ -93,70 +97,129 @@ def lateness(model: Model, t: np.ndarray, q: np.ndarray, force_on_arm: np.ndarra
     ----------
     model : Model
     t, q, force_on_arm
-        As in `refine`, on one clock.
+        As in `Recording`, on one clock.
     """
     good = np.isfinite(q).all(axis=1) & np.isfinite(force_on_arm).all(axis=1)
-    unexplained = _fitted(model, t[good], q[good], t[good], force_on_arm[good])
+    fit = _Fit.of(model, Recording(t[good], q[good], t[good], force_on_arm[good]), _LATEST + _COARSE)
     best = 0.0
     for width, step in ((_LATEST, _COARSE), (_COARSE, 0.25 * _COARSE)):
-        best = min((float(shift) for shift in best + np.arange(-width, width + 0.5 * step, step)), key=unexplained)
-    return -best, unexplained(0.0) / max(unexplained(best), 1e-300)
+        tried = [float(shift) for shift in best + np.arange(-width, width + 0.5 * step, step)]
+        best = min(tried, key=lambda shift: _left([fit], [shift]))
+    return -best, _left([fit], [0.0]) / max(_left([fit], [best]), 1e-300)
 
 
-def refine(
-    model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray, near: float, *, one_file: bool = False
-) -> float:
-    """Return the shift near `near` [s] at which the equation of motion explains the torques of the contact force best.
+@dataclass(frozen=True)
+class Recording:
+    """Angles, and forces on a clock of their own.
 
-    Parameters
+    Attributes
     ----------
-    model : Model
-        Its lengths count; moments, inertias and passive laws are fitted.
     t, q
         As in `align`, the angles in the convention of armrs.
     force_t, force_on_arm
         As in `align`.
     near : float
-        What `align` found.
+        What `align` found [s].
     one_file : bool
-        Whether both stand in one file: their clocks are the same where that explains the torques about as well.
+        Whether both stand in one file.
     """
-    unexplained = _fitted(model, t, q, force_t, force_on_arm)
-    shifts = near + np.arange(-_NEAR, _NEAR + _FINE, _FINE)
-    left = np.array([unexplained(float(shift)) for shift in shifts])
-    if one_file and abs(near) <= _NEAR and unexplained(0.0) <= _AS_GOOD * left.min():
-        return 0.0
-    k = int(np.clip(np.argmin(left), 1, len(left) - 2))
-    below, at, above = left[k - 1 : k + 2]
-    curvature = below - 2.0 * at + above
-    return float(shifts[k] + (0.5 * _FINE * (below - above) / curvature if curvature > 0.0 else 0.0))
+
+    t: np.ndarray
+    q: np.ndarray
+    force_t: np.ndarray
+    force_on_arm: np.ndarray
+    near: float = 0.0
+    one_file: bool = False
 
 
-def _fitted(model: Model, t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force_on_arm: np.ndarray) -> Callable[[float], float]:
-    """Return what the equation of motion leaves unexplained, by the shift of the forces' clock; arguments as in `refine`."""
-    good, seen = np.isfinite(q).all(axis=1), np.isfinite(force_on_arm).all(axis=1)
-    grid = np.arange(t[good][0], t[good][-1], 1.0 / _RATE)
-    angles = _smoothed(np.column_stack([np.interp(grid, t[good], column) for column in q[good].T]))
-    speeds = np.gradient(angles, grid, axis=0)
-    accelerations = np.gradient(speeds, grid, axis=0)
-    kernels = _armrs.Arm.from_model(model)
-    rows = kernels.regressor(angles, speeds, accelerations)
-    n, joints = angles.shape
-    own = np.zeros((n, joints, 4 * joints))
-    for j in range(joints):
-        own[:, j, 4 * j : 4 * j + 4] = np.column_stack([angles[:, j], speeds[:, j], np.tanh(speeds[:, j] / _CREEP), np.ones(n)])
-    design, jacobian = np.concatenate([rows, own], axis=2), kernels.jacobian(angles)
-    clock, values = force_t[seen], force_on_arm[seen]
+def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
+    """Return for each recording the shift near what `align` found at which the equation of motion explains the contact torques best [s].
 
-    def unexplained(shift: float) -> float:
-        inside = (grid - shift >= clock[0]) & (grid - shift <= clock[-1])
-        force = np.column_stack([np.interp(grid[inside] - shift, clock, column) for column in values.T])
-        torque = np.einsum("nij,ni->nj", jacobian[inside], force)
-        whole = np.column_stack([design[inside].reshape(-1, design.shape[2]), torque.ravel()])
-        # The last entry of the triangle is what the columns before leave of the torques.
-        return float(np.linalg.qr(whole, mode="r")[-1, -1] ** 2) / len(whole)  # type: ignore[call-overload]
+    Parameters
+    ----------
+    model : Model
+        Its lengths count; moments, inertias and passive laws are fitted to all recordings together.
+    recordings : sequence of Recording
 
-    return unexplained
+    Notes
+    -----
+    In one slow movement, a delay and a viscosity look alike. All recordings share the laws of the joints; and one shift holds for all,
+    as where one trigger starts both devices, if that explains the torques about as well. Where both clocks stand in one file, they are
+    the same if that explains the torques about as well.
+    """
+    fits = [_Fit.of(model, recording, _NEAR + _STEP) for recording in recordings]
+    near = np.array([recording.near for recording in recordings])
+    each = _descended(fits, near, near, together=False)
+    least = _left(fits, each)
+    if all(r.one_file for r in recordings) and np.abs(near).max() <= _NEAR and _left(fits, 0.0 * near) <= _AS_GOOD * least:
+        return [0.0] * len(recordings)
+    common = np.full(len(near), np.median(each))
+    if np.abs(common - near).max() <= _NEAR:
+        common = _descended(fits, common, near, together=True)
+        if _left(fits, common) <= _TOGETHER * least:
+            return common.tolist()
+    return each.tolist()
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """What the equation of motion asks of one recording: `design` times unknowns is the torque of the contact force."""
+
+    grid: np.ndarray
+    design: np.ndarray
+    jacobian: np.ndarray
+    clock: np.ndarray
+    values: np.ndarray
+
+    @classmethod
+    def of(cls, model: Model, recording: Recording, widest: float) -> _Fit:
+        """Return that of the samples that have forces at every shift up to `widest` [s] from the one that was found."""
+        good, seen = np.isfinite(recording.q).all(axis=1), np.isfinite(recording.force_on_arm).all(axis=1)
+        t, clock = recording.t[good], recording.force_t[seen]
+        grid = np.arange(t[0], t[-1], 1.0 / _RATE)
+        angles = _smoothed(np.column_stack([np.interp(grid, t, column) for column in recording.q[good].T]))
+        speeds = np.gradient(angles, grid, axis=0)
+        accelerations = np.gradient(speeds, grid, axis=0)
+        kernels = _armrs.Arm.from_model(model)
+        rows = kernels.regressor(angles, speeds, accelerations)
+        n, joints = angles.shape
+        own = np.zeros((n, joints, 4 * joints))
+        for j in range(joints):
+            own[:, j, 4 * j : 4 * j + 4] = np.column_stack([angles[:, j], speeds[:, j], np.tanh(speeds[:, j] / _CREEP), np.ones(n)])
+        inside = (grid - recording.near - widest >= clock[0]) & (grid - recording.near + widest <= clock[-1])
+        design = np.concatenate([rows, own], axis=2)[inside]
+        return cls(grid[inside], design, kernels.jacobian(angles)[inside], clock, recording.force_on_arm[seen])
+
+    def torque(self, shift: float) -> np.ndarray:
+        """Return the torque of the contact force, joint by joint in one column, with the clock of the forces shifted [s]."""
+        force = np.column_stack([np.interp(self.grid - shift, self.clock, column) for column in self.values.T])
+        return np.einsum("nij,ni->nj", self.jacobian, force).ravel()
+
+
+def _left(fits: Sequence[_Fit], shifts: Sequence[float] | np.ndarray) -> float:
+    """Return the mean square of the torques that the equation of motion leaves unexplained, with one set of laws for all recordings."""
+    torque = np.concatenate([fit.torque(float(shift)) for fit, shift in zip(fits, shifts, strict=True)])
+    whole = np.column_stack([np.concatenate([fit.design.reshape(-1, fit.design.shape[2]) for fit in fits]), torque])
+    # The last entry of the triangle is what the columns before leave of the torques.
+    return float(np.linalg.qr(whole, mode="r")[-1, -1] ** 2) / max(len(whole), 1)  # type: ignore[call-overload]
+
+
+def _descended(fits: Sequence[_Fit], shifts: np.ndarray, near: np.ndarray, *, together: bool) -> np.ndarray:
+    """Return the shifts to which steps of Gauss and Newton lead, within `_NEAR` of what was found; `together` keeps their differences."""
+    design = np.concatenate([fit.design.reshape(-1, fit.design.shape[2]) for fit in fits])
+    ends = np.cumsum([0, *(fit.design.shape[0] * fit.design.shape[1] for fit in fits)])
+    for _ in range(_ROUNDS):
+        slopes = np.zeros((len(design), len(fits)))
+        for k, (fit, shift) in enumerate(zip(fits, shifts, strict=True)):
+            slopes[ends[k] : ends[k + 1], k] = (fit.torque(shift + _STEP) - fit.torque(shift - _STEP)) / (2.0 * _STEP)
+        torque = np.concatenate([fit.torque(float(shift)) for fit, shift in zip(fits, shifts, strict=True)])
+        columns = slopes.sum(axis=1, keepdims=True) if together else slopes
+        steps = np.linalg.lstsq(np.hstack([design, -columns]), torque, rcond=None)[0][design.shape[1] :]
+        moved = np.clip(shifts + np.clip(steps, -_LONGEST, _LONGEST), near - _NEAR, near + _NEAR)
+        if np.abs(moved - shifts).max() < _SETTLED:
+            return moved
+        shifts = moved
+    return shifts
 
 
 def _smoothed(angles: np.ndarray) -> np.ndarray:

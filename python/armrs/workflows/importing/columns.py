@@ -17,9 +17,14 @@ from .recipe import Channel
 _TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed", "xvalue"}
 _JOINTS = (
     {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral", "oberarm", "upperarm", "humerus"},
-    {"elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec", "unterarm", "forearm", "avantbras", "antebrazo"},
+    {
+        "elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec", "unterarm", "forearm", "avantbras", "antebrazo",
+        "avambraccio",
+    },
     {"wrist", "handgelenk", "poignet", "muneca", "polso", "zapestje"},
-)
+)  # fmt: skip
+_LIMBS = {"bras": 1, "brazo": 1, "braccio": 1, "hand": 3, "handwinkel": 3, "main": 3, "mano": 3}
+"""Words that name a joint only beside an angle, a speed or a torque: a hand has a force and a position too."""
 _ROBOT = {"robot", "roboter", "rob", "manipulator", "actuator"}
 _HANDLE = _ROBOT | {"handle", "griff", "hand", "tcp", "tip", "ee", "effector", "endeffector", "flange", "flansch", "poignee", "manico"}
 _SPEED = {"velocity", "speed", "geschwindigkeit", "vitesse", "omega", "vel", "dq", "qd", "velocidad"}
@@ -29,11 +34,12 @@ _FORCE = {"force", "kraft", "f", "forza", "fuerza", "sila"}
 _ANGLE = {"angle", "winkel", "theta", "phi", "q", "joint", "gelenk", "flexion", "ang", "position", "pos", "j"}
 _FORWARD = {
     "horizontal", "horizontale", "forward", "forwards", "vorwarts", "vorwaerts", "vorn", "vorne", "waagrecht", "waagerecht", "avant",
-    "adelante", "avanti",
+    "adelante", "avanti", "horiz", "fwd",
 }  # fmt: skip
 _UP = {
     "vertical",
     "vertikal",
+    "vert",
     "verticale",
     "up",
     "upward",
@@ -134,6 +140,8 @@ def _joint(tokens: Sequence[str], dimension: str | None) -> str | None:
     number = next((k for k, names in enumerate(_JOINTS, start=1) if _mentions(tokens, names)), None)
     if number is None and _mentions(tokens, _ANGLE | _SPEED | _TORQUE | _ROBOT):
         number = next((int(token) for token in tokens if token.isdigit()), None)
+    if number is None and (dimension in ("angle", "speed", "moment") or _mentions(tokens, _ANGLE | _SPEED | _TORQUE)):
+        number = next((_LIMBS[token] for token in tokens if token in _LIMBS), None)
     if number is None:
         return None
     if _mentions(tokens, _ROBOT):

@@ -96,6 +96,8 @@ class RawTrial:
         Added to the time of the forces [s].
     force_table : str, optional
         Title of the table of forces in it; the first when absent.
+    remarks : tuple of str
+        What columns of words say, with the time; for readers, an import takes them from the raw file again.
     """
 
     file: str
@@ -106,6 +108,7 @@ class RawTrial:
     force_file: str | None = None
     force_shift: float = 0.0
     force_table: str | None = None
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -140,7 +143,8 @@ class Recipe:
             blocks.append("\n".join([*_reason(channel.why), "[[channel]]", *tomlfile.lines(table)]))
         for trial in self.trials:
             shift = trial.force_shift if trial.force_file else None
-            blocks.append("\n".join(["[[trial]]", *tomlfile.lines({**vars(trial), "force_shift": shift})]))
+            table = {**vars(trial), "force_shift": shift, "remarks": trial.remarks or None}
+            blocks.append("\n".join(["[[trial]]", *tomlfile.lines(table)]))
         return "\n\n".join(blocks) + "\n"
 
 
@@ -203,9 +207,8 @@ def _channel(place: str, table: Mapping[str, Any]) -> Channel:
 
 
 def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
-    checks.keys(
-        place, table, required=["file", "table", "configuration", "repeat", "role"], optional=["force_file", "force_shift", "force_table"]
-    )
+    optional = ["force_file", "force_shift", "force_table", "remarks"]
+    checks.keys(place, table, required=["file", "table", "configuration", "repeat", "role"], optional=optional)
     for key in ("file", "table", "configuration"):
         checks.text(f"{place}, {key}", table[key])
     return RawTrial(
@@ -217,4 +220,5 @@ def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
         table.get("force_file"),
         checks.number(f"{place}, force_shift", table.get("force_shift", 0.0), unit="s"),
         table.get("force_table"),
+        tuple(checks.instances(f"{place}, remarks", table.get("remarks", []), str)),
     )

@@ -18,7 +18,7 @@ from ...io.raw.units import unit
 from ...io.samples import write_samples
 from ...model import Description, Model, Robot, Subject, Tolerance, TrialEntry, load_model
 from ...tabular import Tabular, Tidy
-from . import clock, columns, conventions, handle, trials
+from . import clock, columns, conventions, handle, remarks, trials
 from . import sources as raw
 from .columns import symbol_of
 from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
@@ -146,6 +146,8 @@ def import_recordings(
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
         recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
+    reads = [replace(read, trial=replace(read.trial, remarks=_remarks(read, recipe.channels))) for read in reads]
+    recipe = replace(recipe, trials=tuple(replace(t, remarks=r.trial.remarks) for t, r in zip(recipe.trials, reads, strict=True)))
     loaded, said = _led(loaded, recipe, reads)
     folder = _write(files.output_folder(out), loaded, recipe, reads, about)
     return Imported(folder, recipe, (*notes, *said))
@@ -241,6 +243,7 @@ def _decided(
             sources.notes.append(f"left out, since it holds neither joint angles nor forces: {table.path}")
         else:
             problems.append(BadInput("file", Text("neither joint angles nor forces"), "columns of one of them", file=table.path))
+    of_files = len(problems)  # that whole files are left out keeps no other file from being judged
     channels = columns.guess([n.table for n in named], _present(mapped, named[0].table), problems)
     force_tables = [n.forces for n in named if n.forces is not None]
     if force_tables:
@@ -254,7 +257,7 @@ def _decided(
     _complete(channels, model.n_joints, named[0].table, problems)
     _alike([n.table for n in named[1:]], [c for c in channels if not force_tables or c.symbol[0] not in "FM"], problems)
     _alike(force_tables[1:], [c for c in channels if c.symbol[0] in "FM"], problems)
-    if problems:
+    if len(problems) > of_files:
         raise BadInputs.of(problems)
     reads = [_aligned(n, channels, model, given, problems) for n in named]
     recorded = [_arrays(read, channels, model.n_joints) for read in reads]
@@ -267,10 +270,10 @@ def _decided(
         convention = Convention(str(given.get("reference", "relative")), str(given.get("zero", "horizontal")), signs, None, why)  # type: ignore[arg-type]
     if problems:
         raise BadInputs.of(problems)
-    reads = [_refined(read, channels, convention, model) for read in reads]
+    reads = _refined(reads, channels, convention, model)
     origin = _origin(reads, channels, convention, model, axes)
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
-    notes = [*sources.notes, *_said(tables), *axes]
+    notes = [*sources.notes, *remarks.said(tables), *axes]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
@@ -321,19 +324,6 @@ def _origin(
 
 def _positions(read: _Read, channels: Sequence[Channel]) -> np.ndarray:
     return np.column_stack([_values(read.table, _by(channels, symbol)) for symbol in ("Py", "Pz")])
-
-
-def _said(tables: Sequence[RawTable]) -> list[str]:
-    """Return what the readers decided, each once, with the file where it does not hold for all."""
-    by_note: dict[str, list[RawTable]] = {}
-    for table in tables:
-        for note in table.notes:
-            by_note.setdefault(note, []).append(table)
-    lines = []
-    for note, those in by_note.items():
-        more = f" and {len(those) - 1} more" if len(those) > 1 else ""
-        lines.append(note if len(those) == len(tables) else f"{note}: {those[0].path}{more}")
-    return lines
 
 
 def _unused(tables: Sequence[RawTable], channels: Sequence[Channel]) -> list[str]:
@@ -434,28 +424,30 @@ def _unexplained(read: _Read, channels: Sequence[Channel], model: Model, given: 
     if force is None:
         return 1.0
     found = conventions.best(model, (t, q, force), given)
-    t, q, force = _arrays(_refined(read, channels, found.convention, model), channels, model.n_joints)
+    t, q, force = _arrays(_refined([read], channels, found.convention, model)[0], channels, model.n_joints)
     return min(found.unexplained, conventions.best(model, (t, q, force), given).unexplained) if force is not None else 1.0
 
 
-def _refined(read: _Read, channels: Sequence[Channel], convention: Convention, model: Model) -> _Read:
-    """Return a trial whose forces are on the clock of the angles as exactly as the equation of motion tells."""
+def _refined(reads: Sequence[_Read], channels: Sequence[Channel], convention: Convention, model: Model) -> list[_Read]:
+    """Return trials whose forces are on the clock of the angles as exactly as the equation of motion tells."""
+    apart = [k for k, read in enumerate(reads) if read.forces is not None]
+    recordings = []
+    for read in (reads[k] for k in apart):
+        t, raw, _ = _arrays(read, channels, model.n_joints)
+        clock_of_forces, y, z = (_values(read.forces, _by(channels, s)) for s in ("t of forces", "Fy", "Fz"))  # type: ignore[arg-type]
+        on_arm = np.column_stack([y, z]) * (1.0 if convention.force_on == "arm" else -1.0)
+        q, same = conventions.to_model_angles(raw, convention), read.trial.force_file == read.trial.file
+        recordings.append(clock.Recording(t, q, clock_of_forces, on_arm, read.trial.force_shift, same))
+    found = dict(zip(apart, clock.refine(model, recordings), strict=True)) if apart else {}
+    return [replace(read, trial=replace(read.trial, force_shift=found.get(k, read.trial.force_shift))) for k, read in enumerate(reads)]
+
+
+def _remarks(read: _Read, channels: Sequence[Channel]) -> tuple[str, ...]:
+    """Return the remarks beside the samples of a trial, on the clock of its angles."""
+    own = remarks.timed(read.table, _values(read.table, _by(channels, "t")))
     if read.forces is None:
-        return read
-    t, raw, _ = _arrays(read, channels, model.n_joints)
-    force = np.column_stack([_values(read.forces, _by(channels, s)) for s in ("Fy", "Fz")])
-    on_arm = force if convention.force_on == "arm" else -force
-    q = conventions.to_model_angles(raw, convention)
-    shift = clock.refine(
-        model,
-        t,
-        q,
-        _values(read.forces, _by(channels, "t of forces")),
-        on_arm,
-        read.trial.force_shift,
-        one_file=read.trial.force_file == read.trial.file,
-    )
-    return replace(read, trial=replace(read.trial, force_shift=shift))
+        return own
+    return (*own, *remarks.timed(read.forces, _values(read.forces, _by(channels, "t of forces")) + read.trial.force_shift))
 
 
 def _by(channels: Sequence[Channel], symbol: str) -> Channel:

@@ -49,7 +49,8 @@ def _by_clock(table: RawTable, notes: list[str]) -> list[RawTable]:
     for a, b in zip(starts, [*starts[1:], len(table.columns)], strict=True):
         own = table.columns[a:b]
         forces = any((symbol_of(c) or "").startswith("F") for c in own)
-        parts.append(replace(table, columns=own, title=table.title if not a else f"{table.title} {'force' if forces else a}"))
+        title = f"{table.title} {'force' if forces else a}" if a else table.title
+        parts.append(replace(table, columns=own, title=title, remarks=() if a else table.remarks))
     return parts
 
 
@@ -77,7 +78,12 @@ def _with_times(table: RawTable, notes: list[str]) -> RawTable:
     if timed.all() and not same.any():
         return table
     kept = rows[~same]
-    return replace(table, columns=tuple(replace(c, values=kept[:, k].copy()) for k, c in enumerate(table.columns)))
+    place = np.minimum(np.searchsorted(np.flatnonzero(timed)[~same], [remark.row for remark in table.remarks]), len(kept) - 1)
+    return replace(
+        table,
+        columns=tuple(replace(c, values=kept[:, k].copy()) for k, c in enumerate(table.columns)),
+        remarks=tuple(replace(remark, row=int(row)) for remark, row in zip(table.remarks, place, strict=True)),
+    )
 
 
 def _without_codes(table: RawTable, notes: list[str]) -> RawTable:
