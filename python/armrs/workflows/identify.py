@@ -21,7 +21,7 @@ from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Effect, Model, Tolerance
 from ..tabular import SYMBOLS, Tabular, Tidy
-from .setup import refuse_wrong_setup
+from .setup import examine_setup
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,12 +261,12 @@ def identify(
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
     settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
     refuse_implausible(dataset)
-    refuse_wrong_setup(dataset)
+    unproved = examine_setup(dataset)
     configurations = sorted({t.configuration for t in dataset.trials})
     columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     with naming_trials(dataset.trials):
         found, follows = _identified(_armrs.Rig(model, effects), columns, settings, dataset)
-    return _result(dataset, found, effects, follows)
+    return _result(dataset, found, effects, (*unproved, *follows))
 
 
 def _checked(
