@@ -16,7 +16,7 @@ from .._armrs import Fit as Fit
 from .._armrs import Identification as Identification
 from ..catalogue import catalogue
 from ..errors import BadInput, IdentificationError, Text, unknown_name
-from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_added
+from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_other_arms
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Effect, Model, Tolerance
@@ -273,7 +273,7 @@ def _checked(
     dataset: Dataset, method: str, with_effects: Sequence[str] | str | None, cutoff: float | None, motion: str, level: float
 ) -> Sequence[str] | None:
     """Refuse what cannot be identified, or not with these settings; return the kinds of effects to fit."""
-    refuse_added(dataset)
+    refuse_other_arms(dataset)
     checks.choice("method", method, ("joint", "cascade"))
     checks.choice("motion", motion, ("auto", "measured", "simulated"))
     kinds = checks.texts("with_effects", () if with_effects is None else with_effects, "kinds of effects")
