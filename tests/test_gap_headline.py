@@ -88,6 +88,9 @@ def test_many_effects_are_named_by_kind() -> None:
 
 def test_nothing_is_claimed_that_was_not_tested() -> None:
     assert headline(result("nothing_missing")).startswith("Nothing is missing: on held-out trials")
+    near, wider = ({"q2_rad": channel(0.003, last, last, 1e-3)} for last in (1.08e-3, 1.21e-3))
+    assert headline(result("nothing_missing", gap=near)).endswith("every channel is off by what repeats differ by.")
+    assert headline(result("nothing_missing", gap=wider)).endswith("every channel is off by at most 1.3 times what repeats differ by.")
     assert "cannot be tested" in headline(result("nothing_missing", z=None))
     assert headline(result("explained", DRY, gap={})).endswith("there is no test trial to measure the gap on.")
     assert headline(result("unexplained")).startswith("Something is missing that the catalogue has no name for: on held-out trials")

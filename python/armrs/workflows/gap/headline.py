@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,8 @@ from ...report.tables import number, spread, unit
 
 OPEN = 1.5
 """A channel is open where its gap exceeds so many times its floor; only where the result does not say itself what is open."""
+_AS_REPEATS = 1.1
+"""A channel whose gap exceeds its floor by a tenth at most is off by what repeats differ by; where it is wider, the sentence says by how much."""
 _FAMILIES = {
     "dry": "dry friction",
     "rate": "damping",
@@ -76,7 +79,7 @@ def headline(result: Mapping[str, Any]) -> str:
     if not effects and not unexplained and not opened:
         if not tested:
             return "No effect was found that these data show; without repeats, whether what is left is noise cannot be tested."
-        return "Nothing is missing: on held-out trials every channel is off by what repeats differ by."
+        return f"Nothing is missing: on held-out trials every channel is off by {_near(result['gap'])}what repeats differ by."
     if effects:
         lacks = f"The model lacks {_names(effects, joints)}"
         lacks += ", and something that the catalogue has no name for" if unexplained else ", and that is not all" if opened else ""
@@ -85,6 +88,12 @@ def headline(result: Mapping[str, Any]) -> str:
         lacks += "" if unexplained else ", yet something is missing"
     said = _gap(result, opened)
     return f"{lacks}{': ' if said else ''}{said}."
+
+
+def _near(gap: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return how many times what repeats differ by the widest channel is at most, in tenths; nothing where that is a tenth or less."""
+    widest = max((value / g["floor"] for g in gap.values() if (value := left(g)) is not None and g["floor"]), default=1.0)
+    return "" if widest <= _AS_REPEATS else f"at most {math.ceil(10.0 * widest - 1e-9) / 10.0:.1f} times "
 
 
 def _names(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> str:
