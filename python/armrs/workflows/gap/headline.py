@@ -128,17 +128,21 @@ def undecided(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
     here = {(e["joint"], e["channel"]) for e in stated}
     families = {family(e["kind"]) for e in stated}
     kinds = joined([e["kind"].replace("_", " ") for e in stated], "or")
+    where = _trial(effect)
     if len(here) > 1:
-        return joined([effect_name(e, joints) for e in stated], "or") + ", which these movements cannot tell apart"
+        return joined([effect_name(e, joints) for e in stated], "or") + f"{where}, which these movements cannot tell apart"
     if len(families) == 1 and (name := _FAMILIES.get(families.pop())):
-        return effect_name({**effect, "kind": name}, joints) + f" ({kinds}: not told apart)"
-    return effect_name({**effect, "kind": kinds}, joints) + ", which these movements cannot tell apart"
+        return effect_name({**effect, "kind": name}, joints) + f"{where} ({kinds}: not told apart)"
+    return effect_name({**effect, "kind": kinds}, joints) + f"{where}, which these movements cannot tell apart"
+
+
+def _trial(effect: Mapping[str, Any]) -> str:
+    return f" in {effect['trial']} only" if effect.get("trial") else ""
 
 
 def _name(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
     """Return an effect in words: where the data do not decide, with what it may be instead."""
-    where = f" in {effect['trial']} only" if effect.get("trial") else ""
-    return (effect_name(effect, joints) if _decided(effect) else undecided(effect, joints)) + where
+    return effect_name(effect, joints) + _trial(effect) if _decided(effect) else undecided(effect, joints)
 
 
 def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
