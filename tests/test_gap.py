@@ -282,11 +282,15 @@ def test_what_a_trial_without_robot_angles_costs_is_said(tmp_path: Path, capsys:
     write_dataset(bare, tmp_path / "data")
     assert cli.main(["gap", str(tmp_path / "data"), "--quick", "--json", str(tmp_path / "gap.json")]) == 0
     [line] = json.loads((tmp_path / "gap.json").read_text(encoding="utf-8"))["warnings"]
-    assert line.startswith("no robot angles in slow_2.csv: so all trials are compared by joint torques in measured motion, and errors of the contact, ")
+    assert line.startswith(
+        "no robot angles in slow_2.csv: so all trials are compared by joint torques in measured motion, and errors of the contact, "
+    )
     assert line in capsys.readouterr().err
     none = data.replace(trials=tuple(dataclasses.replace(t, robot_q=None) for t in data.trials))
     [line] = examine(none, led=False)
-    assert line.startswith("no angles of a robot, or no [robot] in the model: so all trials are compared by joint torques in measured motion")
+    assert line.startswith(
+        "no angles of a robot, or no [robot] in the model: so all trials are compared by joint torques in measured motion"
+    )
     assert examine(data, led=True) == []
 
 

@@ -15,7 +15,7 @@ import armrs
 from armrs.io.dataset import Dataset
 from armrs.io.plausibility import refuse_implausible
 from armrs.workflows.setup import examine_setup
-from tests import gap_sessions
+from gap_sessions import session as gap_session
 
 ROOT = Path(__file__).resolve().parents[1]
 SEEDS = {"MuJoCo, two segments": 65005, "MuJoCo, three segments": 65004}
@@ -69,7 +69,7 @@ UNDECIDED = {
 def session(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Dataset]:
     """Two trials of each movement."""
     if request.param not in SEEDS:
-        data = gap_sessions.session(armrs.Effect("viscous", 2, parameters={"viscosity": 0.2}))
+        data = gap_session(armrs.Effect("viscous", 2, parameters={"viscosity": 0.2}))
     else:
         pytest.importorskip("mujoco")
         folder = tmp_path_factory.mktemp("world")

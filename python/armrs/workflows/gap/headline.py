@@ -12,7 +12,7 @@ from ...report.tables import number, spread, unit
 OPEN = 1.5
 """A channel is open where its gap exceeds so many times its floor; only where the result does not say itself what is open."""
 _AS_REPEATS = 1.1
-"""A channel whose gap exceeds its floor by a tenth at most is off by what repeats differ by; where it is wider, the sentence says by how much."""
+"""A channel whose gap exceeds its floor by a tenth at most is off by what repeats differ by; a wider one is told with its factor."""
 _FAMILIES = {
     "dry": "dry friction",
     "rate": "damping",

@@ -92,9 +92,7 @@ def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
     angles = ", ".join(t.file for t in dataset.trials if t.robot_q is None)
     forces = ", ".join(t.file for t in dataset.trials if t.force_on_arm is None)
     missing = [f"no {what} in {files}" for what, files in (("robot angles", angles), ("contact forces", forces)) if files]
-    return [
-        f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack"
-    ]
+    return [f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack"]
 
 
 def _still_joints(dataset: Dataset, led: bool) -> list[str]:
