@@ -144,9 +144,8 @@ def _unproved(model: Model, motion: Motion, *, met: bool) -> list[str]:
         return []
     others = ", or ".join(f"{100 * left:.2g} % with {reading.place}: {reading.allowed}" for left, reading in near)
     why = "" if met else ", and no angles of a robot prove them"
-    return [
-        f"the forces do not decide what the columns hold{why}: as given {100 * given:.2g} % of the contact torques are unexplained, {others}"
-    ]
+    said = f"as given {100 * given:.2g} % of the contact torques are unexplained, {others}"
+    return [f"the forces do not decide what the columns hold{why}: {said}"]
 
 
 def _ranked(model: Model, motion: Motion, met: bool) -> list[tuple[float, Reading]]:
