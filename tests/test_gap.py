@@ -282,11 +282,16 @@ def test_what_a_trial_without_robot_angles_costs_is_said(tmp_path: Path, capsys:
     write_dataset(bare, tmp_path / "data")
     assert cli.main(["gap", str(tmp_path / "data"), "--quick", "--json", str(tmp_path / "gap.json")]) == 0
     [line] = json.loads((tmp_path / "gap.json").read_text(encoding="utf-8"))["warnings"]
-    assert line.startswith("no robot angles in slow_2.csv: so all trials are compared by joint torques, and errors of the contact, ")
+    assert line.startswith(
+        "no robot angles in slow_2.csv: so all trials are compared by joint torques in measured motion, and errors of the contact, "
+    )
     assert line in capsys.readouterr().err
-    # Nothing is said where no trial has them, or where all do.
     none = data.replace(trials=tuple(dataclasses.replace(t, robot_q=None) for t in data.trials))
-    assert examine(none, led=False) == examine(data, led=True) == []
+    [line] = examine(none, led=False)
+    assert line.startswith(
+        "no angles of a robot, or no [robot] in the model: so all trials are compared by joint torques in measured motion"
+    )
+    assert examine(data, led=True) == []
 
 
 def test_without_repeats_a_movement_that_separates_rivals_is_found() -> None:

@@ -80,6 +80,15 @@ def test_what_is_not_decided_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> N
     assert "coulomb in joint 1 (shoulder) or viscous in joint 2 (elbow), which" in headline(result("explained", elsewhere))
 
 
+def test_a_trial_stands_beside_what_is_not_decided_in_it() -> None:
+    rival = {**effect("angle_offset", 1, ("offset", 0.02, 0.001, "rad")), "gain": 1.0}
+    slip = {**effect("handle_slip", None, ("y", 2e-3, 1e-4, "m")), "decided": False, "trial": "trials/a_3.csv", "alternatives": [rival]}
+    said = headline(result("explained", slip))
+    assert said.startswith(
+        "The model lacks handle slip or angle offset in joint 1 (shoulder) in trials/a_3.csv only, which these movements cannot tell apart: "
+    )
+
+
 def test_many_effects_are_named_by_kind() -> None:
     springs = [effect("elastic", j, ("stiffness", 1.0, 0.1, "N m/rad")) for j in (3, 1, 2)]
     said = headline(result("explained", *springs, DRY))
@@ -88,6 +97,9 @@ def test_many_effects_are_named_by_kind() -> None:
 
 def test_nothing_is_claimed_that_was_not_tested() -> None:
     assert headline(result("nothing_missing")).startswith("Nothing is missing: on held-out trials")
+    near, wider = ({"q2_rad": channel(0.003, last, last, 1e-3)} for last in (1.08e-3, 1.21e-3))
+    assert headline(result("nothing_missing", gap=near)).endswith("every channel is off by what repeats differ by.")
+    assert headline(result("nothing_missing", gap=wider)).endswith("every channel is off by at most 1.3 times what repeats differ by.")
     assert "cannot be tested" in headline(result("nothing_missing", z=None))
     assert headline(result("explained", DRY, gap={})).endswith("there is no test trial to measure the gap on.")
     assert headline(result("unexplained")).startswith("Something is missing that the catalogue has no name for: on held-out trials")

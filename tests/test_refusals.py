@@ -351,3 +351,21 @@ def test_functions_refuse_with_the_argument(call: Callable[[], object], message:
         call()
     assert "\n" not in str(caught.value)
     assert isinstance(caught.value, ValueError)
+
+
+@pytest.mark.parametrize("segments", [4, 6])
+def test_an_arm_of_more_than_three_segments_is_refused_by_name(segments: int) -> None:
+    model = armrs.Model(
+        tuple(armrs.Segment(f"segment {k}", 0.2, 1.0, 0.1, 0.004) for k in range(1, segments + 1)),
+        tuple(armrs.Joint(f"joint {k}") for k in range(1, segments + 1)),
+        robot=armrs.Robot((0.45, 0.45), (1.05, -0.10)),
+    )
+    noise = np.random.default_rng(0).standard_normal
+    trials = tuple(
+        armrs.Trial(f"{k}.csv", "slow", k, "fit", np.arange(100) / 50.0, 0.1 * noise((100, segments)), noise((100, 2))) for k in (1, 2)
+    )
+    dataset = armrs.Dataset("long", model, trials, "robot")
+    movement = armrs.Movement(np.array([[0.0] * segments, [0.1] * segments]), speed=0.5, acceleration=2.0)
+    for call in (lambda: armrs.identify(dataset), lambda: armrs.find_gap(dataset), lambda: armrs.simulate(model, movement)):
+        with pytest.raises(BadInput, match=rf"\[\[arm.segment\]\]: found {segments}, allowed 1 to 3 segments; only kernels"):
+            call()

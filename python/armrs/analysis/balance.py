@@ -117,6 +117,6 @@ def unexplained(model: Model, motion: Motion) -> float:
     # What matters of the tall system is its triangle.
     triangle: np.ndarray = np.linalg.qr(np.column_stack([*(c.ravel() for c in columns), torque.ravel()]), mode="r")  # type: ignore[assignment]
     low, high = (np.array(b) for b in zip(*bounds, strict=True))
-    solved = lsq_linear(triangle[:-1, :-1], triangle[:-1, -1], (low, high))
+    solved = lsq_linear(triangle[:-1, :-1], triangle[:-1, -1], (low, high), method="bvls")
     size = float(np.sum(torque**2))
     return float(np.sqrt((2.0 * solved.cost + triangle[-1, -1] ** 2) / size)) if size > 0.0 else 1.0

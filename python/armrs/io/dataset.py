@@ -28,6 +28,9 @@ from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, sti
 FILE = "dataset.toml"
 NO_MODEL = "no model is named: the arm is that of the subject by the literature (de Leva 1996)"
 
+_MOST_SEGMENTS = 3
+"""Of an arm that is simulated, identified and searched; `each_short_length` of the core has the same limit."""
+
 
 _CHANNELS = {
     "q": ("joint", "rad"), "dq": ("joint", "rad/s"), "tau": ("joint", "N m"), "force_on_arm": ("axis", "N"), "base": ("axis", "m"),
@@ -174,8 +177,14 @@ class Dataset(Framed, Series):
         return dataclasses.replace(self, **changes)
 
 
-def refuse_added(dataset: Dataset) -> None:
-    """Refuse masses that are worn in some configurations: whatever has one arm in all trials would ignore them."""
+def refuse_other_arms(dataset: Dataset) -> None:
+    """Refuse arms that nothing identifies: with masses worn in some configurations, which would be ignored, or of too many segments.
+
+    The core refuses long arms as well, but only after the samples were looked at, which takes long for them.
+    """
+    if dataset.model.n_joints > _MOST_SEGMENTS:
+        allowed = f"1 to {_MOST_SEGMENTS} segments; only kernels, passive moments and co-simulation take more"
+        raise BadInput("[[arm.segment]]", dataset.model.n_joints, allowed, file=dataset.model_path)
     if dataset.added:
         raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
 

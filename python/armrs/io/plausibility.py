@@ -19,8 +19,11 @@ from .trial import Trial, constant
 
 _FAR = 0.3
 """Distance of hand and handle, relative to the arm, beyond which angles of arm and robot contradict each other."""
-_SUSPECT = 0.05
-"""The same, beyond which another reading of the columns is looked for."""
+_SUSPECT = 0.02
+"""The same, beyond which another reading of the columns is looked for: a mirrored wrist puts the hand that far off, a handle that slips
+or a soft contact does not."""
+_MET = 0.05
+"""The same, up to which hand and handle meet: the angles of the arm are then taken as right."""
 _MEETS = 0.2
 """Another reading explains the columns when it brings hand and handle this much nearer."""
 _HELD = (0.002, 0.05)
@@ -131,7 +134,7 @@ def hand_meets_handle(dataset: Dataset) -> bool:
     if model.robot is None or any(trial.robot_q is None for trial in dataset.trials):
         return False
     reach = sum(s.length for s in model.segments)
-    return all(_rms(gap) <= _SUSPECT * reach for gap in _gaps(dataset))
+    return all(_rms(gap) <= _MET * reach for gap in _gaps(dataset))
 
 
 def mean_gap(dataset: Dataset) -> np.ndarray | None:

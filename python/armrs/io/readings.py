@@ -53,9 +53,22 @@ def of_angles(n: int) -> Iterator[Reading]:
         for sign, turned in ((1.0, ""), (-1.0, ", mirrored")):
             yield Reading("column q1", f"q1 from +y ({kind}from the vertical downwards{turned}?)", sign * angles, -quarter)
             yield Reading("column q1", f"q1 from +y ({kind}from the vertical upwards{turned}?)", sign * angles, quarter)
+    for j in range(n) if n > 1 else ():
+        yield from _of_one_joint(n, j)
     for order in permutations(range(n)) if n <= _MOST_SWAPPED else ():
         if order != tuple(range(n)):
             yield Reading("columns q1 …", "q1 of the first joint, the others outwards (swapped columns?)", every[list(order)], none)
+
+
+def _of_one_joint(n: int, joint: int) -> Iterator[Reading]:
+    """Give the angle of one joint, from 0, turning the other way, and as a goniometer reads it, pi where the arm is straight."""
+    turn, shift = np.eye(n), np.zeros(n)
+    turn[joint, joint] = -1.0
+    name = f"q{joint + 1}"
+    yield Reading(f"column {name}", f"{name} counter-clockwise like the others (this one mirrored?)", turn, shift)
+    if joint > 0:
+        between = f"{name} from the line of the segment before (the angle between both segments?)"
+        yield Reading(f"column {name}", between, turn, np.pi * np.eye(n)[joint])
 
 
 def of_robot_angles() -> Iterator[Reading]:

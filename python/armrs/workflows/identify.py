@@ -16,13 +16,13 @@ from .._armrs import Fit as Fit
 from .._armrs import Identification as Identification
 from ..catalogue import catalogue
 from ..errors import BadInput, IdentificationError, Text, unknown_name
-from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_added
+from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_other_arms
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Effect, Model, Tolerance
 from ..tabular import SYMBOLS, Labelled, Series, Tabular, Tidy, over_trials
 from ..telling import telling
-from .setup import refuse_wrong_setup
+from .setup import examine_setup
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,19 +273,19 @@ def identify(
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
     settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
     refuse_implausible(dataset)
-    refuse_wrong_setup(dataset)
+    unproved = examine_setup(dataset)
     configurations = sorted({t.configuration for t in dataset.trials})
     columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     with naming_trials(dataset.trials):
         found, follows = _identified(_armrs.Rig(model, effects), columns, settings, dataset)
-    return _result(dataset, found, effects, follows)
+    return _result(dataset, found, effects, (*unproved, *follows))
 
 
 def _checked(
     dataset: Dataset, method: str, with_effects: Sequence[str] | str | None, cutoff: float | None, motion: str, level: float
 ) -> Sequence[str] | None:
     """Refuse what cannot be identified, or not with these settings; return the kinds of effects to fit."""
-    refuse_added(dataset)
+    refuse_other_arms(dataset)
     checks.choice("method", method, ("joint", "cascade"))
     checks.choice("motion", motion, ("auto", "measured", "simulated"))
     kinds = checks.texts("with_effects", () if with_effects is None else with_effects, "kinds of effects")

@@ -38,6 +38,9 @@ pub enum MotionSource {
     Simulated,
 }
 
+/// A fit that leaves this much more than repeats differ by, as a mean ratio of the channels' deviations, may be in a wrong minimum.
+const MISFIT: f64 = 2.0;
+
 /// Choices of an identification.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -150,6 +153,20 @@ struct Settled<const N: usize> {
     effects: Vec<(f64, i8)>,
     settled: bool,
     objective: f64,
+    /// How many times larger the residuals are than what repeats differ by, if there are repeats.
+    excess: Option<f64>,
+}
+
+/// The better end of two fits; of two that failed the second, as the first started from the model as given.
+fn better<T, const N: usize>(
+    one: Result<(T, Settled<N>), IdentError>,
+    other: Result<(T, Settled<N>), IdentError>,
+) -> Result<(T, Settled<N>), IdentError> {
+    match (one, other) {
+        (Ok(one), Ok(other)) if other.1.better_than(&one.1) => Ok(other),
+        (Ok(one), _) => Ok(one),
+        (Err(_), other) => other,
+    }
 }
 
 impl<const N: usize> Ended for Settled<N> {
@@ -187,20 +204,30 @@ impl<const N: usize> Task<'_, N> {
             MotionSource::Auto if self.fit.iter().all(|t| can_simulate(t)) => {}
             MotionSource::Auto | MotionSource::Measured => return measured().map(certain),
         }
-        if let Ok(found) = simulated(model) {
-            return Ok(certain(found));
+        let mut best = simulated(model);
+        let given = best.as_ref().is_ok_and(|(_, found)| self.done(found));
+        if given {
+            return best.map(certain);
         }
-        // An arm of which little is known moves elsewhere than its model.
-        let seen = measured()?;
-        let mut along = simulated(&seen.1.model);
-        for share in SHARES {
-            let typical = |error| simulated(&typical(model, self.fit, share)).map_err(|_| error);
-            along = along.or_else(typical);
+        // An arm of which little is known moves elsewhere than its model, and a fit along a motion that is not the arm's may end in the
+        // wrong minimum.
+        let seen = measured();
+        let starts = seen.iter().map(|(_, found)| found.model.clone());
+        for start in starts.chain(SHARES.map(|share| typical(model, self.fit, share))) {
+            best = better(best, simulated(&start));
+            if best.as_ref().is_ok_and(|(_, found)| self.done(found)) {
+                break;
+            }
         }
-        Ok(match along {
-            Ok(found) => certain(found),
-            Err(error) => (seen.0, seen.1, Some(error)),
-        })
+        match best {
+            Ok(found) => Ok(certain(found)),
+            Err(error) => seen.map(|(task, found)| (task, found, Some(error))),
+        }
+    }
+
+    /// Whether further starts can do no good: the robot holds every joint, or the fit leaves little more than repeats differ by.
+    fn done(&self, found: &Settled<N>) -> bool {
+        N <= HELD || (found.settled && found.excess.is_none_or(|excess| excess < MISFIT))
     }
 
     /// The fit along filtered and differentiated angles.
@@ -304,6 +331,7 @@ impl<const N: usize> Task<'_, N> {
             .map(|(k, _)| (solved.outcome.x[k], solved.outcome.active[k]))
             .collect();
         let objective = self.objective(&prepared, &solved.outcome.x);
+        let excess = self.excess(&prepared, &solved.outcome.x);
         Ok(Settled {
             model: current,
             solved,
@@ -311,6 +339,7 @@ impl<const N: usize> Task<'_, N> {
             effects,
             settled,
             objective,
+            excess,
         })
     }
 
@@ -322,15 +351,25 @@ impl<const N: usize> Task<'_, N> {
             .collect()
     }
 
+    /// How many times larger residuals are than what repeats differ by, as a geometric mean of the channels; none without repeats.
+    fn excess(&self, prepared: &[Pieces], x: &[f64]) -> Option<f64> {
+        let repeats = deviations(self.fit, &self.fitted(prepared));
+        let size = |values: &[Vec<f64>]| Noise::<N>::of_all(values).log_determinant();
+        let ratio = |repeats: &Vec<Vec<f64>>| size(&self.residuals(prepared, x)) - size(repeats);
+        Some(&repeats)
+            .filter(|repeats| !repeats.is_empty())
+            .map(|repeats| libm::exp(ratio(repeats) / (2 * N) as f64))
+    }
+
+    fn residuals(&self, prepared: &[Pieces], x: &[f64]) -> Vec<Vec<f64>> {
+        let pieces = self.fitted(prepared).into_iter().flatten();
+        pieces.map(|rows| residual(rows, x)).collect()
+    }
+
     /// Twice the negative logarithm of what data and prior say of an estimate, whatever the weights: `n ln det S + Σ ((x − mean) / sd)²`, with
     /// S the covariance of n residuals.
     fn objective(&self, prepared: &[Pieces], x: &[f64]) -> f64 {
-        let residuals: Vec<Vec<f64>> = self
-            .fitted(prepared)
-            .into_iter()
-            .flatten()
-            .map(|rows| residual(rows, x))
-            .collect();
+        let residuals = self.residuals(prepared, x);
         let samples = residuals.iter().map(Vec::len).sum::<usize>() / N;
         let prior: f64 = self
             .unknowns

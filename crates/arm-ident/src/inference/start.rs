@@ -7,7 +7,7 @@ use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::spring;
 
 /// Shares of what is typical to start from, in turn.
-pub(crate) const SHARES: [f64; 2] = [1.0, 0.3];
+pub(crate) const SHARES: [f64; 3] = [0.3, 1.0, 0.1];
 /// Part of the whole arm's weight moment that each joint's typical sizes are read off at least: muscles that cross a wrist are made
 /// for more than the weight of a hand.
 const OF_THE_ARM: f64 = 0.3;

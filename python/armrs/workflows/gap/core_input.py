@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ... import _armrs, checks
-from ...io.dataset import Dataset, refuse_added
+from ...io.dataset import Dataset, refuse_other_arms
 from ...io.trial import refuse_moving_base
 from ..identify import core_columns
 
@@ -25,7 +25,7 @@ def channel_names(dataset: Dataset, led: bool) -> list[str]:
 
 def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
     """Return the trials for the core."""
-    refuse_added(dataset)
+    refuse_other_arms(dataset)
     refuse_moving_base(dataset.trials)
     configurations = sorted({t.configuration for t in dataset.trials})
     return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,8 @@ from ...report.tables import number, spread, unit
 
 OPEN = 1.5
 """A channel is open where its gap exceeds so many times its floor; only where the result does not say itself what is open."""
+_AS_REPEATS = 1.1
+"""A channel whose gap exceeds its floor by a tenth at most is off by what repeats differ by; a wider one is told with its factor."""
 _FAMILIES = {
     "dry": "dry friction",
     "rate": "damping",
@@ -76,7 +79,7 @@ def headline(result: Mapping[str, Any]) -> str:
     if not effects and not unexplained and not opened:
         if not tested:
             return "No effect was found that these data show; without repeats, whether what is left is noise cannot be tested."
-        return "Nothing is missing: on held-out trials every channel is off by what repeats differ by."
+        return f"Nothing is missing: on held-out trials every channel is off by {_near(result['gap'])}what repeats differ by."
     if effects:
         lacks = f"The model lacks {_names(effects, joints)}"
         lacks += ", and something that the catalogue has no name for" if unexplained else ", and that is not all" if opened else ""
@@ -85,6 +88,12 @@ def headline(result: Mapping[str, Any]) -> str:
         lacks += "" if unexplained else ", yet something is missing"
     said = _gap(result, opened)
     return f"{lacks}{': ' if said else ''}{said}."
+
+
+def _near(gap: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return how many times what repeats differ by the widest channel is at most, in tenths; nothing where that is a tenth or less."""
+    widest = max((value / g["floor"] for g in gap.values() if (value := left(g)) is not None and g["floor"]), default=1.0)
+    return "" if widest <= _AS_REPEATS else f"at most {math.ceil(10.0 * widest - 1e-9) / 10.0:.1f} times "
 
 
 def _names(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> str:
@@ -119,17 +128,21 @@ def undecided(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
     here = {(e["joint"], e["channel"]) for e in stated}
     families = {family(e["kind"]) for e in stated}
     kinds = joined([e["kind"].replace("_", " ") for e in stated], "or")
+    where = _trial(effect)
     if len(here) > 1:
-        return joined([effect_name(e, joints) for e in stated], "or") + ", which these movements cannot tell apart"
+        return joined([effect_name(e, joints) for e in stated], "or") + f"{where}, which these movements cannot tell apart"
     if len(families) == 1 and (name := _FAMILIES.get(families.pop())):
-        return effect_name({**effect, "kind": name}, joints) + f" ({kinds}: not told apart)"
-    return effect_name({**effect, "kind": kinds}, joints) + ", which these movements cannot tell apart"
+        return effect_name({**effect, "kind": name}, joints) + f"{where} ({kinds}: not told apart)"
+    return effect_name({**effect, "kind": kinds}, joints) + f"{where}, which these movements cannot tell apart"
+
+
+def _trial(effect: Mapping[str, Any]) -> str:
+    return f" in {effect['trial']} only" if effect.get("trial") else ""
 
 
 def _name(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
     """Return an effect in words: where the data do not decide, with what it may be instead."""
-    where = f" in {effect['trial']} only" if effect.get("trial") else ""
-    return (effect_name(effect, joints) if _decided(effect) else undecided(effect, joints)) + where
+    return effect_name(effect, joints) + _trial(effect) if _decided(effect) else undecided(effect, joints)
 
 
 def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:

@@ -13,10 +13,14 @@ from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.plausibility import refuse_implausible
 from ...io.trial import Trial, constant
-from ..setup import refuse_wrong_setup
+from ..setup import examine_setup
 from .between_samples import unresolved
 from .core_input import core_settings, core_trials
 
+_BY_TORQUES = (
+    "so all trials are compared by joint torques in measured motion, and errors of the contact, the robot and the force sensor, "
+    "misalignment, delay, tremor and bursts are not asked"
+)
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
 _NEAR = 0.02
@@ -76,22 +80,19 @@ def _dead_sensors(dataset: Dataset, led: bool) -> list[str]:
 
 
 def _wrong_setup(dataset: Dataset, led: bool) -> list[str]:
-    refuse_wrong_setup(dataset)
-    return []
+    return examine_setup(dataset)
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
     """Return which trials keep the others from being compared in the closed chain, and what is not asked for it."""
-    whole = [t for t in dataset.trials if t.robot_q is not None and t.force_on_arm is not None]
-    if led or dataset.model.robot is None or not whole:
+    if led or not any(t.force_on_arm is not None for t in dataset.trials):
         return []
+    if dataset.model.robot is None or not any(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials):
+        return [f"no angles of a robot, or no [robot] in the model: {_BY_TORQUES}"]
     angles = ", ".join(t.file for t in dataset.trials if t.robot_q is None)
     forces = ", ".join(t.file for t in dataset.trials if t.force_on_arm is None)
     missing = [f"no {what} in {files}" for what, files in (("robot angles", angles), ("contact forces", forces)) if files]
-    return [
-        f"{'; '.join(missing)}: so all trials are compared by joint torques, and errors of the contact, the robot and the force sensor, "
-        "misalignment, delay, tremor and bursts are not asked; leave such trials out, or add what they lack"
-    ]
+    return [f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack"]
 
 
 def _still_joints(dataset: Dataset, led: bool) -> list[str]:
