@@ -24,8 +24,6 @@ from armrs import cli
 from armrs.io.dataset import Dataset
 from armrs.workflows.experiment import load_experiment
 from armrs.workflows.record import measure
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from patients import PERSON
 
 EXPERIMENT = """\

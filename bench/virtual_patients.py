@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -23,10 +22,8 @@ from pathlib import Path
 import numpy as np
 
 import armrs
-from armrs.workflows import history
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 import patients
+from armrs.workflows import history
 
 CHANGE = 1.2
 """Factor of the gain in the second session, or one over it."""

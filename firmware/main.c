@@ -74,9 +74,9 @@ static int effect(armrs_effect *to, const char *name, uint32_t joint, armrs_real
 
 static int set_up(void) {
   static const armrs_segment segments[ARMRS_JOINTS] = {
-      {(armrs_real)0.322, (armrs_real)2.325, {(armrs_real)0.186, 0}, (armrs_real)0.0055},
-      {(armrs_real)0.264, (armrs_real)1.390, {(armrs_real)0.121, 0}, (armrs_real)0.0011},
-      {(armrs_real)0.093, (armrs_real)0.828, {(armrs_real)0.081, 0}, (armrs_real)0.0066},
+      {(armrs_real)0.322, (armrs_real)2.325, {(armrs_real)0.186, 0}, (armrs_real)0.0173},
+      {(armrs_real)0.264, (armrs_real)1.390, {(armrs_real)0.121, 0}, (armrs_real)0.0067},
+      {(armrs_real)0.093, (armrs_real)0.828, {(armrs_real)0.081, 0}, (armrs_real)0.0018},
   };
   static const armrs_real base[2] = {0, 0}, gravity[2] = {0, (armrs_real)-9.81};
   static const armrs_real rest[ARMRS_JOINTS] = {(armrs_real)-0.8, (armrs_real)1.1, (armrs_real)0.05};

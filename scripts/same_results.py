@@ -3,6 +3,7 @@
 
     .venv/bin/python scripts/same_results.py out/before                      # in the checkout before a change
     .venv/bin/python scripts/same_results.py out/after --against ../before/out/before
+    .venv/bin/python scripts/same_results.py out/after --base main           # both, unattended: the other build is made in out/after/base
 
 Every result is JSON, standard output or an amended model below `results/` of the folder. What is there already is not computed again. Exits
 with 1 where results differ, and names the first keys that do.
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -50,6 +52,16 @@ def commands(folder: Path, sessions: int, rigs: Path | None) -> Iterator[tuple[s
         yield f"{family}-{seed}-identify", ["identify", session, "--json", "-"]
 
 
+def other_build(folder: Path, revision: str) -> Path:
+    """Check out and build a revision below the folder, unless that was done; return its Python."""
+    base = folder.resolve() / "base"
+    if not base.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        subprocess.run(["git", "worktree", "add", "--detach", base, revision], cwd=ROOT, check=True)
+    subprocess.run(["make", "build"], cwd=base, check=True, stdout=subprocess.DEVNULL)
+    return base / ".venv" / "bin" / "python"
+
+
 def generate(folder: Path, sessions: int) -> None:
     """Make the sessions with the rapier world."""
     world = ROOT / "target" / "release" / "hidden-world"
@@ -60,26 +72,28 @@ def generate(folder: Path, sessions: int) -> None:
             subprocess.run([world, *made], cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
-def record(folder: Path, sessions: int, rigs: Path | None) -> Path:
-    """Make every result that is missing; return the folder that has them."""
+def record(folder: Path, sessions: int, rigs: Path | None, python: str | Path = sys.executable) -> Path:
+    """Make every result that is missing with the build of a Python; return the folder that has them."""
     results = folder / "results"
     results.mkdir(parents=True, exist_ok=True)
     (folder / "swing.toml").write_text(MOVEMENT, encoding="utf-8")
     if rigs and not (folder / "rigs").exists():
         (folder / "rigs").symlink_to(rigs.resolve())
-    generate(folder, sessions)
+    if not (folder / "sessions").is_symlink():
+        generate(folder, sessions)
     for name, arguments in commands(folder, sessions, rigs):
         target = results / f"{name}.json"
         if target.exists():
             continue
-        done = subprocess.run([sys.executable, "-m", "armrs", *arguments], cwd=folder, capture_output=True, check=False)
+        done = subprocess.run([python, "-m", "armrs", *arguments], cwd=folder, capture_output=True, check=False)
         if "-o" in arguments:
             out = folder / arguments[arguments.index("-o") + 1]
             for path in sorted([*out.rglob("*.json"), *out.rglob("*.toml")]):
                 if "data" not in path.relative_to(out).parts:
                     shutil.copy(path, results / f"{name}-{'-'.join(path.relative_to(out).parts)}")
         # The last of its files: one that is there was made whole.
-        (results / f"{name}.err").write_bytes(b"%d\n" % done.returncode + done.stderr)
+        said = re.sub(rb".*, after \d+ s\n", b"", done.stderr)  # which work took long says the clock
+        (results / f"{name}.err").write_bytes(b"%d\n" % done.returncode + said)
         target.write_bytes(done.stdout)
         print(f"{name}: status {done.returncode}", flush=True)
     return results
@@ -123,12 +137,21 @@ def main() -> int:
     parser.add_argument("folder", type=Path, help="where results and sessions are written")
     parser.add_argument("--sessions", type=int, default=100, metavar="N", help="generated development sessions, default 100")
     parser.add_argument("--rigs", type=Path, help="folder with the measured rigs of the tests")
-    parser.add_argument("--against", type=Path, help="folder that another build wrote")
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--against", type=Path, help="folder that another build wrote")
+    other.add_argument("--base", metavar="REVISION", help="revision that is built here, and asked the same sessions")
     given = parser.parse_args()
     if given.sessions:
         subprocess.run(["cargo", "build", "--quiet", "--release", "-p", "hidden-world"], cwd=ROOT, check=True)
     results = record(given.folder, given.sessions, given.rigs)
-    return 0 if given.against is None or not compare(results, given.against / "results") else 1
+    theirs = given.against
+    if given.base:
+        theirs = given.folder / "of-base"
+        theirs.mkdir(exist_ok=True)
+        if not (theirs / "sessions").exists():
+            (theirs / "sessions").symlink_to(given.folder.resolve() / "sessions")
+        record(theirs, given.sessions, given.rigs, other_build(given.folder, given.base))
+    return 0 if theirs is None or not compare(results, theirs / "results") else 1
 
 
 if __name__ == "__main__":

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +20,7 @@ from armrs.cosim.system import System, couple
 from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
 from armrs.model import load_model
+from pythonfmu_builds import built
 
 ARM = Path(__file__).parents[1] / "examples" / "cosim" / "arm.toml"
 NEAR = np.radians([-60.0, 50.0])
@@ -48,11 +47,7 @@ class Pulse(Fmi2Slave):
 @pytest.fixture(scope="module")
 def pulse(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A partner that pushes for a moment, made by PythonFMU."""
-    pytest.importorskip("pythonfmu")
-    folder = tmp_path_factory.mktemp("pulse")
-    (folder / "pulse.py").write_text(PULSE, encoding="utf-8")
-    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "pulse.py"], check=True, cwd=folder, capture_output=True)
-    return folder / "Pulse.fmu"
+    return built(tmp_path_factory.mktemp("pulse"), PULSE, "Pulse")
 
 
 def pushed(partner: Partner, step: float, **settings: float) -> System:
@@ -222,11 +217,7 @@ class Pd(Fmi2Slave):
 @pytest.fixture(scope="module")
 def late(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A controller as most are written for PythonFMU: its output is computed in do_step."""
-    pytest.importorskip("pythonfmu")
-    folder = tmp_path_factory.mktemp("late")
-    (folder / "pd.py").write_text(LATE, encoding="utf-8")
-    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "pd.py"], check=True, cwd=folder, capture_output=True)
-    return folder / "Pd.fmu"
+    return built(tmp_path_factory.mktemp("late"), LATE, "Pd")
 
 
 def controlled(partner: Partner, step: float, **settings: float) -> System:
@@ -274,11 +265,8 @@ def test_the_samples_of_a_refined_run_are_of_the_run_that_is_reported(late: Path
 
 
 def test_a_partner_that_fails_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("pythonfmu")
     text = LATE.replace("self.steps += 1.0", "self.steps = 1.0 / (0.05 - current_time if current_time < 0.05 else 0.0)")
-    (tmp_path / "pd.py").write_text(text, encoding="utf-8")
-    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "pd.py"], check=True, cwd=tmp_path, capture_output=True)
-    with IsolatedSlave(tmp_path / "Pd.fmu", name="pd") as partner, pytest.raises(CoupledError) as error:
+    with IsolatedSlave(built(tmp_path, text, "Pd"), name="pd") as partner, pytest.raises(CoupledError) as error:
         run_checked(controlled(partner, 0.01))
     assert str(error.value).startswith("failed: do_step: fatal error: pd: ")
 
@@ -403,10 +391,8 @@ class Counter(Fmi3Slave):
 
 
 def test_an_integer_that_its_input_cannot_hold_is_refused_and_not_wrapped(tmp_path: Path) -> None:
-    pytest.importorskip("pythonfmu3")
-    (tmp_path / "counter.py").write_text(COUNTER, encoding="utf-8")
-    subprocess.run([sys.executable, "-m", "pythonfmu3", "build", "-f", "counter.py"], check=True, cwd=tmp_path, capture_output=True)
-    with ImportedSlave(tmp_path / "Counter.fmu", name="a") as a, ImportedSlave(tmp_path / "Counter.fmu", name="b") as b:
+    counter = built(tmp_path, COUNTER, "Counter", fmi=3)
+    with ImportedSlave(counter, name="a") as a, ImportedSlave(counter, name="b") as b:
         system = couple([a, b], [("a.given", "b.taken")], step=0.1, duration=0.2)
         with pytest.raises((CoupledError, SlaveError), match="3000000000, allowed is an integer from -2147483648 to 2147483647"):
             run_system(system)

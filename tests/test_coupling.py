@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,6 +26,7 @@ from armrs.errors import BadInput, CoupledError, SlaveError
 from armrs.fmu.export import export_fmu
 from armrs.model import Segment, load_model
 from markup import unescaped
+from pythonfmu_builds import built
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 NEAR = np.radians([-60.0, 50.0])
@@ -51,13 +50,8 @@ MOTION = [
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A robot that leads the hand 0.1 m back and forth, with the contact spring of the thesis, made by PythonFMU."""
-    pytest.importorskip("pythonfmu")
-    folder = tmp_path_factory.mktemp("robot")
-    source = EXAMPLES / "python" / "cosim" / "robot.py"
-    command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(source), "-d", str(folder), "--handle-state"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (folder / "Robot.fmu").exists(), done.stderr
-    return folder / "Robot.fmu"
+    source = (EXAMPLES / "python" / "cosim" / "robot.py").read_text(encoding="utf-8")
+    return built(tmp_path_factory.mktemp("robot"), source, "Robot", "--handle-state")
 
 
 class Rig:
@@ -206,11 +200,7 @@ class Spring(Fmi3Slave):
 
 def test_a_foreign_partner_of_fmi_3(arm: Rig, tmp_path: Path) -> None:
     """A spring made by PythonFMU3 at the force port, against the same spring inside the arm behind its motion port."""
-    pytest.importorskip("pythonfmu3")
-    (tmp_path / "spring.py").write_text(SPRING, encoding="utf-8")
-    command = [sys.executable, "-m", "pythonfmu3", "build", "-f", "spring.py", "--handle-state"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert (tmp_path / "Spring.fmu").exists(), done.stderr
+    built(tmp_path, SPRING, "Spring", "--handle-state", fmi=3)
     whole = Slave(arm.model.replace(contact=Contact((200.0, 1e-9))), port="motion", start=NEAR, handle=(0.1, 0.0))
     whole.enter_initialization_mode()
     whole.exit_initialization_mode()

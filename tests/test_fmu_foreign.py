@@ -11,6 +11,7 @@ import pytest
 
 from armrs.fmu.check import check_fmu
 from armrs.fmu.description import read_description
+from pythonfmu_builds import built
 
 SLAVE_2 = """
 from pythonfmu import {kind}, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability
@@ -60,17 +61,11 @@ CASES = [(fmi, kind, state) for fmi, kinds in KINDS.items() for kind in kinds fo
 CONTAINERS = [(kind, fmi, option) for kind in ("Float64", "Int32", "Boolean") for fmi in (2, 3) for option in ("", "-sequential", "-mt")]
 
 
-def built(folder: Path, fmi: int, kind: str, *, state: bool = False) -> Path:
+def small(folder: Path, fmi: int, kind: str, *, state: bool = False) -> Path:
     """Make an FMU with an input, an output and a parameter of one type."""
-    module = "pythonfmu" if fmi == 2 else "pythonfmu3"
-    pytest.importorskip(module)
     variability = "continuous" if kind in ("Real", "Float64") else "discrete"
     text = (SLAVE_2 if fmi == 2 else SLAVE_3).format(kind=kind, value=repr(KINDS[fmi][kind]), variability=variability)
-    (folder / "small.py").write_text(text, encoding="utf-8")
-    command = [sys.executable, "-m", module, "build", "-f", "small.py", *(["--handle-state"] if state else [])]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
-    assert (folder / "Small.fmu").exists(), done.stdout + done.stderr
-    return folder / "Small.fmu"
+    return built(folder, text, "Small", *(["--handle-state"] if state else []), fmi=fmi)
 
 
 def errors(path: Path) -> list[str]:
@@ -79,7 +74,7 @@ def errors(path: Path) -> list[str]:
 
 @pytest.mark.parametrize(("fmi", "kind", "state"), CASES)
 def test_nothing_is_found_in_a_good_fmu(fmi: int, kind: str, state: bool, tmp_path: Path) -> None:
-    path = built(tmp_path, fmi, kind, state=state)
+    path = small(tmp_path, fmi, kind, state=state)
     assert read_description(path).fmi == fmi
     assert errors(path) == []
 
@@ -87,7 +82,7 @@ def test_nothing_is_found_in_a_good_fmu(fmi: int, kind: str, state: bool, tmp_pa
 @pytest.mark.parametrize(("kind", "fmi", "option"), CONTAINERS)
 def test_nothing_is_found_in_a_good_container(kind: str, fmi: int, option: str, tmp_path: Path) -> None:
     pytest.importorskip("fmu_manipulation_toolbox")
-    built(tmp_path, 3, kind)
+    small(tmp_path, 3, kind)
     content = {"name": "container.fmu", "fmu": ["Small.fmu"], "step_size": 0.01}
     (tmp_path / "container.json").write_text(json.dumps(content), encoding="utf-8")
     program = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"

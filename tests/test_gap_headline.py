@@ -169,3 +169,8 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     assert others(result("explained", {**DRY, "alternatives": [rival]})) == [
         "Instead of coulomb in joint 2 it may be viscous in joint 2 (explains these movements nearly as well, by 7.1 units less)."
     ]
+    far = effect("viscous", 2, why="explains these movements as far as a law that is not exact can", worse=170.4)
+    [line] = others(result("explained", {**DRY, "alternatives": [far]}))
+    assert line.endswith(
+        "it may be viscous in joint 2 (explains these movements as far as a law that is not exact can, by 170 units less)."
+    )

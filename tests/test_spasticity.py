@@ -1,4 +1,4 @@
-"""Reflexes by the speed of stretch, in patients whose laws the tests write themselves (tests/patients.py)."""
+"""Reflexes by the speed of stretch, in patients whose laws the tests write themselves (bench/patients.py)."""
 
 from __future__ import annotations
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from armrs.cosim.ssp import ROOT, load_ssp
 from armrs.cosim.ssp_export import export_ssp
 from armrs.cosim.system import load_system
 from armrs.errors import BadInput
+from pythonfmu_builds import built
 
 ARM = Path(__file__).parents[1] / "examples" / "cosim" / "arm.toml"
 GAIN = """
@@ -46,11 +45,7 @@ class Gain(Fmi2Slave):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with an FMU of PythonFMU."""
-    pytest.importorskip("pythonfmu")
-    place = tmp_path_factory.mktemp("ssp")
-    (place / "gain.py").write_text(GAIN, encoding="utf-8")
-    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", "gain.py"], check=True, cwd=place, capture_output=True)
-    return place
+    return built(tmp_path_factory.mktemp("ssp"), GAIN, "Gain").parent
 
 
 def arms(folder: Path) -> Path:

@@ -7,6 +7,13 @@ from typing import ClassVar, NotRequired, TypeAlias, TypedDict, final, type_chec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .io.trial import Trial
+from .workflows.gap.core_input import SearchSettings
+from .workflows.identify import CoreSettings
+from .workflows.movement import Movement
+from .workflows.plan import Instruments, Limits
+from .workflows.simulate import CoreDrive, CoreRun, Sensors
+
 __all__ = [
     "DECISIONS",
     "MISFIT",
@@ -95,23 +102,31 @@ _Array: TypeAlias = NDArray[np.float64]
 @type_check_only
 class _Predicted(TypedDict):
     name: str
-    unit: str
-    effect: int | None
+    kind: str
+    joint: int | None
     value: float
     std: float
     std_of_data: float
     relative: float
+    unit: str
 
 @type_check_only
 class _Forecast(TypedDict):
-    predicted: list[_Predicted]
+    predictions: list[_Predicted]
     worst: float
     force: float
     speed: float
     robot_speed: float
     robot_acceleration: float
     duration: float
-    durations: list[float]
+
+@type_check_only
+class _Search(TypedDict):
+    speeds: list[float]
+    waypoints: int
+    repeats: int
+    evaluations: int
+    seed: int
 
 @type_check_only
 class _Excess(TypedDict):
@@ -142,6 +157,25 @@ class _Fit(TypedDict):
     residuals: int
     rounds: int
     settled: bool
+
+@type_check_only
+class _Records(TypedDict):
+    q: _Array
+    force_on_arm: _Array
+    angle_noise: float
+    force_noise: float
+
+@type_check_only
+class _Watch(TypedDict):
+    bandwidth: float
+    damping: float
+    torque_limit: float
+    angle_margin: float
+    speed: float
+    acceleration: float
+    force: float
+    fault: tuple[float, str, int, tuple[float, float]] | None
+    seed: int
 
 @type_check_only
 class _Controlled(TypedDict):
@@ -1421,9 +1455,9 @@ def confirmed(
 ) -> MappingProxyType[str, ChannelGap]: ...
 def control(
     rig: Rig,
-    drive: Mapping[str, object],
-    settings: Mapping[str, object],
-    watch: Mapping[str, object],
+    drive: CoreDrive,
+    settings: CoreRun,
+    watch: _Watch,
 ) -> _Controlled: ...
 def declare(
     name: str,
@@ -1433,12 +1467,12 @@ def declare(
     grid: tuple[float, float, float, float, int, int],
     tabulate: Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
 ) -> None: ...
-def design(rig: Rig, settings: Mapping[str, object], sensing: Mapping[str, object], bounds: Mapping[str, object]) -> _Design: ...
+def design(rig: Rig, settings: CoreSettings, sensing: Instruments, bounds: Limits, search: _Search) -> _Design: ...
 def distances(
     rig: Rig,
-    trials: Sequence[Mapping[str, object]],
-    settings: Mapping[str, object],
-    planned: Sequence[Mapping[str, object]],
+    trials: Sequence[Trial],
+    settings: SearchSettings,
+    planned: Sequence[Trial],
     rivals: Sequence[Alternative],
 ) -> list[list[float] | None]: ...
 def effects() -> list[_Kind]: ...
@@ -1446,40 +1480,36 @@ def online_settings(rig: Rig, period: float) -> _OnlineSettings: ...
 def firmware(rig: Rig, uncertainty: float, samples: Sequence[Sequence[float]]) -> _Firmware: ...
 def find_gap(
     rig: Rig,
-    trials: Sequence[Mapping[str, object]],
-    settings: Mapping[str, object],
+    trials: Sequence[Trial],
+    settings: SearchSettings,
     progress: Callable[[str, float], None] | None = None,
 ) -> GapResult: ...
 def fit_by_simulation(
     rig: Rig,
-    drive: Mapping[str, object],
-    settings: Mapping[str, object],
-    recorded: Mapping[str, object],
+    drive: CoreDrive,
+    settings: CoreRun,
+    recorded: _Records,
     free: Sequence[tuple[int, int, float, float]],
 ) -> _Fit: ...
-def forecast(
-    rig: Rig, settings: Mapping[str, object], sensing: Mapping[str, object], tasks: Sequence[Mapping[str, object]]
-) -> _Forecast: ...
-def identify(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object]) -> Identification: ...
+def forecast(rig: Rig, settings: CoreSettings, sensing: Instruments, tasks: tuple[Sequence[Movement], int]) -> _Forecast: ...
+def identify(rig: Rig, trials: Sequence[Trial], settings: CoreSettings) -> Identification: ...
 def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[_Literature]: ...
-def play(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object], own: bool = False) -> list[SimulatedTrial]: ...
-def reach(rig: Rig, trials: Sequence[Mapping[str, object]], settings: Mapping[str, object]) -> list[float]: ...
+def play(rig: Rig, trials: Sequence[Trial], settings: SearchSettings, own: bool = False) -> list[SimulatedTrial]: ...
+def reach(rig: Rig, trials: Sequence[Trial], settings: SearchSettings) -> list[float]: ...
 def simulate(
     rig: Rig,
-    drive: Mapping[str, object],
-    settings: Mapping[str, object],
-    sensing: Mapping[str, object] | None = None,
+    drive: CoreDrive,
+    settings: CoreRun,
+    sensing: tuple[Sensors, Sequence[int]] | None = None,
 ) -> _Recorded: ...
-def simulate_in_pieces(
-    rig: Rig, drive: Mapping[str, object], settings: Mapping[str, object], samples: int, take: Callable[[_Recorded], None]
-) -> None: ...
+def simulate_in_pieces(rig: Rig, drive: CoreDrive, settings: CoreRun, samples: int, take: Callable[[_Recorded], None]) -> None: ...
 def smooth(
     values: NDArray[np.float64], rate: float, cutoff: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def look(
     rig: Rig,
-    trials: Sequence[Mapping[str, object]],
-    settings: Mapping[str, object],
+    trials: Sequence[Trial],
+    settings: SearchSettings,
     progress: Callable[[str, float], None] | None = None,
 ) -> Screening: ...
 def low_pass_both_ways(values: NDArray[np.float64], rate: float, cutoff: float, order: int) -> NDArray[np.float64]: ...

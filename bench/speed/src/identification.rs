@@ -5,7 +5,7 @@ use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Segment, gravity, inverse_dynamics, jacobian, models,
 };
 use arm_ident::inference::joint_method::{MotionSource, Options};
-use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::regression::trial::{Model, Tolerance, Trial};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
@@ -72,17 +72,8 @@ fn fast(n: usize, effects: &[Effect<f64>]) -> Trial<3> {
         torques.push(needed.map(|v| v + 0.05 * noise()));
     }
     Trial {
-        role: Role::Fit,
-        configuration: 0,
-        rate: RATE,
-        q: angles,
-        speed: None,
-        force_on_arm: None,
-        moment_on_arm: None,
         torque: Some(torques),
-        handle: None,
-        base: None,
-        valid: vec![true; n],
+        ..Trial::new(RATE, angles)
     }
 }
 

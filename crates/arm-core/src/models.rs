@@ -25,13 +25,13 @@ pub fn mechanical_arm() -> Chain<f64, 2> {
     ])
 }
 
-/// The upper extremity of table 4.10; moments of inertia as printed in table 1 of appendix D. There those of upper arm and forearm are
-/// about the long axes, three and five times smaller than about the axis of the movement.
+/// The upper extremity of table 4.10. Moments of inertia are those about the axes of the joints after de Leva (1996) for 77 kg, the handle
+/// counted as a point: table 1 of appendix D has those about the long axes.
 pub fn human_arm() -> Chain<f64, 3> {
     chain([
-        segment(0.322, 0.186, 2.114, 0.005),
-        segment(0.264, 0.121, 1.264, 0.001),
-        segment(0.093, 0.081, 0.753, 0.006),
+        segment(0.322, 0.186, 2.114, 0.0157),
+        segment(0.264, 0.121, 1.264, 0.0061),
+        segment(0.093, 0.081, 0.753, 0.0016),
     ])
 }
 

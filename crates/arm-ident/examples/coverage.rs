@@ -10,7 +10,7 @@
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Joints, Limits, Segment, Setup, Shape, models};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
-use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::regression::trial::{Model, Tolerance, Trial};
 use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Recording, Start, simulate};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
@@ -193,17 +193,10 @@ fn print_row(name: &str, truth: f64, found: &[Found]) {
 fn measured(run: &Recording<2>, session: &Session, random: &mut ChaCha8Rng) -> Trial<2> {
     let n = run.time.len();
     let mut trial = Trial {
-        speed: None,
-        role: Role::Fit,
-        configuration: 0,
-        rate: RATE,
-        q: Vec::with_capacity(n),
         force_on_arm: Some(Vec::with_capacity(n)),
-        moment_on_arm: None,
-        torque: None,
         handle: Some(Vec::with_capacity(n)),
-        base: None,
         valid: vec![true; n],
+        ..Trial::new(RATE, Vec::with_capacity(n))
     };
     for i in 0..n {
         let q = Joints::from_fn(|j, _| {

@@ -21,9 +21,8 @@ use crate::own;
 use crate::results::{Alternative, GapResult, Screening, SimulatedTrial};
 use crate::rig::Rig;
 
-/// What is known beforehand.
+/// What is known beforehand: the attributes of a Python `SearchSettings`.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Settings {
     /// The model as given.
     model: Py<model::Model>,
@@ -80,7 +79,7 @@ impl<'a, 'py> Call<'a, 'py> {
     fn files(&self) -> Vec<TrialFile> {
         let file = |c: &Columns<'_>| TrialFile {
             file: c.file.clone(),
-            end: c.end,
+            end: c.end(),
         };
         self.trials.iter().map(file).collect()
     }
@@ -276,10 +275,10 @@ type Rival = (Effect<f64>, Vec<usize>);
 /// ----------
 /// rig : Rig
 ///     Everything with the named effect, which is the last of the rig's.
-/// trials : list of dict
+/// trials : list of Trial
 ///     Those that were made.
-/// settings : dict
-/// planned : list of dict
+/// settings : SearchSettings
+/// planned : list of Trial
 ///     Movements as they would be recorded.
 /// rivals : list of Alternative
 ///
@@ -303,7 +302,10 @@ pub fn distances(
         (planned, rivals): (&[Columns<'_>], &[Rival]),
     ) -> PyResult<Vec<Option<Vec<f64>>>> {
         let all = call.session(chain)?;
-        let (planned, threads) = (read_trials(planned, call.rig)?, call.settings.threads);
+        // Each is one more movement, beside those that were made.
+        let alone = |c| read_trials(std::slice::from_ref(c), call.rig);
+        let planned: Vec<_> = planned.iter().map(alone).collect::<PyResult<_>>()?;
+        let threads = call.settings.threads;
         let mut without = all.clone();
         let Some(named) = without.effects.pop() else {
             return Err(bad_input("effects", "none", "a named effect"));
@@ -313,7 +315,7 @@ pub fn distances(
             let prepared = PreparedSession::with_noise(&without, noise, threads)?;
             let contest = Contest::new(prepared, named, rivals)?;
             let mut found = vec![Some(contest.distances(None)?)];
-            let one = |i: usize| contest.distances(Some(&planned[i])).ok();
+            let one = |i: usize| contest.distances(planned[i].first()).ok();
             let each = contest.prepared().parallel(planned.len(), one);
             found.extend(each);
             Ok(found)

@@ -1,5 +1,7 @@
 //! Identification: trials in, estimates out.
 
+use std::collections::BTreeSet;
+
 use arm_core::effect::{Effect, Place};
 use arm_core::{Chain, Joints};
 use arm_ident::inference::joint_method::{MotionSource, Options};
@@ -16,18 +18,16 @@ use crate::model;
 use crate::results::Identification;
 use crate::rig::Rig;
 
-/// One trial as Python hands it over: SI units, uniform samples, no gaps in the numbers.
+/// The attributes of a Python `Trial` that the core reads: SI units, uniform samples, no gaps in the numbers.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Columns<'py> {
     pub file: String,
-    pub role: String,
-    /// Time of the last sample [s].
-    pub end: f64,
-    configuration: usize,
+    role: String,
     /// Name of the movement.
-    movement: String,
+    configuration: String,
     rate: f64,
+    /// Time of each sample [s].
+    t: PyReadonlyArray1<'py, f64>,
     q: PyReadonlyArray2<'py, f64>,
     dq: Option<PyReadonlyArray2<'py, f64>>,
     force_on_arm: Option<PyReadonlyArray2<'py, f64>>,
@@ -38,9 +38,8 @@ pub struct Columns<'py> {
     valid: PyReadonlyArray1<'py, bool>,
 }
 
-/// How to identify.
+/// How to identify: the attributes of a Python `CoreSettings`.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Settings {
     method: String,
     fitted: Vec<bool>,
@@ -57,14 +56,28 @@ impl Settings {
     pub fn tolerance(&self) -> Tolerance {
         *self.tolerance.get().inner()
     }
+
+    /// Which effects of the rig are fitted.
+    pub fn fitted(&self) -> impl Iterator<Item = bool> {
+        self.fitted.iter().copied()
+    }
 }
 
-/// Trials as the core takes them.
+impl Columns<'_> {
+    /// Time of the last sample [s].
+    pub fn end(&self) -> f64 {
+        self.t.as_array().last().copied().unwrap_or(0.0)
+    }
+}
+
+/// Trials as the core takes them, their movements numbered in the order of their names.
 pub fn read_trials<const N: usize>(columns: &[Columns<'_>], rig: &Rig) -> PyResult<Vec<Trial<N>>> {
-    columns.iter().map(|c| trial(c, rig)).collect()
+    let movements: BTreeSet<&str> = columns.iter().map(|c| c.configuration.as_str()).collect();
+    let place = |c: &Columns<'_>| movements.range(..c.configuration.as_str()).count();
+    columns.iter().map(|c| trial(c, place(c), rig)).collect()
 }
 
-fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
+fn trial<const N: usize>(c: &Columns<'_>, configuration: usize, rig: &Rig) -> PyResult<Trial<N>> {
     let joints = |name, a| {
         Ok::<_, PyErr>(
             rows::<N>(name, a)?
@@ -89,7 +102,7 @@ fn trial<const N: usize>(c: &Columns<'_>, rig: &Rig) -> PyResult<Trial<N>> {
         } else {
             Role::Fit
         },
-        configuration: c.configuration,
+        configuration,
         rate: c.rate,
         q: joints("q", &c.q)?,
         speed: c.dq.as_ref().map(|v| joints("dq", v)).transpose()?,
@@ -208,7 +221,7 @@ pub fn identify(
         .map_err(identification)?;
         let names = trials.iter().zip(columns).map(|(trial, c)| TrialName {
             role: trial.role,
-            configuration: c.movement.clone(),
+            configuration: c.configuration.clone(),
         });
         let asked = Asked {
             model: settings.model.get().inner(),

@@ -1,5 +1,6 @@
 //! Plans: what movements will show, and movements that show much.
 
+use arm_core::effect::Effect;
 use arm_core::{Chain, Joints, Shape};
 use arm_ident::IdentError;
 use arm_ident::experiment_design::design::{Allowed, design};
@@ -15,9 +16,8 @@ use crate::errors::{bad_input, identification, simulation};
 use crate::ident::{Settings, model};
 use crate::rig::Rig;
 
-/// What the sensors do.
+/// The attributes of Python `Instruments` that the core reads: what the sensors do.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Sensing {
     rate: f64,
     cutoff: f64,
@@ -25,29 +25,32 @@ pub struct Sensing {
     angle: f64,
 }
 
-/// One movement and how often it is made.
+/// The attributes of a Python `Movement` that the core reads.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Planned<'py> {
     waypoints: PyReadonlyArray2<'py, f64>,
     speed: f64,
     acceleration: f64,
     shape: String,
     pause: f64,
-    repeats: usize,
 }
 
-/// What a plan must respect, and how long to search.
+/// The attributes of Python `Limits`: what a plan must respect.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Bounds {
-    angle: Vec<[f64; 2]>,
+    angles: Vec<[f64; 2]>,
     speed: f64,
     acceleration: f64,
     robot_speed: f64,
     robot_acceleration: f64,
     force: f64,
     duration: f64,
+}
+
+/// What is searched, and for how long.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Search {
     speeds: Vec<f64>,
     waypoints: usize,
     repeats: usize,
@@ -81,13 +84,14 @@ pub fn forecast_py<'py>(
     rig: &Rig,
     settings: Settings,
     sensing: Sensing,
-    tasks: Vec<Planned<'py>>,
+    tasks: (Vec<Planned<'py>>, usize),
 ) -> PyResult<Bound<'py, PyDict>> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (settings, sensing, tasks): (&Settings, &Sensing, &[Planned<'py>]),
+        (settings, sensing): (&Settings, &Sensing),
+        (tasks, repeats): (&[Planned<'py>], usize),
     ) -> PyResult<Bound<'py, PyDict>> {
         let question = question(chain, rig, (settings, sensing))?;
         let tasks = tasks
@@ -104,7 +108,7 @@ pub fn forecast_py<'py>(
                         other => return Err(bad_input("shape", other, "trapezoid or smooth")),
                     },
                     pause: t.pause,
-                    repeats: t.repeats,
+                    repeats,
                 })
             })
             .collect::<PyResult<Vec<_>>>()?;
@@ -115,9 +119,9 @@ pub fn forecast_py<'py>(
                 IdentError::Simulation(error) => simulation(error),
                 other => identification(other),
             })?;
-        plain(py, &found)
+        plain(py, &found, &fitted(rig, settings))
     }
-    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&settings, &sensing, &tasks)))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&settings, &sensing), (&tasks.0, tasks.1)))
 }
 
 /// Movements that show every parameter well; see `armrs.plan`.
@@ -129,15 +133,17 @@ pub fn design_py<'py>(
     settings: Settings,
     sensing: Sensing,
     bounds: Bounds,
+    search: Search,
 ) -> PyResult<Bound<'py, PyDict>> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (settings, sensing, bounds): (&Settings, &Sensing, &Bounds),
+        (settings, sensing): (&Settings, &Sensing),
+        (bounds, search): (&Bounds, &Search),
     ) -> PyResult<Bound<'py, PyDict>> {
         let question = question(chain, rig, (settings, sensing))?;
-        let angle = <[[f64; 2]; N]>::try_from(bounds.angle.clone()).map_err(|given| {
+        let angle = <[[f64; 2]; N]>::try_from(bounds.angles.clone()).map_err(|given| {
             bad_input(
                 "angles",
                 format!("{} ranges", given.len()),
@@ -152,16 +158,16 @@ pub fn design_py<'py>(
             robot_acceleration: bounds.robot_acceleration,
             force: bounds.force,
             duration: bounds.duration,
-            speeds: bounds.speeds.clone(),
-            waypoints: bounds.waypoints,
-            repeats: bounds.repeats,
-            evaluations: bounds.evaluations,
-            seed: bounds.seed,
+            speeds: search.speeds.clone(),
+            waypoints: search.waypoints,
+            repeats: search.repeats,
+            evaluations: search.evaluations,
+            seed: search.seed,
         };
         let found = py
             .detach(|| design(&question, &allowed, || {}))
             .map_err(identification)?;
-        let out = plain(py, &found.forecast)?;
+        let out = plain(py, &found.forecast, &fitted(rig, settings))?;
         let list = PyList::empty(py);
         for ((task, pace), excess) in found.tasks.iter().zip(&found.paces).zip(&found.slowed_for) {
             let item = PyDict::new(py);
@@ -182,7 +188,7 @@ pub fn design_py<'py>(
         out.set_item("tasks", list)?;
         Ok(out)
     }
-    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&settings, &sensing, &bounds)))
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&settings, &sensing), (&bounds, &search)))
 }
 
 /// A limit by its name in `armrs.Limits`, and what would be found at the pace asked for.
@@ -197,27 +203,41 @@ fn told<'py>(py: Python<'py>, excess: &Excess) -> PyResult<Bound<'py, PyDict>> {
     Ok(item)
 }
 
-fn plain<'py>(py: Python<'py>, found: &Forecast) -> PyResult<Bound<'py, PyDict>> {
+/// The effects that are fitted, in their order.
+fn fitted(rig: &Rig, settings: &Settings) -> Vec<Effect<f64>> {
+    let each = rig.effects.iter().zip(settings.fitted());
+    each.filter_map(|(effect, fit)| fit.then_some(*effect))
+        .collect()
+}
+
+/// A forecast with the attributes of Python's `Prediction` and `Plan`.
+fn plain<'py>(
+    py: Python<'py>,
+    found: &Forecast,
+    fitted: &[Effect<f64>],
+) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     let list = PyList::empty(py);
     for p in &found.predicted {
         let item = PyDict::new(py);
         item.set_item("name", &p.name)?;
         item.set_item("unit", p.unit.replace('·', " "))?;
-        item.set_item("effect", p.effect)?;
+        let effect = p.effect.map(|i| fitted[i]);
+        let kind = effect.map_or("combination", |e| e.kind.info().kind);
+        item.set_item("kind", kind)?;
+        item.set_item("joint", effect.map(|e| e.index + 1))?;
         item.set_item("value", p.value)?;
         item.set_item("std", p.std)?;
         item.set_item("std_of_data", p.std_of_data)?;
         item.set_item("relative", p.relative())?;
         list.append(item)?;
     }
-    out.set_item("predicted", list)?;
+    out.set_item("predictions", list)?;
     out.set_item("worst", found.worst())?;
     out.set_item("force", found.force)?;
     out.set_item("speed", found.speed)?;
     out.set_item("robot_speed", found.robot_speed)?;
     out.set_item("robot_acceleration", found.robot_acceleration)?;
     out.set_item("duration", found.duration)?;
-    out.set_item("durations", found.durations.clone())?;
     Ok(out)
 }

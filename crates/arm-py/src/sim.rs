@@ -16,9 +16,8 @@ use crate::convert::rows;
 use crate::errors::{bad_input, simulation};
 use crate::rig::Rig;
 
-/// How the arm is driven; what belongs to another kind of drive is `None`.
+/// How the arm is driven, a Python `CoreDrive`; what belongs to another kind of drive is `None`.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Driven<'py> {
     /// "movement", "robot", "handle", "torque" or "free".
     kind: String,
@@ -33,9 +32,8 @@ pub struct Driven<'py> {
     rigid: bool,
 }
 
-/// Numerical settings.
+/// Numerical settings, a Python `CoreRun`.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
 pub struct Settings {
     engine: String,
     integrator: String,
@@ -57,35 +55,42 @@ impl Settings {
     }
 }
 
-/// Noise and limits of the sensors: (deviation, correlation time, range, bits) for each kind of channel.
+/// Noise and limits of a kind of channel, a Python `Channel`.
 #[derive(FromPyObject)]
-#[pyo3(from_item_all)]
+pub struct Limited {
+    deviation: f64,
+    correlation_time: f64,
+    range: f64,
+    bits: Option<u32>,
+}
+
+/// Python `Sensors`.
+#[derive(FromPyObject)]
 pub struct Sensing {
     rate: f64,
-    seeds: Vec<u64>,
-    angle: (f64, f64, f64, Option<u32>),
-    force: (f64, f64, f64, Option<u32>),
-    moment: (f64, f64, f64, Option<u32>),
-    robot: (f64, f64, f64, Option<u32>),
-    torque: (f64, f64, f64, Option<u32>),
+    angle: Limited,
+    force: Limited,
+    moment: Limited,
+    robot: Limited,
+    torque: Limited,
 }
 
 impl Sensing {
     fn sensors<const N: usize>(&self, seed: u64) -> Sensors<N> {
-        let channel = |(deviation, correlation_time, range, bits)| Channel {
-            deviation,
-            correlation_time,
-            range,
-            bits,
+        let channel = |of: &Limited| Channel {
+            deviation: of.deviation,
+            correlation_time: of.correlation_time,
+            range: of.range,
+            bits: of.bits,
         };
         Sensors {
             rate: self.rate,
             seed,
-            angle: [channel(self.angle); N],
-            force: [channel(self.force); 2],
-            moment: channel(self.moment),
-            robot: [channel(self.robot); 2],
-            torque: [channel(self.torque); N],
+            angle: [channel(&self.angle); N],
+            force: [channel(&self.force); 2],
+            moment: channel(&self.moment),
+            robot: [channel(&self.robot); 2],
+            torque: [channel(&self.torque); N],
         }
     }
 }
@@ -98,13 +103,13 @@ pub fn simulate<'py>(
     rig: &Rig,
     drive: Driven<'py>,
     settings: Settings,
-    sensing: Option<Sensing>,
+    sensing: Option<(Sensing, Vec<u64>)>,
 ) -> PyResult<Bound<'py, PyDict>> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings, sensing): (&Driven<'py>, &Settings, Option<&Sensing>),
+        (drive, settings, sensing): (&Driven<'py>, &Settings, Option<&(Sensing, Vec<u64>)>),
     ) -> PyResult<Bound<'py, PyDict>> {
         let experiment = experiment(chain, rig, drive, settings)?;
         let engine = settings.engine()?;
@@ -112,9 +117,8 @@ pub fn simulate<'py>(
         crate::own::failed()?;
         let recording = outcome.map_err(simulation)?;
         let out = columns(py, &Piece::from(&recording))?;
-        if let Some(sensing) = sensing {
-            let readings = sensing
-                .seeds
+        if let Some((sensing, seeds)) = sensing {
+            let readings = seeds
                 .iter()
                 .map(|&seed| readings::<N>(py, &sensing.sensors(seed), &experiment, &recording))
                 .collect::<PyResult<Vec<_>>>()?;

@@ -10,7 +10,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_core::estimator::{Estimator, Sample, Settings};
 use arm_core::{Chain, Elbow, Equation, Joints, Measured, Real, Robot, Segment};
 use arm_ident::inference::joint_method::{Options, identify};
-use arm_ident::regression::trial::{Model, Role, Trial};
+use arm_ident::regression::trial::{Model, Trial};
 use arm_sim::{Channel, Integrator, Sensors, digest, models, simulate, simulate_batch};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
@@ -42,18 +42,11 @@ fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
     let arm = Robot::new([0.376, 0.239], [0.0, 0.0], Elbow::Down)?;
     let lead = handle.iter().map(|&h| arm.angles(h));
     let lead = lead.collect::<Result<Vec<_>, _>>()?;
+    let q = pairs(&read.q).into_iter().map(Joints::from).collect();
     let trial = Trial {
-        role: Role::Fit,
-        configuration: 0,
-        rate: 500.0,
-        q: pairs(&read.q).into_iter().map(Joints::from).collect(),
         force_on_arm: Some(pairs(&read.force_on_arm)),
-        moment_on_arm: None,
-        speed: None,
-        torque: None,
-        valid: vec![true; handle.len()],
         handle: Some(handle),
-        base: None,
+        ..Trial::new(500.0, q)
     };
     Ok((trial, lead))
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ..io.trial import Trial
 from ..model import Effect, Model, load_model
 from ..tabular import Framed, Tidy
 from ..workflows.movement import Movement
-from ..workflows.simulate import DEFAULT_DT, DEFAULT_RATE, driven
+from ..workflows.simulate import DEFAULT_DT, DEFAULT_RATE, CoreRun, driven
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +109,9 @@ def fit_by_simulation(
     names = list(checks.texts("free", list(free) if isinstance(free, Mapping) else free, "parameters"))
     places = [_place(effects, name) for name in names]
     bounds = [_bounds(name, free[name]) if isinstance(free, Mapping) else place[2:] for name, place in zip(names, places, strict=True)]
-    settings = _settings(integrator, dt, rate, len(angles), drive)
-    recorded = {
+    start = drive.q[0].tolist() if isinstance(drive, Trial) else None
+    settings = CoreRun(integrator, dt, 1.0 / rate, duration=(len(angles) - 1) / rate, q=start)
+    recorded: _armrs._Records = {
         "q": np.ascontiguousarray(angles),
         "force_on_arm": np.ascontiguousarray(force),
         "angle_noise": angle_noise,
@@ -132,19 +132,6 @@ def fit_by_simulation(
         settled=raw["settled"],
         effects=tuple(effects),
     )
-
-
-def _settings(integrator: str, dt: float, rate: float, samples: int, drive: Movement | Trial | None) -> dict[str, Any]:
-    """Return how the core simulates the runs of a fit."""
-    return {
-        "engine": "native",
-        "integrator": integrator,
-        "dt": dt,
-        "duration": (samples - 1) / rate,
-        "output_interval": 1.0 / rate,
-        "q": drive.q[0].tolist() if isinstance(drive, Trial) else None,
-        "qd": None,
-    }
 
 
 def _recorded(q: np.ndarray, force_on_arm: np.ndarray, joints: int) -> tuple[np.ndarray, np.ndarray]:

@@ -94,9 +94,9 @@ def identify(
 ) -> int:
     """Identify body segment and joint parameters, each with an interval and what decided it.
 
-    Exit status 1 when the solver did not quite get there, when the result cannot be true of this arm and these sensors, when more than
-    half the variation of a joint's torque is left (above a fifth there is a warning), or when speeds are noise to a good part. Such a
-    result is not added to a history.
+    Exit status 1 when the solver did not converge fully, when the result cannot be true of this arm and these sensors, when more than
+    half the variation of a joint's torque is left, or when speeds are noise to a good part. Above a fifth of that variation there is a
+    warning. A result with status 1 is not added to a history.
     """
     from ..io.dataset import load_dataset
     from ..report import words

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -271,13 +271,11 @@ def identify(
     effects, fitted = effects_of(model, kinds)
     if not model.segment_uncertainty and not any(fitted):
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
-    settings = core_settings(model, fitted, dataset.tolerance) | {"method": method, "cutoff": cutoff, "motion": motion, "level": level}
+    settings = CoreSettings(model, fitted, dataset.tolerance, method=method, cutoff=cutoff, motion=motion, level=level)
     refuse_implausible(dataset)
     unproved = examine_setup(dataset)
-    configurations = sorted({t.configuration for t in dataset.trials})
-    columns = [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
     with naming_trials(dataset.trials):
-        found, follows = _identified(_armrs.Rig(model, effects), columns, settings, dataset)
+        found, follows = _identified(_armrs.Rig(model, effects), settings, dataset)
     return _result(dataset, found, effects, (*unproved, *follows))
 
 
@@ -334,11 +332,9 @@ def _result(dataset: Dataset, found: Identification, effects: list[Effect], foll
     return Identified(told, dataset)
 
 
-def _identified(
-    built: _armrs.Rig, columns: list[dict[str, Any]], settings: dict[str, Any], dataset: Dataset
-) -> tuple[Identification, tuple[str, ...]]:
+def _identified(built: _armrs.Rig, settings: CoreSettings, dataset: Dataset) -> tuple[Identification, tuple[str, ...]]:
     """Return what the core identified, and a line where the measured motion had to take the place of the simulated one."""
-    found = _armrs.identify(built, columns, settings)
+    found = _armrs.identify(built, [bridged(t) for t in dataset.trials], settings)
     error = found.not_simulated
     if error is None:
         return found, ()
@@ -415,17 +411,17 @@ def _passive_laws(model: Model) -> list[Effect]:
     return [Effect(kind, j) for j in range(1, model.n_joints + 1) if j not in taken for kind in PASSIVE_LAWS]
 
 
-def core_settings(model: Model, fitted: list[bool], tolerance: Tolerance) -> dict[str, Any]:
-    """Return what the core has to know besides the data; method and level are the usual ones."""
-    return {
-        "method": "joint",
-        "fitted": fitted,
-        "model": model,
-        "tolerance": tolerance,
-        "cutoff": None,
-        "motion": "auto",
-        "level": 0.95,
-    }
+@dataclass(frozen=True)
+class CoreSettings:
+    """What the core has to know besides the trials: the model as given, which effects of the rig are fitted, and what `identify` takes."""
+
+    model: Model
+    fitted: list[bool]
+    tolerance: Tolerance
+    method: str = "joint"
+    cutoff: float | None = None
+    motion: str = "auto"
+    level: float = 0.95
 
 
 _FAR = 2.0
@@ -547,12 +543,12 @@ def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
     return added
 
 
-def core_columns(trial: Trial) -> dict[str, Any]:
-    """Return a trial for the core; gaps are bridged by straight lines and masked by `valid`."""
+def bridged(trial: Trial) -> Trial:
+    """Return a trial for the core, which reads no NaN: gaps are bridged by straight lines, and masked by `valid`."""
 
     def whole(values: np.ndarray | None) -> np.ndarray | None:
-        if values is None:
-            return None
+        if values is None or np.isfinite(values).all():
+            return values
         table = np.array(values, dtype=float).reshape(len(trial), -1)
         for column in table.T:
             bad = ~np.isfinite(column)
@@ -560,21 +556,9 @@ def core_columns(trial: Trial) -> dict[str, Any]:
                 column[bad] = np.interp(trial.t[bad], trial.t[~bad], column[~bad])
         return table.reshape(values.shape)
 
-    return {
-        "file": trial.file,
-        "role": trial.role,
-        "end": float(trial.t[-1]),
-        "movement": trial.configuration,
-        "rate": trial.rate,
-        "q": whole(trial.q),
-        "dq": whole(trial.dq),
-        "force_on_arm": whole(trial.force_on_arm),
-        "moment_on_arm": whole(trial.moment_on_arm),
-        "tau": whole(trial.tau),
-        "robot_q": whole(trial.robot_q),
-        "base": whole(trial.base),
-        "valid": np.array(trial.valid),
-    }
+    channels = ("q", "dq", "force_on_arm", "moment_on_arm", "tau", "robot_q", "base")
+    filled: dict[str, Any] = {name: whole(getattr(trial, name)) for name in channels}
+    return replace(trial, **filled)
 
 
 def _with_caveat(estimates: Sequence[Estimate], caveat: str | None) -> tuple[Estimate, ...]:

@@ -16,7 +16,7 @@ from ..model import Model, Tolerance
 from ..report.plain import origin
 from ..tabular import Tabular, Tidy
 from .experiment import Safety
-from .identify import core_settings, effects_of
+from .identify import CoreSettings, effects_of
 from .movement import Movement
 from .simulate import about
 
@@ -102,8 +102,6 @@ class Limits:
 
 MOST_UNCERTAIN = 0.5
 """Relative standard deviation from which on a parameter counts as not known."""
-_SCALARS = ("speed", "acceleration", "robot_speed", "robot_acceleration", "force", "duration")
-"""Limits that are a single number."""
 
 
 @dataclass(frozen=True)
@@ -288,11 +286,13 @@ def forecast(
     """
     asked = _Question(model, with_effects, instruments, repeats)
     movements = checks.instances("movements", movements, Movement)
-    tasks = [_task(m, model, repeats) for m in movements]
-    if not tasks:
+    if not movements:
         raise BadInput("movements", Text("none"), "at least one")
+    for movement in movements:
+        if movement.waypoints.shape[1] != model.n_joints:
+            raise BadInput("waypoints", f"rows of {movement.waypoints.shape[1]} angles", f"rows of {model.n_joints}")
     try:
-        return asked.plan(movements, _armrs.forecast(asked.rig, asked.settings, asked.sensing, tasks))
+        return asked.plan(movements, _armrs.forecast(asked.rig, asked.settings, instruments, (movements, asked.repeats)))
     except BadInput as error:
         # Of several movements nobody says which it was.
         raise about(movements[0], error) if len(movements) == 1 else error from None
@@ -346,16 +346,14 @@ def plan(
     shares = checks.numbers("speeds", speeds, shape=(None,)).tolist()
     if not shares:
         raise BadInput("speeds", Text("none"), "at least one share")
-    bounds = {
-        "angle": [list(ends) for ends in limits.angles],
-        **{name: float(getattr(limits, name)) for name in _SCALARS},
+    search: _armrs._Search = {
         "speeds": [checks.number("speeds", v, above=0.0, most=1.0) for v in shares],
         "waypoints": checks.whole("waypoints", waypoints, least=2, most=100),
         "repeats": repeats,
         "evaluations": checks.whole("evaluations", evaluations, least=1, most=100_000),
         "seed": checks.whole("seed", seed, least=0, most=2**64 - 1),
     }
-    raw = _armrs.design(asked.rig, asked.settings, asked.sensing, bounds)
+    raw = _armrs.design(asked.rig, asked.settings, instruments, limits, search)
     found = tuple(Movement(t["waypoints"], speed=t["speed"], acceleration=t["acceleration"], shape="smooth") for t in raw["tasks"])
     slowed = tuple(Slowed(k, t["pace"], **t["slowed_for"]) for k, t in enumerate(raw["tasks"], start=1) if t["slowed_for"] is not None)
     return replace(asked.plan(found, raw), slowed=slowed)
@@ -411,34 +409,19 @@ class _Question:
         self.model, self.repeats = model, checks.whole("repeats", repeats, least=1, most=10_000)
         self.effects, fitted = effects_of(model, with_effects)
         self.rig = _armrs.Rig(model, self.effects)
-        self.settings = core_settings(model, fitted, instruments.tolerance)
-        self.sensing = {name: getattr(instruments, name) for name in ("rate", "cutoff", "force", "angle")}
+        self.settings = CoreSettings(model, fitted, instruments.tolerance)
 
-    def plan(self, movements: tuple[Movement, ...], raw: Mapping[str, Any]) -> Plan:
+    def plan(self, movements: tuple[Movement, ...], raw: _armrs._Forecast) -> Plan:
         """Return what the core found."""
-        fitted = [e for e, fit in zip(self.effects, self.settings["fitted"], strict=True) if fit]
-        predictions = []
-        for p in raw["predicted"]:
-            effect = None if p["effect"] is None else fitted[p["effect"]]
-            predictions.append(
-                Prediction(
-                    name=p["name"],
-                    kind="combination" if effect is None else effect.kind,
-                    joint=None if effect is None else effect.joint,
-                    **{key: p[key] for key in ("value", "std", "std_of_data", "relative", "unit")},
-                )
-            )
         return Plan(
             movements=movements,
             repeats=self.repeats,
-            predictions=tuple(predictions),
+            predictions=tuple(Prediction(**p) for p in raw["predictions"]),
+            worst=raw["worst"],
+            force=raw["force"],
+            speed=raw["speed"],
+            robot_speed=raw["robot_speed"],
+            robot_acceleration=raw["robot_acceleration"],
+            duration=raw["duration"],
             model=self.model,
-            **{key: raw[key] for key in ("worst", "force", "speed", "robot_speed", "robot_acceleration", "duration")},
         )
-
-
-def _task(movement: Movement, model: Model, repeats: int) -> dict[str, Any]:
-    if movement.waypoints.shape[1] != model.n_joints:
-        raise BadInput("waypoints", f"rows of {movement.waypoints.shape[1]} angles", f"rows of {model.n_joints}")
-    shared = ("speed", "acceleration", "shape", "pause")
-    return {"waypoints": np.array(movement.waypoints), "repeats": repeats} | {name: getattr(movement, name) for name in shared}

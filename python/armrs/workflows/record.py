@@ -21,7 +21,7 @@ from ..model import AddedMass, Effect, Model
 from ..tabular import Tabular, Tidy
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .movement import Movement
-from .simulate import DEFAULT_DT, Channel, Sensors, Simulated, driven, simulate
+from .simulate import DEFAULT_DT, Channel, CoreRun, Sensors, Simulated, driven, simulate
 
 if TYPE_CHECKING:
     from .._armrs import _Controlled
@@ -234,8 +234,9 @@ class _Session:
     def _lead(self, model: Model, movement: Movement, fault: Fault | None, seed: int) -> _Controlled:
         """Let the robot's controller follow the movement; it is programmed with the true lengths."""
         c, s = self.experiment.controller, self.experiment.safety
-        settings = {"engine": "native", "integrator": "rk4", "dt": DEFAULT_DT, "duration": None, "output_interval": 1.0 / RECORDING_RATE}
-        watch = {
+        start = [float(v) for v in movement.waypoints[0]]
+        run = CoreRun("rk4", DEFAULT_DT, 1.0 / RECORDING_RATE, q=start)
+        watch: _armrs._Watch = {
             "bandwidth": c.bandwidth_rad_s,
             "damping": c.damping,
             "torque_limit": c.torque_limit_Nm,
@@ -246,8 +247,7 @@ class _Session:
             "fault": None if fault is None else _injected(fault),
             "seed": seed,
         }
-        start = {"q": [float(v) for v in movement.waypoints[0]], "qd": None}
-        return _armrs.control(_armrs.Rig(model), driven(movement, "compliant"), settings | start, watch)
+        return _armrs.control(_armrs.Rig(model), driven(movement, "compliant"), run, watch)
 
     def _read(self, run: Run, repeat: int, true: Simulated, state: tuple[np.random.Generator, dict[str, Any]]) -> _Seen:
         """Let every device read the run."""

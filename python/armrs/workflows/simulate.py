@@ -69,9 +69,6 @@ class Channel:
         if self.bits is not None:
             checks.whole("bits", self.bits, least=1, most=32)
 
-    def _entry(self) -> tuple[float, float, float, int | None]:
-        return self.deviation, self.correlation_time, self.range, self.bits
-
 
 @dataclass(frozen=True)
 class Sensors:
@@ -367,7 +364,7 @@ def simulate(
             coupling=coupling,
             start=(start, start_speed),
         )
-        sensing = _sensing(sensors, seeds, rate)
+        sensing = _seeded(sensors, seeds, rate)
         with asked.about_drive():
             return asked.recorded(_armrs.simulate(_armrs.Rig(asked.model), asked.led, asked.core, sensing))
 
@@ -413,8 +410,8 @@ class _Asked:
 
     model: Model
     drive: Movement | Trial | None
-    led: dict[str, Any]
-    core: dict[str, Any]
+    led: CoreDrive
+    core: CoreRun
     settings: dict[str, Any]
 
     @contextlib.contextmanager
@@ -423,7 +420,7 @@ class _Asked:
         try:
             yield
         except BadInput as error:
-            raise about(self.drive, error, f"; a step is {self.core['dt']:g} s") from None
+            raise about(self.drive, error, f"; a step is {self.core.dt:g} s") from None
 
     def recorded(self, raw: _Recorded) -> Simulated:
         """Return what the core has recorded."""
@@ -469,25 +466,25 @@ def _asked(
     if duration is not None:
         _check_duration(duration, dt, rate)
     led = driven(drive, coupling)
-    if duration is not None and led["times"] is not None and duration > led["times"][-1] + 1e-6 * dt:
-        raise BadInput("duration", duration, f"at most {led['times'][-1]:.10g} s, the length of the trial")
-    if duration is None and led["times"] is not None and rate * led["times"][-1] < 1.0:
-        raise BadInput("rate", rate, f"at least one sample interval in the {led['times'][-1]:.10g} s of the trial")
+    if duration is not None and led.times is not None and duration > led.times[-1] + 1e-6 * dt:
+        raise BadInput("duration", duration, f"at most {led.times[-1]:.10g} s, the length of the trial")
+    if duration is None and led.times is not None and rate * led.times[-1] < 1.0:
+        raise BadInput("rate", rate, f"at least one sample interval in the {led.times[-1]:.10g} s of the trial")
     angles, speeds = start
     if isinstance(drive, Trial) and angles is None:
         first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
         angles = drive.q[first]
-        if led["kind"] != "robot" and speeds is None and drive.dq is not None:
+        if led.kind != "robot" and speeds is None and drive.dq is not None:
             speeds = drive.dq[first]
-    core = {
-        "engine": engine,
-        "integrator": integrator,
-        "dt": dt,
-        "duration": duration,
-        "output_interval": 1.0 / rate,
-        "q": None if angles is None else checks.numbers("start", angles, "rad").reshape(-1).tolist(),
-        "qd": None if speeds is None else checks.numbers("start_speed", speeds, "rad/s").reshape(-1).tolist(),
-    }
+    core = CoreRun(
+        engine=engine,
+        integrator=integrator,
+        dt=dt,
+        duration=duration,
+        output_interval=1.0 / rate,
+        q=None if angles is None else checks.numbers("start", angles, "rad").reshape(-1).tolist(),
+        qd=None if speeds is None else checks.numbers("start_speed", speeds, "rad/s").reshape(-1).tolist(),
+    )
     settings = {
         "engine": engine,
         "integrator": None if engine == "rapier" else integrator,
@@ -532,22 +529,39 @@ def _check_duration(duration: float, dt: float, rate: float) -> None:
         raise BadInput("duration", duration, f"a whole number of steps of {dt:g} s", hint=f"nearest: {round(steps) * dt:.10g} s")
 
 
-def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class CoreDrive:
+    """How an arm is driven: "movement", "robot", "torque" or "free"; values are its waypoints, or samples at the times."""
+
+    kind: str
+    rigid: bool
+    values: np.ndarray | None = None
+    times: np.ndarray | None = None
+    shape: str = "trapezoid"
+    speed: float = 0.0
+    acceleration: float = 0.0
+    pause: float = 0.0
+
+
+@dataclass(frozen=True)
+class CoreRun:
+    """How a run is computed: where it starts, its length [s] where the drive does not say it, and time from sample to sample [s]."""
+
+    integrator: str
+    dt: float
+    output_interval: float
+    engine: str = "native"
+    duration: float | None = None
+    q: list[float] | None = None
+    qd: list[float] | None = None
+
+
+def driven(drive: Movement | Trial | None, coupling: str) -> CoreDrive:
     """Return a drive as the core takes it."""
-    led: dict[str, Any] = {
-        "kind": "free",
-        "values": None,
-        "times": None,
-        "shape": "trapezoid",
-        "speed": 0.0,
-        "acceleration": 0.0,
-        "pause": 0.0,
-        "rigid": coupling == "rigid",
-    }
+    rigid = coupling == "rigid"
     if isinstance(drive, Movement):
-        shared = ("shape", "speed", "acceleration", "pause")
-        led |= {"kind": "movement", "values": np.array(drive.waypoints)} | {name: getattr(drive, name) for name in shared}
-    elif drive is not None:
+        return CoreDrive("movement", rigid, drive.waypoints, None, drive.shape, drive.speed, drive.acceleration, drive.pause)
+    if drive is not None:
         kind, values = ("robot", drive.robot_q) if drive.robot_q is not None else ("torque", drive.tau)
         if values is None:
             raise BadInput("columns", "neither robot angles nor joint torques", "qr1_rad and qr2_rad, or tau1_Nm …", file=drive.file)
@@ -557,12 +571,12 @@ def driven(drive: Movement | Trial | None, coupling: str) -> dict[str, Any]:
             lost = float(drive.t[int(np.argmin(there))])
             what = "robot angles" if kind == "robot" else "joint torques"
             raise BadInput(what, Text(f"none at {lost:g} s"), "samples without a gap: they drive the arm", file=drive.file)
-        led |= {"kind": kind, "values": np.array(values[:upto]), "times": np.array(drive.t[:upto] - drive.t[0])}
-    return led
+        return CoreDrive(kind, rigid, np.array(values[:upto]), np.array(drive.t[:upto] - drive.t[0]))
+    return CoreDrive("free", rigid)
 
 
-def _sensing(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> dict[str, Any] | None:
-    """Return what sensors do as the core takes it; what would silently have no effect is refused."""
+def _seeded(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> tuple[Sensors, list[int]] | None:
+    """Return sensors with their seeds; what would silently have no effect is refused."""
     checks.instance("seeds", seeds, list, tuple, range, np.ndarray)
     read = [checks.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
     if sensors is None:
@@ -574,4 +588,4 @@ def _sensing(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> dict
     if sensors.rate > rate * (1.0 + 1e-9):
         found = Text(f"{rate:g} Hz")
         raise BadInput("rate", found, f"at least the {sensors.rate:g} Hz of the sensors, which read what is recorded")
-    return {"rate": sensors.rate, "seeds": read} | {kind: getattr(sensors, kind)._entry() for kind in _CHANNELS}
+    return sensors, read

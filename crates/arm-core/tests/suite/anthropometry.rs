@@ -1,7 +1,7 @@
 //! Literature values against the thesis' tables and the worked numbers of the errata.
 
 use arm_core::anthropometry::{AUTHORS, Author, Axis, Grip, PARTS, Part, Sex, Subject};
-use arm_core::{Body, Invalid};
+use arm_core::{Body, Invalid, models};
 
 fn man(body_mass: f64, height: f64) -> Subject {
     Subject::new(body_mass, height, Sex::Male).expect("a possible man")
@@ -79,6 +79,12 @@ fn moments_of_inertia_of_appendix_d() {
             1e-4
         ));
     }
+    // The sample arm has those about the axes of the joints; that of its hand has the handle besides.
+    let [upper_arm, forearm, hand] = models::human_arm().segments().map(|s| s.inertia);
+    let across = |part, length| by_radius(part, length, Axis::Transverse);
+    assert!(printed(across(Part::UpperArm, 0.322), upper_arm, 1e-4));
+    assert!(printed(across(Part::Forearm, 0.264), forearm, 1e-4));
+    assert!((0.0010..0.0010 + 0.0024).contains(&hand));
     assert!(printed(
         by_radius(Part::Hand, 0.09, Axis::Sagittal),
         0.0015,

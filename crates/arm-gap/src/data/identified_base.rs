@@ -4,6 +4,8 @@
 //! a rest angle, viscosity and dry friction ([`arm_core::effect::Probe::passive`]), is linear in the equation of motion, and is
 //! identified together with the segments: along the measured motion or, where a joint's speed is noise, along the simulated one.
 
+use std::cell::LazyCell;
+
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
 use arm_ident::inference::estimate::{Estimate, Identified};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
@@ -13,7 +15,7 @@ use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
-use crate::data::joint_in_motion::{WithStd, laws_in_motion};
+use crate::data::joint_in_motion::{WithStd, in_motion, laws_in_motion};
 use crate::data::passive_law::{Free, LIKELY, Passive};
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::prediction::Course;
@@ -123,6 +125,8 @@ impl<const N: usize> Session<N> {
         (found, model): (&Identified<N>, &Model<N>),
     ) -> Vec<WithStd> {
         let shows = |(law, std): &WithStd| law.parameters[0] > LIKELY * std;
+        // Differentiated once, and only where a joint asks for it.
+        let moving = LazyCell::new(|| in_motion(&self.trials, found.cutoff).unwrap_or_default());
         for own in laws.chunk_by_mut(|(a, _), (b, _)| a.index == b.index) {
             let mut dry = own.iter().filter(|(l, _)| l.kind.smoothed_by().is_some());
             let mut springs = own.iter().filter(|(law, _)| spring(law).is_some());
@@ -135,9 +139,7 @@ impl<const N: usize> Session<N> {
             let (joint, chain) = (own[0].0.index, &found.chain);
             let asked = model.fitted.iter().filter(|law| law.index == joint);
             let asked: Vec<_> = asked.copied().collect();
-            let alone =
-                laws_in_motion(chain, &self.trials, (joint, &asked, friction), found.cutoff);
-            if let Ok(Some(alone)) = alone {
+            if let Some(alone) = laws_in_motion(chain, &moving, (joint, &asked, friction)) {
                 own.copy_from_slice(&alone);
             }
         }

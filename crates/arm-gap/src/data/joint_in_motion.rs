@@ -5,6 +5,7 @@
 
 use arm_core::effect::{Effect, Local, MAX_STATES};
 use arm_core::{Chain, Joints, Pose, inverse_dynamics, static_torque};
+use arm_ident::regression::kinematics::Kinematics;
 use arm_ident::regression::measured_motion::measured;
 use arm_ident::regression::trial::{Role, Trial};
 use arm_ident::regression::unknown::spring;
@@ -34,33 +35,56 @@ struct Moving {
 /// * `laws` - what the joint may have, springs at rest in the middle of the measured angles
 /// * `friction` - what resting samples say of its dry friction, with its standard deviation: it stands where the joint moves one way alone,
 ///   since nothing tells it from a rest angle then
-/// * `cutoff` - of the motion \[Hz\]
-///
-/// # Errors
-/// [`GapError`] for a trial too short for the filter.
 pub(super) fn laws_in_motion<const N: usize>(
     chain: &Chain<f64, N>,
-    trials: &[Trial<N>],
+    trials: &[InMotion<'_, N>],
     (joint, laws, friction): (usize, &[Effect<f64>], WithStd),
-    cutoff: f64,
-) -> Result<Option<Vec<WithStd>>, GapError> {
-    let fit: Vec<_> = trials.iter().filter(|t| t.role == Role::Fit).collect();
-    let seen = moving(chain, &fit, joint, cutoff)?;
+) -> Option<Vec<WithStd>> {
+    let seen = moving(chain, trials, joint);
     let dry = laws.iter().position(|law| law.kind == friction.0.kind);
     let Some(dry) = dry else {
-        return Ok(seen.best(laws));
+        return seen.best(laws);
     };
     if let Some(found) = seen.best(laws)
         && found[dry].0.parameters[0] > LIKELY * found[dry].1
     {
-        return Ok(Some(found));
+        return Some(found);
     }
     let mut others = laws.to_vec();
     others.remove(dry);
-    Ok(seen.without(&friction.0).best(&others).map(|mut found| {
-        found.insert(dry, friction);
-        found
-    }))
+    let mut found = seen.without(&friction.0).best(&others)?;
+    found.insert(dry, friction);
+    Some(found)
+}
+
+/// A trial with the motion that was measured in it.
+pub(super) struct InMotion<'a, const N: usize> {
+    trial: &'a Trial<N>,
+    motion: Kinematics<N>,
+    /// Samples that say the same as one, because filters have passed over them.
+    alike: f64,
+}
+
+/// The fit trials with their motion.
+///
+/// * `cutoff` - of the motion \[Hz\]
+///
+/// # Errors
+/// [`GapError`] for a trial too short for the filter.
+pub(super) fn in_motion<const N: usize>(
+    trials: &[Trial<N>],
+    cutoff: f64,
+) -> Result<Vec<InMotion<'_, N>>, GapError> {
+    let fit = trials.iter().filter(|t| t.role == Role::Fit);
+    let one = |trial| {
+        let (motion, alike) = (measured(trial, cutoff)?, 0.5 * trial.rate / cutoff);
+        Ok(InMotion {
+            trial,
+            motion,
+            alike,
+        })
+    };
+    fit.map(one).collect()
 }
 
 /// A law with the standard deviation of its size.
@@ -68,19 +92,18 @@ pub(super) type WithStd = (Effect<f64>, f64);
 
 fn moving<const N: usize>(
     chain: &Chain<f64, N>,
-    trials: &[&Trial<N>],
+    trials: &[InMotion<'_, N>],
     joint: usize,
-    cutoff: f64,
-) -> Result<Moving, GapError> {
+) -> Moving {
     let mut seen = Moving {
         q: Vec::new(),
         qd: Vec::new(),
         torque: Vec::new(),
         alike: 1.0,
     };
-    for trial in trials {
-        let motion = measured(trial, cutoff)?;
-        seen.alike = f64::max(seen.alike, 0.5 * trial.rate / cutoff);
+    for of in trials {
+        let (trial, motion) = (of.trial, &of.motion);
+        seen.alike = f64::max(seen.alike, of.alike);
         for i in 0..trial.len() {
             let (q, qd, qdd) = (&motion.q[i], &motion.qd[i], &motion.qdd[i]);
             if !trial.valid[i] || qd[joint].abs() <= MOVES {
@@ -97,7 +120,7 @@ fn moving<const N: usize>(
             seen.torque.push(torque[joint]);
         }
     }
-    Ok(seen)
+    seen
 }
 
 /// Laws that were fitted, each with the standard deviation of its size, and what they leave.

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Asked, Named, Value, at_most, placed};
 use crate::measurement_model::hypothesis::Target;
 use crate::selection::conclusion::Finding;
-use crate::selection::model_selection::{self, Alternative as Fitted};
+use crate::selection::model_selection::{self, Alternative as Fitted, TIE};
 use crate::trial_specific::component::TrialSpecific;
 
 /// A movement that would tell two explanations apart.
@@ -53,19 +53,25 @@ pub struct Alternative {
     pub free: Vec<usize>,
 }
 
-/// An alternative explains the data as well below so many units of twice the log-likelihood, and nearly as well above.
+/// An alternative explains the data as well below so many units of twice the log-likelihood, and nearly as well up to [`TIE`].
 const AS_WELL: f64 = 2.0;
+
+/// How well an alternative explains the data that does so much worse, in words. Beyond [`TIE`] it is one only where nothing repeats a
+/// movement, and no law can be told from another that is not exact.
+fn how_well(worse: f64) -> &'static str {
+    match worse {
+        ..AS_WELL => "explains these movements as well",
+        ..=TIE => "explains these movements nearly as well",
+        _ => "explains these movements as far as a law that is not exact can",
+    }
+}
 
 impl Alternative {
     fn of(fitted: &Fitted) -> Self {
-        let why = match fitted.worse < AS_WELL {
-            true => "explains these movements as well",
-            false => "explains these movements nearly as well",
-        };
         let (worse, likeness) = (fitted.worse, fitted.likeness);
         Self {
             free: fitted.candidate.free.clone(),
-            ..Self::new(&fitted.effect, why, worse, likeness)
+            ..Self::new(&fitted.effect, how_well(worse), worse, likeness)
         }
     }
 
@@ -271,6 +277,18 @@ pub struct Place {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_does_much_worse_does_not_explain_nearly_as_well() {
+        let nearly = |worse| how_well(worse).ends_with("nearly as well");
+        assert_eq!(
+            [1.9, 2.0, 10.0, 10.1, 170.0].map(nearly),
+            [false, true, true, false, false]
+        );
+        assert!(
+            how_well(1.9).ends_with("movements as well") && how_well(170.0).contains("not exact")
+        );
+    }
 
     #[test]
     fn what_adds_to_a_channel_changes_its_sign_with_the_body_that_the_force_is_on() {

@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Contact, Joints, Setup};
 use arm_gap::data::session::{ComparisonMode, Session};
-use arm_ident::regression::trial::{Role, Tolerance, Trial};
+use arm_ident::regression::trial::{Tolerance, Trial};
 use arm_sim::{Drive, Experiment, Start, simulate};
 
 use crate::sessions::arm;
@@ -32,17 +32,8 @@ fn swinging(seconds: f64) -> Session<2> {
         .map(Joints::from_column_slice)
         .collect();
     let trial = Trial {
-        role: Role::Fit,
-        configuration: 0,
-        rate: RATE,
-        speed: None,
-        force_on_arm: None,
-        moment_on_arm: None,
         torque: Some(vec![Joints::zeros(); q.len()]),
-        handle: None,
-        base: None,
-        valid: vec![true; q.len()],
-        q,
+        ..Trial::new(RATE, q)
     };
     Session {
         chain,

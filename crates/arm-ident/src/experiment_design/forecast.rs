@@ -15,7 +15,7 @@ use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
 use crate::regression::preprocessing::{Pieces, filtered};
 use crate::regression::sensitivity::{Course, parts};
-use crate::regression::trial::{Model, Role, Tolerance, Trial};
+use crate::regression::trial::{Model, Tolerance, Trial};
 use crate::regression::unknown::{Source, Unknown, unknowns};
 use arm_numerics::NumericsError;
 use arm_numerics::statistics::sandwich_covariance::{SandwichCovariance, standard_error};
@@ -292,19 +292,9 @@ impl<const N: usize> Seen<N> {
         experiment.output_interval = Some(finer);
         let recording = simulate(&experiment)?;
         let course = Course::new(&recording, question.accuracy.rate, parts);
-        let q = course.at_samples().q;
         let trial = Trial {
-            role: Role::Fit,
-            configuration: 0,
-            rate: question.accuracy.rate,
             force_on_arm: Some(course.force_at_samples()),
-            moment_on_arm: None,
-            torque: None,
-            handle: None,
-            base: None,
-            speed: None,
-            valid: vec![true; q.len()],
-            q,
+            ..Trial::new(question.accuracy.rate, course.at_samples().q)
         };
         Ok(Self {
             trial,

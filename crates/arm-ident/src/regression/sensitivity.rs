@@ -13,7 +13,7 @@ use nalgebra::SMatrix;
 use crate::regression::equation::Building;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
-use crate::regression::trial::{Model, Role, Trial};
+use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Source, Unknown};
 
 /// Joints that a handle holds; what is left of their freedom is the give of the contact, which is none to speak of.
@@ -74,17 +74,8 @@ impl<const N: usize> Course<N> {
             base: None,
         };
         let fine = Trial {
-            role: Role::Fit,
-            configuration: 0,
-            rate: rate * parts as f64,
-            q: motion.q.clone(),
-            speed: None,
             force_on_arm: Some(force.map(|f| [f[0], f[1]]).collect()),
-            moment_on_arm: None,
-            torque: None,
-            handle: None,
-            base: None,
-            valid: vec![true; motion.q.len()],
+            ..Trial::new(rate * parts as f64, motion.q.clone())
         };
         Self {
             fine,

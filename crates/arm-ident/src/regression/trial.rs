@@ -41,6 +41,23 @@ pub struct Trial<const N: usize> {
 }
 
 impl<const N: usize> Trial<N> {
+    /// A trial to fit of which only the angles \[rad\] are measured, at a rate \[Hz\] and without a gap.
+    pub fn new(rate: f64, q: Vec<Joints<f64, N>>) -> Self {
+        Self {
+            role: Role::Fit,
+            configuration: 0,
+            rate,
+            speed: None,
+            force_on_arm: None,
+            moment_on_arm: None,
+            torque: None,
+            handle: None,
+            base: None,
+            valid: vec![true; q.len()],
+            q,
+        }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.q.len()

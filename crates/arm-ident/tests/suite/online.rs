@@ -10,7 +10,7 @@ use arm_core::{
 };
 use arm_ident::inference::estimate::Identified;
 use arm_ident::inference::joint_method::{Options, identify};
-use arm_ident::regression::trial::{Model, Role, Trial};
+use arm_ident::regression::trial::{Model, Trial};
 
 use super::noise::Noise;
 
@@ -151,17 +151,12 @@ fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
         })
         .collect();
     let trial = Trial {
-        role: Role::Fit,
-        configuration: 0,
-        rate: 1000.0,
-        q: pairs(&read.q).into_iter().map(Joints::from).collect(),
         force_on_arm: Some(force),
-        moment_on_arm: None,
-        torque: None,
-        valid: vec![true; handle.len()],
         handle: Some(handle),
-        base: None,
-        speed: None,
+        ..Trial::new(
+            1000.0,
+            pairs(&read.q).into_iter().map(Joints::from).collect(),
+        )
     };
     let heavy = truth.segments().map(|s| Segment {
         mass: 1.1 * s.mass,
@@ -389,17 +384,8 @@ fn dfki() -> Option<(Model<2>, Trial<2>)> {
             .collect::<Vec<_>>()
     };
     let trial = Trial {
-        role: Role::Fit,
-        configuration: 0,
-        rate,
-        q: pair(1),
-        force_on_arm: None,
-        moment_on_arm: None,
         torque: Some(pair(5)),
-        handle: None,
-        base: None,
-        speed: None,
-        valid: vec![true; even.len()],
+        ..Trial::new(rate, pair(1))
     };
     let segment = |length, mass, com, inertia| Segment {
         length,

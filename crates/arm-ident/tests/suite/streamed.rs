@@ -9,7 +9,7 @@ use arm_ident::inference::joint_method::identify;
 use arm_ident::regression::measured_motion::low_pass;
 use arm_ident::regression::preprocessing::filtered;
 use arm_ident::regression::rows::Rows;
-use arm_ident::regression::trial::{Role, Trial};
+use arm_ident::regression::trial::Trial;
 use arm_numerics::NumericsError;
 
 const RATE: f64 = 100.0;
@@ -26,17 +26,8 @@ fn raw(samples: usize) -> (Rows, Trial<2>) {
         fits: None,
     };
     let trial = Trial {
-        role: Role::Fit,
-        configuration: 0,
-        rate: RATE,
-        q: vec![Joints::zeros(); samples],
-        speed: None,
-        force_on_arm: None,
-        moment_on_arm: None,
-        torque: None,
-        handle: None,
-        base: None,
         valid: (0..samples).map(|i| i % 7000 != 3500).collect(),
+        ..Trial::new(RATE, vec![Joints::zeros(); samples])
     };
     (rows, trial)
 }

@@ -4,7 +4,7 @@ use arm_core::effect::{Effect, Kind, MAX_STATES, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Joints, Plane, Pose, Segment, inverse_dynamics, jacobian, static_torque,
 };
-use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
+use arm_ident::regression::trial::{Model, Tolerance, Trial};
 
 /// Angles, speeds and accelerations at a time.
 pub type State<const N: usize> = [Joints<f64, N>; 3];
@@ -108,17 +108,8 @@ impl<const N: usize> Recipe<N> {
 
     pub fn empty(&self) -> Trial<N> {
         Trial {
-            role: Role::Fit,
-            configuration: 0,
-            rate: self.rate,
-            q: Vec::new(),
-            speed: None,
-            force_on_arm: None,
-            moment_on_arm: None,
-            torque: None,
-            handle: None,
-            base: None,
             valid: vec![true; self.samples()],
+            ..Trial::new(self.rate, Vec::new())
         }
     }
 }

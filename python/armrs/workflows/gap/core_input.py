@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 from ... import _armrs, checks
 from ...io.dataset import Dataset, refuse_other_arms
-from ...io.trial import refuse_moving_base
-from ..identify import core_columns
+from ...io.trial import Trial, refuse_moving_base
+from ...model import Model, Tolerance
+from ..identify import bridged
 
 
 def is_led(dataset: Dataset) -> bool:
@@ -23,21 +24,35 @@ def channel_names(dataset: Dataset, led: bool) -> list[str]:
     return _armrs.channel_names(dataset.model.n_joints, led)
 
 
-def core_trials(dataset: Dataset) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class SearchSettings:
+    """What is known beforehand.
+
+    The model, and the body on which forces are stated, are those of the files; `own` are kinds of one's own that are asked besides.
+    """
+
+    model: Model
+    force_on_robot: bool
+    tolerance: Tolerance
+    led: bool
+    own: list[str]
+    threads: int
+
+
+def core_trials(dataset: Dataset) -> list[Trial]:
     """Return the trials for the core."""
     refuse_other_arms(dataset)
     refuse_moving_base(dataset.trials)
-    configurations = sorted({t.configuration for t in dataset.trials})
-    return [core_columns(t) | {"configuration": configurations.index(t.configuration)} for t in dataset.trials]
+    return [bridged(t) for t in dataset.trials]
 
 
-def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> dict[str, Any]:
-    """Return what is known beforehand, for the core."""
-    return {
-        "model": dataset.model,
-        "force_on_robot": dataset.force_on == "robot",
-        "tolerance": dataset.tolerance,
-        "led": led,
-        "own": list(own),
-        "threads": (os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),
-    }
+def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> SearchSettings:
+    """Return what is known beforehand; as many threads as processors when none are given."""
+    return SearchSettings(
+        model=dataset.model,
+        force_on_robot=dataset.force_on == "robot",
+        tolerance=dataset.tolerance,
+        led=led,
+        own=list(own),
+        threads=(os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),
+    )

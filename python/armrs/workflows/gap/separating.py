@@ -12,7 +12,7 @@ from ..._armrs import Alternative, Missing, Separation
 from ...errors import ArmrsError, SimulationError
 from ...io.trial import Trial
 from ...model import Model
-from ..identify import core_columns
+from ..identify import bridged
 from ..movement import Movement
 from ..simulate import Sensors, simulate
 from .core_input import core_settings, core_trials, is_led
@@ -85,7 +85,7 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
             _armrs.Rig(model, [*others, own]),
             core_trials(result.dataset),
             core_settings(result.dataset, True, threads),
-            [core_columns(c.trial) | {"configuration": 0} for c in family],
+            [bridged(c.trial) for c in family],
             effect.alternatives,
         )
     except SimulationError:

@@ -179,7 +179,7 @@ def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.nd
     else:
         asked = [[t.file for t in data.trials].index(effect.trial)]
     others = [e for e in result.model.all_effects if e != own]
-    columns = [core_trials(data)[k] | {"role": "fit"} for k in asked]
+    columns = [replace(core_trials(data)[k], role="fit") for k in asked]
     settings = core_settings(data, led, 1)
     with_it, without = (
         [play.shown["given"] for play in _armrs.play(_armrs.Rig(result.model, listed), columns, settings)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -198,7 +198,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> Mapping[str, Cha
     led = is_led(data)
     tests = data.test_trials or data.trials
     data = data.replace(trials=tuple(tests))
-    columns, settings = [t | {"role": "fit"} for t in core_trials(data)], core_settings(data, led, 1)
+    columns, settings = [replace(t, role="fit") for t in core_trials(data)], core_settings(data, led, 1)
     model, found = result.dataset.model, result.result
     return _armrs.confirmed(
         _armrs.play(_armrs.Rig(data.model), columns, settings),

@@ -104,7 +104,7 @@ def _how(alternative: Mapping[str, Any]) -> str:
     worse = alternative.get("worse")
     if worse is None:
         return str(alternative["why"])
-    return alternative["why"] + (f", by {worse:.2g} units less" if worse >= 0.1 else ", by no less")
+    return alternative["why"] + (f", by {worse:{'.0f' if worse >= 10.0 else '.2g'}} units less" if worse >= 0.1 else ", by no less")
 
 
 def apart(result: Mapping[str, Any]) -> list[str]:
