@@ -1,9 +1,4 @@
-//! The arm as a functional mock-up unit: the C interfaces of FMI 2.0 and 3.0 for co-simulation and Model Exchange.
-//!
-//! Everything that computes, and every rule of the standards, is in [`arm_cosim`]; here are pointers, strings and logs. This
-//! is the only crate of an FMU with `unsafe`. No call unwinds into the importer: a panic ends as `Fatal`, and the instance
-//! refuses everything but to be freed; others are not touched.
-
+#![doc = include_str!("../README.md")]
 #![allow(non_snake_case, reason = "names of the standards")]
 #![allow(
     clippy::missing_safety_doc,
