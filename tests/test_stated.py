@@ -116,7 +116,7 @@ def test_nalgebra_is_said_to_do_what_it_does() -> None:
     ]
     sources = "\n".join(path.read_text(encoding="utf-8") for crate in users for path in crate.glob("src/**/*.rs"))
     done = {word for method, word in methods.items() if re.search(rf"\.{method}\(", sources)}
-    assert "Cholesky" in done
+    assert done
     for file, place in (("docs/determinism.md", r"^- \*\*nalgebra\*\*.*?(?=^- )"), ("Cargo.toml", r"^#[^\n]*(?=\nnalgebra)")):
         said = re.search(place, (ROOT / file).read_text(encoding="utf-8"), flags=re.M | re.S)
         assert said is not None and {word for word in methods.values() if word in said[0]} == done, file

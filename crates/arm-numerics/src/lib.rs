@@ -10,4 +10,4 @@ pub use error::NumericsError;
 pub use least_squares::condense::Condenser;
 pub use least_squares::factor::Factor;
 pub use linalg::cholesky::Cholesky;
-pub use linalg::matrix::Matrix;
+pub use linalg::matrix::{Matrix, interleaved_dot};

@@ -4,6 +4,7 @@
 //! channels are correlated; both are read off repeats, where the model's errors cancel. Without repeats the residual of a
 //! fit takes their place: what the model lacks is in it too, so that less is seen, not more.
 
+pub use arm_numerics::interleaved_dot as dot;
 use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
 
 use crate::GapError;
@@ -294,23 +295,6 @@ fn inverse_factor(correlation: &[f64], n: usize) -> Vec<f64> {
         }
     }
     inverse
-}
-
-/// Sum of products in four interleaved partial sums: a fixed order that vector units can follow.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (heads, tails) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = heads
-        .remainder()
-        .iter()
-        .zip(tails.remainder())
-        .fold(0.0, |s, (x, y)| s + x * y);
-    for (x, y) in heads.zip(tails) {
-        for lane in 0..4 {
-            sums[lane] += x[lane] * y[lane];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 #[cfg(test)]

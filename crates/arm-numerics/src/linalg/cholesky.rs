@@ -1,6 +1,6 @@
 //! Cholesky factor of a small symmetric matrix, such as the normal equations of a fit.
 
-use crate::linalg::matrix::{Matrix, add_scaled, dot};
+use crate::linalg::matrix::{Matrix, add_scaled, interleaved_dot};
 
 /// Columns closer to a combination of the others than this (squared sine of the angle) are not told apart.
 const LEAST: f64 = 1e-9;
@@ -102,7 +102,7 @@ impl Cholesky {
     /// `x ← L⁻ᵀ x`.
     fn solve_transposed(&self, x: &mut [f64]) {
         for j in (0..x.len()).rev() {
-            let below = dot(&self.lower.column(j)[j + 1..], &x[j + 1..]);
+            let below = interleaved_dot(&self.lower.column(j)[j + 1..], &x[j + 1..]);
             x[j] = (x[j] - below) / self.lower[(j, j)];
         }
     }

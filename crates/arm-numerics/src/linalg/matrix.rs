@@ -236,6 +236,23 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y)
 }
 
+/// Sum of products in four interleaved partial sums: a fixed order that vector units can follow.
+pub fn interleaved_dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (heads, tails) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = heads
+        .remainder()
+        .iter()
+        .zip(tails.remainder())
+        .fold(0.0, |s, (x, y)| s + x * y);
+    for (x, y) in heads.zip(tails) {
+        for lane in 0..4 {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
 /// `y += f x`.
 pub fn add_scaled(y: &mut [f64], f: f64, x: &[f64]) {
     for (yi, xi) in y.iter_mut().zip(x) {
