@@ -174,3 +174,7 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     assert line.endswith(
         "it may be viscous in joint 2 (explains these movements as far as a law that is not exact can, by 170 units less)."
     )
+    for worse, said in ((-729.0, "(why, by 729 units more)."), (-3.0, "(why, by no less)."), (0.05, "(why, by no less).")):
+        other = effect("viscous", 2, why="why", worse=worse)
+        [line] = others(result("explained", {**DRY, "alternatives": [other]}))
+        assert line.endswith(said)

@@ -55,11 +55,15 @@ pub struct Alternative {
 
 /// An alternative explains the data as well below so many units of twice the log-likelihood, and nearly as well up to [`TIE`].
 const AS_WELL: f64 = 2.0;
+/// It explains them better from so many on.
+const BETTER: f64 = -TIE;
 
 /// How well an alternative explains the data that does so much worse, in words. Beyond [`TIE`] it is one only where nothing repeats a
-/// movement, and no law can be told from another that is not exact.
+/// movement, and no law can be told from another that is not exact. One that does as much better was not taken, because it is a law that
+/// few joints have in the place of one that every joint has.
 fn how_well(worse: f64) -> &'static str {
     match worse {
+        ..BETTER => "explains these movements better, but few joints have it",
         ..AS_WELL => "explains these movements as well",
         ..=TIE => "explains these movements nearly as well",
         _ => "explains these movements as far as a law that is not exact can",
@@ -280,6 +284,8 @@ mod tests {
 
     #[test]
     fn what_does_much_worse_does_not_explain_nearly_as_well() {
+        assert!(how_well(-729.0).starts_with("explains these movements better"));
+        assert_eq!(how_well(-9.0), how_well(0.0));
         let nearly = |worse| how_well(worse).ends_with("nearly as well");
         assert_eq!(
             [1.9, 2.0, 10.0, 10.1, 170.0].map(nearly),

@@ -100,11 +100,18 @@ def _separating(alternative: Mapping[str, Any]) -> str:
     return f"{alternative['separating_movement']}; with one such trial they would be {then} standard deviations apart (now {now})."
 
 
+_BETTER = 10.0
+"""Units of twice the log-likelihood from which an alternative explains more, and not just as much."""
+
+
 def _how(alternative: Mapping[str, Any]) -> str:
     worse = alternative.get("worse")
     if worse is None:
         return str(alternative["why"])
-    return alternative["why"] + (f", by {worse:{'.0f' if worse >= 10.0 else '.2g'}} units less" if worse >= 0.1 else ", by no less")
+    if abs(worse) < 0.1 or -_BETTER < worse < 0.0:
+        return alternative["why"] + ", by no less"
+    size = f"{abs(worse):{'.0f' if abs(worse) >= 10.0 else '.2g'}}"
+    return f"{alternative['why']}, by {size} units {'less' if worse > 0.0 else 'more'}"
 
 
 def apart(result: Mapping[str, Any]) -> list[str]:
