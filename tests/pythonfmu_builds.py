@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,10 @@ def built(folder: Path, source: str, name: str, *options: str, fmi: int = 2) -> 
     """Make the FMU of the class `name` in a folder."""
     module = "pythonfmu" if fmi == 2 else "pythonfmu3"
     pytest.importorskip(module)
-    (folder / "source.py").write_text(source, encoding="utf-8")
-    command = [sys.executable, "-m", module, "build", "-f", "source.py", *options]
+    # Python imports the source of every FMU that one process loads: each has a name of its own.
+    script = f"{name.lower()}_{zlib.crc32(source.encode()):08x}.py"
+    (folder / script).write_text(source, encoding="utf-8")
+    command = [sys.executable, "-m", module, "build", "-f", script, *options]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
     fmu = folder / f"{name}.fmu"
     assert fmu.exists(), done.stdout + done.stderr

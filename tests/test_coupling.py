@@ -25,6 +25,7 @@ from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
 from armrs.fmu.export import export_fmu
 from armrs.model import Segment, load_model
+from armrs.workflows.simulate import CoreDrive, CoreRun
 from markup import unescaped
 from pythonfmu_builds import built
 
@@ -64,10 +65,9 @@ class Rig:
         self.q = start.get(["q[1]", "q[2]"])
         self.handle = start.get(["robot.r[1]", "robot.r[2]"])
         self.t = np.arange(0.0, DURATION + 1e-9, 0.25e-3)
-        drive = {"kind": "handle", "times": self.t, "values": np.array([self._at(t) for t in self.t]), "shape": "trapezoid"}
-        drive |= {"speed": 0.0, "acceleration": 0.0, "pause": 0.0, "rigid": False}
-        settings = {"engine": "native", "integrator": "rk4", "dt": 0.25e-3, "duration": DURATION, "output_interval": 1e-3}
-        run = _armrs.simulate(_armrs.Rig(self.model), drive, settings | {"q": list(self.q), "qd": [0.0, 0.0]})
+        drive = CoreDrive("handle", False, np.array([self._at(t) for t in self.t]), self.t)
+        settings = CoreRun("rk4", 0.25e-3, 1e-3, duration=DURATION, q=list(self.q), qd=[0.0, 0.0])
+        run = _armrs.simulate(_armrs.Rig(self.model), drive, settings)
         self.reference: np.ndarray = run["q"]
 
     def _at(self, time: float) -> list[float]:

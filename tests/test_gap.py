@@ -365,7 +365,7 @@ def test_where_the_arm_cannot_be_followed_the_torques_of_its_measured_motion_are
     monkeypatch.setattr(_armrs, "find_gap", refused_once)
     hidden = armrs.Effect("coulomb", 2, parameters={"torque": 0.5})
     found = armrs.find_gap(session(hidden), threads=2, separate=False)
-    assert [given[2]["led"] for given in asked] == [True, False]
+    assert [given[2].led for given in asked] == [True, False]
     assert set(found.gap) >= {"tau1_Nm", "tau2_Nm"}
     assert "joint torques in measured motion are compared" in found.warnings[0]
     # Without the closed chain the load of a joint is not known well enough to tell Coulomb's law from one that grows with the load.
