@@ -107,6 +107,27 @@ def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> Non
     assert len(clinic.notes([result(warnings=list("abcdef"))])) == clinic.MOST_NOTES + 1
 
 
+def test_a_slip_and_a_tremor_are_unusual_and_a_spring_is_not() -> None:
+    """A page that was made of a gap with a handle that slipped said that nothing unusual was noticed."""
+    effects = [
+        {"kind": "elastic", "joint": 2, "family": "elastic", "summary": "linear spring about a rest angle"},
+        {"kind": "tremor", "joint": 2, "family": "muscle", "summary": "muscle tremor"},
+        {
+            "kind": "handle_slip",
+            "joint": None,
+            "family": "contact",
+            "summary": "handle that slips",
+            "trial": "trials/slow_1.csv",
+            "span": [2.575, 5.74],
+        },
+    ]
+    gap = {"verb": "gap", "verdict": "explained", "effects": effects, "data": {"joints": ["shoulder", "elbow"]}}
+    assert clinic.unusual([], [gap]) == [
+        "The analysis found: muscle tremor (elbow).",
+        "In the recording slow_1, 2.6 to 5.7 s: handle that slips. This part was left out.",
+    ]
+
+
 @pytest.mark.parametrize(("value", "said"), [(0.6, "within"), (0.5, "not clear"), (0.1, "below"), (3.0, "above")])
 def test_the_interval_is_compared_with_the_norm_not_the_value(value: float, said: str, norms: tuple[clinic.Norm, ...]) -> None:
     lines = clinic.lines_of(result(parameters=[estimate("elastic", "stiffness", 1, value, 0.05)]), norms)

@@ -423,6 +423,9 @@ def unusual(lines: Sequence[Line], results: Sequence[Mapping[str, Any]] = ()) ->
     said = []
     if any(result.get("verb") == "gap" and result.get("verdict") == "unexplained" for result in results):
         said.append("Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it.")
+    for result in results:
+        if result.get("verb") == "gap":
+            said += found(result)
     for line in lines:
         title = f"{line.joint}: {line.quantity.title.lower()}"
         if line.beside_norm in ("below", "above"):
@@ -430,6 +433,23 @@ def unusual(lines: Sequence[Line], results: Sequence[Mapping[str, Any]] = ()) ->
         if line.trend is not None and line.trend.startswith(("higher", "lower")):
             said.append(f"{title} is {line.trend} {line.quantity.unit} than in the session before.")
     return said
+
+
+def found(result: Mapping[str, Any]) -> list[str]:
+    """Return what the search for missing effects found besides the laws that every joint has, and what disturbed single recordings."""
+    said = []
+    for effect in result.get("effects", ()):
+        joint = effect.get("joint")
+        what = effect["summary"] + ("" if joint is None else f" ({result['data']['joints'][joint - 1]})")
+        if effect.get("trial") and effect.get("span"):
+            start, end = effect["span"]
+            said.append(f"In the recording {Path(effect['trial']).stem}, {start:.1f} to {end:.1f} s: {what}. This part was left out.")
+        elif effect["family"] not in _OF_EVERY_JOINT:
+            said.append(f"The analysis found: {what}.")
+    return said
+
+
+_OF_EVERY_JOINT = ("elastic", "rate", "dry")
 
 
 def notes(results: Sequence[Mapping[str, Any]]) -> list[str]:
