@@ -440,11 +440,11 @@ def found(result: Mapping[str, Any]) -> list[str]:
     said = []
     for effect in result.get("effects", ()):
         joint = effect.get("joint")
-        what = effect["summary"] + ("" if joint is None else f" ({result['data']['joints'][joint - 1]})")
+        what = effect.get("summary", effect["kind"]) + ("" if joint is None else f" ({result['data']['joints'][joint - 1]})")
         if effect.get("trial") and effect.get("span"):
             start, end = effect["span"]
             said.append(f"In the recording {Path(effect['trial']).stem}, {start:.1f} to {end:.1f} s: {what}. This part was left out.")
-        elif effect["family"] not in _OF_EVERY_JOINT:
+        elif effect.get("family", "elastic") not in _OF_EVERY_JOINT:
             said.append(f"The analysis found: {what}.")
     return said
 
