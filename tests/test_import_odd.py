@@ -11,7 +11,7 @@ import pytest
 
 import armrs
 from armrs.errors import BadInput
-from test_import import DEGREE, KNOWN, Recording, recording
+from test_import import DEGREE, KNOWN, SI, Recording, recording, repeated, table, write_text
 
 __all__ = ["recording"]
 GERMAN = ["Zeit [ms]", "Schulter [°]", "Ellbogen [°]", "Kraft y [N]", "Kraft z [N]"]
@@ -233,3 +233,14 @@ def test_two_recordings_in_one_file_are_refused(recording: Recording, tmp_path: 
     with pytest.raises(BadInput, match=r"found 0 after 2990 in sample 301, allowed time stamps that increase \(two recordings in one file"):
         armrs.import_recordings([path], tmp_path / "set", model=KNOWN)
     assert not (tmp_path / "set").exists()
+
+
+def test_files_that_all_state_a_wrong_unit_are_alike(recording: Recording, tmp_path: Path) -> None:
+    """The first was read by the size of its values, and the others were refused for the unit that its own header states."""
+    names, values = table(recording, names=["Zeit [s]", *SI[1:]], t=1e3, angle=DEGREE)
+    files = [write_text(tmp_path / f"slow_{k}.csv", names, repeated(values, k)) for k in (1, 2)]
+    imported = armrs.import_recordings(files, tmp_path / "set", model=KNOWN)
+    assert len(imported.recipe.trials) == 2
+    other = write_text(tmp_path / "slow_3.csv", [names[0], "q1_deg", *names[2:]], repeated(values, 3))
+    with pytest.raises(armrs.BadInput, match=r"slow_3\.csv"):
+        armrs.import_recordings([*files, other], tmp_path / "other", model=KNOWN)

@@ -255,8 +255,8 @@ def _decided(
         ]
     channels, axes = _plane(channels)
     _complete(channels, model.n_joints, named[0].table, problems)
-    _alike([n.table for n in named[1:]], [c for c in channels if not force_tables or c.symbol[0] not in "FM"], problems)
-    _alike(force_tables[1:], [c for c in channels if c.symbol[0] in "FM"], problems)
+    _alike([n.table for n in named], [c for c in channels if not force_tables or c.symbol[0] not in "FM"], problems)
+    _alike(force_tables, [c for c in channels if c.symbol[0] in "FM"], problems)
     if len(problems) > of_files:
         raise BadInputs.of(problems)
     reads = [_aligned(n, channels, model, given, problems) for n in named]
@@ -282,8 +282,9 @@ def _decided(
 
 
 def _alike(tables: Sequence[RawTable], channels: Sequence[Channel], problems: list[BadInput]) -> None:
-    """Refuse tables that lack a column of the first, or have it in another unit."""
-    for table in tables:
+    """Refuse tables that lack a column of the first, or have it in another unit: the one that it is in, or that its header states."""
+    stated_first = {c.name: stated.text for table in tables[:1] for c in table.columns if (stated := unit(c.unit)) is not None}
+    for table in tables[1:]:
         there = {c.name: c for c in table.columns}
         for channel in channels:
             if channel.symbol == "t of forces":
@@ -293,7 +294,7 @@ def _alike(tables: Sequence[RawTable], channels: Sequence[Channel], problems: li
                 problems.append(BadInput("columns", found, f"the columns of the first file: this one is {channel.symbol}", file=table.path))
                 continue
             stated = unit(there[channel.column].unit)
-            if stated is not None and stated.text != channel.unit:
+            if stated is not None and stated.text not in (channel.unit, stated_first.get(channel.column)):
                 place, allowed = f"column {channel.column!r}", f"{channel.unit}, as in the first file"
                 problems.append(BadInput(place, there[channel.column].unit, allowed, file=table.path, hint="import it by itself"))
             elif channel.symbol == "t" and (back := np.flatnonzero(np.diff(there[channel.column].values) <= 0.0)).size:
