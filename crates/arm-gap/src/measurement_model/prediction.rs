@@ -28,6 +28,9 @@ const BAND: f64 = 5.0;
 const HANDLE_BAND: f64 = 4.0;
 /// Steps that are tried, longest first \[s\]; the last one is taken even where dry friction would like it shorter.
 pub(crate) const STEPS: [f64; 4] = [2e-3, 1e-3, 5e-4, 2.5e-4];
+/// Least rate at which a run is recorded that sensors read \[Hz\]: what a delayed sensor reads lies between samples, where few of them
+/// would take a fifth of an arm's ringing on its contact.
+const RECORDED: f64 = 250.0;
 /// Samples at the start whose mean tells where the arm was at rest.
 const START: usize = 5;
 /// Time at the start over which forces are averaged \[s\].
@@ -198,7 +201,8 @@ impl<const N: usize> Session<N> {
         hypothesis: &Hypothesis<N>,
         course: &Course<N>,
     ) -> Result<Run<N>, SimulationError> {
-        self.run_finely(hypothesis, course, 1)
+        let parts = libm::ceil(RECORDED / course.rate - 1e-9).max(1.0);
+        self.run_finely(hypothesis, course, parts as usize)
     }
 
     /// The same, recorded `parts` times for each sample of the trial.

@@ -212,3 +212,31 @@ fn a_number_that_is_held_is_no_unknown_and_the_others_answer_as_before() {
         }
     }
 }
+
+#[test]
+fn a_delayed_force_keeps_the_ringing_of_the_arm_on_its_contact() {
+    let session = session(&[], (0.0, 0.0));
+    let mut hypothesis = session.given();
+    let delay = Effect::new(Kind::named("time_delay").expect("known"), 0);
+    hypothesis.calibration = vec![delay.with(&[0.004])];
+    // Without the damping of the contact the arm rings on from the first jerk.
+    hypothesis.contact[1] = [-0.9; 2];
+    let course = session.course(1).expect("a course");
+    let read = |parts: Option<usize>| {
+        let run = match parts {
+            None => session.run(&hypothesis, &course),
+            Some(parts) => session.run_finely(&hypothesis, &course, parts),
+        };
+        let run = run.expect("a run");
+        let read = session.read_raw(&hypothesis, &course, &run);
+        read.expect("channels")[2].clone()
+    };
+    let fine = read(Some(20));
+    let off = |column: &[f64]| {
+        let off = std::iter::zip(column, &fine).map(|(a, b)| a - b);
+        size(&[off.collect()])
+    };
+    // Recorded no finer than it is read, a run loses much more.
+    assert!(off(&read(None)) < 2e-3, "{}", off(&read(None)));
+    assert!(off(&read(Some(1))) > 10.0 * off(&read(None)));
+}
