@@ -45,7 +45,7 @@ def run(peers: dict[str, Peer]) -> list[dict[str, Any]]:
             worse = (own["rms"][2] - other["rms"][2]) / other["rms"][2]
             note(f"residual of the wrist above that of {solver}, relative", "armrs, Rust", max(float(worse), 0.0), OPTIMUM)
             off = np.abs(np.array(own["first_moments"]) - other["first_moments"]).max() / np.abs(own["first_moments"]).max()
-            note("identifiable sums, relative", f"SciPy {solver}", float(off), 1e-6)
+            note("base parameters, relative", f"SciPy {solver}", float(off), 1e-6)
     fits = {tool: peer.ask("fit") for tool, peer in peers.items()}
     fits = {tool: fit for tool, fit in fits.items() if fit is not None}
     best = min((fit["cost"] for fit in fits.values()), default=0.0)
