@@ -49,32 +49,34 @@ def returned() -> dict[str, type]:
     return found
 
 
-def check(result: Tabular, folder: Path) -> None:
-    """Assert that a result shows itself in one line and in a notebook, and is a data frame, JSON, a figure, a page, labelled arrays."""
+def faults(result: Tabular, folder: Path) -> list[str]:
+    """Return what a result does not do: one line, a notebook, a data frame, JSON, a figure, a page, labelled arrays."""
     import pandas as pd
 
-    one_line = repr(result)
-    assert len(one_line) < 500 and "\n" not in one_line and " at 0x" not in one_line
-    assert not re.search(r"\d[\d.]{9,}", one_line.replace(str(folder), "")), one_line
-    shown = result._repr_html_()
-    assert 100 < len(shown) < 20_000 and shown.count("<tr>") == 1 + min(30, result.tidy().n_rows)
-    frame = result.to_dataframe()
-    assert len(frame) == result.tidy().n_rows and set(frame.attrs["units"]) <= set(frame.columns)
-    pd.testing.assert_frame_equal(pd.DataFrame(result, columns=frame.columns), frame, check_dtype=False)
-    assert isinstance(json.loads(result.to_json(folder / "result.json")), dict)
-    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == json.loads(result.to_json())
-    axes = result.plot()
-    assert len(axes) > 0 and all(isinstance(ax, Axes) for ax in axes)
-    page = result.report(folder / "page.html").read_text(encoding="utf-8")
-    assert re.search(r"<h1>([\w-]+)", page)[1] in {kind.title.split()[0] for kind in pages.KINDS.values()}  # type: ignore[index]
-    if isinstance(result, Series):
-        check_series(result)
+    one_line, shown, frame, axes = repr(result), result._repr_html_(), result.to_dataframe(), result.plot()
+    written, page = result.to_json(folder / "result.json"), result.report(folder / "page.html").read_text(encoding="utf-8")
+    rows, title = result.tidy().n_rows, re.search(r"<h1>([\w-]+)", page)
+    holds = {
+        f"one short line: {one_line}": len(one_line) < 500 and "\n" not in one_line and " at 0x" not in one_line,
+        f"no long number: {one_line}": not re.search(r"\d[\d.]{9,}", one_line.replace(str(folder), "")),
+        "a table in a notebook": 100 < len(shown) < 20_000 and shown.count("<tr>") == 1 + min(30, rows),
+        "a data frame with units": len(frame) == rows and set(frame.attrs["units"]) <= set(frame.columns),
+        "the same data frame by pandas": pd.DataFrame(result, columns=frame.columns).astype(frame.dtypes).equals(frame),
+        "an object in JSON": isinstance(json.loads(written), dict),
+        "the same in a file": json.loads((folder / "result.json").read_text(encoding="utf-8")) == json.loads(written),
+        "axes": len(axes) > 0 and all(isinstance(ax, Axes) for ax in axes),
+        "a page with the title of its kind": title and title[1] in {kind.title.split()[0] for kind in pages.KINDS.values()},
+    }
+    return [what for what, done in holds.items() if not done] + (series_faults(result) if isinstance(result, Series) else [])
 
 
-def check_series(held: Series) -> None:
-    """Assert that labelled arrays have names for all dimensions, and that time and what is not named in its channel has a unit."""
+def series_faults(held: Series) -> list[str]:
+    """Return which labelled arrays lack a unit or hold no number, and time where it has none."""
     labelled = held.to_xarray()
-    assert labelled["time"].attrs["units"] == "s" and "time" in {*labelled.dims, *labelled.data_vars}
-    for name, values in labelled.data_vars.items():
-        assert "units" in values.attrs, name
-        assert values.dtype.kind != "f" or np.isfinite(values).any(), name
+    is_timed = labelled["time"].attrs["units"] == "s" and "time" in {*labelled.dims, *labelled.data_vars}
+    lacking = [
+        str(name)
+        for name, values in labelled.data_vars.items()
+        if "units" not in values.attrs or values.dtype.kind == "f" and not np.isfinite(values).any()
+    ]
+    return lacking if is_timed else ["time", *lacking]

@@ -14,7 +14,7 @@ from .. import checks
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from . import figures, html, pages, plotting
-from .words import is_synthetic, name
+from .words import disturbance, is_synthetic, name
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,9 @@ MOST_NOTES = 3
 """Notes that find room on one page."""
 ANALYSED = ("identify", "passive", "gap", "spasticity")
 """Results of which a summary is made."""
+_OF_EVERY_JOINT = ("elastic", "rate", "dry")
+"""Families of laws that every joint has: they stand in the table of the joint."""
+_MOVING = "a joint rubs and may stick, which the analysis follows only roughly"
 
 
 @dataclass(frozen=True)
@@ -441,15 +444,12 @@ def found(result: Mapping[str, Any]) -> list[str]:
     for effect in result.get("effects", ()):
         joint = effect.get("joint")
         what = effect.get("summary", effect["kind"]) + ("" if joint is None else f" ({result['data']['joints'][joint - 1]})")
-        if effect.get("trial") and effect.get("span"):
-            start, end = effect["span"]
-            said.append(f"In the recording {Path(effect['trial']).stem}, {start:.1f} to {end:.1f} s: {what}. This part was left out.")
+        if there := disturbance(effect):
+            trial, start, end = there
+            said.append(f"In the recording {Path(trial).stem}, {start:.1f} to {end:.1f} s: {what}. This part was left out.")
         elif effect.get("family", "elastic") not in _OF_EVERY_JOINT:
             said.append(f"The analysis found: {what}.")
     return said
-
-
-_OF_EVERY_JOINT = ("elastic", "rate", "dry")
 
 
 def notes(results: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -467,9 +467,6 @@ def _number(value: float, line: Line | None = None) -> str:
     finest = 3 if line is None or line.quantity.unit != "°" else 1
     decimals = 0 if size <= 0.0 else min(max(1 - math.floor(math.log10(size)), 0), finest)
     return f"{value:.{decimals}f}".replace("-", "−")
-
-
-_MOVING = "a joint rubs and may stick, which the analysis follows only roughly"
 
 
 def doubts(results: Sequence[Mapping[str, Any]]) -> Iterator[str]:

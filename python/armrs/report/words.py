@@ -47,6 +47,12 @@ def is_synthetic(result: Mapping[str, Any]) -> bool:
     return bool(result["data"].get("synthetic"))
 
 
+def disturbance(effect: Mapping[str, Any]) -> tuple[str, float, float] | None:
+    """Return trial, start and end [s] of an effect that was in one trial only and is left out there; None of any other."""
+    trial, span = effect.get("trial"), effect.get("span")
+    return (trial, span[0], span[1]) if trial and span else None
+
+
 def verdict(result: Mapping[str, Any]) -> str:
     """Return a result in a sentence or two; results of `gap` and `sweep` have words of their own."""
     sentences = {

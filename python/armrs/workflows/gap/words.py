@@ -16,6 +16,8 @@ verdict = headline.headline
 """The result in one sentence."""
 _TELLS = 5.0
 """Standard deviations from which on a movement tells two effects apart."""
+_BETTER = 10.0
+"""Units of twice the log-likelihood from which an alternative explains more, and not just as much."""
 
 
 def size(effect: Mapping[str, Any]) -> str:
@@ -100,10 +102,6 @@ def _separating(alternative: Mapping[str, Any]) -> str:
     return f"{alternative['separating_movement']}; with one such trial they would be {then} standard deviations apart (now {now})."
 
 
-_BETTER = 10.0
-"""Units of twice the log-likelihood from which an alternative explains more, and not just as much."""
-
-
 def _how(alternative: Mapping[str, Any]) -> str:
     worse = alternative.get("worse")
     if worse is None:
@@ -116,11 +114,12 @@ def _how(alternative: Mapping[str, Any]) -> str:
 
 def apart(result: Mapping[str, Any]) -> list[str]:
     """Return what was in one trial only, a line each."""
-    return [
-        f"{effect_name(e)} in {e['trial']}, {e['span'][0]:.2f} to {e['span'][1]:.2f} s ({size(e)}): left out of what is fitted."
-        for e in result["effects"]
-        if e.get("trial") and e.get("span")
-    ]
+    lines = []
+    for effect in result["effects"]:
+        if there := common.disturbance(effect):
+            trial, start, end = there
+            lines.append(f"{effect_name(effect)} in {trial}, {start:.2f} to {end:.2f} s ({size(effect)}): left out of what is fitted.")
+    return lines
 
 
 def left(result: Mapping[str, Any]) -> list[str]:
