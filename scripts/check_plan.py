@@ -72,7 +72,7 @@ def repetition(arm: Model, planned: Plan, seed: int) -> dict[tuple[str, int | No
         run = armrs.simulate(measured, movement, rate=RECORDED, sensors=Sensors.realistic(), seeds=seeds)
         for k, read in enumerate(run.readings, 1):
             name = f"planned {number}"
-            trials.append(Trial(f"{name} {k}.csv", name, k, "fit", read["time"], read["q"], read["force_on_arm"], None, read["robot_q"]))
+            trials.append(Trial(f"{name} {k}.csv", name, k, "fit", read.time, read.q, read.force_on_arm, None, read.robot_q))
     # Believed values as far from the truth as the model says that they may be, moment by moment as identification has them.
     segments = []
     for s in arm.segments:

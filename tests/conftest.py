@@ -191,11 +191,11 @@ def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "slow",
             k,
             "fit" if k < 4 else "test",
-            read["time"],
-            read["q"],
-            read["force_on_arm"],
+            read.time,
+            read.q,
+            read.force_on_arm,
             None,
-            read["robot_q"],
+            read.robot_q,
         )
         for k, read in enumerate(run.readings, start=1)
     )

@@ -36,10 +36,10 @@ def session(*hidden: armrs.Effect, seed: int = 0) -> Dataset:
                     configuration=name,
                     repeat=repeat,
                     role="test" if repeat == 4 else "fit",
-                    t=read["time"],
-                    q=read["q"],
-                    force_on_arm=read["force_on_arm"],
-                    robot_q=read["robot_q"],
+                    t=read.time,
+                    q=read.q,
+                    force_on_arm=read.force_on_arm,
+                    robot_q=read.robot_q,
                 )
             )
     return Dataset("hidden", model(), tuple(trials), force_on="arm", synthetic=True)

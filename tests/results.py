@@ -77,6 +77,6 @@ def series_faults(held: Series) -> list[str]:
     lacking = [
         str(name)
         for name, values in labelled.data_vars.items()
-        if "units" not in values.attrs or values.dtype.kind == "f" and not np.isfinite(values).any()
+        if "units" not in values.attrs or (values.dtype.kind == "f" and not np.isfinite(values).any())
     ]
     return lacking if is_timed else ["time", *lacking]

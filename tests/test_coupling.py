@@ -68,7 +68,7 @@ class Rig:
         drive = CoreDrive("handle", False, np.array([self._at(t) for t in self.t]), self.t)
         settings = CoreRun("rk4", 0.25e-3, 1e-3, duration=DURATION, q=list(self.q), qd=[0.0, 0.0])
         run = _armrs.simulate(_armrs.Rig(self.model), drive, settings)
-        self.reference: np.ndarray = run["q"]
+        self.reference: np.ndarray = run.columns["q"]
 
     def _at(self, time: float) -> list[float]:
         half = 0.5 * DURATION

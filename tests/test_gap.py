@@ -82,9 +82,11 @@ def test_of_each_round_one_contender_is_blue(viscous: armrs.GapFound) -> None:
     """None was: the rungs of a result are made anew each time they are asked for."""
     from matplotlib.colors import to_hex
 
-    axes = figures.gap(viscous)["ladder"]().figure.axes[0]
+    axes = figures.gap(viscous)["search_trace"]().figure.axes[0]
     colours = [to_hex(bar.get_facecolor()) for bar in axes.patches]
-    assert colours.count(plotting.BLUE.lower()) == len(viscous.ladder) and len(colours) == sum(len(r.tried) for r in viscous.ladder)
+    assert colours.count(plotting.BLUE.lower()) == len(viscous.search_trace) and len(colours) == sum(
+        len(r.tried) for r in viscous.search_trace
+    )
 
 
 def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> None:

@@ -97,9 +97,9 @@ def led(
         held = fore.replace(length=fore.length + moved * (-1) ** repeat)
         true = model(*own).replace(contact=contact, segments=(upper, held))
         read = armrs.simulate(true, movement, engine="rapier", rate=50.0, sensors=sensors, seeds=[repeat]).readings[0]
-        columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
+        columns = {name: getattr(read, name) for name in ("q", "force_on_arm", "robot_q")}
         role = "test" if repeat == len(phases) else "fit"
-        trials.append(armrs.Trial(file=f"led_{repeat}.csv", configuration="led", repeat=repeat, role=role, t=read["time"], **columns))
+        trials.append(armrs.Trial(file=f"led_{repeat}.csv", configuration="led", repeat=repeat, role=role, t=read.time, **columns))
     return Dataset("led", model(), tuple(trials), force_on="arm", synthetic=True)
 
 
@@ -139,9 +139,9 @@ def test_a_handle_beside_the_hand_turns_the_wrist() -> None:
         held = parts[2].replace(length=parts[2].length + 4e-4 * (-1) ** repeat)
         true = given.replace(segments=(*parts[:2], held))
         read = armrs.simulate(true, movement, engine="rapier", rate=50.0, sensors=sensors, seeds=[repeat]).readings[0]
-        columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
+        columns = {name: getattr(read, name) for name in ("q", "force_on_arm", "robot_q")}
         role = "test" if repeat == 4 else "fit"
-        trials.append(armrs.Trial(file=f"led_{repeat}.csv", configuration="led", repeat=repeat, role=role, t=read["time"], **columns))
+        trials.append(armrs.Trial(file=f"led_{repeat}.csv", configuration="led", repeat=repeat, role=role, t=read.time, **columns))
     wrist = calibrate(Dataset("led", given, tuple(trials), force_on="arm", synthetic=True), threads=2).gap["q3_rad"]
     assert wrist.calibrated is not None
     # The force on a lever of 0.4 mm turns the wrist by milliradians; what is left is noise.

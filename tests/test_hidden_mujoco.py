@@ -78,7 +78,7 @@ def native(world: Any, who: Any, truth: Any, *effects: armrs.Effect) -> np.ndarr
         effects=effects,
     )
     read = armrs.simulate(model, trial, sensors=Sensors(rate=RATE), seeds=[0]).readings[0]
-    return np.column_stack([read["q"] - q, read["force_on_arm"] - force])
+    return np.column_stack([read.q - q, read.force_on_arm - force])
 
 
 def test_both_engines_agree_where_nothing_is_hidden(world: Any, who: Any) -> None:

@@ -291,7 +291,7 @@ def test_the_rest_angle_of_a_spring_is_an_unknown() -> None:
     path = np.radians([[-60, 40], [-30, 100], [-60, 100], [-20, 30], [-60, 40]])
     run = armrs.simulate(truth, armrs.Movement(path, speed=0.8, acceleration=2.0), sensors=armrs.Sensors.realistic(), seeds=range(3))
     trials = [
-        armrs.Trial(f"{k}.csv", "large", k, "fit", read["time"], read["q"], read["force_on_arm"], None, read["robot_q"])
+        armrs.Trial(f"{k}.csv", "large", k, "fit", read.time, read.q, read.force_on_arm, None, read.robot_q)
         for k, read in enumerate(run.readings, start=1)
     ]
     found = armrs.identify(armrs.Dataset("spring", demo.handed_over(truth), tuple(trials), "robot", synthetic=True), with_effects="elastic")

@@ -56,7 +56,7 @@ def test_a_movement_beyond_a_limit_is_slowed_until_it_fits() -> None:
         gentle = armrs.plan(arm, dataclasses.replace(fast, **{limit: most}), evaluations=1)
         (slow,) = gentle.slowed
         assert (slow.movement, slow.limit, slow.allowed) == (1, limit, most) and slow.found == getattr(free, limit)
-        assert gentle.to_dict()["slowed"] == [dataclasses.asdict(slow)]
+        assert gentle.to_dict()["slowed"] == [slow.to_dict()]
         # Slower by a factor in time: accelerations by its square.
         assert slow.pace == pytest.approx(share ** (0.5 if limit == "robot_acceleration" else 1.0), rel=0.03)
         before, after = free.movements[0], gentle.movements[0]
@@ -78,7 +78,7 @@ def test_a_delay_of_the_force_is_identified_beyond_its_first_order() -> None:
         trials = []
         for movement, name in zip(movements, "ab", strict=True):
             read = armrs.simulate(late, movement, rate=check_plan.RECORDED, sensors=Sensors(), seeds=[1]).readings[0]
-            trials.append(Trial(f"{name}.csv", name, 1, "fit", read["time"], read["q"], read["force_on_arm"], None, read["robot_q"]))
+            trials.append(Trial(f"{name}.csv", name, 1, "fit", read.time, read.q, read.force_on_arm, None, read.robot_q))
         found = armrs.identify(Dataset("late", arm, tuple(trials), "robot", tolerance=check_plan.TOLERANCE, synthetic=True))
         for e in found.combinations[:2]:
             assert e.value == pytest.approx(truth[e.name], rel=1.5e-3), (delay, e.name)

@@ -60,6 +60,28 @@ CLASSES: dict[str, dict[str, Any]] = {
         "smallest": 0.03,
     },
     "Tried": {"effects": (("viscous", 2, None),), "gain": 90.0},
+    "SearchStep": {"tried": (), "before": 300.0, "after": 210.0},
+    "Prediction": {
+        "name": "torque",
+        "kind": "coulomb",
+        "joint": 1,
+        "value": 0.2,
+        "std": 0.01,
+        "std_of_data": 0.02,
+        "relative": 0.1,
+        "unit": "N m",
+    },
+    "Slowed": {
+        "movement": 2,
+        "pace": 0.5,
+        "limit": "force",
+        "found": 120.0,
+        "allowed": 60.0,
+        "what": "force on the arm",
+        "unit": "N",
+    },
+    "DesignedMovement": {"waypoints": ((0.0, 0.1), (0.2, 0.3)), "speed": 1.0, "acceleration": 4.0},
+    "RunFit": {"values": (0.2,), "sd": (0.01,), "active": (-1,), "squares": 98.0, "residuals": 100, "rounds": 3, "settled": True},
     "Fitted": {
         "segments": ([0.0, 0.1, 0.0],),
         "contact": [[0.0, 0.0], [0.0, 0.1]],
@@ -157,6 +179,26 @@ def test_whole_results_can_be_kept(slow_arm: Path) -> None:
     doubled = found.result.replace(rank=2 * found.rank)
     assert doubled.rank == 2 * found.rank
     assert doubled.parameters == found.parameters
+
+
+def test_a_plan_is_typed_and_one_json() -> None:
+    forecast = _armrs.Forecast([made("Prediction")], 0.1, 12.0, 1.0, 0.8, 3.0, 40.0)
+    assert list(forecast.to_dict())[:3] == ["predictions", "worst_relative_std", "largest_force_N"]
+    design = _armrs.Design(forecast, [made("DesignedMovement")], [made("Slowed")])
+    assert pickle.loads(pickle.dumps(design)) == design and design.replace(slowed=()).slowed == ()
+    assert str(design.slowed[0]).startswith("movement 2 is slowed to 50 % of the pace asked for")
+    assert str(forecast.predictions[0]) == "torque = 0.2 ± 0.01 N m"
+
+
+def test_a_recording_and_what_is_read_of_it_are_objects(slow_arm: Path) -> None:
+    movement = armrs.load_movement(slow_arm / "movement.toml")
+    run = armrs.simulate(slow_arm / "truth.toml", movement, sensors=armrs.Sensors(), seeds=[1])
+    (read,) = run.readings
+    assert read.q.shape == run.q.shape and read.force_on_arm.shape == run.force_on_arm.shape and read.tau is None
+    again = pickle.loads(pickle.dumps(read))
+    assert np.array_equal(again.q, read.q) and repr(again) == f"Readings({len(run.t)} samples)"
+    with pytest.raises(AttributeError):
+        read.q = None  # type: ignore[misc]
 
 
 def test_what_a_value_rests_on_is_one_of_three() -> None:

@@ -49,8 +49,8 @@ def session(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     run = armrs.simulate(arm(True), movement, sensors=armrs.Sensors.realistic(), seeds=range(3))
     trials = tuple(
         armrs.Trial(
-            f"trials/round_{k}.csv", "round", k, "fit" if k < 3 else "test", r["time"], r["q"], r["force_on_arm"],
-            None, r["robot_q"] if request.param == "with" else None,
+            f"trials/round_{k}.csv", "round", k, "fit" if k < 3 else "test", r.time, r.q, r.force_on_arm,
+            None, r.robot_q if request.param == "with" else None,
         )
         for k, r in enumerate(run.readings, start=1)
     )  # fmt: skip

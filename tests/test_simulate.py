@@ -278,7 +278,7 @@ def test_sensors_that_read_faster_than_the_run_is_recorded_are_refused() -> None
     with pytest.raises(BadInput, match="rate: found 50 Hz, allowed at least the 100 Hz of the sensors, which read what is recorded"):
         armrs.simulate(true_model(), duration=0.1, rate=50.0, sensors=armrs.Sensors(rate=100.0), seeds=[1])
     run = armrs.simulate(true_model(), duration=0.1, sensors=armrs.Sensors(rate=100.0), seeds=[1])
-    assert np.array_equal(run.readings[0]["q"], run.q)
+    assert np.array_equal(run.readings[0].q, run.q)
 
 
 def test_sensors_and_seeds_belong_together() -> None:

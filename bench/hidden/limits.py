@@ -32,7 +32,7 @@ SLIPPED = 0.5e-3 / math.sqrt(2.0)
 def shown(model: Model, trial: Trial) -> np.ndarray:
     """Angles and forces as they are read, shape (n, n_joints + 2)."""
     reading = armrs.simulate(model, trial, sensors=Sensors(), seeds=[0], dt=STEP).readings[0]
-    return np.column_stack([reading["q"], reading["force_on_arm"]])
+    return np.column_stack([reading.q, reading.force_on_arm])
 
 
 def white(change: np.ndarray, noise: dict[str, Any], n_joints: int) -> np.ndarray:

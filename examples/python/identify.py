@@ -17,11 +17,11 @@ trials = tuple(
         configuration="swing",
         repeat=k,
         role="fit" if k < 4 else "test",
-        t=read["time"],
-        q=read["q"],
-        force_on_arm=read["force_on_arm"],
+        t=read.time,
+        q=read.q,
+        force_on_arm=read.force_on_arm,
         moment_on_arm=None,
-        robot_q=read["robot_q"],
+        robot_q=read.robot_q,
     )
     for k, read in enumerate(run.readings, start=1)
 )

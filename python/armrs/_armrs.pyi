@@ -2,7 +2,7 @@
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import ClassVar, NotRequired, TypeAlias, TypedDict, final, type_check_only
+from typing import ClassVar, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,11 +29,14 @@ __all__ = [
     "ChannelGap",
     "Contact",
     "Description",
+    "Design",
+    "DesignedMovement",
     "Digest",
     "Effect",
     "Estimate",
     "Fit",
     "Fitted",
+    "Forecast",
     "GapResult",
     "Identification",
     "Joint",
@@ -47,13 +50,18 @@ __all__ = [
     "ParameterId",
     "ParameterInfo",
     "Place",
+    "Prediction",
+    "Readings",
+    "Recording",
     "Rig",
     "Robot",
-    "Rung",
+    "RunFit",
     "Screening",
+    "SearchStep",
     "Segment",
     "Separation",
     "SimulatedTrial",
+    "Slowed",
     "Subject",
     "Suspect",
     "Tolerance",
@@ -100,63 +108,12 @@ SAMPLE_STATUSES: list[str]
 _Array: TypeAlias = NDArray[np.float64]
 
 @type_check_only
-class _Predicted(TypedDict):
-    name: str
-    kind: str
-    joint: int | None
-    value: float
-    std: float
-    std_of_data: float
-    relative: float
-    unit: str
-
-@type_check_only
-class _Forecast(TypedDict):
-    predictions: list[_Predicted]
-    worst: float
-    force: float
-    speed: float
-    robot_speed: float
-    robot_acceleration: float
-    duration: float
-
-@type_check_only
 class _Search(TypedDict):
     speeds: list[float]
     waypoints: int
     repeats: int
     evaluations: int
     seed: int
-
-@type_check_only
-class _Excess(TypedDict):
-    limit: str
-    what: str
-    found: float
-    allowed: float
-    unit: str
-
-@type_check_only
-class _Task(TypedDict):
-    waypoints: _Array
-    speed: float
-    acceleration: float
-    pace: float
-    slowed_for: _Excess | None
-
-@type_check_only
-class _Design(_Forecast):
-    tasks: list[_Task]
-
-@type_check_only
-class _Fit(TypedDict):
-    values: list[float]
-    sd: list[float]
-    active: list[int]
-    squares: float
-    residuals: int
-    rounds: int
-    settled: bool
 
 @type_check_only
 class _Records(TypedDict):
@@ -186,52 +143,6 @@ class _Controlled(TypedDict):
     force_after_fault: float | None
     way_after_stop: float | None
     stop: tuple[str, int, float, float, float] | None
-
-_Recorded = TypedDict(
-    "_Recorded",
-    {
-        "time": _Array,
-        "q": _Array,
-        "qd": _Array,
-        "qdd": _Array,
-        "tip": _Array,
-        "handle": _Array | None,
-        "robot_q": _Array | None,
-        "robot_qd": _Array | None,
-        "robot_qdd": _Array | None,
-        "force_on_arm": _Array,
-        "moment_on_arm": _Array,
-        "torque.inertial": _Array,
-        "torque.centrifugal": _Array,
-        "torque.coriolis": _Array,
-        "torque.gravity": _Array,
-        "torque.frame": _Array,
-        "torque.resisting": _Array,
-        "torque.drive": _Array,
-        "torque.contact": _Array,
-        "resisting": _Array | None,
-        "memory": _Array | None,
-        "energy.kinetic": _Array,
-        "energy.potential": _Array,
-        "energy.contact": _Array,
-        "work.handle": _Array,
-        "work.drive": _Array,
-        "work.resisted": _Array,
-        "work.damped": _Array,
-        "effects": list[tuple[str, int]],
-        "energy_error": _Array,
-        "readings": NotRequired[list[_Readings]],
-    },
-)
-
-@type_check_only
-class _Readings(TypedDict):
-    time: _Array
-    q: _Array
-    force_on_arm: _Array | None
-    moment_on_arm: _Array | None
-    robot_q: _Array | None
-    tau: _Array | None
 
 @type_check_only
 class _Parameter(TypedDict):
@@ -1038,24 +949,237 @@ class Tried:
     def __eq__(self, other: object, /) -> bool: ...
 
 @final
-class Rung:
+class SearchStep:
     __match_args__: ClassVar[tuple[str, ...]]
     def __new__(
         cls,
         tried: Iterable[Tried],
         before: float,
         after: float,
-    ) -> Rung: ...
+    ) -> SearchStep: ...
     @property
     def tried(self) -> tuple[Tried, ...]: ...
     @property
     def before(self) -> float: ...
     @property
     def after(self) -> float: ...
-    def replace(self, **changes: object) -> Rung: ...
-    def __replace__(self, **changes: object) -> Rung: ...
+    def replace(self, **changes: object) -> SearchStep: ...
+    def __replace__(self, **changes: object) -> SearchStep: ...
     def to_dict(self) -> dict[str, object]: ...
     def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Prediction:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        name: str,
+        kind: str,
+        joint: int | None,
+        value: float,
+        std: float,
+        std_of_data: float,
+        relative: float,
+        unit: str,
+    ) -> Prediction: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def joint(self) -> int | None: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def std(self) -> float: ...
+    @property
+    def std_of_data(self) -> float: ...
+    @property
+    def relative(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    def replace(self, **changes: object) -> Prediction: ...
+    def __replace__(self, **changes: object) -> Prediction: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Forecast:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        predictions: Iterable[Prediction],
+        worst: float,
+        force: float,
+        speed: float,
+        robot_speed: float,
+        robot_acceleration: float,
+        duration: float,
+    ) -> Forecast: ...
+    @property
+    def predictions(self) -> tuple[Prediction, ...]: ...
+    @property
+    def worst(self) -> float: ...
+    @property
+    def force(self) -> float: ...
+    @property
+    def speed(self) -> float: ...
+    @property
+    def robot_speed(self) -> float: ...
+    @property
+    def robot_acceleration(self) -> float: ...
+    @property
+    def duration(self) -> float: ...
+    def replace(self, **changes: object) -> Forecast: ...
+    def __replace__(self, **changes: object) -> Forecast: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Slowed:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        movement: int,
+        pace: float,
+        limit: str,
+        found: float,
+        allowed: float,
+        what: str,
+        unit: str,
+    ) -> Slowed: ...
+    @property
+    def movement(self) -> int: ...
+    @property
+    def pace(self) -> float: ...
+    @property
+    def limit(self) -> str: ...
+    @property
+    def found(self) -> float: ...
+    @property
+    def allowed(self) -> float: ...
+    @property
+    def what(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    def replace(self, **changes: object) -> Slowed: ...
+    def __replace__(self, **changes: object) -> Slowed: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class DesignedMovement:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        waypoints: Iterable[Iterable[float]],
+        speed: float,
+        acceleration: float,
+    ) -> DesignedMovement: ...
+    @property
+    def waypoints(self) -> tuple[tuple[float, ...], ...]: ...
+    @property
+    def speed(self) -> float: ...
+    @property
+    def acceleration(self) -> float: ...
+    def replace(self, **changes: object) -> DesignedMovement: ...
+    def __replace__(self, **changes: object) -> DesignedMovement: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Design:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        forecast: Forecast,
+        movements: Iterable[DesignedMovement],
+        slowed: Iterable[Slowed],
+    ) -> Design: ...
+    @property
+    def forecast(self) -> Forecast: ...
+    @property
+    def movements(self) -> tuple[DesignedMovement, ...]: ...
+    @property
+    def slowed(self) -> tuple[Slowed, ...]: ...
+    def replace(self, **changes: object) -> Design: ...
+    def __replace__(self, **changes: object) -> Design: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class RunFit:
+    __match_args__: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        values: Iterable[float],
+        sd: Iterable[float],
+        active: Iterable[int],
+        squares: float,
+        residuals: int,
+        rounds: int,
+        settled: bool,
+    ) -> RunFit: ...
+    @property
+    def values(self) -> tuple[float, ...]: ...
+    @property
+    def sd(self) -> tuple[float, ...]: ...
+    @property
+    def active(self) -> tuple[int, ...]: ...
+    @property
+    def squares(self) -> float: ...
+    @property
+    def residuals(self) -> int: ...
+    @property
+    def rounds(self) -> int: ...
+    @property
+    def settled(self) -> bool: ...
+    def replace(self, **changes: object) -> RunFit: ...
+    def __replace__(self, **changes: object) -> RunFit: ...
+    def to_dict(self) -> dict[str, object]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Readings:
+    def __new__(
+        cls,
+        time: _Array,
+        q: _Array,
+        force_on_arm: _Array | None,
+        moment_on_arm: _Array | None,
+        robot_q: _Array | None,
+        tau: _Array | None,
+    ) -> Readings: ...
+    @property
+    def time(self) -> _Array: ...
+    @property
+    def q(self) -> _Array: ...
+    @property
+    def force_on_arm(self) -> _Array | None: ...
+    @property
+    def moment_on_arm(self) -> _Array | None: ...
+    @property
+    def robot_q(self) -> _Array | None: ...
+    @property
+    def tau(self) -> _Array | None: ...
+
+@final
+class Recording:
+    def __new__(
+        cls,
+        columns: dict[str, _Array | None],
+        effects: Sequence[tuple[str, int]],
+        energy_error: _Array,
+        readings: tuple[Readings, ...],
+    ) -> Recording: ...
+    @property
+    def columns(self) -> MappingProxyType[str, _Array | None]: ...
+    @property
+    def effects(self) -> list[tuple[str, int]]: ...
+    @property
+    def energy_error(self) -> _Array: ...
+    @property
+    def readings(self) -> tuple[Readings, ...]: ...
 
 @final
 class Fitted:
@@ -1101,7 +1225,7 @@ class GapResult:
         looks_like: str | None,
         absorbed: Iterable[Absorbed],
         lack: tuple[tuple[float, float], tuple[float, float]],
-        ladder: Iterable[Rung],
+        search_trace: Iterable[SearchStep],
         warnings: Iterable[str],
         model: Model,
         calibrated: Fitted,
@@ -1130,7 +1254,7 @@ class GapResult:
     @property
     def lack(self) -> tuple[tuple[float, float], tuple[float, float]]: ...
     @property
-    def ladder(self) -> tuple[Rung, ...]: ...
+    def search_trace(self) -> tuple[SearchStep, ...]: ...
     @property
     def warnings(self) -> tuple[str, ...]: ...
     @property
@@ -1468,7 +1592,7 @@ def declare(
     grid: tuple[float, float, float, float, int, int],
     tabulate: Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
 ) -> None: ...
-def design(rig: Rig, settings: CoreSettings, sensing: Instruments, bounds: Limits, search: _Search) -> _Design: ...
+def design(rig: Rig, settings: CoreSettings, sensing: Instruments, bounds: Limits, search: _Search) -> Design: ...
 def distances(
     rig: Rig,
     trials: Sequence[Trial],
@@ -1491,8 +1615,8 @@ def fit_by_simulation(
     settings: CoreRun,
     recorded: _Records,
     free: Sequence[tuple[int, int, float, float]],
-) -> _Fit: ...
-def forecast(rig: Rig, settings: CoreSettings, sensing: Instruments, tasks: tuple[Sequence[Movement], int]) -> _Forecast: ...
+) -> RunFit: ...
+def forecast(rig: Rig, settings: CoreSettings, sensing: Instruments, tasks: tuple[Sequence[Movement], int]) -> Forecast: ...
 def identify(rig: Rig, trials: Sequence[Trial], settings: CoreSettings) -> Identification: ...
 def literature(body_mass: float, height: float, sex: str, lengths: Sequence[float | None]) -> list[_Literature]: ...
 def play(rig: Rig, trials: Sequence[Trial], settings: SearchSettings, own: bool = False) -> list[SimulatedTrial]: ...
@@ -1502,8 +1626,8 @@ def simulate(
     drive: CoreDrive,
     settings: CoreRun,
     sensing: tuple[Sensors, Sequence[int]] | None = None,
-) -> _Recorded: ...
-def simulate_in_pieces(rig: Rig, drive: CoreDrive, settings: CoreRun, samples: int, take: Callable[[_Recorded], None]) -> None: ...
+) -> Recording: ...
+def simulate_in_pieces(rig: Rig, drive: CoreDrive, settings: CoreRun, samples: int, take: Callable[[Recording], None]) -> None: ...
 def smooth(
     values: NDArray[np.float64], rate: float, cutoff: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...

@@ -4,10 +4,10 @@ use arm_core::Chain;
 use arm_ident::inference::by_simulation::{self, Free, Recorded};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::arm::{AnyChain, each_short_length};
 use crate::errors::{bad_input, identification};
+use crate::results::RunFit;
 use crate::rig::Rig;
 use crate::sim::{Driven, Settings, experiment};
 
@@ -34,14 +34,14 @@ pub fn fit_by_simulation<'py>(
     settings: Settings,
     recorded: Records<'py>,
     free: Vec<(usize, usize, f64, f64)>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<RunFit> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
         (drive, settings, recorded): (&Driven<'py>, &Settings, &Records<'py>),
         free: &[Free],
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> PyResult<RunFit> {
         if recorded.q.shape()[1] != N {
             let found = recorded.q.shape()[1];
             return Err(bad_input(
@@ -59,16 +59,7 @@ pub fn fit_by_simulation<'py>(
         };
         let outcome = py.detach(|| by_simulation::fit(&experiment, &values, free, 1));
         crate::own::failed()?;
-        let fit = outcome.map_err(identification)?;
-        let out = PyDict::new(py);
-        out.set_item("values", fit.values)?;
-        out.set_item("sd", fit.sd)?;
-        out.set_item("active", fit.active)?;
-        out.set_item("squares", fit.squares)?;
-        out.set_item("residuals", fit.residuals)?;
-        out.set_item("rounds", fit.rounds)?;
-        out.set_item("settled", fit.settled)?;
-        Ok(out)
+        Ok(RunFit(outcome.map_err(identification)?))
     }
     let free: Vec<Free> = free
         .into_iter()

@@ -5,15 +5,15 @@ use std::ops::ControlFlow;
 use arm_core::{Chain, Joints, Limits, Shape};
 use arm_sim::{
     Channel, Coupling, Drive, Engine, Experiment, HandlePath, Integrator, Interpolation, Movement,
-    Piece, Recording, Sensors, Series, Start,
+    Piece, Sensors, Series, Start,
 };
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn, ToPyArray};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
 
 use crate::arm::{AnyChain, each_short_length};
 use crate::convert::rows;
 use crate::errors::{bad_input, simulation};
+use crate::results::{Readings, Recording as Recorded};
 use crate::rig::Rig;
 
 /// How the arm is driven, a Python `CoreDrive`; what belongs to another kind of drive is `None`.
@@ -104,27 +104,27 @@ pub fn simulate<'py>(
     drive: Driven<'py>,
     settings: Settings,
     sensing: Option<(Sensing, Vec<u64>)>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Recorded> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
         (drive, settings, sensing): (&Driven<'py>, &Settings, Option<&(Sensing, Vec<u64>)>),
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> PyResult<Recorded> {
         let experiment = experiment(chain, rig, drive, settings)?;
         let engine = settings.engine()?;
         let outcome = py.detach(|| arm_sim::simulate_with(engine, &experiment));
         crate::own::failed()?;
         let recording = outcome.map_err(simulation)?;
-        let out = columns(py, &Piece::from(&recording))?;
+        let mut readings = Vec::new();
         if let Some((sensing, seeds)) = sensing {
-            let readings = seeds
-                .iter()
-                .map(|&seed| readings::<N>(py, &sensing.sensors(seed), &experiment, &recording))
-                .collect::<PyResult<Vec<_>>>()?;
-            out.set_item("readings", PyList::new(py, readings)?)?;
+            for &seed in seeds {
+                let sensors = sensing.sensors::<N>(seed);
+                let read = sensors.read(&experiment, &recording);
+                readings.push(Readings::of(py, &read.map_err(simulation)?)?);
+            }
         }
-        Ok(out)
+        Recorded::of(py, &Piece::from(&recording), readings)
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
 }
@@ -150,7 +150,10 @@ pub fn simulate_in_pieces<'py>(
         let engine = settings.engine()?;
         let mut raised = None;
         let mut give = |piece: &Piece<'_, N>| {
-            let given = Python::attach(|py| take.call1(py, (columns(py, piece)?,)).map(|_| ()));
+            let given = Python::attach(|py| {
+                take.call1(py, (Recorded::of(py, piece, Vec::new())?,))
+                    .map(|_| ())
+            });
             given.map_or_else(
                 |error| {
                     raised = Some(error);
@@ -320,36 +323,6 @@ fn driven<const N: usize>(
     }
 }
 
-fn columns<'py, const N: usize>(
-    py: Python<'py>,
-    piece: &Piece<'_, N>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let recording = piece.recording;
-    let out = PyDict::new(py);
-    for (name, width, values) in recording.columns() {
-        // Energies, works, time and the moment are numbers; everything else belongs to joints, axes or effects.
-        let scalar = name == "time"
-            || name == "moment_on_arm"
-            || name.starts_with("energy")
-            || name.starts_with("work");
-        let shape = if scalar {
-            Shaped::Vector
-        } else {
-            Shaped::Table(width)
-        };
-        put(py, &out, name, (shape, values))?;
-    }
-    let effects: Vec<_> = recording
-        .effects
-        .iter()
-        .map(|(kind, index)| (kind.info().kind, *index))
-        .collect();
-    out.set_item("effects", effects)?;
-    out.set_item("energy_error", piece.energy_error().to_pyarray(py))?;
-    arm_sim::definite(piece).map_err(simulation)?;
-    Ok(out)
-}
-
 /// What stands for every bit of a run, which takes a quarter as long as the run; see `armrs.Simulated`.
 #[pyclass(module = "armrs._armrs")]
 pub struct Digest(arm_sim::Digest);
@@ -378,56 +351,4 @@ impl Digest {
     fn value(&self) -> String {
         format!("{:016x}", self.0.value())
     }
-}
-
-/// How a column is shaped in Python.
-enum Shaped {
-    /// One number a sample, `(n,)`.
-    Vector,
-    /// Several numbers a sample, `(n, width)`, also where the width is one.
-    Table(usize),
-}
-
-/// Sets a column; an empty one is `None`.
-fn put(
-    py: Python<'_>,
-    out: &Bound<'_, PyDict>,
-    name: &str,
-    (shape, values): (Shaped, &[f64]),
-) -> PyResult<()> {
-    let array = values.to_pyarray(py);
-    match shape {
-        _ if values.is_empty() => out.set_item(name, py.None()),
-        Shaped::Vector => out.set_item(name, array),
-        Shaped::Table(width) => {
-            out.set_item(name, array.call_method1("reshape", (-1, width as isize))?)
-        }
-    }
-}
-
-fn readings<'py, const N: usize>(
-    py: Python<'py>,
-    sensors: &Sensors<N>,
-    experiment: &Experiment<N>,
-    recording: &Recording<N>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let read = sensors.read(experiment, recording).map_err(simulation)?;
-    let out = PyDict::new(py);
-    put(py, &out, "time", (Shaped::Vector, &read.time))?;
-    put(py, &out, "q", (Shaped::Table(N), &read.q))?;
-    put(
-        py,
-        &out,
-        "force_on_arm",
-        (Shaped::Table(2), &read.force_on_arm),
-    )?;
-    put(
-        py,
-        &out,
-        "moment_on_arm",
-        (Shaped::Vector, &read.moment_on_arm),
-    )?;
-    put(py, &out, "robot_q", (Shaped::Table(2), &read.robot_q))?;
-    put(py, &out, "tau", (Shaped::Table(N), &read.torque))?;
-    Ok(out)
 }

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .. import _armrs, checks
+from .._armrs import RunFit as RunFit
 from ..catalogue import catalogue
 from ..errors import BadInput
 from ..io.trial import Trial
@@ -118,18 +119,18 @@ def fit_by_simulation(
         "force_noise": force_noise,
     }
     limits = [(effect, parameter, float(low), float(high)) for (effect, parameter, *_), (low, high) in zip(places, bounds, strict=True)]
-    raw = _armrs.fit_by_simulation(_armrs.Rig(model), driven(drive, "compliant"), settings, recorded, limits)
-    for (index, parameter, *_), value in zip(places, raw["values"], strict=True):
+    found = _armrs.fit_by_simulation(_armrs.Rig(model), driven(drive, "compliant"), settings, recorded, limits)
+    for (index, parameter, *_), value in zip(places, found.values, strict=True):
         effect = effects[index]
         key = catalogue()[effect.kind].parameters[parameter].name
         effects[index] = Effect(effect.kind, effect.joint, effect.channel, {**effect.parameters, key: value})
     return SimulationFit(
-        values=dict(zip(names, raw["values"], strict=True)),
-        sd=dict(zip(names, raw["sd"], strict=True)),
-        at_bound=tuple(name for name, active in zip(names, raw["active"], strict=True) if active),
-        residual_rms=float(np.sqrt(raw["squares"] / raw["residuals"])),
-        rounds=raw["rounds"],
-        settled=raw["settled"],
+        values=dict(zip(names, found.values, strict=True)),
+        sd=dict(zip(names, found.sd, strict=True)),
+        at_bound=tuple(name for name, active in zip(names, found.active, strict=True) if active),
+        residual_rms=float(np.sqrt(found.squares / found.residuals)),
+        rounds=found.rounds,
+        settled=found.settled,
         effects=tuple(effects),
     )
 

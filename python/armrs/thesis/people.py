@@ -88,10 +88,10 @@ def trials(made: Simulated, configuration: str, first: int = 1, role: str = "fit
             configuration=configuration,
             repeat=k,
             role=role,
-            t=read["time"],
-            q=read["q"],
-            force_on_arm=read["force_on_arm"],
-            robot_q=read["robot_q"],
+            t=read.time,
+            q=read.q,
+            force_on_arm=read.force_on_arm,
+            robot_q=read.robot_q,
         )
         for k, read in enumerate(made.readings, start=first)
     ]

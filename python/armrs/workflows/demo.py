@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .._armrs import Readings
 from ..analysis.quantities import value_in
 from ..io import files
 from ..io.dataset import Dataset, load_dataset, write_dataset
@@ -182,10 +183,10 @@ def slow_movements(session: Dataset) -> Dataset:
     return session.replace(trials=tuple(t for t in session.trials if TWO_SPEEDS[t.configuration].speed < SLOWEST))
 
 
-def _trial(name: str, repeat: int, role: str, read: Mapping[str, np.ndarray]) -> Trial:
+def _trial(name: str, repeat: int, role: str, read: Readings) -> Trial:
     return Trial(
-        file=f"trials/{name}_{repeat}.csv", configuration=name, repeat=repeat, role=role, t=read["time"], q=read["q"],
-        force_on_arm=read["force_on_arm"], moment_on_arm=None, robot_q=read["robot_q"],
+        file=f"trials/{name}_{repeat}.csv", configuration=name, repeat=repeat, role=role, t=read.time, q=read.q,
+        force_on_arm=read.force_on_arm, moment_on_arm=None, robot_q=read.robot_q,
     )  # fmt: skip
 
 

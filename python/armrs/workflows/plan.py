@@ -10,6 +10,11 @@ from typing import Any
 import numpy as np
 
 from .. import _armrs, checks
+from .._armrs import Design as Design
+from .._armrs import DesignedMovement as DesignedMovement
+from .._armrs import Forecast as Forecast
+from .._armrs import Prediction as Prediction
+from .._armrs import Slowed as Slowed
 from ..errors import BadInput, Text
 from ..io import files, tomlfile
 from ..model import Model, Tolerance
@@ -104,72 +109,6 @@ MOST_UNCERTAIN = 0.5
 """Relative standard deviation from which on a parameter counts as not known."""
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """How well one parameter will be known.
-
-    Attributes
-    ----------
-    name, kind : str
-        As identification gives them.
-    joint : int or None
-        From 1.
-    value : float
-        As it is believed before the experiment.
-    std : float
-        Standard deviation to be expected, with what is known beforehand.
-    std_of_data : float
-        The same from the data alone, within the calibration as promised.
-    relative : float
-        The latter relative to the value; a parameter of an effect that is small counts as 0.05.
-    unit : str
-    """
-
-    name: str
-    kind: str
-    joint: int | None
-    value: float
-    std: float
-    std_of_data: float
-    relative: float
-    unit: str
-
-    def __str__(self) -> str:
-        return f"{self.name} = {self.value:.4g} ± {self.std:.2g} {self.unit}"
-
-
-@dataclass(frozen=True)
-class Slowed:
-    """A planned movement that had to be slowed: the same path, all of it slower by one factor in time.
-
-    Attributes
-    ----------
-    movement : int
-        From 1.
-    pace : float
-        Its share of the speed that was asked for; of the acceleration that squared.
-    limit : str
-        What it would exceed if it were faster, by its name in `Limits`.
-    found, allowed : float
-        What that would be at the speed that was asked for, and the limit [unit].
-    what, unit : str
-    """
-
-    movement: int
-    pace: float
-    limit: str
-    found: float
-    allowed: float
-    what: str
-    unit: str
-
-    def __str__(self) -> str:
-        return (
-            f"movement {self.movement} is slowed to {100 * self.pace:.3g} % of the pace asked for: at all of it the {self.what} would be "
-            f"{self.found:.4g} {self.unit}, allowed {self.allowed:.4g} {self.unit}"
-        )
-
-
 @dataclass(frozen=True, eq=False)
 class Plan(Tabular):
     """Movements, and what they will show.
@@ -179,15 +118,8 @@ class Plan(Tabular):
     movements : tuple of Movement
     repeats : int
         Trials of each.
-    predictions : tuple of Prediction
-    worst : float
-        The worst relative standard deviation from the data alone.
-    force, speed, robot_speed : float
-        Largest force on the arm [N], largest speed of a joint, and of a joint of the robot, zero without one [rad/s].
-    robot_acceleration : float
-        Largest acceleration of a joint of the robot, zero without one [rad/s²].
-    duration : float
-        Of all trials together [s].
+    forecast : Forecast
+        What they will show, and what they ask of the robot; its attributes are those of the plan as well.
     model : Model
     slowed : tuple of Slowed
         The movements that had to be slowed for a limit.
@@ -195,22 +127,51 @@ class Plan(Tabular):
 
     movements: tuple[Movement, ...]
     repeats: int
-    predictions: tuple[Prediction, ...]
-    worst: float
-    force: float
-    speed: float
-    robot_speed: float
-    robot_acceleration: float
-    duration: float
+    forecast: Forecast
     model: Model = field(repr=False)
     slowed: tuple[Slowed, ...] = field(default=(), repr=False)
+
+    @property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """How well each parameter will be known."""
+        return self.forecast.predictions
+
+    @property
+    def worst(self) -> float:
+        """The worst relative standard deviation from the data alone."""
+        return self.forecast.worst
+
+    @property
+    def force(self) -> float:
+        """Largest force on the arm [N]."""
+        return self.forecast.force
+
+    @property
+    def speed(self) -> float:
+        """Largest speed of a joint [rad/s]."""
+        return self.forecast.speed
+
+    @property
+    def robot_speed(self) -> float:
+        """Largest speed of a joint of the robot, zero without one [rad/s]."""
+        return self.forecast.robot_speed
+
+    @property
+    def robot_acceleration(self) -> float:
+        """Largest acceleration of a joint of the robot, zero without one [rad/s²]."""
+        return self.forecast.robot_acceleration
+
+    @property
+    def duration(self) -> float:
+        """Of all trials together [s]."""
+        return self.forecast.duration
 
     def __repr__(self) -> str:
         return f"Plan({len(self.movements)} movements, {self.duration:.4g} s; {'; '.join(map(str, self.predictions))})"
 
     def tidy(self) -> Tidy:
         """Return how well each parameter will be known, one a row."""
-        names = list(vars(self.predictions[0])) if self.predictions else []
+        names = Prediction.__match_args__ if self.predictions else ()
         return Tidy({name: [getattr(p, name) for p in self.predictions] for name in names}, {})
 
     def to_dict(self) -> dict[str, Any]:
@@ -227,14 +188,8 @@ class Plan(Tabular):
                 }
                 for m in self.movements
             ],
-            "predictions": [dict(vars(p)) for p in self.predictions],
-            "worst_relative_std": self.worst,
-            "largest_force_N": self.force,
-            "largest_speed_rad_s": self.speed,
-            "largest_robot_speed_rad_s": self.robot_speed,
-            "largest_robot_acceleration_rad_s2": self.robot_acceleration,
-            "duration_s": self.duration,
-            "slowed": [dict(vars(s)) for s in self.slowed],
+            **self.forecast.to_dict(),
+            "slowed": [s.to_dict() for s in self.slowed],
         }
 
     def to_toml(self) -> str:
@@ -353,10 +308,9 @@ def plan(
         "evaluations": checks.whole("evaluations", evaluations, least=1, most=100_000),
         "seed": checks.whole("seed", seed, least=0, most=2**64 - 1),
     }
-    raw = _armrs.design(asked.rig, asked.settings, instruments, limits, search)
-    found = tuple(Movement(t["waypoints"], speed=t["speed"], acceleration=t["acceleration"], shape="smooth") for t in raw["tasks"])
-    slowed = tuple(Slowed(k, t["pace"], **t["slowed_for"]) for k, t in enumerate(raw["tasks"], start=1) if t["slowed_for"] is not None)
-    return replace(asked.plan(found, raw), slowed=slowed)
+    design = _armrs.design(asked.rig, asked.settings, instruments, limits, search)
+    found = tuple(Movement(np.array(m.waypoints), speed=m.speed, acceleration=m.acceleration, shape="smooth") for m in design.movements)
+    return replace(asked.plan(found, design.forecast), slowed=design.slowed)
 
 
 def angles_of(text: str) -> tuple[tuple[float, float], ...]:
@@ -411,17 +365,6 @@ class _Question:
         self.rig = _armrs.Rig(model, self.effects)
         self.settings = CoreSettings(model, fitted, instruments.tolerance)
 
-    def plan(self, movements: tuple[Movement, ...], raw: _armrs._Forecast) -> Plan:
+    def plan(self, movements: tuple[Movement, ...], forecast: Forecast) -> Plan:
         """Return what the core found."""
-        return Plan(
-            movements=movements,
-            repeats=self.repeats,
-            predictions=tuple(Prediction(**p) for p in raw["predictions"]),
-            worst=raw["worst"],
-            force=raw["force"],
-            speed=raw["speed"],
-            robot_speed=raw["robot_speed"],
-            robot_acceleration=raw["robot_acceleration"],
-            duration=raw["duration"],
-            model=self.model,
-        )
+        return Plan(movements, self.repeats, forecast, self.model)

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from .. import checks
+from .._armrs import Prediction
 from ..analysis.stretches import UNITS, Stretch, spread
 from ..errors import BadInput, Text
 from ..model import Model
 from .movement import Movement
-from .plan import Instruments, Limits, Plan, Prediction, forecast
+from .plan import Instruments, Limits, Plan, forecast
 from .spasticity import DEFAULT_CUTOFF, low_pass
 
 SLOWEST = np.radians(15.0)
@@ -78,7 +79,8 @@ def plan_stretches(
     predictions = _predicted(model, movements, joint, repeats, expected, instruments)
     # What the robot can do, and the forces, are those of any planned movement.
     possible = forecast(model, movements, repeats=repeats, with_effects=(), instruments=instruments)
-    return replace(possible, predictions=predictions, worst=max(p.relative for p in predictions))
+    worst = max(p.relative for p in predictions)
+    return replace(possible, forecast=possible.forecast.replace(predictions=predictions, worst=worst))
 
 
 def _movement(limits: Limits, joint: int, speed: float) -> Movement:

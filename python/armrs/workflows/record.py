@@ -254,7 +254,7 @@ class _Session:
         draw, story = state
         devices, model = self.experiment.devices, true.model
         read = true.readings[0]
-        stamps = read["time"]
+        stamps = read.time
         seen = (1.0 + devices.clock_drift) * stamps + devices.clock_offset_s + devices.clock_jitter_s * draw.standard_normal(len(stamps))
         q = np.column_stack([np.interp(seen, true.t, column) for column in true.q.T])
         markers = self._markers(model, stamps, q, draw)
@@ -268,9 +268,9 @@ class _Session:
             role="fit" if repeat <= run.repeats else "test",
             t=stamps,
             q=motion.q,
-            force_on_arm=read["force_on_arm"],
-            moment_on_arm=None if devices.moment_noise_Nm is None else read["moment_on_arm"],
-            robot_q=read["robot_q"],
+            force_on_arm=read.force_on_arm,
+            moment_on_arm=None if devices.moment_noise_Nm is None else read.moment_on_arm,
+            robot_q=read.robot_q,
             tau=_brakes(true, stamps, devices, draw),
             emg=_emg(true, stamps, draw) if devices.emg else {},
         )

@@ -8,11 +8,13 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from .. import _armrs, checks
+from .._armrs import Readings as Readings
+from .._armrs import Recording as Recording
 from ..catalogue import catalogue
 from ..errors import BadInput, SimulationError, Text
 from ..io.trial import Trial, refuse_moving_base
@@ -21,9 +23,6 @@ from ..tabular import Labelled, Series, Tabular, Tidy
 from ..telling import telling
 from .accuracy import EnergyBalance, energy_balance
 from .movement import Movement
-
-if TYPE_CHECKING:
-    from .._armrs import _Recorded
 
 DEFAULT_DT = 0.25e-3
 """Step of the simulation [s]."""
@@ -136,7 +135,7 @@ class Simulated(Tabular, Series):
         Contact force [N].
     columns : dict of str to ndarray
         Everything that was recorded: tip, handle, robot angles, every torque by itself, energies and works.
-    readings : tuple of dict
+    readings : tuple of Readings
         What the sensors read, one for each seed asked for.
     model : Model
     settings : dict
@@ -149,7 +148,7 @@ class Simulated(Tabular, Series):
     qdd: np.ndarray
     force_on_arm: np.ndarray
     columns: dict[str, Any] = field(repr=False)
-    readings: tuple[Mapping[str, Any], ...] = field(repr=False)
+    readings: tuple[Readings, ...] = field(repr=False)
     model: Model = field(repr=False)
     settings: dict[str, Any] = field(repr=False)
 
@@ -422,16 +421,17 @@ class _Asked:
         except BadInput as error:
             raise about(self.drive, error, f"; a step is {self.core.dt:g} s") from None
 
-    def recorded(self, raw: _Recorded) -> Simulated:
+    def recorded(self, raw: Recording) -> Simulated:
         """Return what the core has recorded."""
+        columns: dict[str, Any] = {**raw.columns, "effects": raw.effects, "energy_error": raw.energy_error}
         return Simulated(
-            t=raw["time"],
-            q=raw["q"],
-            qd=raw["qd"],
-            qdd=raw["qdd"],
-            force_on_arm=raw["force_on_arm"],
-            columns={k: v for k, v in raw.items() if k != "readings"},
-            readings=tuple(raw.get("readings", ())),
+            t=columns["time"],
+            q=columns["q"],
+            qd=columns["qd"],
+            qdd=columns["qdd"],
+            force_on_arm=columns["force_on_arm"],
+            columns=columns,
+            readings=raw.readings,
             model=self.model,
             settings=self.settings,
         )

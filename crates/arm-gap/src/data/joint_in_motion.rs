@@ -9,10 +9,11 @@ use arm_ident::regression::kinematics::Kinematics;
 use arm_ident::regression::measured_motion::measured;
 use arm_ident::regression::trial::{Role, Trial};
 use arm_ident::regression::unknown::spring;
-use arm_numerics::linalg::matrix::{add_scaled, dot};
+use arm_numerics::linalg::matrix::add_scaled;
 use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
+use crate::data::noise::dot;
 use crate::data::passive_law::LIKELY;
 
 /// Speed above which a joint moves \[rad/s\]: three times the default smoothing of dry laws, 0.01 rad/s, which are whole by then.

@@ -4,6 +4,7 @@
 //! channels are correlated; both are read off repeats, where the model's errors cancel. Without repeats the residual of a
 //! fit takes their place: what the model lacks is in it too, so that less is seen, not more.
 
+/// The one sum of products of this crate.
 pub use arm_numerics::interleaved_dot as dot;
 use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
 

@@ -5,10 +5,11 @@
 //! and the angles are compared. A law that is not exact near rest then still takes the energy that the arm loses.
 
 use arm_core::Joints;
-use arm_numerics::linalg::matrix::{add_scaled, dot};
+use arm_numerics::linalg::matrix::add_scaled;
 use arm_numerics::statistics::autoregressive::effective_samples;
 use arm_numerics::{Cholesky, Matrix};
 
+use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::joint_torque::free_run::{CHANGE, State, slope_into};
 use crate::measurement_model::hypothesis::priors;

@@ -4,10 +4,10 @@
 //! trial. A driven arm does not: small errors of torques add up to any angle, so that it starts anew every second.
 
 use arm_core::Joints;
-use arm_numerics::linalg::matrix::dot;
 use arm_numerics::{Cholesky, Matrix};
 use arm_sim::{Drive, Experiment, Interpolation, Series, SimulationError, Start, simulate};
 
+use crate::data::noise::dot;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, STEPS, offsets, unbent};

@@ -38,6 +38,16 @@ pub struct ChannelGap {
 }
 
 impl ChannelGap {
+    /// With the model as given, calibrated and amended.
+    fn of([before, calibrated, after]: [Option<f64>; 3]) -> Self {
+        Self {
+            before,
+            calibrated,
+            after,
+            ..Self::default()
+        }
+    }
+
     /// Share of the calibrated gap above the floor that is gone, 1 where all of it is.
     pub fn closed(&self) -> Option<f64> {
         let (calibrated, after, floor) = (self.calibrated?, self.after?, self.floor?);
@@ -102,27 +112,18 @@ pub(super) fn channel_gaps(
     let tests = || trials.iter().filter(|t| t.test);
     let tested = tested(trials, last);
     let channel = |(c, name): (usize, String)| {
-        let [before, calibrated, after] = Version::ALL.map(|v| size(tests(), v, c));
         let gap = tested.get(c);
         let gap = ChannelGap {
-            before,
-            calibrated,
-            after,
             floor: gap.and_then(|g| g.floor),
             floor_std: gap.and_then(|g| g.floor_std),
             open: gap.and_then(|g| opened(g, trials)),
+            ..ChannelGap::of(Version::ALL.map(|v| size(tests(), v, c)))
         };
         (name, gap)
     };
     let mut all: Named<_> = (0..).zip(channel_names(joints, led)).map(channel).collect();
     for joint in (0..joints).filter(|_| !led) {
-        let [before, calibrated, after] = Version::ALL.map(|v| free_size(tests(), v, joint));
-        let gap = ChannelGap {
-            before,
-            calibrated,
-            after,
-            ..ChannelGap::default()
-        };
+        let gap = ChannelGap::of(Version::ALL.map(|v| free_size(tests(), v, joint)));
         all.insert(format!("q{}_rad", joint + 1), gap);
     }
     all
@@ -143,17 +144,15 @@ pub fn confirmed(
     }
     let tested = tested(&tests, Version::Given);
     let channel = |(c, name): (usize, &String)| {
-        let [before, calibrated, after] = plays
-            .each_ref()
-            .map(|trials| size(trials.iter().map(AsRef::as_ref), Version::Given, c));
+        let simulated = |trials: &Vec<Arc<SimulatedTrial>>| {
+            size(trials.iter().map(AsRef::as_ref), Version::Given, c)
+        };
         let known = known.get(name);
         let gap = ChannelGap {
-            before,
-            calibrated,
-            after,
             floor: known.and_then(|g| g.floor),
             floor_std: known.and_then(|g| g.floor_std),
             open: tested.get(c).and_then(|g| opened(g, &tests)),
+            ..ChannelGap::of(plays.each_ref().map(simulated))
         };
         (name.clone(), gap)
     };

@@ -8,7 +8,7 @@ use super::absorbed::absorbed;
 use super::channel_gap::channel_gaps;
 use super::limit::limits;
 use super::{
-    Absorbed, Asked, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, Rung,
+    Absorbed, Asked, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, SearchStep,
     SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
 };
 use crate::data::prepared_session::PreparedSession;
@@ -57,7 +57,7 @@ pub struct GapResult {
     /// Lack of fit of the calibrated and of the amended model.
     pub lack: [Lack; 2],
     /// Rounds of the search.
-    pub ladder: Vec<Rung>,
+    pub search_trace: Vec<SearchStep>,
     /// What a reader should know of the data.
     pub warnings: Vec<String>,
     /// The model with the named effects, everything refitted.
@@ -141,7 +141,7 @@ impl GapResult {
             looks_like: None,
             absorbed: absorbed(asked.model, &finding.amended.hypothesis, unknowns),
             lack: finding.lack.each_ref().map(Lack::from),
-            ladder: finding.search_trace.iter().map(Rung::of).collect(),
+            search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
             warnings: Vec::new(),
             model: amended.amended(asked.model, &locked)?,
             calibrated: Fitted::of(&finding.calibrated.hypothesis),
@@ -230,7 +230,7 @@ impl Serialize for GapResult {
             amended,
         };
         out.serialize_field("lack_of_fit", &lack)?;
-        out.serialize_field("ladder", &self.ladder)?;
+        out.serialize_field("search_trace", &self.search_trace)?;
         out.serialize_field("warnings", &self.warnings)?;
         out.serialize_field("model", MODEL_FILE)?;
         out.end()

@@ -3,7 +3,7 @@ use serde::Serialize;
 use super::{Named, placed};
 use crate::candidates::candidate::Candidate;
 use crate::selection::first_order_screening;
-use crate::selection::search_state::{Ruled, SearchStep};
+use crate::selection::search_state::{self, Ruled};
 
 /// An effect that was asked for and not named: the smallest that these data would have shown, and what it would explain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -119,7 +119,7 @@ pub struct Tried {
 
 /// One round of the search.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Rung {
+pub struct SearchStep {
     /// What was converged by simulation, best first.
     pub tried: Vec<Tried>,
     /// Misfit before the round.
@@ -128,8 +128,8 @@ pub struct Rung {
     pub after: f64,
 }
 
-impl Rung {
-    pub(super) fn of(step: &SearchStep) -> Self {
+impl SearchStep {
+    pub(super) fn of(step: &search_state::SearchStep) -> Self {
         let place = |c: &Candidate| placed(c.effect.kind, c.effect.index);
         let tried = step.tried.iter().map(|(members, gain)| Tried {
             effects: members.iter().map(place).collect(),

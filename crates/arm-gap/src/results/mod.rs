@@ -19,7 +19,7 @@ pub use asked::{Asked, TrialFile};
 pub use channel_gap::{ChannelGap, Open, channel_names, confirmed};
 pub use effect::{Alternative, Missing, Place, Separation};
 pub use found::{GapResult, Lack, Screening};
-pub use limit::{Limit, Rung, Suspect, Tried};
+pub use limit::{Limit, SearchStep, Suspect, Tried};
 pub use root_mean_square::{pairwise_sum, root_mean_square};
 pub use simulated::{SimulatedTrial, Version, sizes};
 pub use value::Value;

@@ -138,7 +138,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             let each: Vec<&Response> = responses.iter().collect();
             let (coordinates, clusters) = self.equations_with(point, &fitted, &each);
-            let step = |damping: f64| stepped(&clusters, hypothesis, &coordinates, damping);
+            let equations = Equations::new(&clusters, hypothesis, &coordinates);
             let next = |step: &Step| {
                 let along = step.usable.iter().map(|&i| &coordinates[i]);
                 let along = std::iter::zip(along, step.sizes.iter().copied());
@@ -149,7 +149,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands. A step that gains too
             // little to first order need not be tried, nor any that is damped more.
             let found = (lightest.saturating_sub(1)..DAMPING.len())
-                .filter_map(|d| Some((d, step(DAMPING[d])?)))
+                .filter_map(|d| Some((d, equations.step(DAMPING[d])?)))
                 .take_while(|(_, step)| step.gain > LITTLE * fitted.enough())
                 .find_map(|(d, step)| Some((d, next(&step)?)));
             let Some((damping, next)) = found else {
@@ -189,8 +189,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .filter(|(i, _)| *i != out)
                 .map(|(_, c)| c.clone())
                 .collect();
-            let Step { usable, sizes, .. } =
-                stepped(&others, hypothesis, &coordinates, 0.0).unwrap_or_default();
+            let Step { usable, sizes, .. } = Equations::new(&others, hypothesis, &coordinates)
+                .step(0.0)
+                .unwrap_or_default();
             sum += cluster.square;
             for (&i, a) in usable.iter().zip(&sizes) {
                 let row = usable.iter().zip(&sizes);
@@ -244,41 +245,63 @@ pub(crate) struct Step {
     pub gain: f64,
 }
 
-/// The step that lowers the cost most within bounds; `None` where the equations are singular.
-pub(crate) fn stepped<const N: usize>(
-    clusters: &[Cluster],
-    hypothesis: &Hypothesis<N>,
-    coordinates: &[Coordinate],
-    damping: f64,
-) -> Option<Step> {
-    let mut normal = Normal::new(clusters, &priors(hypothesis, coordinates));
-    let plain = normal.gram.clone();
-    let usable: Vec<usize> = (0..coordinates.len())
-        .filter(|&i| normal.gram[(i, i)] > 0.0)
-        .collect();
-    regularise(&mut normal.gram, hypothesis, coordinates);
-    for &i in &usable {
-        normal.gram[(i, i)] *= 1.0 + damping;
+/// The normal equations of a step, with the room that bounds leave it.
+pub(crate) struct Equations {
+    normal: Normal,
+    regularised: Matrix,
+    /// Places of the unknowns that they decide anything about.
+    usable: Vec<usize>,
+    /// How far each of these may go down and up.
+    room: Vec<(f64, f64)>,
+}
+
+impl Equations {
+    pub(crate) fn new<const N: usize>(
+        clusters: &[Cluster],
+        hypothesis: &Hypothesis<N>,
+        coordinates: &[Coordinate],
+    ) -> Self {
+        let normal = Normal::new(clusters, &priors(hypothesis, coordinates));
+        let usable: Vec<usize> = (0..coordinates.len())
+            .filter(|&i| normal.gram[(i, i)] > 0.0)
+            .collect();
+        let mut regularised = normal.gram.clone();
+        regularise(&mut regularised, hypothesis, coordinates);
+        let room = usable.iter().map(|&i| {
+            let c = &coordinates[i];
+            let value = hypothesis.get(c.target);
+            (c.lower - value, c.upper - value)
+        });
+        Self {
+            room: room.collect(),
+            normal,
+            regularised,
+            usable,
+        }
     }
-    let bounds = |i: usize| {
-        let c = &coordinates[usable[i]];
-        let value = hypothesis.get(c.target);
-        (c.lower - value, c.upper - value)
-    };
-    let (sizes, _) = solve(&normal.gram, &normal.score, &usable, &bounds)?;
-    let gain = usable.iter().zip(&sizes).map(|(&i, a)| {
-        let bent: f64 = usable
-            .iter()
-            .zip(&sizes)
-            .map(|(&j, b)| plain[(i, j)] * b)
-            .sum();
-        a * (2.0 * normal.score[i] - bent)
-    });
-    Some(Step {
-        gain: gain.sum(),
-        usable,
-        sizes,
-    })
+
+    /// The step that lowers the cost most within bounds; `None` where the equations are singular.
+    pub(crate) fn step(&self, damping: f64) -> Option<Step> {
+        let (usable, score) = (&self.usable, &self.normal.score);
+        let mut damped = self.regularised.clone();
+        for &i in usable {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        let (sizes, _) = solve(&damped, score, usable, &|i| self.room[i])?;
+        let gain = usable.iter().zip(&sizes).map(|(&i, a)| {
+            let bent: f64 = usable
+                .iter()
+                .zip(&sizes)
+                .map(|(&j, b)| self.normal.gram[(i, j)] * b)
+                .sum();
+            a * (2.0 * score[i] - bent)
+        });
+        Some(Step {
+            gain: gain.sum(),
+            usable: usable.clone(),
+            sizes,
+        })
+    }
 }
 
 /// Shapes that the data hardly decide move no further than their own size in one step. An angle has no size of its own.

@@ -14,7 +14,7 @@ use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::departure;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, away_from_gaps, difference, margin, smooth};
-use crate::selection::fit::{Step, stepped};
+use crate::selection::fit::{Equations, Step};
 use crate::sensitivity::normal_equations::Cluster;
 use crate::trial_specific::component::shapes_of;
 
@@ -162,7 +162,8 @@ impl<const N: usize> PreparedSession<'_, N> {
             square: dot(&at.left, &at.left),
             rows: at.left.len(),
         };
-        let Step { usable, sizes, .. } = stepped(&[cluster], &at.hypothesis, coordinates, 0.0)?;
+        let Step { usable, sizes, .. } =
+            Equations::new(&[cluster], &at.hypothesis, coordinates).step(0.0)?;
         let mut all = vec![0.0; coordinates.len()];
         usable
             .iter()

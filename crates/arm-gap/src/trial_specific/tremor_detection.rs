@@ -5,9 +5,9 @@ use std::sync::Arc;
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
 use arm_core::{Contact, Joints, Pose, jacobian};
 use arm_numerics::Cholesky;
-use arm_numerics::linalg::matrix::dot;
 
 use crate::GapError;
+use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::repeats::same_rate;
 use crate::measurement_model::prediction::{Channels, Course, smooth};

@@ -3,3 +3,4 @@
 pub mod design;
 pub mod forecast;
 pub mod limit;
+pub mod results;

@@ -4,6 +4,7 @@
 //! one batch, so the derivatives come almost for nothing: they go in the lanes beside the run.
 
 use arm_sim::{Experiment, Recording, simulate_batch};
+use serde::Serialize;
 
 use crate::error::IdentError;
 use crate::inference::multistart::{Ended, best};
@@ -53,7 +54,7 @@ pub struct Recorded<'a, const N: usize> {
 }
 
 /// The run that comes closest.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fit {
     /// Value of each free parameter.
     pub values: Vec<f64>,

@@ -37,6 +37,7 @@ plain! {
     f64: "a number",
     bool: "True or False",
     usize: "a whole number",
+    i8: "a whole number",
     String: "a text",
     (f64, f64): "two numbers",
     [f64; 2]: "two numbers",

@@ -261,7 +261,7 @@ result_class! {
 
 result_class! {
     /// One round of the search.
-    Rung of core::Rung, in "armrs.workflows.gap" {
+    SearchStep of core::SearchStep, in "armrs.workflows.gap" {
         /// What was converged by simulation, best first.
         tried: Vec<core::Tried>, "";
         /// Misfit before the round.
@@ -284,5 +284,5 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<Limit>()?;
     m.add_class::<Suspect>()?;
     m.add_class::<Tried>()?;
-    m.add_class::<Rung>()
+    m.add_class::<SearchStep>()
 }

@@ -100,7 +100,7 @@ result_class! {
         /// Lack of fit, ratio and z, of the calibrated and of the amended model; NaN without repeats.
         lack: [Lack; 2], "";
         /// Rounds of the search.
-        ladder: Vec<core::Rung>, "";
+        search_trace: Vec<core::SearchStep>, "";
         /// What a reader should know of the data.
         warnings: Vec<String>, "";
         /// The model with the named effects, everything refitted.

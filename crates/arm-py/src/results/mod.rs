@@ -4,11 +4,15 @@ mod class;
 mod gap;
 mod gap_result;
 mod identified;
+mod planned;
+mod recorded;
 mod simulated;
 
 pub use gap::Alternative;
 pub use gap_result::{GapResult, Screening};
 pub use identified::Identification;
+pub use planned::{Design, Forecast, RunFit};
+pub use recorded::{Readings, Recording};
 pub use simulated::SimulatedTrial;
 
 use pyo3::prelude::*;
@@ -18,5 +22,8 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     gap::add(m)?;
     gap_result::add(m)?;
     identified::add(m)?;
+    planned::add(m)?;
+    m.add_class::<Readings>()?;
+    m.add_class::<Recording>()?;
     m.add_class::<SimulatedTrial>()
 }

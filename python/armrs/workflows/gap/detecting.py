@@ -68,8 +68,8 @@ def detectable(
         seeds = range(seed + repeats * number, seed + repeats * (number + 1))
         run = simulate(model, movement, dt=step, rate=instruments.rate, sensors=sensors, seeds=seeds)
         for repeat, read in enumerate(run.readings, start=1):
-            columns = {name: read[name] for name in ("q", "force_on_arm", "robot_q")}
-            trials.append(Trial(f"planned {number + 1}, {repeat}", f"planned {number + 1}", repeat, "fit", read["time"], **columns))
+            columns = {name: getattr(read, name) for name in ("q", "force_on_arm", "robot_q")}
+            trials.append(Trial(f"planned {number + 1}, {repeat}", f"planned {number + 1}", repeat, "fit", read.time, **columns))
     data = Dataset("planned", model, tuple(trials), force_on="arm", synthetic=True, tolerance=instruments.tolerance)
     seen = _armrs.look(_armrs.Rig(model, model.all_effects), core_trials(data), core_settings(data, True, threads))
     limits = [

@@ -40,8 +40,8 @@ def gap(result: GapFound) -> Figures:
     missing = _missing_torques(result)
     if all(missing.values()):
         figures["maps"] = partial(missing_torque, [j.name for j in result.dataset.model.joints], missing)
-    if result.ladder:
-        figures["ladder"] = partial(_ladder, result)
+    if result.search_trace:
+        figures["search_trace"] = partial(_search_trace, result)
     return figures | {_name_of(k, e): partial(_effect, result, k, e) for k, e in enumerate(result.effects)}
 
 
@@ -142,18 +142,18 @@ def missing_torque(joints: Sequence[str], found: Mapping[str, Sequence[maps.Disc
     return Drawn("maps", "Where the torque is missing", text, figure, "where")
 
 
-def _ladder(result: GapFound) -> Drawn:
+def _search_trace(result: GapFound) -> Drawn:
     """Draw what the contenders of each round explained."""
-    count = sum(len(rung.tried) for rung in result.ladder)
-    figure = plotting.figure(9.2, 0.36 * count + 0.45 * len(result.ladder) + 0.9)
+    count = sum(len(step.tried) for step in result.search_trace)
+    figure = plotting.figure(9.2, 0.36 * count + 0.45 * len(result.search_trace) + 0.9)
     ax = figure.subplots()
     y, ticks, labels = 0.0, [], []
-    for number, rung in enumerate(result.ladder, start=1):
+    for number, step in enumerate(result.search_trace, start=1):
         ax.text(0.0, y, f"round {number}", transform=ax.get_yaxis_transform(), ha="left", va="center", fontsize=9, fontweight="bold")
         y += 0.85
-        gains = [tried.gain for tried in rung.tried]
-        goes_on = min(range(len(gains)), key=lambda k, best=rung.before - rung.after, gains=gains: abs(gains[k] - best))  # type: ignore[misc]
-        for k, tried in enumerate(rung.tried):
+        gains = [tried.gain for tried in step.tried]
+        goes_on = min(range(len(gains)), key=lambda k, best=step.before - step.after, gains=gains: abs(gains[k] - best))  # type: ignore[misc]
+        for k, tried in enumerate(step.tried):
             ax.barh(y, max(tried.gain, 0.0), height=0.62, color=plotting.BLUE if k == goes_on else plotting.SILVER)
             ax.text(max(tried.gain, 0.0), y, f"  {tried.gain:.0f}", va="center", fontsize=9, color=plotting.INK)
             ticks.append(y)
@@ -173,7 +173,7 @@ def _ladder(result: GapFound) -> Drawn:
         "drawn here. The blue one pays best for its freedom and goes on; what no longer pays then is taken out again, so that fewer "
         "may be named in the end."
     )
-    return Drawn("ladder", "The evidence, round by round", text, figure, "evidence")
+    return Drawn("search_trace", "The evidence, round by round", text, figure, "evidence")
 
 
 def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:

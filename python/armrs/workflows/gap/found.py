@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ... import _armrs
-from ..._armrs import Absorbed, ChannelGap, GapResult, Limit, Missing, Place, Rung, SimulatedTrial
+from ..._armrs import Absorbed, ChannelGap, GapResult, Limit, Missing, Place, SearchStep, SimulatedTrial
 from ...io.dataset import Dataset
 from ...model import Model
 from ...tabular import Labelled, Series, Tabular, Tidy, over_trials
@@ -42,7 +42,7 @@ class GapFound(Tabular, Series):
     absorbed : tuple of Absorbed
     lack : ((float, float), (float, float))
         Lack of fit, ratio and z, of the calibrated and of the amended model; NaN without repeats.
-    ladder : tuple of Rung
+    search_trace : tuple of SearchStep
         Rounds of the search.
     warnings : tuple of str
     model : Model
@@ -101,9 +101,9 @@ class GapFound(Tabular, Series):
         return self.result.lack
 
     @cached_property
-    def ladder(self) -> tuple[Rung, ...]:
+    def search_trace(self) -> tuple[SearchStep, ...]:
         """Rounds of the search."""
-        return self.result.ladder
+        return self.result.search_trace
 
     @property
     def warnings(self) -> tuple[str, ...]:

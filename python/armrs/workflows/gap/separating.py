@@ -166,15 +166,15 @@ def _recorded(model: Model, movement: Movement, rate: float, force: float) -> Tr
     except ArmrsError:
         return None
     read = run.readings[0]
-    if np.abs(read["force_on_arm"]).max() > force or read.get("robot_q") is None:
+    if read.force_on_arm is None or read.robot_q is None or np.abs(read.force_on_arm).max() > force:
         return None
     return Trial(
         file="planned",
         configuration="planned",
         repeat=1,
         role="fit",
-        t=read["time"],
-        q=read["q"],
-        force_on_arm=read["force_on_arm"],
-        robot_q=read["robot_q"],
+        t=read.time,
+        q=read.q,
+        force_on_arm=read.force_on_arm,
+        robot_q=read.robot_q,
     )
