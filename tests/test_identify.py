@@ -15,7 +15,7 @@ import armrs
 from armrs.analysis.quantities import value_in
 from armrs.catalogue import catalogue
 from armrs.cli import main
-from armrs.workflows import demo
+from armrs.workflows import demo, identify
 from armrs.workflows.demo import BRAKES
 
 # DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
@@ -328,3 +328,9 @@ def test_an_arm_of_which_little_is_known_is_identified_with_default_options(tmp_
     assert all(abs(e.value - value) < 3.5 * e.std for e, value in values)
     alone = armrs.identify(dataset, with_effects=())
     assert not [e for e in alone.parameters if e.kind in ("elastic", "viscous", "coulomb")]
+
+
+def test_the_cascade_says_where_a_movement_is_not_quasi_static() -> None:
+    """With 0.37 rad/s and 0.28 rad/s² it gave a first moment of 0.6278 ± 0.0027 for 0.7011, and no word."""
+    (line,) = identify._not_quasi_static([5.2, 0.4])
+    assert line.startswith("not quasi-static: inertia, which the cascade neglects, moves the first moment of joint 1 by 5.2 standard deviations")

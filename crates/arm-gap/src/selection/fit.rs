@@ -419,3 +419,59 @@ fn precision_of<const N: usize>(
     }
     Precision { coordinates, sd }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn equations(gram: f64, score: f64, room: (f64, f64)) -> Equations {
+        let matrix = || Matrix::from_fn(1, 1, |_, _| gram);
+        Equations {
+            normal: Normal {
+                gram: matrix(),
+                score: vec![score],
+                square: 0.0,
+                rows: 10,
+            },
+            regularised: matrix(),
+            usable: vec![0],
+            room: vec![room],
+        }
+    }
+
+    /// Of a parabola of curvature 4 with its minimum at 3: the step, half of it when damped by one, and what each gains.
+    #[test]
+    fn damping_shortens_a_step_and_the_gain_is_that_of_the_undamped_equations() {
+        let free = equations(4.0, 12.0, (-10.0, 10.0));
+        let step = |damping| free.step(damping).expect("not singular");
+        let (plain, damped) = (step(0.0), step(1.0));
+        let near = |step: &Step, size: f64, gain: f64| {
+            (step.sizes[0] - size).abs() < 1e-12 && (step.gain - gain).abs() < 1e-12
+        };
+        assert!(near(&plain, 3.0, 36.0) && near(&damped, 1.5, 27.0));
+        let bounded = equations(4.0, 12.0, (-1.0, 1.0)).step(0.0).expect("a step");
+        assert!(near(&bounded, 1.0, 20.0));
+    }
+
+    /// A law that may miss as much as noise leaves widens the intervals by the square root of two, others not at all.
+    #[test]
+    fn what_a_law_may_miss_widens_its_intervals() {
+        let coordinate = |joint| Coordinate {
+            target: Target::Known(joint, 0),
+            prior: None,
+            lower: 0.0,
+            upper: 1.0,
+            step: 1e-3,
+        };
+        let mut precision = Precision {
+            coordinates: vec![coordinate(0), coordinate(1)],
+            sd: vec![0.1, 0.2],
+        };
+        precision.widen(|t| t == Target::Known(0, 0), 1.0);
+        assert!((precision.sd[0] - 0.1 * libm::sqrt(2.0)).abs() < 1e-15);
+        assert_eq!(precision.sd[1], 0.2);
+        precision.widen(|_| true, -1.0);
+        assert_eq!(precision.sd[1], 0.2);
+        assert!((Precision::BESIDE - Precision::ALONG * Precision::ALONG).abs() < 1e-15);
+    }
+}

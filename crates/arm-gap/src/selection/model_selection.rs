@@ -434,3 +434,27 @@ fn others(own: &Candidate, named: &[Candidate], library: &Library) -> Vec<usize>
         .filter(|&c| is_other(&library.candidates[c]))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    /// Dry friction stands for a family of laws and may miss 3 %: what is near its joint may be that, elsewhere a quarter of it.
+    #[test]
+    fn an_effect_must_explain_more_than_the_law_of_another_misses() {
+        let friction = Effect::<f64>::new(Kind::Coulomb, 1);
+        let missed = friction.kind.probe().missed;
+        assert_eq!(missed, 0.03);
+        let in_joint = |kind, joint| mimicked(&Effect::<f64>::new(kind, joint), &friction, 1000.0);
+        assert_eq!(in_joint(Kind::Viscous, 1), 1000.0 * missed);
+        assert_eq!(in_joint(Kind::Viscous, 0), 1000.0 * missed * ELSEWHERE);
+        // A spring over joints 1 and 2 acts in both, a bias of the sensor in none.
+        assert_eq!(in_joint(Kind::Biarticular, 1), 1000.0 * missed);
+        assert_eq!(in_joint(Kind::ForceBias, 0), 1000.0 * missed * ELSEWHERE);
+        // An exact law misses next to nothing.
+        let spring = Effect::<f64>::new(Kind::Elastic, 1);
+        assert!(mimicked(&friction, &spring, 1000.0) <= 1000.0 * FLOOR);
+    }
+}

@@ -3,6 +3,7 @@
 mod candidates;
 mod preparing;
 mod responses;
+mod screening;
 mod search;
 mod sessions;
 mod swinging;

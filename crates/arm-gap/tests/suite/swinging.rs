@@ -93,3 +93,21 @@ fn a_free_arm_tells_no_mass_by_itself_and_a_led_one_has_no_free_run() {
         .expect("nothing to run");
     assert!(none.is_empty());
 }
+
+/// A viscosity that is known to 5 % is found by the amplitude of simulated runs of 2 s, from 15 % too much.
+#[test]
+fn a_free_swing_is_fitted_by_its_simulated_amplitude() {
+    use arm_gap::data::prepared_session::PreparedSession;
+    let mut session = swinging(6.0);
+    for effect in &mut session.effects {
+        effect.parameters[0] *= 1.15;
+    }
+    let prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let (fitted, _) = prepared.calibrate().expect("a calibration");
+    let (found, precision) = prepared.refined(&fitted).expect("a free swing");
+    for (j, effect) in found.known.iter().enumerate() {
+        let viscosity = effect.parameters[0];
+        assert!((viscosity - 0.1).abs() < 0.002, "joint {j}: {viscosity}");
+    }
+    assert_eq!(precision.sd.len(), session.nuisances().len());
+}
