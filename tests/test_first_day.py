@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import json
 import subprocess
@@ -16,17 +17,19 @@ import pyarrow.parquet as pq
 import pytest
 
 import armrs
-from armrs import cli
+from armrs import anthropometry, cli
+from armrs.analysis import balance
 from armrs.errors import BadInput
 from armrs.io.raw import RawTable, read_raw
 from armrs.io.raw.table import Remark, column, remarks_of
 from armrs.report import console, html, moving, plotting
-from armrs.workflows import demo
+from armrs.workflows import demo, setup
 from armrs.workflows.importing import clock, handle
 from armrs.workflows.importing.columns import symbol_of
 from armrs.workflows.importing.recipe import load_recipe
 from armrs.workflows.importing.remarks import timed
 from armrs.workflows.importing.samples import cleaned
+from armrs.workflows.residuals import residuals
 from test_import_sources import on_a_terminal
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -188,6 +191,67 @@ def test_remarks_of_every_kind_of_table_are_kept(tmp_path: Path) -> None:
     for name in ("a.xlsx", "a.parquet", "a.csv"):
         (table,) = read_raw(tmp_path / name)
         assert table.remarks == (Remark("note", 4, "cough"),), name
+
+
+def some(dataset: armrs.Dataset, *configurations: str) -> armrs.Dataset:
+    return dataset.replace(trials=tuple(t for t in dataset.trials if t.configuration in configurations))
+
+
+def in_pounds(dataset: armrs.Dataset) -> armrs.Dataset:
+    """Newtons that were read as pounds."""
+    return dataset.replace(trials=tuple(dataclasses.replace(t, force_on_arm=4.4482216 * t.force_on_arm) for t in dataset.trials))
+
+
+def test_forces_in_another_unit_and_another_body_are_told(imported: Path, tmp_path: Path) -> None:
+    """The springs took up what the weight of the arm left, and nothing was said."""
+    dataset = armrs.load_dataset(imported)
+    assert setup.other_weight(dataset) is None
+    wrong = in_pounds(dataset)
+    found = setup.other_weight(wrong)
+    assert found is not None and found.factor == pytest.approx(4.8, abs=0.3) and found.apart > 10.0
+    said = "times the masses and first moments of the model"
+    small = armrs.identify(some(wrong, "elbow", "reach", "raised"), with_effects="elastic,viscous")
+    assert not small.is_sound and any(said in line and "forces stated in lbf that are N" in line for line in small.contradictions)
+    checked = armrs.check_dataset(armrs.write_dataset(wrong, tmp_path / "pounds"))
+    assert [p.next_step for p in checked.problems if said in p.text] == [
+        "correct the unit of the forces and import again, or body mass (armrs init) or masses (model.toml)"
+    ]
+    lengths = [s.length for s in dataset.model.segments]
+    heavy = anthropometry.literature_model(armrs.Subject(93.0, 1.75, "male"), lengths).replace(robot=dataset.model.robot)
+    found = setup.other_weight(dataset.replace(model=heavy))
+    assert found is not None and found.factor == pytest.approx(0.74, abs=0.05) and found.apart > 2.0
+    assert "a wrong body mass" in str(found) and "lbf" not in str(found)
+    assert setup.other_weight(dataset.replace(model=heavy.replace(gravity=0.0))) is None
+    assert balance.weight_of(dataset.model, [still(dataset)]) is None
+
+
+def still(dataset: armrs.Dataset) -> balance.Motion:
+    """An arm that stands: its weight and a constant moment are the same then."""
+    trial = dataset.trials[0]
+    n = len(trial.t)
+    motion = balance.motion_of([(trial.t, np.tile(trial.q[:1], (n, 1)), np.tile([1.0, 2.0], (n, 1)), None)])
+    assert motion is not None
+    return motion
+
+
+def test_one_trial_says_what_it_cannot_tell(imported: Path) -> None:
+    """Its intervals were as those of repeats, and nothing was said."""
+    dataset = armrs.load_dataset(imported)
+    one = armrs.identify(dataset.replace(trials=some(dataset, "reach").trials[:1]))
+    (line,) = [line for line in one.warnings if line.startswith("one fit trial")]
+    wide = {f"{e.name} of joint {e.joint}" for e in one.parameters if e.kind != "segment" and e.std > 0.25 * abs(e.value)}
+    assert wide and all(name in line for name in wide) and line.endswith("record repeats of each movement")
+
+
+def test_a_fit_at_the_noise_is_not_called_poor(imported: Path) -> None:
+    """28 % of the variation were left in a wrist that hardly resists: noise, as the repeats say."""
+    dataset = some(armrs.load_dataset(imported), "elbow", "reach", "raised")
+    found = armrs.identify(dataset)
+    left = residuals(found.explained)
+    assert max(r.share for r in left) > 0.2 > max(r.lacking for r in left)
+    assert not [line for line in found.warnings if "of the variation" in line]
+    poor = armrs.identify(dataset, with_effects=())
+    assert [line for line in poor.warnings if "of the variation" in line and "alike in all repeats: the model does not describe" in line]
 
 
 def test_robot_angles_that_do_not_hold_the_hand_are_told(tmp_path: Path) -> None:

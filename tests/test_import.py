@@ -370,6 +370,44 @@ def test_the_name_of_a_movement_keeps_its_letters(recording: Recording) -> None:
     assert [(n.configuration, n.repeat) for n in named] == list(expected.values()) and not left
 
 
+def _bare(title: str, channels: str) -> RawTable:
+    names = {"angles": SI[:3], "forces": [SI[0], *SI[3:]], "both": SI}[channels]
+    return RawTable(Path(f"{title}.csv"), title, tuple(column(name, np.arange(5.0)) for name in names), ())
+
+
+@pytest.mark.parametrize(
+    ("angles", "forces", "expected"),
+    [
+        (("slow_1_angles", "slow_2_angles"), ("slow_1_force", "slow_2_force"), [("slow", 1), ("slow", 2)]),
+        (("slow_1_mocap", "fast_1_mocap"), ("slow_1_ati", "fast_1_ati"), [("slow", 1), ("fast", 1)]),
+        (
+            ("Winkel_S7_langsam_1", "Winkel_S7_langsam_2"),
+            ("Kraft S7 langsam 1", "Kraft S7 langsam 2"),
+            [("s7-langsam", 1), ("s7-langsam", 2)],
+        ),
+    ],
+)
+def test_forces_in_files_of_their_own_keep_the_repeats(angles: tuple[str, ...], forces: tuple[str, ...], expected: list[object]) -> None:
+    """Words of what was measured, and of the device, made each file a movement of its own."""
+    named, left, _ = trials.arrange([*(_bare(a, "angles") for a in angles), *(_bare(f, "forces") for f in forces)])
+    assert [(n.configuration, n.repeat) for n in named] == expected and not left
+    assert [n.forces and n.forces.title for n in named] == list(forces)
+
+
+def test_a_word_of_the_role_is_no_movement() -> None:
+    """`slow_3_test` was the movement `slow-3-test`, beside which `slow` had two repeats; `Test 1` and `Test 2` were all kept apart."""
+    named, _, why = trials.arrange([_bare(t, "both") for t in ("slow_1", "slow_2", "slow_3_test", "fast_1", "fast_2_probe")])
+    found = [(n.configuration, n.repeat, n.role) for n in named]
+    expected = [("slow", 1, "fit"), ("slow", 2, "fit"), ("slow", 3, "test"), ("fast", 1, "fit"), ("fast", 2, "test")]
+    assert (found, why) == (expected, "from the names of the files")
+    named, _, _ = trials.arrange([_bare(t, "both") for t in ("Test 1", "Test 2", "Test 3")])
+    assert [(n.configuration, n.repeat, n.role) for n in named] == [("test", 1, "fit"), ("test", 2, "fit"), ("test", 3, "test")]
+    named, _, _ = trials.arrange(
+        [*(_bare(t, "angles") for t in ("slow_1", "slow_2_test")), *(_bare(f"slow_{k}_kraft", "forces") for k in (1, 2))]
+    )
+    assert [(n.repeat, n.role, n.forces and n.forces.title) for n in named] == [(1, "fit", "slow_1_kraft"), (2, "test", "slow_2_kraft")]
+
+
 def test_sheets_of_a_workbook_are_trials_by_their_titles(recording: Recording, tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
@@ -408,11 +446,19 @@ def test_repeats_that_are_counted_from_zero(recording: Recording, tmp_path: Path
 
 
 def test_an_import_replaces_a_former_one_whole_and_nothing_of_another_origin(recording: Recording, tmp_path: Path) -> None:
-    """Trials of a former import stayed beside those of the next, and the model that `armrs init` had written was replaced."""
+    """What was edited was lost; trials of a former import stayed beside those of the next; and the model of `armrs init` was replaced."""
     names, values = table(recording, names=SI)
     sources = [write_text(tmp_path / f"slow_{k}.csv", names, repeated(values, k)) for k in (1, 2, 3)]
-    armrs.import_recordings(sources, tmp_path / "set", model=KNOWN)
-    armrs.import_recordings(sources[:1], tmp_path / "set", model=KNOWN)
+    made = armrs.import_recordings(sources, tmp_path / "set", model=KNOWN)
+    with (made.folder / "dataset.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[tolerance]\nforce_bias_N = 0.5\n")
+    for again in (sources[:1], [made.folder / "import.toml"]):
+        with pytest.raises(
+            BadInput, match=r"set: -o: found the data set of a former import, allowed .* or --force, which replaces it whole"
+        ):
+            armrs.import_recordings(again, tmp_path / "set", model=KNOWN)
+    assert armrs.load_dataset(made.folder).tolerance.force_bias_N == 0.5 and len(list((made.folder / "trials").iterdir())) == 3
+    armrs.import_recordings(sources[:1], tmp_path / "set", model=KNOWN, replace=True)
     assert [path.name for path in (tmp_path / "set" / "trials").iterdir()] == ["slow_1.csv"]
     subject = armrs.initialise(tmp_path / "subject", body_mass=78.0, height=1.80, sex="male", lengths=(0.322, 0.264))
     before = (subject.folder / "model.toml").read_bytes()

@@ -29,6 +29,8 @@ _FIRST_MOMENTS = (0.5, 1.6)
 """First moments relative to the model's: literature values are that far off at most."""
 _INERTIA = (0.3, 3.0)
 """Inertia relative to the model's."""
+_NOTHING, _ALIKE = 1e-6, 1e8
+"""A regressor of less than this part of the largest does not act; regressors with a greater condition number are not told apart."""
 _ELASTIC, _CONSTANT, _VISCOUS, _DRY = 5.0, 5.0, 3.0, 1.0
 """Most of the passive laws, in weight moments of the whole stretched arm per rad, alone, per rad/s and alone."""
 
@@ -97,26 +99,70 @@ def unexplained(model: Model, motion: Motion) -> float:
     """
     from scipy.optimize import lsq_linear
 
-    arm = _armrs.Arm.from_model(model)
-    n, joints = motion.q.shape
-    torque = np.einsum("nij,ni->nj", arm.jacobian(motion.q)[:, :2, :], motion.force) + motion.moment[:, None]
-    regressor = arm.regressor(motion.q, motion.speed, motion.acceleration)
-    weight = model.gravity * float(np.sum(np.abs(arm.first_moments)))
-    columns = [*np.moveaxis(regressor[:, :, :joints] * np.array(arm.first_moments), 2, 0)]
-    columns.append(regressor[:, :, 2 * joints :] @ np.array(arm.second_moments))
-    bounds = [*[_FIRST_MOMENTS] * joints, _INERTIA]
-    for j in range(joints):
-        for law, least, most in (
-            (motion.q[:, j], 0.0, _ELASTIC),
-            (np.ones(n), -_CONSTANT, _CONSTANT),
-            (motion.speed[:, j], 0.0, _VISCOUS),
-            (np.tanh(motion.speed[:, j] / _CREEPING), 0.0, _DRY),
-        ):
-            columns.append(np.outer(law, np.eye(joints)[j]))
-            bounds.append((least * weight, most * weight))
+    torque, segments, inertia, passive = _terms(model, motion)
+    weight = model.gravity * float(np.sum(np.abs(_armrs.Arm.from_model(model).first_moments)))
+    columns = [*segments, inertia, *passive]
+    laws = ((0.0, _ELASTIC), (-_CONSTANT, _CONSTANT), (0.0, _VISCOUS), (0.0, _DRY))
+    bounds = [*[_FIRST_MOMENTS] * len(segments), _INERTIA]
+    bounds += [(least * weight, most * weight) for _ in range(model.n_joints) for least, most in laws]
     # What matters of the tall system is its triangle.
-    triangle: np.ndarray = np.linalg.qr(np.column_stack([*(c.ravel() for c in columns), torque.ravel()]), mode="r")  # type: ignore[assignment]
+    triangle: np.ndarray = np.linalg.qr(np.column_stack([*columns, torque]), mode="r")  # type: ignore[assignment]
     low, high = (np.array(b) for b in zip(*bounds, strict=True))
     solved = lsq_linear(triangle[:-1, :-1], triangle[:-1, -1], (low, high), method="bvls")
     size = float(np.sum(torque**2))
     return float(np.sqrt((2.0 * solved.cost + triangle[-1, -1] ** 2) / size)) if size > 0.0 else 1.0
+
+
+def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | None:
+    """Return how many times heavier than its model the arm is by the contact torques, and the standard deviation.
+
+    Least squares over one factor of gravity and inertia of all segments, and the passive laws of `unexplained`, without bounds. The
+    deviation is that between motions (sandwich estimate), of a single one between its quarters.
+
+    Parameters
+    ----------
+    model : Model
+    motions : sequence of Motion
+        Whose errors are independent of each other.
+
+    Returns
+    -------
+    (float, float) or None
+        None where the motions do not tell the weight from springs of the joints.
+    """
+    rows = []
+    for motion in _quarters(motions[0]) if len(motions) == 1 else motions:
+        torque, segments, inertia, passive = _terms(model, motion)
+        rows.append((np.column_stack([np.sum(segments, axis=0) + inertia, *passive]), torque))
+    whole = np.sum([a.T @ a for a, _ in rows], axis=0)
+    size = np.sqrt(np.diag(whole))
+    moved = size > _NOTHING * size.max()
+    if not moved[0] or np.linalg.cond((whole / np.outer(size, size))[np.ix_(moved, moved)]) > _ALIKE:
+        return None
+    inverse = np.linalg.inv(whole[np.ix_(moved, moved)])
+    found = inverse @ np.sum([a[:, moved].T @ torque for a, torque in rows], axis=0)
+    scatter = [a[:, moved].T @ (torque - a[:, moved] @ found) for a, torque in rows]
+    spread = inverse @ np.sum([np.outer(s, s) for s in scatter], axis=0) @ inverse * len(rows) / (len(rows) - 1)
+    return float(found[0]), float(np.sqrt(spread[0, 0]))
+
+
+def _quarters(motion: Motion) -> list[Motion]:
+    """Return the four quarters of a motion."""
+    pieces = np.array_split(np.arange(len(motion.q)), 4)
+    return [Motion(motion.q[p], motion.speed[p], motion.acceleration[p], motion.force[p], motion.moment[p]) for p in pieces]
+
+
+def _terms(model: Model, motion: Motion) -> tuple[np.ndarray, list[np.ndarray], np.ndarray, list[np.ndarray]]:
+    """Return the contact torques, and what they balance: each first moment, inertia, and the passive laws of each joint; all flat [N m]."""
+    arm = _armrs.Arm.from_model(model)
+    n, joints = motion.q.shape
+    torque = np.einsum("nij,ni->nj", arm.jacobian(motion.q)[:, :2, :], motion.force) + motion.moment[:, None]
+    regressor = arm.regressor(motion.q, motion.speed, motion.acceleration)
+    segments = [*np.moveaxis(regressor[:, :, :joints] * np.array(arm.first_moments), 2, 0)]
+    inertia = regressor[:, :, 2 * joints :] @ np.array(arm.second_moments)
+    passive = [
+        np.outer(law, np.eye(joints)[j])
+        for j in range(joints)
+        for law in (motion.q[:, j], np.ones(n), motion.speed[:, j], np.tanh(motion.speed[:, j] / _CREEPING))
+    ]
+    return torque.ravel(), [s.ravel() for s in segments], inertia.ravel(), [law.ravel() for law in passive]

@@ -198,6 +198,7 @@ def import_(
     points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the midpoint.")] = "",
     rate_hz: Annotated[float | None, typer.Option(help="Sample rate of recordings without a column of time [Hz].")] = None,
     ask: Annotated[bool, typer.Option("--ask", help="Ask for each column on the terminal, with a guess and its reason.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the data set of a former import, with what was edited in it.")] = False,
     json: JsonFile = None,
 ) -> None:
     """Convert recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO, exports of Vicon, Qualisys, OptiTrack) into a data set.
@@ -216,6 +217,7 @@ def import_(
     options = {
         "angles": angles and angles.value, "zero": zero and zero.value, "clockwise": joints,
         "force_on": force_on and force_on.value, "points": listed(points), "rate": rate_hz,
+        "replace": force,
     }  # fmt: skip
     talking = on_a_terminal()
     if ask and not talking:
@@ -288,7 +290,7 @@ def _after_check(done: Checked, dataset: Path) -> str:
     place = shlex.quote(str(dataset))
     if done.errors:
         return f"correct the errors above, then armrs check {place} again"
-    able = [f"armrs {v.verb} {place} -o {v.verb}" for v in done.verbs if v.able and v.verb != "passive"]
+    able = [f"armrs {v.verb} {place} -o {'identified' if v.verb == 'identify' else v.verb}" for v in done.verbs if v.able and v.verb != "passive"]
     return ", then ".join(able) or "record forces or joint torques beside the angles"
 
 

@@ -192,6 +192,10 @@ def _remedy(error: ArmrsError) -> str:
 
 
 _WARNINGS = (
+    (
+        "times the masses",
+        "correct the unit of the forces and import again, or body mass (armrs init) or masses (model.toml)",
+    ),
     ("saturated", "record with a larger range of the sensor, or leave these trials out"),
     ("no samples from", "fill the gap or record the movement again; where it was, nothing is compared"),
     ("samples are missing", "record these repeats again, or leave them out"),

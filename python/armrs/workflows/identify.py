@@ -22,26 +22,9 @@ from ..io.trial import Trial, refuse_moving_base
 from ..model import Effect, Model, Tolerance
 from ..tabular import SYMBOLS, Labelled, Series, Tabular, Tidy, over_trials
 from ..telling import telling
-from .setup import examine_setup
-
-
-@dataclass(frozen=True, eq=False)
-class Explained:
-    """How a fitted model explains one trial, after the common low-pass.
-
-    Attributes
-    ----------
-    trial : Trial
-    t : ndarray, shape (m,)
-        Times of the samples that were used [s].
-    measured, fitted : ndarray, shape (m, n_joints)
-        Joint torques that the measurement asks for, and those of the fitted model [N m].
-    """
-
-    trial: Trial
-    t: np.ndarray
-    measured: np.ndarray
-    fitted: np.ndarray
+from .residuals import Explained as Explained
+from .residuals import Residual, poor_fits, residuals, without_fit
+from .setup import Weight, examine_setup, other_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +259,7 @@ def identify(
     unproved = examine_setup(dataset)
     with naming_trials(dataset.trials):
         found, follows = _identified(_armrs.Rig(model, effects), settings, dataset)
-    return _result(dataset, found, effects, (*unproved, *follows))
+    return _result(dataset, found, effects, (*unproved, *follows), other_weight(dataset))
 
 
 def _checked(
@@ -301,7 +284,7 @@ def _checked(
     return None if with_effects is None and method == "joint" else kinds
 
 
-def _result(dataset: Dataset, found: Identification, effects: list[Effect], follows: Sequence[str]) -> Identified:
+def _result(dataset: Dataset, found: Identification, effects: list[Effect], follows: Sequence[str], weight: Weight | None) -> Identified:
     """Return what the core found, with what is to be said of it."""
     model = dataset.model
     noisy = _noisy_speeds(found.speed_noise)
@@ -310,7 +293,8 @@ def _result(dataset: Dataset, found: Identification, effects: list[Effect], foll
     )
     calibration = _moved_by_data(calibration, dataset.tolerance)
     # Without a load there is no torque that a residual could be a part of.
-    shares = [] if found.scale_free else _residual_shares(Identified(found, dataset).explained)
+    left: Sequence[Residual] = () if found.scale_free else residuals(Identified(found, dataset).explained)
+    impossible = weight is not None and weight.apart > _BEYOND
     told = found.replace(
         parameters=parameters,
         combinations=combinations,
@@ -318,14 +302,17 @@ def _result(dataset: Dataset, found: Identification, effects: list[Effect], foll
         contradictions=(
             *_contradictions(parameters),
             *_beyond_tolerance(calibration, dataset.tolerance, _BEYOND, np.inf),
-            *_misfits(shares, _NO_FIT, np.inf),
+            *without_fit(left),
+            *([str(weight)] if impossible else []),
         ),
         misfits=(
-            *_misfits(shares, _POOR, _NO_FIT),
+            *poor_fits(left),
+            *([] if weight is None or impossible else [str(weight)]),
             *_beyond_segment(model, parameters),
             *(f"{line}: what the model lacks may be in it" for line in _beyond_tolerance(calibration, dataset.tolerance, _FAR, _BEYOND)),
             *noisy,
             *_not_quasi_static(found.neglected_inertia),
+            *_alone(dataset, parameters),
         ),
         left_out=(*follows, *_left_out(found.method, effects), *_unmoved(found.method, parameters)),
     )
@@ -428,10 +415,8 @@ _FAR = 2.0
 """A calibration this many times its tolerance, which is its standard deviation beforehand, may stand for something else."""
 _BEYOND = 5.0
 """A calibration this many times its tolerance is no calibration."""
-_POOR = 0.2
-"""A residual above this share of the variation of a torque is a poor fit."""
-_NO_FIT = 0.5
-"""And above this, none."""
+_WIDE = 0.25
+"""A standard deviation above this part of its value is a wide one."""
 _ROUNDING = 1e-12
 """What of a length is beyond another by this part of it is a difference of equal numbers."""
 
@@ -442,6 +427,19 @@ def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
         f"{e.name} was driven to its lower limit: does force_on name the right side, and does the robot fit?"
         for e in parameters
         if e.kind == "segment" and e.decided_by == "bound" and e.name.startswith("m") and abs(e.value) <= 1e-2 * abs(e.interval[1])
+    )
+
+
+def _alone(dataset: Dataset, parameters: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return that one trial was fitted, which tells nothing of what repeats differ by, with the joint laws whose intervals are wide."""
+    if len(dataset.fit_trials) != 1:
+        return ()
+    laws = [e for e in parameters if e.kind != "segment" and e.decided_by == "data" and e.std > _WIDE * abs(e.value)]
+    names = ", ".join(dict.fromkeys(f"{e.name} of joint {e.joint}" for e in laws))
+    wide = f"; wide, more than {_WIDE:.0%} of the value: {names}" if names else ""
+    return (
+        "one fit trial: how repeats differ is not known, so the intervals hold for this one recording, its handle and its calibration"
+        f"{wide}; record repeats of each movement",
     )
 
 
@@ -480,22 +478,6 @@ def _moved_by_data(calibration: Sequence[Estimate], tolerance: Tolerance) -> tup
 def _promised(calibration: Estimate, tolerance: Tolerance) -> float:
     """Return the tolerance that a calibration has."""
     return float(next(getattr(tolerance, key) for start, key in _TOLERANCES.items() if calibration.name.startswith(start)))
-
-
-def _residual_shares(explained: Sequence[Explained]) -> list[float]:
-    """Return how much of the variation of every joint's torque the fitted model leaves, over the fit trials."""
-    measured = np.concatenate([e.measured for e in explained if e.trial.role == "fit"])
-    rest = np.concatenate([e.measured - e.fitted for e in explained if e.trial.role == "fit"])
-    return [float(r / m) if m > 0 else 0.0 for m, r in zip(np.std(measured, axis=0), np.std(rest, axis=0), strict=True)]
-
-
-def _misfits(shares: Sequence[float], above: float, upto: float) -> tuple[str, ...]:
-    """Return the joints that leave a share of their torque between two limits, a line each."""
-    return tuple(
-        f"the residual of joint {j} is {share:.0%} of the variation of its torque: the model does not describe these data"
-        for j, share in enumerate(shares, start=1)
-        if above < share <= upto
-    )
 
 
 NOISY_SPEED = "noisy speed"

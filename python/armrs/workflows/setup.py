@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.balance import SAMPLES, Motion, motion_of, unexplained
+from ..analysis.balance import SAMPLES, Motion, motion_of, unexplained, weight_of
 from ..errors import BadInput, Text
 from ..io import readings
 from ..io.dataset import Dataset
@@ -38,6 +39,15 @@ _TIED, _MUCH = 4.0, 0.125
 _UNPROVED = 1.5
 """A reading that leaves less than this many times what the given one does is not excluded (in the right setup forces read otherwise leave
 3 times as much, and angles of shoulder and elbow: 22 sessions of two worlds; a mirrored wrist 1.2 to 2.4 times)."""
+_OTHER_WEIGHT, _MUCH_HEAVIER = 2.0, 0.1
+"""Another weight is told from so many standard deviations on, and from this part of the weight on: 47 right sessions of two worlds lie
+within both (factors 0.85 to 1.10)."""
+_FEW = 3
+"""Movements from which on their differences, and not those of trials, are the scatter of the weight."""
+_UNITS = {"lbf": 4.4482216, "kgf": 9.80665}
+"""Other units of force [N]."""
+_SAME_UNIT = 0.3
+"""A factor this close to that of a unit suggests it: literature and springs are wrong by as much."""
 _STEPS = (np.radians(10.0), np.radians(1.0))
 """Steps in which another zero of an angle is looked for [rad]."""
 
@@ -132,6 +142,50 @@ def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool
     share = f"{100 * given:.0f} %" if given < 1.0 else "all"
     found = Text(f"{share} of the contact torques unexplained by gravity and passive joints, {100 * left:.2g} % if read otherwise")
     return BadInput(best.place, found, best.allowed + also)
+
+
+@dataclass(frozen=True)
+class Weight:
+    """How heavy the arm is by the forces.
+
+    Attributes
+    ----------
+    factor, std : float
+        Times the weight of the model, and the standard deviation of that.
+    apart : float
+        Standard deviations from the model, whose own uncertainty counts.
+    """
+
+    factor: float
+    std: float
+    apart: float
+
+    def __str__(self) -> str:
+        found = f"the movements ask for {self.factor:.2f} ± {self.std:.2f} times the masses and first moments of the model, in all segments"
+        units = [
+            f"forces stated in {wrong} that are {right}"
+            for unit, newtons in _UNITS.items()
+            for ratio, wrong, right in ((newtons, unit, "N"), (1.0 / newtons, "N", unit))
+            if abs(self.factor / ratio - 1.0) < _SAME_UNIT
+        ]
+        causes = " or ".join([*units, "a wrong body mass", "a mass that the model lacks"])
+        return f"{found}, {self.apart:.1f} standard deviations from it: {causes}?"
+
+
+def other_weight(dataset: Dataset) -> Weight | None:
+    """Return how heavy the arm is, where that contradicts the masses of the model; None where it does not, or cannot be told."""
+    model, trials = dataset.model, balanced_trials(dataset)
+    if model.gravity == 0.0 or dataset.added:
+        return None
+    names = list(dict.fromkeys(t.configuration for t in trials))
+    groups = [[t for t in trials if t.configuration == name] for name in names] if len(names) >= _FEW else [[t] for t in trials]
+    motions = [motion for group in groups if (motion := _motion(group, SAMPLES // len(groups))) is not None]
+    found = weight_of(model, motions) if motions else None
+    if found is None:
+        return None
+    factor, std = found
+    apart = abs(factor - 1.0) / float(np.hypot(np.hypot(std, model.segment_uncertainty), dataset.tolerance.force_gain))
+    return Weight(factor, std, apart) if apart > _OTHER_WEIGHT and abs(factor - 1.0) > _MUCH_HEAVIER else None
 
 
 def _unproved(model: Model, motion: Motion, *, met: bool) -> list[str]:

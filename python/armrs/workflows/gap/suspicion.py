@@ -13,7 +13,7 @@ from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.plausibility import refuse_implausible
 from ...io.trial import Trial, constant
-from ..setup import examine_setup
+from ..setup import examine_setup, other_weight
 from .between_samples import unresolved
 from .core_input import core_settings, core_trials
 
@@ -51,8 +51,8 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
 def tests() -> tuple[Callable[[Dataset, bool], list[str]], ...]:
     """Return the tests of `examine`, each by itself: of a data set and whether a robot leads the arm, lines or a refusal."""
     return (
-        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _still_joints, _moving_starts, unresolved, _uneven_repeats,
-        _saturated,
+        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _other_weight, _still_joints, _moving_starts, unresolved,
+        _uneven_repeats, _saturated,
     )  # fmt: skip
 
 
@@ -81,6 +81,11 @@ def _dead_sensors(dataset: Dataset, led: bool) -> list[str]:
 
 def _wrong_setup(dataset: Dataset, led: bool) -> list[str]:
     return examine_setup(dataset)
+
+
+def _other_weight(dataset: Dataset, led: bool) -> list[str]:
+    found = other_weight(dataset)
+    return [] if found is None else [str(found)]
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:

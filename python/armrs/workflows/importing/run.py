@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from dataclasses import replace as changed
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,7 @@ def import_recordings(
     force_on: str | None = None,
     points: Sequence[str] = (),
     rate: float | None = None,
+    replace: bool = False,
 ) -> Imported:
     """Turn own recordings into a data set.
 
@@ -117,6 +119,8 @@ def import_recordings(
         Markers of the joints, shoulder to handle, for C3D and TRC files.
     rate : float, optional
         Sample rate of recordings without a column of time [Hz].
+    replace : bool
+        Whether the data set of a former import may be replaced, whole and with what was edited in it.
 
     Returns
     -------
@@ -134,6 +138,7 @@ def import_recordings(
     rate = None if rate is None else checks.number("rate", rate, above=0.0, most=1e6, unit="Hz")
     if not paths:
         raise BadInput("sources", Text("nothing"), "one recording or more")
+    former = _former(files.output_folder(out), checks.flag("replace", replace))
     if isinstance(model, Model):
         loaded, about = model, (Subject(), Tolerance())
     else:
@@ -146,10 +151,10 @@ def import_recordings(
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
         recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
-    reads = [replace(read, trial=replace(read.trial, remarks=_remarks(read, recipe.channels))) for read in reads]
-    recipe = replace(recipe, trials=tuple(replace(t, remarks=r.trial.remarks) for t, r in zip(recipe.trials, reads, strict=True)))
+    reads = [changed(read, trial=changed(read.trial, remarks=_remarks(read, recipe.channels))) for read in reads]
+    recipe = changed(recipe, trials=tuple(changed(t, remarks=r.trial.remarks) for t, r in zip(recipe.trials, reads, strict=True)))
     loaded, said = _led(loaded, recipe, reads)
-    folder = _write(files.output_folder(out), loaded, recipe, reads, about)
+    folder = _write(files.output_folder(out), former, loaded, recipe, reads, about)
     return Imported(folder, recipe, (*notes, *said))
 
 
@@ -251,7 +256,7 @@ def _decided(
         channels = [
             *channels,
             *(c for c in own if c.symbol[0] in "FM"),
-            *(replace(c, symbol="t of forces") for c in own if c.symbol == "t"),
+            *(changed(c, symbol="t of forces") for c in own if c.symbol == "t"),
         ]
     channels, axes = _plane(channels)
     _complete(channels, model.n_joints, named[0].table, problems)
@@ -338,8 +343,8 @@ def _unused(tables: Sequence[RawTable], channels: Sequence[Channel]) -> list[str
 def _renamed(table: RawTable, mapped: Mapping[str, tuple[str, int]]) -> RawTable:
     """Return a table whose mapped columns carry their symbols as labels, so that they are recognised everywhere."""
     symbols = {name: symbol for symbol, (name, _) in mapped.items()}
-    renamed = tuple(replace(c, label=symbols.get(c.name, symbols.get(c.label, c.label))) for c in table.columns)
-    return replace(table, columns=renamed)
+    renamed = tuple(changed(c, label=symbols.get(c.name, symbols.get(c.label, c.label))) for c in table.columns)
+    return changed(table, columns=renamed)
 
 
 def _present(mapped: Mapping[str, tuple[str, int]], table: RawTable) -> dict[str, tuple[str, int]]:
@@ -366,7 +371,7 @@ def _plane(channels: list[Channel]) -> tuple[list[Channel], list[str]]:
             names = {f"{kind}{forward}": f"{kind}y", f"{kind}{up}": f"{kind}z"}
             if (forward, up) != ("y", "z"):
                 notes.append(f"{said} axes: {forward} is taken as forward, {up} as up")
-        channels = [replace(c, symbol=names.get(c.symbol, c.symbol)) for c in channels if c.symbol in names or c.symbol not in own]
+        channels = [changed(c, symbol=names.get(c.symbol, c.symbol)) for c in channels if c.symbol in names or c.symbol not in own]
     return [c for c in channels if c.symbol not in ("My", "Mz")], notes
 
 
@@ -407,13 +412,13 @@ def _aligned(
         return _Read(trial, named.table, None)
     q = np.column_stack([_values(named.table, c) for c in channels if c.symbol.startswith("q") and c.symbol[1:].isdigit()])
     force = np.column_stack([_values(named.forces, _by(channels, s)) for s in ("Fy", "Fz")])
-    trial = replace(trial, force_file=os.fspath(named.forces.path), force_table=named.forces.title, force_shift=0.0)
+    trial = changed(trial, force_file=os.fspath(named.forces.path), force_table=named.forces.title, force_shift=0.0)
     try:
         shifts = clock.align(_values(named.table, _by(channels, "t")), q, _values(named.forces, _by(channels, "t of forces")), force)
     except BadInput as error:
         problems.append(error.within(file=named.forces.path))
         return _Read(trial, named.table, named.forces)
-    reads = [_Read(replace(trial, force_shift=shift.seconds), named.table, named.forces) for shift in shifts]
+    reads = [_Read(changed(trial, force_shift=shift.seconds), named.table, named.forces) for shift in shifts]
     if len(reads) == 1:
         return reads[0]
     return min(reads, key=lambda read: _unexplained(read, channels, model, given))
@@ -440,7 +445,7 @@ def _refined(reads: Sequence[_Read], channels: Sequence[Channel], convention: Co
         q, same = conventions.to_model_angles(raw, convention), read.trial.force_file == read.trial.file
         recordings.append(clock.Recording(t, q, clock_of_forces, on_arm, read.trial.force_shift, same))
     found = dict(zip(apart, clock.refine(model, recordings), strict=True)) if apart else {}
-    return [replace(read, trial=replace(read.trial, force_shift=found.get(k, read.trial.force_shift))) for k, read in enumerate(reads)]
+    return [changed(read, trial=changed(read.trial, force_shift=found.get(k, read.trial.force_shift))) for k, read in enumerate(reads)]
 
 
 def _remarks(read: _Read, channels: Sequence[Channel]) -> tuple[str, ...]:
@@ -499,7 +504,7 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
 
     for kept in recipe.trials:
         forces = kept.force_file and os.fspath(folder / kept.force_file)
-        trial = replace(kept, file=os.fspath(folder / kept.file), force_file=forces)
+        trial = changed(kept, file=os.fspath(folder / kept.file), force_file=forces)
         try:
             table = table_of(trial.file, trial.table, recipe.points)
             reads.append(_Read(trial, table, table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None))
@@ -510,11 +515,9 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
     return reads
 
 
-def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read], about: tuple[Subject, Tolerance]) -> Path:
-    """Write the data set whole or not at all, with `import.toml` in it."""
-    folder = files.output_folder(out)
-    former = _former(folder)
-    kept = replace(recipe, trials=tuple(_seen_from(folder, read.trial) for read in reads))
+def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[_Read], about: tuple[Subject, Tolerance]) -> Path:
+    """Write the data set whole or not at all, with `import.toml` in it, and remove the other trials of a former import."""
+    kept = changed(recipe, trials=tuple(_seen_from(folder, read.trial) for read in reads))
 
     def write(part: Path) -> list[Path]:
         written = []
@@ -539,12 +542,15 @@ def _write(out: Path, model: Model, recipe: Recipe, reads: Sequence[_Read], abou
     return folder
 
 
-def _former(folder: Path) -> set[str]:
-    """Return the trials that a former import left in a folder; a data set of another origin is refused."""
+def _former(folder: Path, replaced: bool) -> set[str]:
+    """Return the trials that a former import left in a folder, where it may be replaced; a data set of another origin never may."""
     if not (folder / "dataset.toml").exists():
         return set()
     if not (folder / FILE).is_file():
         raise BadInput("-o", Text("a data set that armrs import did not write"), "a folder of its own", file=folder)
+    if not replaced:
+        allowed = "a folder of its own, or --force, which replaces it whole, with all that was edited in it"
+        raise BadInput("-o", Text("the data set of a former import"), allowed, file=folder)
     return {_name_of(trial) for trial in load_recipe(folder / FILE).trials}
 
 
@@ -557,7 +563,7 @@ def _seen_from(folder: Path, trial: RawTrial) -> RawTrial:
     """Return a trial whose files are named relative to the folder that `import.toml` is in."""
     here = folder.resolve()
     force_file = None if trial.force_file is None else os.path.relpath(Path(trial.force_file).resolve(), here)
-    return replace(trial, file=os.path.relpath(Path(trial.file).resolve(), here), force_file=force_file)
+    return changed(trial, file=os.path.relpath(Path(trial.file).resolve(), here), force_file=force_file)
 
 
 def _si_columns(read: _Read, recipe: Recipe, n_joints: int, robot: Robot | None) -> dict[str, np.ndarray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 from ...io.raw import RawTable
@@ -13,8 +13,12 @@ _REPEAT = re.compile(
     r"^(?P<name>.*?)[\s_\-.]*(?:(?<![^\W\d_])(?:trial|rep|repeat|run|take|wdh|nr|no|t|r))?[\s_\-.#]*(?P<number>\d+)$", flags=re.IGNORECASE
 )
 """A name and the number of a repeat; a word for the number is a word of its own: `shoulder 1` is no `shoulde`."""
-_TEST = {"test", "holdout", "validation"}
-_FORCE_WORDS = {"force", "forces", "kraft", "kraefte", "krafte", "ft", "loadcell", "sensor"}
+_TEST = {"test", "holdout", "validation", "probe", "prüfung", "prufung", "pruefung"}
+_FORCE_WORDS = {"force", "forces", "kraft", "kraefte", "krafte", "kräfte", "ft", "loadcell", "sensor"}
+_ANGLE_WORDS = {"angles", "angle", "winkel", "kinematics", "kinematik", "motion", "markers", "joints"}
+_OTHER_WORDS = 1
+"""Words that the names of a file of angles and its file of forces may each have for themselves, such as those of the devices."""
+_SEPARATORS = re.compile(r"[\s_\-.]+")
 _FEWEST = 3
 """Repeats from which on the last one is kept apart: two are left to read the noise off."""
 
@@ -39,12 +43,13 @@ def arrange(tables: Sequence[RawTable]) -> tuple[list[Named], list[RawTable], st
     placed: list[tuple[RawTable, str, int, bool]] = []
     counts: dict[str, int] = {}
     used: set[tuple[str, int]] = set()
-    split = [_split(title) for title in _titles(with_angles)]
+    split = [_split(title) for title in _names(_titles(with_angles))]
+    all_tests = all(_TEST & set(words(table.title)) for table in with_angles)
     from_zero = {name for name, number in split if number == 0}
     for table, (name, number) in zip(with_angles, split, strict=True):
         if number is not None and name in from_zero:
             number += 1
-        is_test = bool(_TEST & set(words(table.title)))
+        is_test = bool(_TEST & set(words(table.title))) and not all_tests
         repeat = number if number is not None and (name, number) not in used else counts.get(name, 0) + 1
         while (name, repeat) in used:
             repeat += 1
@@ -79,6 +84,21 @@ def _titles(tables: Sequence[RawTable]) -> list[str]:
     return [t.title for t in tables]
 
 
+def _names(titles: Sequence[str]) -> list[str]:
+    """Return the names of movements: titles without words of role, of what was measured, and without the word that all end with."""
+    parts = [[part for part in _SEPARATORS.split(title.strip()) if part] for title in titles]
+    last = {part[-1].lower() for part in parts if part}
+    if len(titles) > 1 and len(last) == 1 and all(_lettered(part[:-1]) for part in parts) and _lettered(list(last)):
+        parts = [part[:-1] for part in parts]
+    bare = [[word for word in part if word.lower() not in _TEST | _FORCE_WORDS | _ANGLE_WORDS] for part in parts]
+    return ["_".join(word) if _lettered(word) else title for word, title in zip(bare, titles, strict=True)]
+
+
+def _lettered(parts: Sequence[str]) -> bool:
+    """Whether words say more than a number."""
+    return any(character.isalpha() for part in parts for character in part)
+
+
 def _split(title: str) -> tuple[str, int | None]:
     match = _REPEAT.match(title.strip())
     name = match["name"] if match and match["name"] else (title if match is None else "movement")
@@ -86,16 +106,28 @@ def _split(title: str) -> tuple[str, int | None]:
     return cleaned, int(match["number"]) if match else None
 
 
-def _key(table: RawTable) -> str:
-    return " ".join(
-        w for w in words(table.title) if w not in _FORCE_WORDS | {"angles", "angle", "winkel", "kinematics", "motion", "markers"}
-    )
+def _key(table: RawTable, besides: Set[str] = frozenset()) -> tuple[str, ...]:
+    return tuple(w for w in words(table.title) if w not in _FORCE_WORDS | _ANGLE_WORDS | besides)
 
 
 def _pairs(angles: Sequence[RawTable], forces: Sequence[RawTable]) -> dict[int, RawTable]:
-    """Return the table of forces of each table of angles: that of the same name without the words for force and angle."""
-    by_key = {_key(table): table for table in forces}
-    found = {id(table): by_key[_key(table)] for table in angles if _key(table) in by_key}
+    """Return the table of forces of each table of angles, by their names.
+
+    That of the same name without the words for force, angle and role, or the only one that differs by the word for a device.
+    """
+    found: dict[int, RawTable] = {}
+    for besides in (frozenset[str](), frozenset(_TEST)):
+        by_key = {_key(table, besides): table for table in forces}
+        found = {id(table): by_key[_key(table, besides)] for table in angles if _key(table, besides) in by_key} | found
+    for table in angles:
+        own = set(_key(table))
+        near = [f for f in forces if len(own ^ set(_key(f))) <= 2 * _OTHER_WORDS and _numbers(table) == _numbers(f)]
+        if id(table) not in found and len(near) == 1:
+            found[id(table)] = near[0]
     if not found and len(angles) == len(forces) == 1:
         return {id(angles[0]): forces[0]}
     return found
+
+
+def _numbers(table: RawTable) -> list[str]:
+    return [w for w in words(table.title) if w.isdigit()]
