@@ -124,7 +124,7 @@ def test_every_problem_is_listed_with_its_next_step(session: Path, tmp_path: Pat
 
 def test_commands_end_with_the_next(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["check", str(session)]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].startswith(f"Next: armrs identify {session} -o identify")
+    assert capsys.readouterr().out.splitlines()[-1].startswith(f"Next: armrs identify {session} -o identified, then armrs gap")
     cli.main(["identify", str(session), "-o", str(tmp_path / "i")])
     assert capsys.readouterr().out.splitlines()[-1].startswith("Next: armrs ")
 

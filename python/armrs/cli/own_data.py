@@ -290,7 +290,11 @@ def _after_check(done: Checked, dataset: Path) -> str:
     place = shlex.quote(str(dataset))
     if done.errors:
         return f"correct the errors above, then armrs check {place} again"
-    able = [f"armrs {v.verb} {place} -o {'identified' if v.verb == 'identify' else v.verb}" for v in done.verbs if v.able and v.verb != "passive"]
+    able = [
+        f"armrs {v.verb} {place} -o {'identified' if v.verb == 'identify' else v.verb}"
+        for v in done.verbs
+        if v.able and v.verb != "passive"
+    ]
     return ", then ".join(able) or "record forces or joint torques beside the angles"
 
 
