@@ -191,11 +191,20 @@ def test_no_number_has_ten_digits(pages: Path, verb: str) -> None:
 
 
 SYMBOLS = {
-    "identify": ["m is the mass of a segment", "stiffness·rest is the torque of that spring at angle zero"],
+    "identify": ["m is the mass of a segment, ℓ the distance", "I₁ + m₁·ℓ₁²", "stiffness·rest is the torque of that spring at angle zero"],
     "sweep": ["m is the mass of a segment", "By data is the share"],
     "notebook": ["m is the mass of a segment"],
     "gap": ["q1 and q2: the angle of joint 1", "Fz: the contact force upward", "In formulas R is the torque with which a joint resists"],
 }
+
+
+@pytest.mark.parametrize("verb", ["identify", "plan", "sweep"])
+def test_every_value_is_seen_on_a_phone(pages: Path, verb: str) -> None:
+    """Columns from the fourth on lay beyond the edge."""
+    with opened(pages / verb / "report.html", width=390) as seen:
+        outside = "[...document.querySelectorAll('.many td')].filter(e => e.getBoundingClientRect().right > 390).map(e => e.innerText)"
+        assert seen.page.locator(".many td").count() > 0
+        assert seen.page.evaluate(outside) == []
 
 
 @pytest.mark.parametrize("verb", SYMBOLS)

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 
 from armrs import plotting
 from armrs.io.trial import Trial
-from armrs.report import figures
+from armrs.report import figures, tables
 from armrs.report.sketch import sketch
 from armrs.workflows import demo
 
@@ -82,7 +82,7 @@ def test_the_legend_of_intervals_explains_what_occurs() -> None:
 
 
 def test_symbols_tell_i_from_l() -> None:
-    assert plotting.symbol("I1 + m1*l1^2") == "I₁ + m₁·ℓ₁²"
+    assert tables.typeset("I1 + m1*l1^2") == "I₁ + m₁·ℓ₁²"
 
 
 def test_angles_are_in_degrees(ax: matplotlib.axes.Axes) -> None:

@@ -222,7 +222,7 @@ def _planned(predictions: Sequence[Mapping[str, Any]], joints: Sequence[str], co
 def quantity_name(item: Mapping[str, Any], joints: Sequence[str]) -> str:
     """Name a quantity beside an axis."""
     if item["kind"] in ("segment", "combination"):
-        return plotting.symbol(item["name"])
+        return tables.typeset(item["name"])
     return f"{tables.label(item)} {tables.where(item, joints)}".strip()
 
 

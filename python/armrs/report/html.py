@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from ..errors import BadInput, Text
 from ..io import files
+from . import tables
 
 TEMPLATES = Path(__file__).with_name("templates")
 CONTENTS = Markup("<!-- contents -->")
@@ -60,13 +61,15 @@ class Picture:
 
 def environment(*folders: Path) -> Environment:
     """Return an environment of the templates of reports and of those in `folders`: escaping always, a missing value is an error."""
-    return Environment(
+    engine = Environment(
         loader=FileSystemLoader([TEMPLATES, *folders]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         keep_trailing_newline=True,
     )
+    engine.filters["typeset"] = tables.typeset
+    return engine
 
 
 def render(engine: Environment, template: str, values: Mapping[str, Any]) -> Markup:

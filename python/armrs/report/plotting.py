@@ -183,15 +183,6 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
     return ax
 
 
-_BELOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-
-
-def symbol(name: str) -> str:
-    """Set a quantity such as `I1 + m1*l1^2` as print does, I₁ + m₁·ℓ₁²: I and l look different."""
-    text = re.sub(r"([mlaIn])([0-9]+)", lambda found: found[1].replace("l", "ℓ") + found[2].translate(_BELOW), name)
-    return tables.symbol(text)
-
-
 def interval_legend(figure: Figure, items: Sequence[Mapping[str, Any]]) -> None:
     """Explain the markers of `intervals` above a figure, those that occur."""
     from matplotlib.lines import Line2D

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,11 +22,12 @@ _MOST_DECIMALS = 6
 
 @dataclass(frozen=True)
 class Table:
-    """Head and rows; the first `left` columns hold words."""
+    """Head and rows; the first `left` columns hold words, and the first names quantities where `symbols` says so."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
     left: int = 1
+    symbols: bool = False
 
     def __post_init__(self) -> None:
         shown = [[digits(cell, 4) if isinstance(cell, float) else cell for cell in row] for row in self.rows]
@@ -69,7 +71,7 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
     ]
     head = ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "but", "in the model"]
     used = [k for k in range(len(head)) if any(row[k] not in (None, "") for row in rows)]
-    return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1)
+    return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1, symbols=True)
 
 
 def deciding(items: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -104,6 +106,15 @@ def label(item: Mapping[str, Any]) -> str:
 def symbol(text: str) -> str:
     """Set a sum of products as print does: `m1*l1^2` is m1·l1²."""
     return text.replace("^2", "²").replace("*", "·")
+
+
+_BELOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_NUMBERED = re.compile(r"(?<![A-Za-z])([mlaIn])([1-9])(?![0-9.])")
+
+
+def typeset(text: object) -> str:
+    """Set names such as `I1 + m1*l1^2` as print does, I₁ + m₁·ℓ₁²: on pages and in figures I and l look different."""
+    return _NUMBERED.sub(lambda found: found[1].replace("l", "ℓ") + found[2].translate(_BELOW), symbol(str(text)))
 
 
 def where(item: Mapping[str, Any], joints: Sequence[str]) -> str:
@@ -203,7 +214,7 @@ def online(data: Mapping[str, Any]) -> Table:
         [symbol(e["name"]), where(e, joints), number(e["value"], e["std"]), spread(e["std"]), unit(e["unit"]), e["decided_by"]]
         for e in data["estimates"]
     ]
-    return Table(["unknown", "joint", "value", "± std", "unit", "decided by"], rows, left=2)
+    return Table(["unknown", "joint", "value", "± std", "unit", "decided by"], rows, left=2, symbols=True)
 
 
 def statuses(data: Mapping[str, Any]) -> Table:
@@ -288,7 +299,7 @@ def predictions(data: Mapping[str, Any]) -> Table:
         ]
         rows.append(row if other is None else [*row, percent(other["predictions"][k]["relative"])])
     head = ["quantity", "where", "believed", "± std to expect", "± std of the data", "unit", "relative"]
-    return Table(head if other is None else [*head, "compared"], rows, left=2)
+    return Table(head if other is None else [*head, "compared"], rows, left=2, symbols=True)
 
 
 def percent(share: float | None) -> str:
