@@ -5,7 +5,6 @@ Angles come in radians and are shown in degrees. Colours tell quantities apart a
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
