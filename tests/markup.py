@@ -12,7 +12,23 @@ from typing import Any
 import armrs
 
 PAYLOAD = "\"'><evil onevil=1><!-- evil{{ 7*7 }} </style></script>"
-CLASSES = {"contents", "verdict", "soft", "label", "care", "wide", "left", "data", "prior", "bound", "swipe", "broad", "tall", "broad tall"}
+CLASSES = {
+    "contents",
+    "verdict",
+    "soft",
+    "label",
+    "care",
+    "wide",
+    "wide many",
+    "left",
+    "data",
+    "prior",
+    "bound",
+    "swipe",
+    "broad",
+    "tall",
+    "broad tall",
+}
 """Every class that a report gives to an element."""
 # One pixel.
 PNG = bytes.fromhex(
@@ -37,6 +53,7 @@ class Markup(HTMLParser):
                 "aria-label",
                 "charset",
                 "class",
+                "data-head",
                 "content",
                 "href",
                 "http-equiv",
