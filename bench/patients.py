@@ -40,6 +40,11 @@ class Patient:
     stiffness: float = 0.8
     tone: float = 0.15
     wrong_inertia: float = 0.03
+    gain_y: float = 0.0
+    gain_z: float = 0.0
+    bias_y: float = 0.0
+    bias_z: float = 0.0
+    """Errors of the laboratory's force sensor, the same in all sessions; drawn as large as a data set declares them."""
 
     @staticmethod
     def drawn(draw: np.random.Generator) -> Patient:
@@ -51,6 +56,10 @@ class Patient:
             viscosity=draw.uniform(0.05, 0.3),
             dry=draw.uniform(0.05, 0.3),
             stiffness=draw.uniform(0.3, 1.5),
+            gain_y=0.01 * draw.standard_normal(),
+            gain_z=0.01 * draw.standard_normal(),
+            bias_y=0.2 * draw.standard_normal(),
+            bias_z=0.2 * draw.standard_normal(),
         )
 
 
@@ -142,11 +151,32 @@ gain = {gain}
 threshold = {threshold}
 latency = {latency}
 
+[[effect]]
+kind = "force_gain"
+channel = "Fy"
+gain = {gain_y}
+
+[[effect]]
+kind = "force_gain"
+channel = "Fz"
+gain = {gain_z}
+
+[[effect]]
+kind = "force_bias"
+channel = "Fy"
+bias = {bias_y}
+
+[[effect]]
+kind = "force_bias"
+channel = "Fz"
+bias = {bias_z}
+
 [handle]
 mass = 0.193
 
 [sensors]
 rate_Hz = 200
+marker_offset_m = 0.0014
 emg = true
 
 [variation]

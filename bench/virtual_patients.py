@@ -60,7 +60,8 @@ def judge(found: armrs.Spasticity, patient: patients.Patient, counts: dict[str, 
     """Compare the reflex of one session with the truth."""
     # The shoulder, which is held, is not asked.
     joint = max(j.joint for j in found.joints)
-    estimates = {e.name: e for e in found.followed() if e.joint == joint}
+    seen = next(j.reflex for j in found.joints if j.joint == joint)
+    estimates = {**(seen.parameters if seen.found else {}), "viscosity": seen.viscosity, "torque": seen.dry}
     counts["reflex found"].append("gain" in estimates)
     for name, attribute in TRUE.items():
         if name not in estimates:

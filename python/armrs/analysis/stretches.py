@@ -10,7 +10,7 @@ that neither the colour of the noise nor what differs from trial to trial has to
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -47,6 +47,12 @@ class Stretch:
         Angle and speed with less of a low-pass, of which thresholds are asked [rad, rad/s].
     smooth : callable
         The low-pass that angle and moment went through: what reflex and friction should show went through it too.
+    coarser : callable
+        A low-pass of half the cutoff for the fine motion: what it changes stands for what the one in use may have done.
+    shared : ndarray, shape (n_errors, n)
+        What errors that all sessions share, each of one standard deviation, do to the moment [N m]: of masses and of the force sensor.
+    placed : ndarray, shape (n_errors, n)
+        The same of errors that the trials of one session share: of markers, which are placed anew for the next.
     """
 
     t: np.ndarray
@@ -57,16 +63,32 @@ class Stretch:
     fine_q: np.ndarray
     fine_qd: np.ndarray
     smooth: Callable[[np.ndarray], np.ndarray] = field(repr=False)
+    coarser: Callable[[np.ndarray], np.ndarray] = field(repr=False)
+    shared: np.ndarray = field(repr=False)
+    placed: np.ndarray = field(repr=False)
 
 
 @dataclass(frozen=True)
 class Estimated:
-    """A number with its interval."""
+    """A number with its interval.
+
+    Attributes
+    ----------
+    value : float
+    std : float
+        From the scatter of the trials and the errors that they share: calibration, anthropometry, markers, the low-pass of the motion.
+    interval : tuple of float
+        With both.
+    unit : str
+    repeatable : tuple of float
+        The interval without the errors that sessions share, as they cancel in a difference: calibration, anthropometry, the low-pass.
+    """
 
     value: float
     std: float
     interval: tuple[float, float]
     unit: str
+    repeatable: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +158,8 @@ class _Problem:
         self.ends = np.cumsum([len(s.q) for s in stretches])[:-1]
         self.linear = np.concatenate([_less_mean(_columns(s, self.middle)) for s in stretches])
         self.moment = np.concatenate([_less_mean(s.moment) for s in stretches])
+        self.shared = np.concatenate([_less_mean(s.shared.T) for s in stretches])
+        self.placed = np.concatenate([_less_mean(s.placed.T) for s in stretches])
         self.basis = np.linalg.qr(self.linear)[0]
         self.rest = self.moment - self.basis @ (self.basis.T @ self.moment)
         self.total = float(self.rest @ self.rest)
@@ -226,12 +250,32 @@ class _Problem:
         return np.column_stack([self.column(direction, shape), *slopes, self.linear])
 
     def _deviations(self, direction: int, shape: np.ndarray, free: int) -> np.ndarray:
-        """Return deviations and degrees of freedom of gain, shape, viscosity and dry friction, (2, 7), linearised at the optimum."""
+        """Return of gain, shape, viscosity and dry friction, linearised at the optimum, (4, 7).
+
+        Deviations by scatter, degrees of freedom, deviations by errors of one session and by errors that all sessions share.
+        """
         jacobian = self.jacobian(direction, shape, self.gain(direction, shape)[0], free)
         found = deviations(np.split(jacobian, self.ends), np.split(self.residual(direction, shape), self.ends))
-        none = np.array([0.0, 1.0])[:, None] * np.ones(4 - free)
-        known = np.array(found)
+        none = np.array([0.0, 1.0, 0.0, 0.0])[:, None] * np.ones(4 - free)
+        scale = np.linalg.norm(jacobian, axis=0) + 1e-300
+        lost = self._lost(direction, shape)[:, None]
+        moved = (
+            np.linalg.norm(np.linalg.lstsq(jacobian / scale, errors, rcond=None)[0], axis=1) / scale
+            for errors in (self.placed, np.column_stack([self.shared, lost]))
+        )
+        known = np.array([*found, *moved])
         return np.concatenate([known[:, : 1 + free], none, known[:, 1 + free + ELASTIC : 3 + free + ELASTIC]], axis=1)
+
+    def _lost(self, direction: int, shape: np.ndarray) -> np.ndarray:
+        """Return what a coarser low-pass of the motion changes in reflex and dry friction [N m]."""
+        parts = []
+        gain = self.gain(direction, shape)[0]
+        dry = np.linalg.lstsq(self.linear, self.moment - gain * self.column(direction, shape), rcond=None)[0][ELASTIC + 1]
+        for own in self.stretches:
+            coarse = replace(own, fine_q=own.coarser(own.fine_q), fine_qd=own.coarser(own.fine_qd))
+            seen, told = (gain * drive(s, direction, shape) + dry * _dry(s) for s in (own, coarse))
+            parts.append(_less_mean(seen - told))
+        return np.concatenate(parts)
 
     def result(self, direction: int, shape: np.ndarray, free: int) -> Reflex:
         """Return what was found."""
@@ -239,13 +283,15 @@ class _Problem:
         column = self.column(direction, shape)
         linear = np.linalg.lstsq(self.linear, self.moment - gain * column, rcond=None)[0]
         values = np.array([gain, *shape, *linear[ELASTIC : ELASTIC + 2]])
-        std, freedom = self._deviations(direction, shape, free)
-        half = np.array([students_t.quantile(LEVEL, f) for f in freedom]) * std
+        scatter, freedom, placed, shared = self._deviations(direction, shape, free)
+        normal = students_t.quantile(LEVEL, np.inf)
+        half = np.hypot(np.array([students_t.quantile(LEVEL, f) for f in freedom]) * scatter, normal * placed)
+        whole, std = np.hypot(half, normal * shared), np.sqrt(scatter**2 + placed**2 + shared**2)
         least = np.array([0.0, 0.0, 0.0, -np.inf, 0.0, -np.inf, -np.inf])
         names, units = ("gain", *SHAPES), (*UNITS.values(), "N m s/rad", "N m")
         numbers = [
-            Estimated(float(v), float(s), (float(max(v - h, low)), float(v + h)), unit)
-            for v, s, h, low, unit in zip(values, std, half, least, units, strict=True)
+            Estimated(float(v), float(s), (float(max(v - w, low)), float(v + w)), unit, (float(max(v - h, low)), float(v + h)))
+            for v, s, w, h, low, unit in zip(values, std, whole, half, least, units, strict=True)
         ]
         split = slice(ELASTIC), slice(ELASTIC, ELASTIC + 2)
         parts = (*(self.linear[:, own] @ linear[own] for own in split), gain * column)
@@ -277,4 +323,9 @@ def _columns(stretch: Stretch, middle: float) -> np.ndarray:
     # What is not linear in the motion is computed before the low-pass, as joints do.
     x = stretch.fine_q - middle
     springs = (stretch.smooth(x**k) for k in range(1, ELASTIC + 1))
-    return np.column_stack([*springs, stretch.qd, stretch.smooth(np.tanh(stretch.fine_qd / CREEP)), stretch.qdd])
+    return np.column_stack([*springs, stretch.qd, _dry(stretch), stretch.qdd])
+
+
+def _dry(stretch: Stretch) -> np.ndarray:
+    """Return what dry friction of 1 N m shows."""
+    return stretch.smooth(np.tanh(stretch.fine_qd / CREEP))

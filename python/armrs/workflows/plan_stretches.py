@@ -119,4 +119,5 @@ def _stretch(movement: Movement, joint: int, rate: float) -> Stretch:
         q += way * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
         qd += way / lasts * 30.0 * (s * (1.0 - s)) ** 2
         qdd += way / lasts**2 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
-    return Stretch(t, q, qd, qdd, np.zeros(len(t)), q, qd, low_pass(rate, min(DEFAULT_CUTOFF, 0.4 * rate)))
+    smooth, none = low_pass(rate, min(DEFAULT_CUTOFF, 0.4 * rate)), np.zeros((0, len(t)))
+    return Stretch(t, q, qd, qdd, np.zeros(len(t)), q, qd, smooth, smooth, none, none)

@@ -12,7 +12,9 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..analysis import stretches
+from ..analysis.robot_motion import with_robot_motion
 from ..analysis.stretches import Reflex, Stretch
+from ..analysis.uncertainty import Deviations, sensitivity
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
 from ..io.muscle_activity import co_contraction, onset
@@ -27,8 +29,10 @@ DEFAULT_CUTOFF = 4.0
 """Cutoff of the low-pass [Hz]: above it, inertia times the noise of angles would be taken for latency (0.05° gave 6 ms at 8 Hz)."""
 FINER = 3.0
 """How much higher the cutoff of the motion is that the reflex is told: a low-pass before its threshold would not be undone by one after."""
-FINEST = 12.0
-"""Samples that are looked at in each period of the cutoff."""
+FINER_WITH_ROBOT = 10.0
+"""The same where the angles of the robot say the fast motion: they have little noise (`armrs.analysis.robot_motion`)."""
+FINEST = 25.0
+"""Samples that are looked at in each period of the cutoff: those of the finer motion are not to be lost."""
 LEAST_SPEEDS = 1.5
 """The fastest stretch must be faster than the slowest by this factor before a reflex can be told from viscosity."""
 FELT = 0.1
@@ -120,12 +124,15 @@ class Spasticity(Tabular):
         return f"Spasticity({self.dataset.name!r}; {'; '.join(parts) or 'no joint was stretched'})"
 
     def followed(self) -> tuple[Estimate, ...]:
-        """Return what a history keeps: gain, threshold and latency of the reflexes, viscosity and friction besides them."""
+        """Return what a history keeps: gain, threshold and latency of the reflexes, viscosity and friction besides them.
+
+        Intervals are those without the errors that sessions share, which cancel in a difference: of masses, force sensor and low-pass.
+        """
         found = []
         for j in self.joints:
             of = {("stretch_reflex", name): p for name, p in j.reflex.parameters.items()} if j.reflex.found else {}
             of |= {("viscous", "viscosity"): j.reflex.viscosity, ("coulomb", "torque"): j.reflex.dry}
-            found += [Estimate(name, j.joint, kind, p.value, p.std, p.unit, p.interval, "data") for (kind, name), p in of.items()]
+            found += [Estimate(name, j.joint, kind, p.value, p.std, p.unit, p.repeatable, "data") for (kind, name), p in of.items()]
         return tuple(found)
 
     def tidy(self) -> Tidy:
@@ -195,10 +202,10 @@ def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEF
     # Activity of the muscles is what is looked for here: samples with it count.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
     # Torques of the contact are products of forces with angles: the low-pass comes after them.
-    moments = [trial_moments(dataset, trial, min(FINER * cutoff, 0.4 * trial.rate)) for trial in whole]
+    moments = [_moments(dataset, trial, cutoff) for trial in whole]
     found, warnings = [], []
     for joint in range(dataset.model.n_joints):
-        own = [(m, s) for m in moments if (s := _stretch(m, joint, cutoff)) is not None]
+        own = [(m, s) for m, fine in moments if (s := _stretch(dataset, m, joint, cutoff, fine)) is not None]
         speeds = [float(np.abs(s.qd).max()) for _, s in own]
         if len(own) < stretches.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):
             continue
@@ -214,7 +221,16 @@ def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEF
     return Spasticity(tuple(found), cutoff, tuple(warnings), dataset)
 
 
-def _stretch(moments: TrialMoments, joint: int, cutoff: float) -> Stretch | None:
+def _moments(dataset: Dataset, trial: Trial, cutoff: float) -> tuple[TrialMoments, float]:
+    """Return the moments of a trial and the cutoff of their motion [Hz], the fast one that of the robot where the robot was recorded."""
+    fine, most = FINER * cutoff, 0.4 * trial.rate
+    known = with_robot_motion(trial, dataset.model_of(trial.configuration), fine) if fine < most else None
+    if known is not None:
+        trial, fine = known, FINER_WITH_ROBOT * cutoff
+    return trial_moments(dataset, trial, min(fine, most)), min(fine, most)
+
+
+def _stretch(dataset: Dataset, moments: TrialMoments, joint: int, cutoff: float, fine: float) -> Stretch | None:
     """Return one joint of a trial from its first to its last sample that was measured; None where it is held, or interrupted."""
     there = np.flatnonzero(np.isfinite(moments.moment[:, joint]))
     if there.size < 3 or there[-1] - there[0] + 1 != there.size:
@@ -227,7 +243,14 @@ def _stretch(moments: TrialMoments, joint: int, cutoff: float) -> Stretch | None
     every = max(1, int(rate / (FINEST * cutoff)))
     moment = low_pass(rate, cutoff)(moments.moment[there, joint])
     t, q, qd, qdd, moment, fine_q, fine_qd = (values[::every] for values in (t, q, qd, qdd, moment, fine_q, fine_qd))
-    return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, low_pass(rate / every, cutoff))
+    force = None if moments.force is None else moments.force[there][::every]
+    model, smooth = dataset.model_of(moments.trial.configuration), low_pass(rate / every, cutoff)
+    errors = sensitivity(model, moments.q[there][::every], force, Deviations.of(dataset))[:, :, joint]
+    n, seen = dataset.model.n_joints, np.array([smooth(e) for e in errors])
+    # As `Deviations.vector` orders them: lengths and angles are those of the markers.
+    shared, placed = np.concatenate([seen[: 2 * n], seen[4 * n :]]), seen[2 * n : 4 * n]
+    coarser = low_pass(rate / every, 0.5 * fine)
+    return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, smooth, coarser, shared, placed)
 
 
 def low_pass(rate: float, cutoff: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -253,7 +276,8 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
         (t for name in moments.trial.emg if (t := onset(moments.trial, name, *span_s)) is not None),
         default=np.nan,
     )
-    over = along[span] > shape["threshold"].value
+    # The slow low-pass widens a stretch, and with it the time for which it is beyond the threshold.
+    over = fitted.direction * stretch.fine_qd[span] > shape["threshold"].value
     passed = float(stretch.t[first + int(np.argmax(over))]) if over.any() else np.nan
     return StretchSeen(
         file=moments.trial.file,
@@ -268,7 +292,9 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
         catch_speed=np.nan if begun is None else float(along[begun]),
         emg_onset=float(emg - stretch.t[first]),
         emg_latency=float(emg - passed),
-        co_contraction=np.nan if (both := co_contraction(session, session.index(moments.trial), *span_s)) is None else both,
+        co_contraction=np.nan
+        if (both := co_contraction(session, [t.file for t in session].index(moments.trial.file), *span_s)) is None
+        else both,
     )
 
 
