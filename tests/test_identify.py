@@ -333,4 +333,6 @@ def test_an_arm_of_which_little_is_known_is_identified_with_default_options(tmp_
 def test_the_cascade_says_where_a_movement_is_not_quasi_static() -> None:
     """With 0.37 rad/s and 0.28 rad/s² it gave a first moment of 0.6278 ± 0.0027 for 0.7011, and no word."""
     (line,) = identify._not_quasi_static([5.2, 0.4])
-    assert line.startswith("not quasi-static: inertia, which the cascade neglects, moves the first moment of joint 1 by 5.2 standard deviations")
+    assert line.startswith(
+        "not quasi-static: inertia, which the cascade neglects, moves the first moment of joint 1 by 5.2 standard deviations"
+    )
