@@ -40,7 +40,7 @@ _UNPROVED = 1.5
 """A reading that leaves less than this many times what the given one does is not excluded (in the right setup forces read otherwise leave
 3 times as much, and angles of shoulder and elbow: 22 sessions of two worlds; a mirrored wrist 1.2 to 2.4 times)."""
 _OTHER_WEIGHT, _MUCH_HEAVIER = 2.0, 0.1
-"""Another weight is told from so many standard deviations on, and from this part of the weight on: 47 right sessions of two worlds lie
+"""Another weight is told from so many standard deviations on, and from this part of the weight on: 42 right sessions of two worlds lie
 within both (factors 0.85 to 1.10)."""
 _FEW = 3
 """Movements from which on their differences, and not those of trials, are the scatter of the weight."""
