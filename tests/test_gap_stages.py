@@ -72,8 +72,8 @@ def test_the_stages_draw_themselves(found: armrs.GapFound, monkeypatch: pytest.M
 def test_a_result_is_confirmed_on_its_own_test_trials_as_it_was_measured(found: armrs.GapFound) -> None:
     for name, gap in confirm(found).items():
         for step in ("before", "calibrated", "after", "floor"):
-            # The simulation starts elsewhere by rounding.
-            assert getattr(gap, step) == pytest.approx(getattr(found.gap[name], step), rel=1e-9), (name, step)
+            # The handle is placed anew in every trial, from a start that is rounded.
+            assert getattr(gap, step) == pytest.approx(getattr(found.gap[name], step), rel=1e-8), (name, step)
 
 
 def led(
@@ -194,7 +194,9 @@ def test_a_rhythm_has_its_own_phase_in_every_trial(frequency: float) -> None:
         gap = result.gap[name]
         assert gap.calibrated is not None and gap.after is not None and gap.floor is not None
         assert gap.calibrated > 3.0 * gap.floor
-        assert (gap.calibrated - gap.after) / (gap.calibrated - gap.floor) > 0.9, (name, gap)
+        # One test trial: the floor itself is known to some percent.
+        assert gap.floor_std is not None and gap.floor_std < 0.1 * gap.floor
+        assert gap.after - gap.floor < 0.1 * (gap.calibrated - gap.floor) + gap.floor_std, (name, gap)
     assert confirm(result)["Fy_N"].after == pytest.approx(result.gap["Fy_N"].after, rel=1e-9)
 
 

@@ -117,7 +117,7 @@ def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | 
     """Return how many times heavier than its model the arm is by the contact torques, and the standard deviation.
 
     Least squares over one factor of gravity and inertia of all segments, and the passive laws of `unexplained`, without bounds. The
-    deviation is that between motions (sandwich estimate), of a single one between its quarters.
+    deviation is that between motions (sandwich estimate).
 
     Parameters
     ----------
@@ -128,10 +128,12 @@ def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | 
     Returns
     -------
     (float, float) or None
-        None where the motions do not tell the weight from springs of the joints.
+        None where the motions do not tell the weight from springs of the joints, and for a single motion.
     """
+    if len(motions) < 2:
+        return None
     rows = []
-    for motion in _quarters(motions[0]) if len(motions) == 1 else motions:
+    for motion in motions:
         torque, segments, inertia, passive = _terms(model, motion)
         rows.append((np.column_stack([np.sum(segments, axis=0) + inertia, *passive]), torque))
     whole = np.sum([a.T @ a for a, _ in rows], axis=0)
@@ -144,12 +146,6 @@ def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | 
     scatter = [a[:, moved].T @ (torque - a[:, moved] @ found) for a, torque in rows]
     spread = inverse @ np.sum([np.outer(s, s) for s in scatter], axis=0) @ inverse * len(rows) / (len(rows) - 1)
     return float(found[0]), float(np.sqrt(spread[0, 0]))
-
-
-def _quarters(motion: Motion) -> list[Motion]:
-    """Return the four quarters of a motion."""
-    pieces = np.array_split(np.arange(len(motion.q)), 4)
-    return [Motion(motion.q[p], motion.speed[p], motion.acceleration[p], motion.force[p], motion.moment[p]) for p in pieces]
 
 
 def _terms(model: Model, motion: Motion) -> tuple[np.ndarray, list[np.ndarray], np.ndarray, list[np.ndarray]]:

@@ -178,7 +178,9 @@ def other_weight(dataset: Dataset) -> Weight | None:
     if model.gravity == 0.0 or dataset.added:
         return None
     names = list(dict.fromkeys(t.configuration for t in trials))
-    groups = [[t for t in trials if t.configuration == name] for name in names] if len(names) >= _FEW else [[t] for t in trials]
+    if len(names) < _FEW:  # how well the weight is known shows between movements alone
+        return None
+    groups = [[t for t in trials if t.configuration == name] for name in names]
     motions = [motion for group in groups if (motion := _motion(group, SAMPLES // len(groups))) is not None]
     found = weight_of(model, motions) if motions else None
     if found is None:
