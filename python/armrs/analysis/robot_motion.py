@@ -11,6 +11,7 @@ import dataclasses
 import numpy as np
 
 from .. import _armrs
+from ..io.plausibility import hand_path, handle_path
 from ..io.trial import Trial
 from ..model import Model
 
@@ -33,11 +34,10 @@ def with_robot_motion(trial: Trial, model: Model, cutoff: float) -> Trial | None
     slow = _low_passed(trial.q, trial.rate, cutoff)
     if float(np.abs(np.sin(slow[:, 1])).min()) < _LEAST_SINE:
         return None
-    hand = _hand(np.array(robot.lengths), np.array(robot.base), angles)
+    hand = handle_path(robot, angles)
     if model.contact is not None:
         hand = hand - force / np.array(model.contact.stiffness)
-    lengths = np.array([segment.length for segment in model.segments])
-    beside = _inverse(lengths, np.array(model.base), slow, hand) - slow
+    beside = _inverse(model, slow, hand) - slow
     if not np.isfinite(beside).all():
         return None
     return dataclasses.replace(trial, q=slow + beside - _low_passed(beside, trial.rate, cutoff))
@@ -47,17 +47,11 @@ def _low_passed(values: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
     return np.asarray(_armrs.smooth(np.ascontiguousarray(values), rate, cutoff)[0])
 
 
-def _hand(lengths: np.ndarray, base: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return where the end of a chain of relative angles is, (n, 2) [m]."""
-    absolute = np.cumsum(q, axis=1)
-    return base + np.column_stack([np.cos(absolute) @ lengths, np.sin(absolute) @ lengths])
-
-
-def _inverse(lengths: np.ndarray, base: np.ndarray, q: np.ndarray, hand: np.ndarray) -> np.ndarray:
+def _inverse(model: Model, q: np.ndarray, hand: np.ndarray) -> np.ndarray:
     """Return the angles near `q` at which the hand is there (Newton)."""
+    arm = _armrs.Arm.from_model(model)
     for _ in range(_STEPS):
-        absolute = np.cumsum(q, axis=1)
-        along = np.stack([-np.sin(absolute) * lengths, np.cos(absolute) * lengths], axis=1)
-        jacobian = np.cumsum(along[:, :, ::-1], axis=2)[:, :, ::-1]
-        q = q + np.linalg.solve(jacobian, (hand - _hand(lengths, base, q))[:, :, None])[:, :, 0]
+        if not np.isfinite(q).all():
+            break
+        q = q + np.linalg.solve(arm.jacobian(q)[:, :2, :], (hand - hand_path(model, q))[:, :, None])[:, :, 0]
     return q

@@ -12,6 +12,8 @@ from . import console, tables
 if TYPE_CHECKING:
     from ..io.markers import PlanarMotion
 
+SYMBOLS_ON_PAGES = SYMBOLS.replace(", l the", ", ℓ the")
+"""The same for pages, on which `tables.typeset` sets the names."""
 HISTORY_MEANING = (
     "What was measured in each session. A change is set against the uncertainty of both sessions, which is the scatter of their own "
     "repeats, and called one at a level of 5 % over all parameters together. What differs between days without being a change of the "
