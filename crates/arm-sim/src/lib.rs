@@ -47,7 +47,7 @@ pub use path::{Handle, HandlePath};
 pub use rapier::{RapierSettings, simulate_rapier};
 pub use record::{EnergyColumns, Partial, Piece, Recording, TorqueColumns, WorkColumns};
 pub use sensor::{Channel, Readings, Sensors};
-pub use series::{Interpolation, Jet, Series};
+pub use series::{Interpolation, Jet, Series, cubic_weights};
 pub use simulate::{Engine, simulate, simulate_in_pieces, simulate_partial, simulate_with};
 pub use stability::Vibration;
 pub use stepper::{Outside, Port, Seen, Snapshot, Stepper};

@@ -3,7 +3,7 @@
 use arm_core::{Joints, Reading};
 
 use crate::noise::{Noise, Normal};
-use crate::{Experiment, Recording, SimulationError};
+use crate::{Experiment, Recording, SimulationError, cubic_weights};
 
 /// One channel of a sensor: noise, then quantisation, then saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -252,13 +252,9 @@ impl Clock {
             return column(nearest as usize);
         }
         let first = (place.floor() as usize).clamp(1, self.last - 2) - 1;
-        let x = place - first as f64;
-        // Lagrange through the samples 0, 1, 2, 3 from the first.
-        let (a, b, c, d) = (x, x - 1.0, x - 2.0, x - 3.0);
-        column(first + 1) * (a * c * d / 2.0)
-            - column(first) * (b * c * d / 6.0)
-            - column(first + 2) * (a * b * d / 2.0)
-            + column(first + 3) * (a * b * c / 6.0)
+        let weights = cubic_weights(place - first as f64);
+        let four = weights.into_iter().zip(first..);
+        four.map(|(weight, sample)| weight * column(sample)).sum()
     }
 }
 

@@ -160,6 +160,17 @@ impl<const M: usize> Series<M> {
     }
 }
 
+/// Weights of four even samples, at 0, 1, 2 and 3, for the value at `x` of the cubic through them (Lagrange).
+pub fn cubic_weights(x: f64) -> [f64; 4] {
+    let (a, b, c, d) = (x, x - 1.0, x - 2.0, x - 3.0);
+    [
+        -b * c * d / 6.0,
+        a * c * d / 2.0,
+        -a * b * d / 2.0,
+        a * b * c / 6.0,
+    ]
+}
+
 /// Slopes at the samples of the cubic spline whose first two and last two pieces are one polynomial each.
 ///
 /// Two samples give a straight line, three a parabola.

@@ -6,7 +6,7 @@
 
 use arm_core::effect::{MAX_STATES, States, advance_states, any_state};
 use arm_core::{Joints, Plane, Reading, Setup};
-use arm_sim::{Change, SimulationError, Slopes};
+use arm_sim::{Change, SimulationError, Slopes, cubic_weights};
 use nalgebra::SMatrix;
 use std::sync::Arc;
 
@@ -407,14 +407,7 @@ impl<'a, const N: usize> Linear<'a, N> {
 /// The value at a place among samples of the cubic through the four samples about it (Lagrange).
 fn cubic(samples: &[Plane<f64>], place: f64) -> Plane<f64> {
     let first = (place as usize).clamp(1, samples.len() - 3) - 1;
-    let x = place - first as f64;
-    let (a, b, c, d) = (x, x - 1.0, x - 2.0, x - 3.0);
-    let weights = [
-        -b * c * d / 6.0,
-        a * c * d / 2.0,
-        -a * b * d / 2.0,
-        a * b * c / 6.0,
-    ];
+    let weights = cubic_weights(place - first as f64);
     let four = std::iter::zip(weights, &samples[first..first + 4]);
     four.fold([0.0; 2], |sum, (weight, sample)| {
         [0, 1].map(|c| sum[c] + weight * sample[c])

@@ -7,7 +7,7 @@
 
 use arm_core::effect::{Effect, Motion, resisting_torque};
 use arm_core::{Joints, Plane, Pose, inertia, inverse_dynamics, jacobian, static_torque};
-use arm_sim::{Change, Recording, Slopes};
+use arm_sim::{Change, Recording, Slopes, cubic_weights};
 use nalgebra::SMatrix;
 
 use crate::regression::equation::Building;
@@ -114,15 +114,7 @@ impl<const N: usize> Course<N> {
         let i = sample * self.parts;
         let place = (i as f64 - delay * self.fine.rate).clamp(0.0, last);
         let first = place.floor().clamp(1.0, (last - 2.0).max(1.0)) - 1.0;
-        let x = place - first;
-        // Lagrange through the samples 0, 1, 2, 3 from the first.
-        let (a, b, c, d) = (x, x - 1.0, x - 2.0, x - 3.0);
-        let weights = [
-            -b * c * d / 6.0,
-            a * c * d / 2.0,
-            -a * b * d / 2.0,
-            a * b * c / 6.0,
-        ];
+        let weights = cubic_weights(place - first);
         let then = |axis: usize| -> f64 {
             let near = force[first as usize..].iter().zip(weights);
             near.map(|(f, w)| w * f[axis]).sum()
