@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 # Before NumPy is loaded, here and in processes that tests start. Its matrices are small here, and threads that wait for one another take
@@ -144,6 +145,15 @@ class Session:
     def files(self) -> dict[str, bytes]:
         """Everything below the folder, to see that nothing was written."""
         return {str(p.relative_to(self.folder)): p.read_bytes() for p in sorted(self.folder.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture(autouse=True)
+def figures_closed() -> Iterator[None]:
+    """A figure that a test made is closed after it: pyplot keeps them all and warns, in whichever test makes the twenty-first."""
+    yield
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is not None:
+        pyplot.close("all")
 
 
 @pytest.fixture
