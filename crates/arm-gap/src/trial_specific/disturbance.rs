@@ -103,29 +103,40 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
         let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
         let near = clearest.into_iter().filter(|(gain, _)| *gain > NEAR * most);
-        let deviations = suspect.deviations();
-        let mut explained: Vec<Explained> = near
+        let mut explained: Vec<(&Asked, Explained)> = near
             .map(|(_, one)| {
-                let scatter = scatter_elsewhere(one, &asked, &deviations);
                 let answer = |effect| see(self.shape_of(point, trial, effect)?);
                 let asked = timed(one.clone(), &suspect.deviation, answer);
                 let size = asked.size(&suspect.deviation);
-                let gain = asked.gain(&suspect.deviation) / scale / scatter;
-                Explained {
+                let gain = asked.gain(&suspect.deviation) / scale;
+                let found = Explained {
                     asked,
                     size,
-                    scatter,
+                    scatter: 1.0,
                     gain,
-                }
+                };
+                (one, found)
             })
             .collect();
-        explained.sort_by(|a, b| self.worth(b).total_cmp(&self.worth(a)));
+        explained.sort_by(|(_, a), (_, b)| self.worth(b).total_cmp(&self.worth(a)));
+        let scatter = explained.first().map_or(1.0, |(on_grid, first)| {
+            let deviations = suspect.deviations();
+            let left: Vec<_> = deviations.iter().map(|d| first.asked.left_of(d)).collect();
+            scatter_elsewhere(on_grid, &asked, &left)
+        });
+        let scattered = |(_, one): (_, Explained)| Explained {
+            scatter,
+            gain: one.gain / scatter,
+            ..one
+        };
+        let explained: Vec<Explained> = explained.into_iter().map(scattered).collect();
         explained
     }
 
     /// Whether what is asked is a finding in a trial, whatever its size: of two repeats both deviate alike, and the disturbed one is further
     /// from the model; what moves within what the calibration promises of it is none.
-    /// A burst below the dry friction of the arm is none either: joints stick and come loose at other times in every repeat.
+    /// A burst below twice the dry friction of the arm is none either: a joint that sticks holds any torque within plus and minus its
+    /// friction, so that two repeats differ by up to twice as much.
     ///
     /// * `friction` - of the joint that has most \[N m\]
     fn is_finding(&self, one: &Asked, suspect: &Compared, friction: f64) -> bool {
@@ -134,7 +145,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let probe = one.effect.kind.probe();
         let promised = match (probe.nature, probe.promise) {
             (Nature::Slip, _) => self.session.tolerance.handle_placement,
-            (Nature::Burst, _) => friction,
+            (Nature::Burst, _) => 2.0 * friction,
             (_, Some(_)) => self.session.tolerance.angle_offset(),
             (_, None) => 0.0,
         };

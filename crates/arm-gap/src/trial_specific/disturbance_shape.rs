@@ -168,6 +168,13 @@ impl Asked {
         along * along / self.square
     }
 
+    /// What is left of a deviation without it.
+    pub fn left_of(&self, deviation: &[f64]) -> Vec<f64> {
+        let size = self.size(deviation);
+        let own = deviation.iter().zip(&self.row);
+        own.map(|(value, row)| value - size * row).collect()
+    }
+
     /// When it begins, and how long it lasts where it ends \[s\].
     fn timing(&self) -> (f64, Option<f64>) {
         let (start, duration) = timing_of(self.effect.kind);
@@ -180,7 +187,7 @@ impl Asked {
 pub(super) struct Explained {
     pub asked: Asked,
     pub size: f64,
-    /// See [`scatter_elsewhere`].
+    /// See [`scatter_elsewhere`]; one number for all places, which compete for the same samples.
     pub scatter: f64,
     pub gain: f64,
 }
@@ -254,24 +261,24 @@ pub(super) fn timed(
     best
 }
 
-/// How much more than noise the shape of a burst finds at other times of its movement, as a ratio of variances; at least one.
+/// How much more than noise the shape of a disturbance finds at other times of its movement, as a ratio of variances; at least one.
 ///
-/// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like bursts at many times.
+/// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like disturbances at many times.
 ///
-/// * `deviations` - of the trial and its repeats
+/// * `deviations` - of the trial and its repeats, without what the disturbance itself explains: an arm rings long after a burst, and what
+///   slips stays off
 pub(super) fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[Vec<f64>]) -> f64 {
     /// Nine of ten squares of a standard normal number are smaller.
     const NINE_OF_TEN: f64 = 2.706;
-    /// How long a burst is felt around it \[s\].
+    /// How long a burst is felt around it, and a slip about its start \[s\].
     const FELT: f64 = 1.0;
-    let (start, Some(duration)) = one.timing() else {
-        return 1.0;
-    };
-    let own = (start - FELT, start + duration);
+    let (start, duration) = one.timing();
+    let long = duration.unwrap_or(0.0);
+    let own = (start - FELT, start + long);
     let elsewhere = asked.iter().filter(|other| {
-        let (from, long) = other.timing();
-        let same = other.place() == one.place() && long == Some(duration);
-        same && (from - FELT > own.1 || from + duration < own.0)
+        let (from, lasts) = other.timing();
+        let same = other.place() == one.place() && lasts == duration;
+        same && (from - FELT > own.1 || from + long < own.0)
     });
     let mut squares: Vec<f64> = elsewhere
         .flat_map(|other| deviations.iter().map(|d| other.gain(d)))
@@ -320,6 +327,21 @@ mod tests {
         let always = vec![9.0; 95];
         let scatter = scatter_elsewhere(&asked[45], &asked, &[once, always]);
         assert!((scatter - 81.0 / 2.706).abs() < 1e-12, "{scatter}");
+    }
+
+    #[test]
+    fn what_rings_after_a_burst_is_no_scatter() {
+        let mut asked = bursts();
+        for (k, one) in asked.iter_mut().enumerate() {
+            // An arm that rings for 4 s.
+            (k..95.min(k + 40)).for_each(|i| one.row[i] = libm::exp(-0.05 * (i - k) as f64));
+            one.square = dot(&one.row, &one.row);
+        }
+        let seen: Vec<f64> = asked[30].row.iter().map(|v| 50.0 * v).collect();
+        let rings = scatter_elsewhere(&asked[30], &asked, std::slice::from_ref(&seen));
+        assert!(rings > 10.0, "{rings}");
+        let left = asked[30].left_of(&seen);
+        assert_eq!(scatter_elsewhere(&asked[30], &asked, &[left]), 1.0);
     }
 
     #[test]

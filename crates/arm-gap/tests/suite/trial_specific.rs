@@ -1,13 +1,13 @@
 //! What is not the same in every trial: a handle or a sensor that slips, the robot's ripple.
 
-use arm_core::effect::{Kind, Nature};
+use arm_core::effect::{Effect, Kind, Nature};
 use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::session::Session;
 use arm_gap::trial_specific::component::TrialSpecific;
 use arm_gap::trial_specific::tremor_detection::Line;
 use core::f64::consts::TAU;
 
-use crate::sessions::{RATE, session};
+use crate::sessions::{RATE, known, session};
 
 /// The clearest disturbance of a session against the model as given.
 fn disturbance(session: &Session<2>) -> Option<TrialSpecific> {
@@ -63,6 +63,35 @@ fn a_handle_that_slips_is_found_with_its_trial_its_time_and_its_way() {
     assert!((found.span().0 - 3.0).abs() <= 0.1, "{found:?}");
     // How the handle is held differs from trial to trial by as much as that.
     assert!(disturbance(&slipped_in_the_hand([0.0005, 0.0005])).is_none());
+}
+
+/// A session with dry friction \[N m\] in the elbow, and in one trial with a burst of an amplitude \[N m\] from 2 s on besides.
+fn tense(friction: f64, amplitude: f64) -> Session<2> {
+    let effect =
+        |kind, values: &[f64]| Effect::new(Kind::named(kind).expect("known"), 1).with(values);
+    let dry = effect("coulomb", &[friction, 0.0]);
+    let noise = (1e-3, 0.1);
+    let mut session_with_one = session(&[dry], noise);
+    let with_burst = session(&[dry, effect("voluntary", &[amplitude, 2.0, 0.6])], noise);
+    session_with_one.trials[1] = with_burst.trials[1].clone();
+    session_with_one.effects = known().into_iter().chain([dry]).collect();
+    session_with_one
+}
+
+#[test]
+fn a_burst_is_found_with_its_joint_and_not_below_twice_the_dry_friction() {
+    let found = disturbance(&tense(0.2, 0.8)).expect("a burst");
+    assert_eq!(found.effect.kind.probe().nature, Nature::Burst);
+    assert_eq!((found.effect.index, found.trial), (1, Some(1)));
+    let [amplitude, start, duration, ..] = found.effect.parameters;
+    assert!((amplitude - 0.8).abs() < 0.1, "{found:?}");
+    assert!(
+        (start - 2.0).abs() < 0.15 && (duration - 0.6).abs() < 0.2,
+        "{found:?}"
+    );
+    // Two repeats may hold the elbow with 0.2 N m to either side.
+    assert!(disturbance(&tense(0.2, 0.35)).is_none());
+    assert!(disturbance(&tense(0.0, 0.35)).is_some());
 }
 
 #[test]
