@@ -8,6 +8,7 @@ use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
+use crate::candidates::refined_shapes::{held, refined};
 use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
@@ -34,8 +35,8 @@ pub struct Candidate {
     pub free: Vec<usize>,
     /// Position of a rest angle that is free with them.
     pub rest: Option<usize>,
-    /// Positions of shapes that are refined once it is named.
-    pub refined: Vec<usize>,
+    /// Shapes that are refined once it is named: their positions and limits.
+    pub refined: Vec<(usize, (f64, f64))>,
     /// How many shapes were tried of this question.
     pub tried: usize,
     /// Change of the free parameters with which responses are taken.
@@ -148,7 +149,7 @@ impl Candidate {
             question: number,
             free: free.to_vec(),
             rest: question.rest,
-            refined: refined(&effect, question),
+            refined: refined(prepared.session, &effect, question),
             tried: 1,
             step: question.step,
             price: 0.0,
@@ -177,7 +178,7 @@ impl Candidate {
     pub fn at_rest_as(mut self, effect: &Effect<f64>) -> Self {
         if let Some(smoothing) = effect.kind.smoothed_by() {
             self.effect.parameters[smoothing] = effect.parameters[smoothing];
-            self.refined.retain(|&p| Some(p) != held(effect));
+            self.refined.retain(|(p, _)| Some(*p) != held(effect));
         }
         self
     }
@@ -210,27 +211,28 @@ impl Candidate {
     /// The numbers that a fit may change once the effect stands at a place in the list of named ones.
     pub fn coordinates(&self, slot: usize, effect: &Effect<f64>) -> Vec<Coordinate> {
         let info = effect.kind.info();
-        let free = self.free.iter().map(|&p| (p, self.step));
-        let shapes = self.rest.iter().chain(&self.refined);
+        let whole = |p: usize| (info.parameters[p].min, info.parameters[p].max);
+        let free = self.free.iter().map(|&p| (p, whole(p), self.step));
+        let rest = self.rest.map(|p| (p, whole(p)));
         let share = match effect.kind.probe().nature {
             // A frequency that is a little off is out of step at the end of a trial.
             Nature::Periodic => 0.0,
             _ => 0.05,
         };
-        let shapes = shapes.map(|&p| {
+        let shapes = rest.iter().chain(&self.refined).map(|&(p, limits)| {
             let size = (share * effect.parameters[p].abs()).max(1e-3);
-            (p, size)
+            (p, limits, size)
         });
         free.chain(shapes)
-            .map(|(p, step)| Coordinate {
+            .map(|(p, (lower, upper), step)| Coordinate {
                 target: Target::Named(slot, p),
                 prior: self
                     .expected
                     .iter()
                     .find(|e| e.parameter == p)
                     .map(|e| (e.mean, e.sd)),
-                lower: info.parameters[p].min,
-                upper: info.parameters[p].max,
+                lower,
+                upper,
                 step,
             })
             .collect()
@@ -494,17 +496,6 @@ fn motions<const N: usize>(
     prepared.parallel(prepared.references.len(), one)
 }
 
-/// The shapes of an effect that are refined once it is named: of friction that sticks, not the speed below which it would creep.
-fn refined(effect: &Effect<f64>, question: &Question) -> Vec<usize> {
-    let shapes = question.refined.iter().copied();
-    shapes.filter(|&p| Some(p) != held(effect)).collect()
-}
-
-/// The parameter that stays as it is in friction that sticks: the speed over which it would be smoothed.
-fn held(effect: &Effect<f64>) -> Option<usize> {
-    effect.kind.smoothed_by().filter(|_| effect.is_dry())
-}
-
 /// The candidates of one question about a kind at a place.
 ///
 /// * `plain` - the effect, with what it shares with others in its place
@@ -558,7 +549,7 @@ fn ask<const N: usize>(
             question: number,
             free: question.free.to_vec(),
             rest: question.rest,
-            refined: refined(&effect, question),
+            refined: refined(session, &effect, question),
             tried,
             step: question.step,
             price: 0.0,

@@ -1,4 +1,5 @@
 //! The catalogue of effects as questions that a session can answer.
 
 pub mod candidate;
+pub(crate) mod refined_shapes;
 pub mod tabulated;

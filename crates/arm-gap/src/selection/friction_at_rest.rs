@@ -3,6 +3,7 @@
 use arm_core::effect::Kind;
 
 use crate::GapError;
+use crate::candidates::refined_shapes::CREEP;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
@@ -10,7 +11,7 @@ use crate::selection::fit::Fitted;
 use crate::selection::search_state::Settled;
 
 /// Speeds below which friction may creep \[rad/s\]; with zero it sticks.
-const SMOOTHING: [f64; 4] = [0.0, 0.003, 0.01, 0.03];
+const SMOOTHING: [f64; 4] = [0.0, 0.003, 0.01, CREEP];
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Chooses for each dry law of the base and each named one the speed below which it creeps that whole fit trials show, and fits

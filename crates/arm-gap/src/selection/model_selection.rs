@@ -166,10 +166,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 // Less may be the imperfect shape of another one, or of a law of the base.
                 let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
-                let others = others.map(|o| (&fitted.asked[o].effect, gains[o]));
+                let others = others.map(|o| (fitted.asked[o].effect, gains[o]));
+                // A second dry law may be the imperfect shape of the first one, which explains less beside it than by itself.
+                let is_dry = candidate.kind().smoothed_by().is_some() && less.cost.is_finite();
+                let dry = is_dry
+                    .then(|| self.gain_of_dry_law(&point, &less, candidate.effect.index))
+                    .flatten();
                 let least = others
-                    .chain(base.iter().map(|(law, gain)| (law, *gain)))
-                    .map(|(other, gain)| mimicked(&candidate.effect, other, gain))
+                    .chain(base.iter().copied())
+                    .chain(dry)
+                    .map(|(other, gain)| mimicked(&candidate.effect, &other, gain))
                     .fold(floor, f64::max);
                 let worth = gain / scale - candidate.price * candidate.spread;
                 let worth = if gain < least {

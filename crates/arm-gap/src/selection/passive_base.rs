@@ -111,6 +111,27 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(terms.into_iter().map(with_law).collect())
     }
 
+    /// The dry law of the base in a joint, with how much worse a fitted hypothesis does without it. A joint that sticks answers far from in
+    /// proportion to its friction, so that standard deviations do not tell what it explains.
+    pub(crate) fn gain_of_dry_law(
+        &self,
+        point: &LinearizationPoint<N>,
+        fitted: &Fitted<N>,
+        joint: usize,
+    ) -> Option<(Effect<f64>, f64)> {
+        let first = self.session.effects.len();
+        let mut kept = (0..self.session.base.len()).filter(|&b| !self.dropped[b]);
+        let law = |b: usize| &fitted.hypothesis.known[first + b];
+        let known =
+            first + kept.find(|&b| law(b).index == joint && law(b).kind.smoothed_by().is_some())?;
+        let held = point.holding(|t| matches!(t, Target::Known(e, _) if e == known));
+        let mut without = fitted.hypothesis.clone();
+        let effect = without.known[known];
+        without.known[known].parameters[0] = 0.0;
+        let less = self.fit(&held, without, fitted.asked.clone()).ok()?;
+        Some((effect, less.cost - fitted.cost))
+    }
+
     /// Drops the weakest law of each joint that stands out too little; whether there was one.
     ///
     /// * `least` - what a law must gain to stay
