@@ -26,11 +26,11 @@ impl<const N: usize> PreparedSession<'_, N> {
             .collect();
         let mut best: Option<(f64, TrialSpecific)> = None;
         for suspect in &compared {
-            let explained = self.explained(point, suspect, scale);
+            let (explained, scale) = self.explained(point, suspect, scale);
             let Some(first) = explained.first() else {
                 continue;
             };
-            let worth = self.worth(first);
+            let worth = self.worth(first, scale);
             if worth <= best.as_ref().map_or(0.0, |(worth, _)| *worth) {
                 continue;
             }
@@ -39,10 +39,10 @@ impl<const N: usize> PreparedSession<'_, N> {
                 effect: first.effect(shrink),
                 sd: first.sd(scale, shrink),
                 trial: Some(self.fitted[suspect.place]),
-                gain: first.gain,
+                gain: first.gain / scale,
                 rivals: explained[1..]
                     .iter()
-                    .map(|other| (other.effect(shrink), worth - self.worth(other)))
+                    .map(|other| (other.effect(shrink), worth - self.worth(other, scale)))
                     .filter(|(_, worse)| *worse <= TIE)
                     .collect(),
                 locked: false,
@@ -55,18 +55,21 @@ impl<const N: usize> PreparedSession<'_, N> {
     }
 
     /// What a disturbance gains beyond what it must: the price of its sizes, and of all the times and places that were tried.
-    fn worth(&self, one: &Explained) -> f64 {
+    ///
+    /// * `scale` - misfit for each degree of freedom
+    fn worth(&self, one: &Explained, scale: f64) -> f64 {
         let tried = self.fitted.len() * 4 * N * 100;
-        one.gain - price(one.asked.sizes.len(), tried, self.rows_of_references())
+        one.gain / scale - price(one.asked.sizes.len(), tried, self.rows_of_references())
     }
 
-    /// What each kind in each place explains of how a trial differs from its repeats, where and as long as it explains most; the best first.
+    /// What each kind in each place explains of how a trial differs from its repeats, where and as long as it explains most, the best first;
+    /// and the misfit for each degree of freedom, as it is at other times: one number for all places, which compete for the same samples.
     fn explained(
         &self,
         point: &LinearizationPoint<N>,
         suspect: &Compared,
         scale: f64,
-    ) -> Vec<Explained> {
+    ) -> (Vec<Explained>, f64) {
         /// Share of what explains most on the grid of times below which a time of its own helps no more.
         const NEAR: f64 = 0.5;
         let trial = self.fitted[suspect.place];
@@ -102,35 +105,22 @@ impl<const N: usize> PreparedSession<'_, N> {
             }
         }
         let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
-        let near = clearest.into_iter().filter(|(gain, _)| *gain > NEAR * most);
-        let mut explained: Vec<(&Asked, Explained)> = near
-            .map(|(_, one)| {
-                let answer = |effect| see(self.shape_of(point, trial, effect)?);
-                let asked = timed(one.clone(), &suspect.deviation, answer);
-                let size = asked.size(&suspect.deviation);
-                let gain = asked.gain(&suspect.deviation) / scale;
-                let found = Explained {
-                    asked,
-                    size,
-                    scatter: 1.0,
-                    gain,
-                };
-                (one, found)
-            })
-            .collect();
-        explained.sort_by(|(_, a), (_, b)| self.worth(b).total_cmp(&self.worth(a)));
-        let scatter = explained.first().map_or(1.0, |(on_grid, first)| {
+        clearest.retain(|(gain, _)| *gain > NEAR * most);
+        let answer = |effect| see(self.shape_of(point, trial, effect)?);
+        let at_its_time = |(_, one): &(f64, &Asked)| {
+            let asked = timed((*one).clone(), &suspect.deviation, answer);
+            Explained::of(asked, &suspect.deviation)
+        };
+        let mut explained: Vec<Explained> = clearest.iter().map(at_its_time).collect();
+        explained.sort_by(|a, b| self.worth(b, scale).total_cmp(&self.worth(a, scale)));
+        let scatter = explained.first().and_then(|first| {
+            let place = first.asked.place();
+            let (_, on_grid) = clearest.iter().find(|(_, one)| one.place() == place)?;
             let deviations = suspect.deviations();
             let left: Vec<_> = deviations.iter().map(|d| first.asked.left_of(d)).collect();
-            scatter_elsewhere(on_grid, &asked, &left)
+            Some(scatter_elsewhere(on_grid, &asked, &left))
         });
-        let scattered = |(_, one): (_, Explained)| Explained {
-            scatter,
-            gain: one.gain / scatter,
-            ..one
-        };
-        let explained: Vec<Explained> = explained.into_iter().map(scattered).collect();
-        explained
+        (explained, scale * scatter.unwrap_or(1.0))
     }
 
     /// Whether what is asked is a finding in a trial, whatever its size: of two repeats both deviate alike, and the disturbed one is further

@@ -187,12 +187,16 @@ impl Asked {
 pub(super) struct Explained {
     pub asked: Asked,
     pub size: f64,
-    /// See [`scatter_elsewhere`]; one number for all places, which compete for the same samples.
-    pub scatter: f64,
+    /// What it explains of the deviation.
     pub gain: f64,
 }
 
 impl Explained {
+    pub fn of(asked: Asked, deviation: &[f64]) -> Self {
+        let (size, gain) = (asked.size(deviation), asked.gain(deviation));
+        Self { asked, size, gain }
+    }
+
     /// The effect in the size that it has.
     ///
     /// * `shrink` - part of it that the difference of a trial from its repeats shows
@@ -208,7 +212,7 @@ impl Explained {
     ///
     /// * `scale` - misfit for each degree of freedom
     pub fn sd(&self, scale: f64, shrink: f64) -> Vec<f64> {
-        let one = |variance: &f64| libm::sqrt(scale * self.scatter * variance) / shrink;
+        let one = |variance: &f64| libm::sqrt(scale * variance) / shrink;
         self.asked.variances.iter().map(one).collect()
     }
 }
@@ -265,6 +269,7 @@ pub(super) fn timed(
 ///
 /// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like disturbances at many times.
 ///
+/// * `one` - as it stands among `asked`
 /// * `deviations` - of the trial and its repeats, without what the disturbance itself explains: an arm rings long after a burst, and what
 ///   slips stays off
 pub(super) fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[Vec<f64>]) -> f64 {
