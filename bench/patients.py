@@ -40,11 +40,9 @@ class Patient:
     stiffness: float = 0.8
     tone: float = 0.15
     wrong_inertia: float = 0.03
-    gain_y: float = 0.0
-    gain_z: float = 0.0
-    bias_y: float = 0.0
-    bias_z: float = 0.0
-    """Errors of the laboratory's force sensor, the same in all sessions; drawn as large as a data set declares them."""
+    force_gains: tuple[float, float] = (0.0, 0.0)
+    force_biases: tuple[float, float] = (0.0, 0.0)
+    """Errors of the laboratory's force sensor along y and z [1, N], the same in all sessions, as large as a data set declares them."""
 
     @staticmethod
     def drawn(draw: np.random.Generator) -> Patient:
@@ -56,10 +54,8 @@ class Patient:
             viscosity=draw.uniform(0.05, 0.3),
             dry=draw.uniform(0.05, 0.3),
             stiffness=draw.uniform(0.3, 1.5),
-            gain_y=0.01 * draw.standard_normal(),
-            gain_z=0.01 * draw.standard_normal(),
-            bias_y=0.2 * draw.standard_normal(),
-            bias_z=0.2 * draw.standard_normal(),
+            force_gains=tuple(0.01 * draw.standard_normal(2)),
+            force_biases=tuple(0.2 * draw.standard_normal(2)),
         )
 
 
@@ -151,26 +147,6 @@ gain = {gain}
 threshold = {threshold}
 latency = {latency}
 
-[[effect]]
-kind = "force_gain"
-channel = "Fy"
-gain = {gain_y}
-
-[[effect]]
-kind = "force_gain"
-channel = "Fz"
-gain = {gain_z}
-
-[[effect]]
-kind = "force_bias"
-channel = "Fy"
-bias = {bias_y}
-
-[[effect]]
-kind = "force_bias"
-channel = "Fz"
-bias = {bias_z}
-
 [handle]
 mass = 0.193
 
@@ -197,6 +173,12 @@ pause_s = 0.5
 shape = "smooth"
 repeats = 3
 """
+FORCE_ERROR = """
+[[effect]]
+kind = "force_{kind}"
+channel = "{channel}"
+{kind} = {value}
+"""
 LABORATORY_SPEEDS = (0.3, 1.0, 1.8, 2.7, 3.6)
 """Speeds of the stretches in the laboratory [rad/s]."""
 
@@ -205,6 +187,8 @@ def recorded(patient: Patient, seed: int) -> Dataset:
     """Return a session of the virtual laboratory."""
     said = EXPERIMENT.format(person=PERSON, seed=seed, **dataclasses.asdict(patient))
     said += "".join(STRETCH.format(number=k, speed=s, acceleration=max(4.0, 12.0 * s)) for k, s in enumerate(LABORATORY_SPEEDS))
+    for kind, values in (("gain", patient.force_gains), ("bias", patient.force_biases)):
+        said += "".join(FORCE_ERROR.format(kind=kind, channel=c, value=v) for c, v in zip(("Fy", "Fz"), values, strict=True))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "EXPERIMENT.toml"
         file.write_text(said, encoding="utf-8")

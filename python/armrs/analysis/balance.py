@@ -99,8 +99,9 @@ def unexplained(model: Model, motion: Motion) -> float:
     """
     from scipy.optimize import lsq_linear
 
-    torque, segments, inertia, passive = _terms(model, motion)
-    weight = model.gravity * float(np.sum(np.abs(_armrs.Arm.from_model(model).first_moments)))
+    arm = _armrs.Arm.from_model(model)
+    torque, segments, inertia, passive = _terms(arm, motion)
+    weight = model.gravity * float(np.sum(np.abs(arm.first_moments)))
     columns = [*segments, inertia, *passive]
     laws = ((0.0, _ELASTIC), (-_CONSTANT, _CONSTANT), (0.0, _VISCOUS), (0.0, _DRY))
     bounds = [*[_FIRST_MOMENTS] * len(segments), _INERTIA]
@@ -132,9 +133,9 @@ def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | 
     """
     if len(motions) < 2:
         return None
-    rows = []
+    arm, rows = _armrs.Arm.from_model(model), []
     for motion in motions:
-        torque, segments, inertia, passive = _terms(model, motion)
+        torque, segments, inertia, passive = _terms(arm, motion)
         rows.append((np.column_stack([np.sum(segments, axis=0) + inertia, *passive]), torque))
     whole = np.sum([a.T @ a for a, _ in rows], axis=0)
     size = np.sqrt(np.diag(whole))
@@ -148,9 +149,8 @@ def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | 
     return float(found[0]), float(np.sqrt(spread[0, 0]))
 
 
-def _terms(model: Model, motion: Motion) -> tuple[np.ndarray, list[np.ndarray], np.ndarray, list[np.ndarray]]:
+def _terms(arm: _armrs.Arm, motion: Motion) -> tuple[np.ndarray, list[np.ndarray], np.ndarray, list[np.ndarray]]:
     """Return the contact torques, and what they balance: each first moment, inertia, and the passive laws of each joint; all flat [N m]."""
-    arm = _armrs.Arm.from_model(model)
     n, joints = motion.q.shape
     torque = np.einsum("nij,ni->nj", arm.jacobian(motion.q)[:, :2, :], motion.force) + motion.moment[:, None]
     regressor = arm.regressor(motion.q, motion.speed, motion.acceleration)

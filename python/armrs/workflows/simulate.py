@@ -122,6 +122,11 @@ class Run(Protocol):
         """Give the samples in order, as runs of at most `PIECE` of them."""
 
 
+def _samples(columns: dict[str, Any]) -> dict[str, Any]:
+    """Return what a run keeps of its columns by name, and all of them."""
+    return {"t": columns["time"]} | {name: columns[name] for name in ("q", "qd", "qdd", "force_on_arm")} | {"columns": columns}
+
+
 @dataclass(frozen=True, eq=False)
 class Simulated(Tabular, Series):
     """A recorded run; rows are samples.
@@ -227,15 +232,7 @@ class Simulated(Tabular, Series):
 
     def with_columns(self, columns: dict[str, Any]) -> Simulated:
         """Return the run with other samples."""
-        return dataclasses.replace(
-            self,
-            t=columns["time"],
-            q=columns["q"],
-            qd=columns["qd"],
-            qdd=columns["qdd"],
-            force_on_arm=columns["force_on_arm"],
-            columns=columns,
-        )
+        return dataclasses.replace(self, **_samples(columns))
 
 
 def digested(columns: Mapping[str, Any]) -> list[str]:
@@ -424,17 +421,7 @@ class _Asked:
     def recorded(self, raw: Recording) -> Simulated:
         """Return what the core has recorded."""
         columns: dict[str, Any] = {**raw.columns, "effects": raw.effects, "energy_error": raw.energy_error}
-        return Simulated(
-            t=columns["time"],
-            q=columns["q"],
-            qd=columns["qd"],
-            qdd=columns["qdd"],
-            force_on_arm=columns["force_on_arm"],
-            columns=columns,
-            readings=raw.readings,
-            model=self.model,
-            settings=self.settings,
-        )
+        return Simulated(**_samples(columns), readings=raw.readings, model=self.model, settings=self.settings)
 
 
 def _asked(
