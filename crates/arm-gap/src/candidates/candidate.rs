@@ -567,7 +567,8 @@ fn ask<const N: usize>(
 /// The amplitude with which the effect's torque is a small share of what its joint carries, or the largest that the kind
 /// allows; `None` where it has none.
 fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate) -> Option<f64> {
-    const LEAST: f64 = 1e-6; // In the unit of the effect: what less of it changes drowns in rounding.
+    /// Share of the joint's torque that one unit of the effect must make: what less of it changes drowns in rounding.
+    const LEAST: f64 = 1e-6;
     let joint = candidate.effect.index;
     let mut largest = 0.0;
     for movement in movements {
@@ -588,4 +589,40 @@ fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate)
     // A slow movement hardly feels what grows with speed: no step beyond what the parameter may be.
     let info = &candidate.effect.kind.info().parameters[candidate.free[0]];
     (largest > LEAST).then(|| f64::min(SHARE / largest, 0.5 * info.max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One unit of viscosity makes as many newton metres as the joint has radians a second.
+    #[test]
+    fn a_response_is_taken_with_a_fiftieth_of_the_torque_of_the_joint() {
+        let candidate = Candidate {
+            effect: Effect::new(Kind::Viscous, 0).with(&[0.0]),
+            question: 0,
+            free: vec![0],
+            rest: None,
+            refined: Vec::new(),
+            tried: 1,
+            step: 0.0,
+            price: 0.0,
+            spread: 1.0,
+            expected: Vec::new(),
+        };
+        let step = |speed: f64| {
+            let motion = Motion::new(0.0, Joints::from([0.0]), Joints::from([speed]));
+            let movement = Movement {
+                motion: vec![motion; 3],
+                interval: 0.01,
+                torque: [10.0],
+            };
+            torque_step(&[movement], &candidate)
+        };
+        assert!((step(0.5).expect("a step") - 0.4).abs() < 1e-12);
+        assert!(step(0.8e-5).is_none());
+        // No more than half of what the parameter may be.
+        let most = Kind::Viscous.info().parameters[0].max;
+        assert_eq!(step(1.2e-5), Some(f64::min(0.5 * most, 0.02 / 1.2e-6)));
+    }
 }

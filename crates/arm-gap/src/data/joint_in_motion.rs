@@ -259,5 +259,34 @@ mod tests {
         let mut few = swinging();
         few.alike = 60.0;
         assert!(few.fit(&laws).is_none(), "16 samples for 4 numbers");
+        few.alike = 45.0;
+        assert!(few.fit(&laws).is_some(), "22 samples for 4 numbers");
+    }
+
+    #[test]
+    fn a_joint_moves_from_three_times_the_default_smoothing_on() {
+        let speeds = [0.0, 0.029, -0.029, 0.031, -0.031];
+        let column = |of: fn(f64) -> f64| speeds.map(|v| Joints::from([of(v)])).to_vec();
+        let still = |_: f64| 0.0;
+        let trial = Trial::new(100.0, column(still));
+        let motion = Kinematics {
+            q: column(still),
+            qd: column(|v| v),
+            qdd: column(still),
+            base: None,
+        };
+        let trials = [InMotion {
+            trial: &trial,
+            motion,
+            alike: 1.0,
+        }];
+        let segment = arm_core::Segment {
+            length: 0.3,
+            mass: 1.0,
+            com: [0.15, 0.0],
+            inertia: 0.01,
+        };
+        let chain = Chain::<f64, 1>::new([segment], [0.0; 2], [0.0; 2]).expect("an arm");
+        assert_eq!(moving(&chain, &trials, 0).qd, [0.031, -0.031]);
     }
 }

@@ -320,7 +320,7 @@ mod tests {
                 .sum();
             sum - 6.0
         };
-        let size = 0.3 * LEAST;
+        let size = 1.5e-4;
         let mut slow = || {
             let mut x = size * normal();
             let step = size * (1.0 - RHO * RHO).sqrt();
@@ -344,5 +344,14 @@ mod tests {
             // Yule and Walker's equations of fourth order for slow and white noise together leave 1.22.
             assert!(variance < 1.3, "{variance}");
         }
+    }
+
+    /// Of two channels that are one, the second adds what the ridge of a thousandth leaves it.
+    #[test]
+    fn a_channel_that_repeats_another_counts_as_a_thousandth_allows() {
+        let inverse = inverse_factor(&[1.0; 4], 2);
+        let second = 1.0 / libm::sqrt(1.001 - 1.0 / 1.001);
+        assert!((inverse[3] - second).abs() < 1e-9 * second, "{inverse:?}");
+        assert!((inverse[0] - 1.0 / libm::sqrt(1.001)).abs() < 1e-12);
     }
 }

@@ -136,4 +136,28 @@ mod tests {
         assert_eq!(sizes(0.0), [3, 3, 3, 3]);
         assert_eq!(sizes(20.0), [3, 3, 2, 3]);
     }
+
+    /// Pairs of trials that differ by a constant in each of two channels: the squares of both go as that of the constant.
+    fn pairs(distances: &[[f64; 2]]) -> Vec<Repeats> {
+        let channels = |of: &[f64; 2], share: f64| of.map(|d| vec![share * d; 20]).into();
+        let one = |(group, distance): (usize, &[f64; 2])| Repeats {
+            group,
+            samples: ValidSegments::default(),
+            trials: [0.0, 1.0].map(|share| channels(distance, share)).into(),
+        };
+        distances.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn an_outlier_is_five_times_as_far_off_as_others_and_a_quarter_of_the_trials_at_most() {
+        let kept = |far: &[[f64; 2]], near: usize| {
+            let near = vec![[1.0; 2]; near];
+            usual(pairs(&[far, &near].concat())).len()
+        };
+        assert_eq!(kept(&[[4.9, 1.0]], 3), 4);
+        assert_eq!(kept(&[[5.1, 1.0]], 3), 3);
+        // Of 24 trials six may go, though each of seven is far off in one channel.
+        let far = [vec![[10.0, 1.0]; 3], vec![[1.0, 10.0]; 4]].concat();
+        assert_eq!((kept(&far[2..], 7), kept(&far, 5)), (7, 6));
+    }
 }

@@ -100,30 +100,27 @@ mod tests {
             assert_eq!(of(&open), Verdict::Unexplained);
         }
         let large = Evidence {
-            z: MISFIT,
-            ratio: NEAR_NOISE,
-            share: NEGLIGIBLE,
+            z: 6.0,
+            ratio: 2.0,
+            share: 0.05,
             ..CLEAR
         };
         assert_eq!(of(&large), Verdict::Unexplained);
-        let below = Evidence {
-            z: MISFIT - 0.01,
-            ..large
-        };
+        let below = Evidence { z: 5.99, ..large };
         assert_eq!(of(&below), Verdict::Explained);
         let small = Evidence {
-            ratio: NEAR_NOISE - 0.01,
-            share: NEGLIGIBLE - 0.001,
+            ratio: 1.99,
+            share: 0.049,
             ..large
         };
         assert_eq!(of(&small), Verdict::Explained);
         for change in [
             Evidence {
-                ratio: NEAR_NOISE,
+                ratio: 2.0,
                 ..small
             },
             Evidence {
-                share: NEGLIGIBLE,
+                share: 0.05,
                 ..small
             },
             Evidence {

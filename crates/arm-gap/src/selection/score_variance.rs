@@ -100,4 +100,15 @@ mod tests {
         let one = unlike(&told(&[6.0, 0.0, 0.0, 0.0, 0.0, 0.0]), &common);
         assert!((one - (750.0 - 20.5)).abs() < 0.3, "{one}");
     }
+
+    /// Two repeats whose scores, of variance 25 by the noise, are 0 and 50: 50 times what it allows with one degree of freedom, beside
+    /// six that say what the noise says.
+    #[test]
+    fn six_trials_as_the_noise_says_stand_beside_what_repeats_scatter() {
+        let mut trials = told(&[0.0, 2.0]);
+        trials[1].configuration = 0;
+        let found = spread(&trials, &[(0, 1.0)]);
+        assert!((found - (6.0 + 50.0) / 7.0).abs() < 1e-12, "{found}");
+        assert_eq!(spread(&told(&[0.0, 2.0]), &[(0, 1.0)]), 1.0);
+    }
 }

@@ -220,6 +220,11 @@ fn laws_of_the_base_are_likely_where_measured_motion_shows_them() {
     assert!(friction.likely && (friction.effect.parameters[0] - 0.3).abs() < 0.1);
     let none = law("elastic", 1);
     assert!(!none.likely && none.effect.parameters[0] == 0.0, "{none:?}");
+    // A rest angle is known to a radian before the data; a response is taken with a hundredth of what a size may be.
+    let [size, rest] = none.free[..] else {
+        panic!("{none:?}");
+    };
+    assert_eq!((rest.sd, size.step), (1.0, 0.01 * size.sd));
     // The model has a law: nothing is asked of its joints.
     assert!(quiet().with_base().base.is_empty());
 }
