@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -147,6 +148,22 @@ def test_the_source_is_plain_c_and_cpp(compiler: list[str], tmp_path: Path) -> N
     command = [*compiler, *BASE_FLAGS, f"-I{tmp_path}", "-c", str(tmp_path / "armrs_model.c"), "-o", str(tmp_path / "model.o")]
     compiled = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (compiled.returncode, compiled.stderr) == (0, "")
+
+
+def test_the_firmware_example_carries_an_arm_a_tenth_heavier_than_the_one_that_was_recorded() -> None:
+    """Erratum 42: table 1 of appendix D has moments of inertia about the long axes; both arms have those of de Leva (1996) about the joints."""
+    number = r"(?:\(armrs_real\))?([0-9.]+)"
+    rust = re.search(r"fn human_arm.*?\n}", (ROOT / "crates/arm-core/src/models.rs").read_text(encoding="utf-8"), flags=re.S)
+    c = re.search(r"segments\[ARMRS_JOINTS\] = {.*?};", (ROOT / "firmware/main.c").read_text(encoding="utf-8"), flags=re.S)
+    assert rust and c
+    recorded = np.array(re.findall(r"segment\(([0-9.]+), ([0-9.]+), ([0-9.]+), ([0-9.]+)\)", rust[0]), dtype=float)
+    carried = np.array(re.findall(rf"{{{number}, {number}, {{{number}, 0}}, {number}}}", c[0]), dtype=float)
+    length, com, mass, inertia = recorded.T
+    assert carried.shape == (3, 4)
+    # In the order of C; the last digit of each is rounded.
+    for found, expected, digit in zip(carried.T, (length, 1.1 * mass, com, 1.1 * inertia), (1e-3, 1e-3, 1e-3, 1e-4), strict=True):
+        np.testing.assert_allclose(found, expected, atol=0.51 * digit, rtol=0.0)
+    assert np.all(inertia > 0.9 * np.array([0.0155, 0.0055, 0.0010])), "not a third of the transverse moments"
 
 
 def test_a_library_of_another_precision_does_not_link(identified: Path, tmp_path: Path) -> None:

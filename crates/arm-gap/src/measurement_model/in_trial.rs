@@ -219,3 +219,22 @@ fn weights(left: &Channels, columns: &[Channels], sizes: &[f64], counted: &[bool
     };
     (0..left.len()).map(one).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    #[test]
+    fn a_ripple_has_a_phase_of_its_own_in_every_trial_above_three_hertz() {
+        let ripple = |frequency: f64| {
+            let mut effect = Effect::new(Kind::RobotRipple, 0);
+            effect.parameters[shapes_of(effect.kind)[0]] = frequency;
+            is_rhythm(&effect)
+        };
+        assert_eq!([2.9, 3.1].map(ripple), [false, true]);
+        let of = |kind| is_rhythm(&Effect::new(kind, 0));
+        assert!(of(Kind::Tremor) && !of(Kind::Voluntary) && !of(Kind::Elastic));
+    }
+}

@@ -527,3 +527,64 @@ fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>
     }
     limit
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::{Contact, models};
+    use arm_ident::regression::trial::Tolerance;
+
+    use super::*;
+
+    /// A trial at rest of which a handle that shakes at 20 Hz is recorded.
+    fn resting(rate: f64) -> Session<2> {
+        let at = |i: usize| i as f64 / rate;
+        let handle = |i| [0.6, 1e-3 * libm::sin(core::f64::consts::TAU * 20.0 * at(i))];
+        let trial = Trial {
+            handle: Some((0..200).map(handle).collect()),
+            force_on_arm: Some(vec![[0.0; 2]; 200]),
+            ..Trial::new(rate, vec![Joints::zeros(); 200])
+        };
+        Session {
+            chain: models::mechanical_arm(),
+            contact: Contact::new([1e4; 2], [25.0; 2]),
+            effects: Vec::new(),
+            segment_uncertainty: 0.02,
+            tolerance: Tolerance::default(),
+            trials: vec![trial],
+            comparison: ComparisonMode::Led,
+            own: Vec::new(),
+            base: Vec::new(),
+            start: [[0.0; 3]; 2],
+        }
+    }
+
+    #[test]
+    fn an_arm_starts_at_the_mean_of_five_samples_and_of_a_fifth_of_a_second_of_force() {
+        let starts = |sample: usize| {
+            let mut session = resting(100.0);
+            session.trials[0].q[sample][0] = 1.0;
+            let force = session.trials[0].force_on_arm.as_mut().expect("forces");
+            force[sample][1] = 1.0;
+            let course = session.course(0).expect("a course");
+            (course.start[0], course.start_force[1])
+        };
+        let shares = [
+            (0.2, 0.05),
+            (0.2, 0.05),
+            (0.0, 0.05),
+            (0.0, 0.05),
+            (0.0, 0.0),
+        ];
+        assert_eq!([0, 4, 5, 19, 20].map(starts), shares);
+    }
+
+    /// Four times 5 Hz is the cutoff of the filter, at which it leaves half of the power.
+    #[test]
+    fn the_path_of_the_handle_keeps_what_is_within_four_bands_of_the_comparison() {
+        let course = resting(200.0).course(0).expect("a course");
+        // Ten whole periods.
+        let middle = course.handle[50..150].iter().map(|p| p[1] * p[1]);
+        let power = middle.sum::<f64>() / 100.0;
+        assert!((power / 0.5e-6 - 0.5).abs() < 0.01, "{power}");
+    }
+}

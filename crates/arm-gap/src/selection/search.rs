@@ -4,7 +4,7 @@ use crate::GapError;
 use crate::candidates::candidate::{Candidate, Library};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::conclusion::Finding;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
@@ -210,18 +210,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// What was found, fitted once more with segments and sensors as given, where much is left or a sensor is far from what was
     /// promised of it: without what was found they were bent far, and may not find back by themselves.
     pub(crate) fn afresh(&self, (fitted, point): Settled<'a, N>) -> Settled<'a, N> {
-        /// Misfit for each row beyond which much is left.
-        const MUCH: f64 = 1.5;
-        /// Standard deviations beyond which a sensor is far from what was promised.
-        const BENT: f64 = 2.0;
-        let bent = |c: &Coordinate| match (c.target, c.prior) {
-            (Target::Calibration(_), Some((mean, sd))) => {
-                (fitted.hypothesis.get(c.target) - mean).abs() > BENT * sd
-            }
-            _ => false,
-        };
-        let is_bent = point.coordinates.iter().any(bent);
-        if fitted.cost < MUCH * fitted.rows as f64 && !is_bent {
+        let sensors = point
+            .coordinates
+            .iter()
+            .filter_map(|c| match (c.target, c.prior) {
+                (Target::Calibration(_), Some((mean, sd))) => {
+                    Some((fitted.hypothesis.get(c.target) - mean) / sd)
+                }
+                _ => None,
+            });
+        if !is_bent(fitted.cost / fitted.rows as f64, sensors) {
             return (fitted, point);
         }
         let start = Hypothesis {
@@ -388,4 +386,29 @@ fn contenders(choices: &[Choice], library: &Library) -> Vec<Choice> {
         contenders.push(single.clone());
     }
     contenders
+}
+
+/// Whether what was found may have been bent by what it was found without: much is left, or a sensor is far from what was promised.
+///
+/// * `misfit` - for each row
+/// * `sensors` - how far each is off, in standard deviations of the promise
+fn is_bent(misfit: f64, mut sensors: impl Iterator<Item = f64>) -> bool {
+    /// Misfit for each row from which on much is left: noise leaves 1.
+    const MUCH: f64 = 1.5;
+    /// Standard deviations beyond which a sensor is far from what was promised: one in twenty by chance.
+    const FAR: f64 = 2.0;
+    misfit >= MUCH || sensors.any(|off| off.abs() > FAR)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_found_is_fitted_afresh_where_much_is_left_or_a_sensor_is_far_off() {
+        let bent = |misfit, sensor: f64| is_bent(misfit, [0.1, sensor].into_iter());
+        assert!(!bent(1.49, 1.99) && !bent(1.0, -1.99));
+        assert!(bent(1.5, 0.0) && bent(1.0, 2.01) && bent(1.0, -2.01));
+        assert!(!is_bent(1.0, std::iter::empty()));
+    }
 }

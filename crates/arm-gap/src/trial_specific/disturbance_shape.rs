@@ -402,4 +402,16 @@ mod tests {
         let alike = vec![(0, vec![1.0, 0.0]), (1, vec![2.0, 0.0])];
         assert!(Asked::along(effect, alike, &[1.0, 1.0]).is_none());
     }
+
+    /// What makes other times loud counts from a second before and after on, and not nearer.
+    #[test]
+    fn a_burst_is_felt_for_a_second_around_it() {
+        let asked = bursts();
+        let scatter = |loud: &dyn Fn(usize) -> bool| {
+            let deviation = (0..95).map(|k| if loud(k) { 9.0 } else { 1.0 });
+            scatter_elsewhere(&asked[45], &asked, &[deviation.collect()])
+        };
+        assert_eq!(scatter(&|k| (31..60).contains(&k)), 1.0);
+        assert!(scatter(&|k| (21..30).contains(&k) || (62..70).contains(&k)) > 1.0);
+    }
 }

@@ -103,13 +103,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut list = best.into_iter();
-        // The steps of encoders sound in the springs of the contact: what looks like a fast ripple is that.
-        let sounds = |e: &Explained| {
-            e.effect.kind.probe().nature == Nature::Periodic && frequency >= FASTEST_RIPPLE
-        };
-        let (most, first) = list.next().filter(|(_, e)| {
-            e.gain > LEAST_GAIN && e.share > SEEN && e.is_steady() && !sounds(e)
-        })?;
+        let (most, first) = list.next().filter(|(_, e)| e.is_plain(frequency))?;
         let rivals = list
             .filter(|(worth, other)| {
                 let same = (other.effect.kind, other.effect.index)
@@ -417,6 +411,14 @@ struct Explained {
 }
 
 impl Explained {
+    /// Whether it is plain enough to be named at a frequency \[Hz\].
+    fn is_plain(&self, frequency: f64) -> bool {
+        // The steps of encoders sound in the springs of the contact: what looks like a fast ripple is that.
+        let periodic = self.effect.kind.probe().nature == Nature::Periodic;
+        let sounds = periodic && frequency >= FASTEST_RIPPLE;
+        self.gain > LEAST_GAIN && self.share > SEEN && self.is_steady() && !sounds
+    }
+
     /// Whether a ripple is as large in one trial as in another, but for noise; rhythms of muscles need not be.
     fn is_steady(&self) -> bool {
         let trials = self.sizes.len() as f64;
@@ -502,23 +504,55 @@ mod tests {
         assert!(with < 0.1 * without, "{with} {without}");
     }
 
+    fn of_nature(nature: Nature) -> Effect<f64> {
+        let mut kinds = KINDS.iter().copied();
+        let kind = kinds.find(|k| k.probe().nature == nature);
+        Effect::new(kind.expect("a kind of each nature"), 0)
+    }
+
+    /// A swing of these sizes in the trials, all in one phase.
+    fn explained(effect: Effect<f64>, sizes: &[f64], gain: f64, share: f64) -> Explained {
+        Explained {
+            effect,
+            sd: 0.0,
+            gain,
+            locked: false,
+            sizes: sizes.iter().map(|s| vec![0.6 * s, -0.8 * s]).collect(),
+            columns: vec![effect],
+            share,
+        }
+    }
+
+    #[test]
+    fn a_swing_is_plain_from_a_gain_of_60_and_a_twentieth_of_what_is_left_on() {
+        let plain = |nature, gain, share, frequency| {
+            explained(of_nature(nature), &[1.0; 6], gain, share).is_plain(frequency)
+        };
+        for nature in [Nature::Periodic, Nature::Rhythm] {
+            assert!(plain(nature, 60.1, 0.051, 5.0));
+            assert!(!plain(nature, 59.9, 0.051, 5.0) && !plain(nature, 60.1, 0.049, 5.0));
+        }
+        // Above 8 Hz the steps of encoders look like a ripple, and no muscle.
+        assert!(plain(Nature::Periodic, 99.0, 0.5, 7.9));
+        assert!(!plain(Nature::Periodic, 99.0, 0.5, 8.0) && plain(Nature::Rhythm, 99.0, 0.5, 8.0));
+    }
+
+    #[test]
+    fn a_swing_is_locked_where_the_phases_of_trials_are_coherent_by_four_fifths() {
+        let effect = of_nature(Nature::Rhythm);
+        // Half of the trials lead by an angle, half lag: the coherence is its cosine.
+        let locked = |coherence: f64| {
+            let lead = libm::acos(coherence);
+            let sizes = [lead, -lead, lead, -lead].map(|a| vec![libm::cos(a), libm::sin(a)]);
+            common_swing(&[effect], &sizes, 5.0).1
+        };
+        assert_eq!([0.39, 0.79, 0.81].map(locked), [false, false, true]);
+    }
+
     #[test]
     fn a_ripple_is_as_large_in_one_trial_as_in_another() {
-        let mut kinds = KINDS.iter().copied();
-        let ripple = kinds.find(|k| k.probe().nature == Nature::Periodic);
-        let effect = Effect::new(ripple.expect("a periodic kind"), 0);
-        let steady = |sizes: &[f64], gain| {
-            let explained = Explained {
-                effect,
-                sd: 0.0,
-                gain,
-                locked: false,
-                sizes: sizes.iter().map(|s| vec![0.6 * s, -0.8 * s]).collect(),
-                columns: vec![effect],
-                share: 1.0,
-            };
-            explained.is_steady()
-        };
+        let effect = of_nature(Nature::Periodic);
+        let steady = |sizes: &[f64], gain| explained(effect, sizes, gain, 1.0).is_steady();
         assert!(steady(&[1.0, 1.2, 0.8, 1.1, 0.9, 1.0], 1000.0));
         assert!(!steady(&[1.0, 1.0, 1.0, 2.0, 2.0, 2.0], 1000.0));
         // Noise alone makes sizes differ where there is hardly a line.

@@ -230,6 +230,24 @@ fn laws_of_the_base_are_likely_where_measured_motion_shows_them() {
 }
 
 #[test]
+fn calibration_starts_no_further_than_three_standard_deviations_from_the_literature() {
+    let mut session = without_laws(&[]);
+    // A model that is half as heavy as the arm.
+    let light = session.chain.segments().map(|s| arm_core::Segment {
+        mass: 0.5 * s.mass,
+        ..s
+    });
+    let (base, gravity) = (session.chain.base(), session.chain.gravity());
+    session.chain = arm_core::Chain::new(light, base, gravity).expect("a possible arm");
+    let start = session.with_base().start;
+    let furthest = start
+        .iter()
+        .flatten()
+        .fold(0.0, |most, c| f64::max(most, c.abs()));
+    assert!((furthest - 0.06).abs() < 1e-12, "{start:?}");
+}
+
+#[test]
 fn a_joint_that_hardly_moves_is_held_and_nothing_is_asked_of_it() {
     let held = |range: f64| {
         let mut session = without_laws(&[]);
