@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _armrs, checks
+from ..catalogue import catalogue
 from ..errors import ArmrsError, BadInput, Text
 from ..io import files
 from ..io.dataset import Dataset, write_dataset
@@ -32,8 +33,6 @@ GAP = 0.1
 """Length of a gap of a hidden marker [s]."""
 EMG_REST, EMG_GAIN = 3.0, 20.0
 """Amplitude of a silent muscle [µV], and what each newton metre of it adds [µV/(N m)]."""
-MUSCULAR = ("voluntary", "stretch_reflex", "tremor")
-BRAKES = ("coulomb", "stribeck", "load_friction")
 _POINTS = ("shoulder", "elbow", "wrist", "handle")
 
 
@@ -310,11 +309,11 @@ def _sensors(devices: Devices) -> Sensors:
     )
 
 
-def _effects_torque(true: Simulated, kinds: tuple[str, ...]) -> np.ndarray:
-    """Return the torque with which effects of some kinds resist, shape (n, n_joints) [N m]."""
-    total = np.zeros_like(true.q)
+def _effects_torque(true: Simulated, family: str) -> np.ndarray:
+    """Return the torque with which effects of a family resist, shape (n, n_joints) [N m]."""
+    total, kinds = np.zeros_like(true.q), catalogue()
     for column, (kind, joint) in enumerate(true.columns["effects"]):
-        if kind in kinds:
+        if kinds[kind].family == family:
             total[:, joint] += true.columns["resisting"][:, column]
     return total
 
@@ -322,13 +321,13 @@ def _effects_torque(true: Simulated, kinds: tuple[str, ...]) -> np.ndarray:
 def _brakes(true: Simulated, t: np.ndarray, devices: Devices, draw: np.random.Generator) -> np.ndarray | None:
     if devices.brake_noise_Nm is None:
         return None
-    torque = -_effects_torque(true, BRAKES)
+    torque = -_effects_torque(true, "dry")
     at = np.column_stack([np.interp(t, true.t, column) for column in torque.T])
     return at + devices.brake_noise_Nm * draw.standard_normal(at.shape)
 
 
 def _emg(true: Simulated, t: np.ndarray, draw: np.random.Generator) -> dict[str, np.ndarray]:
-    pull = -_effects_torque(true, MUSCULAR)
+    pull = -_effects_torque(true, "muscle")
     return muscle_activity(np.column_stack([np.interp(t, true.t, column) for column in pull.T]), draw)
 
 
