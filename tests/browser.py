@@ -110,9 +110,8 @@ def violations(page: Any) -> list[str]:
     return [f"{v['id']}: {[n['target'] for n in v['nodes']]}" for v in axe.run(page).response["violations"]]
 
 
-def faults_on_screens(path: Path, *, fits_a_phone: bool = False) -> list[str]:
-    """Return what axe-core finds at 1400 px and at 390 px, each in light and dark, and what is wider than the window, or as a table than
-    1200 px."""
+def faults_on_screens(path: Path) -> list[str]:
+    """Return what axe-core finds at 1400 px and at 390 px, each in light and dark, and what is wider than the window."""
     found: list[str] = []
     with opened(path, width=1400) as seen:
         for scheme in ("light", "dark"):
@@ -122,10 +121,8 @@ def faults_on_screens(path: Path, *, fits_a_phone: bool = False) -> list[str]:
                 found += [f"{scheme}, {width} px: {violation}" for violation in violations(seen.page)]
                 if seen.page.evaluate("document.documentElement.scrollWidth") > width:
                     found.append(f"wider than {width} px")
-        if fits_a_phone:
-            found += [f"table wider than 390 px: {text}" for text in seen.page.evaluate(WIDER)]
-        seen.page.set_viewport_size({"width": 1200, "height": 800})
-        return found + [f"table wider than 1200 px: {text}" for text in seen.page.evaluate(WIDER)]
+                found += [f"table wider than {width} px: {text}" for text in seen.page.evaluate(WIDER)]
+        return found
 
 
 def faults_on_paper(path: Path) -> list[str]:

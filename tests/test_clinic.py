@@ -88,6 +88,10 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
         (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
     text = clinic.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html").read_text(encoding="utf-8")
     assert text.count("Stiffness [N m per 10°]") == 1 and ">0.314<" in text
+    assert (
+        "The table has the values of armrs identify. The page of gap fits only what the recordings ask for, and beside it everything else "
+        "that it found, and states shoulder, stiffness 0.436 (0.419 to 0.454)."
+    ) in text
     assert "shoulder: stiffness differs between the analyses by more than both are uncertain." in text
     assert "resting angle differs" not in text
 

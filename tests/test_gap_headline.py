@@ -10,7 +10,7 @@ from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
 from armrs.workflows.gap.headline import headline, still_open
 from armrs.workflows.gap.summary import marks
-from armrs.workflows.gap.words import gap, intervals, left, missing, others
+from armrs.workflows.gap.words import gap, intervals, left, missing, named, others, tie
 
 
 def channel(before: float, calibrated: float, after: float, floor: float | None) -> dict[str, Any]:
@@ -163,6 +163,17 @@ def test_what_has_no_interval_has_no_columns_for_it() -> None:
     assert intervals(result("explained", sized)) == "An interval holds if the structure of the model is right."
 
 
+def test_effects_stand_joint_by_joint_as_on_the_page_for_a_clinician() -> None:
+    size = ("torque", 0.161, 0.006, "N m")
+    more = {"share": 0.5, "summary": "dry friction", "formula": "R", "p_value": 0.0}
+    listed = [effect("coulomb", joint, size, **more) for joint in (2, None, 1)]
+    for one in listed:
+        one["parameters"]["torque"]["interval"] = [0.149, 0.173]
+    told = result("explained", *listed)
+    assert [row[1] for row in missing(told).rows] == [1, 2, None]
+    assert [line.split(":")[0] for line in named(told)] == ["coulomb in joint 1 (shoulder)", "coulomb in joint 2 (elbow)", "coulomb"]
+
+
 def test_alternatives_are_compared_in_one_unit() -> None:
     """It was called a misfit, as was what is left in units of the floor."""
     rival = effect("viscous", 2, why="explains these movements nearly as well", worse=7.1)
@@ -174,6 +185,12 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     assert line.endswith(
         "it may be viscous in joint 2 (explains these movements as far as a law that is not exact can, by 170 units less)."
     )
+    # What is 13 standard deviations apart already cannot be told apart only because a law may miss as much.
+    asked = {"separating_movement": "lead the elbow alone", "separation": {"now": 13.0, "then": 40.0}}
+    lines = others(result("explained", {**DRY, "alternatives": [{**far, **asked}]}))
+    assert lines[1].endswith("40 standard deviations apart (now 13, which the law that is not exact may make).")
+    assert "or by what a law that is not exact may miss: on these" in tie(result("explained", {**DRY, "alternatives": [far]}))
+    assert "log-likelihood: on these" in tie(result("explained", {**DRY, "alternatives": [rival]}))
     for worse, said in ((-729.0, "(why, by 729 units more)."), (-3.0, "(why, by no less)."), (0.05, "(why, by no less).")):
         other = effect("viscous", 2, why="why", worse=worse)
         [line] = others(result("explained", {**DRY, "alternatives": [other]}))

@@ -85,7 +85,7 @@ class Framed:
         head = "".join(f"<th>{_text(name)}{_text(_unit(table.units.get(name)))}</th>" for name in names)
         shown = min(table.n_rows, _SHOWN)
         rows = "".join(
-            "<tr>" + "".join(f"<td>{_text(_cell(table.columns[name][k], name))}</td>" for name in names) + "</tr>" for k in range(shown)
+            "<tr>" + "".join(f"<td>{_marked(table.columns[name][k], name)}</td>" for name in names) + "</tr>" for k in range(shown)
         )
         more = f"<p>{table.n_rows - shown} more rows: to_dataframe()</p>" if table.n_rows > shown else ""
         meaning = f"<p>{_text(self.symbols)}</p>" if self.symbols else ""
@@ -214,6 +214,12 @@ def _text(value: object) -> str:
 
 def _unit(unit: str | None) -> str:
     return f" [{unit}]" if unit else ""
+
+
+def _marked(value: object, name: str) -> str:
+    """Return a cell as HTML; names are set as code, in which I and l look different."""
+    text = _text(_cell(value, name))
+    return f"<code>{text}</code>" if name == "name" and text else text
 
 
 def _cell(value: object, name: str) -> str:

@@ -71,7 +71,7 @@ def recovered(data: Mapping[str, Any]) -> Table:
     ]
     head += ["coverage", "bootstrap ±", "its coverage", "by data"]
     used = [k for k in range(len(head)) if any(row[k] not in (None, "") for row in rows)]
-    return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1)
+    return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1, symbols=True)
 
 
 def varied(data: Mapping[str, Any]) -> Table:

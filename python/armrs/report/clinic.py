@@ -191,7 +191,8 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
         for source, result in zip(sources, results, strict=True):
             if name(result) != name(results[0]):
                 raise BadInput("data, name", name(result), f"the session of the others, {name(results[0])!r}", file=source)
-        found = [line for result in results for line in lines_of(result, norms)]
+        sourced = [(str(result["verb"]), line) for result in results for line in lines_of(result, norms)]
+        found = [line for _, line in sourced]
         joints = results[0]["data"]["joints"]
         lines = sorted(_once(found), key=lambda line: joints.index(line.joint))
         page = {
@@ -200,6 +201,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "measured": measured(results),
             "lines": lines,
             "words": [words_of(line) for line in lines],
+            "estimates": estimates(sourced),
             "unusual": unusual(lines, results),
             "notes": [*_apart(found), *notes(results)],
             "since": max((c["dates"][-2] for r in results for c in r.get("history", ()) if len(c["dates"]) > 1), default=None),
@@ -252,6 +254,31 @@ def _once(lines: Sequence[Line]) -> list[Line]:
         if key not in first or (first[key].value is None and line.value is not None):
             first[key] = line
     return list(first.values())
+
+
+def estimates(sourced: Sequence[tuple[str, Line]]) -> str:
+    """Return whose values a page shows, and what the other analyses state where it is another number, and why."""
+    shown = _once([line for _, line in sourced])
+    sources = dict.fromkeys(verb for verb, line in sourced if any(line is own for own in shown) and line.value is not None)
+    others: dict[str, list[str]] = {}
+    for verb, line in sourced:
+        own = next(o for o in shown if (o.joint, o.quantity.title) == (line.joint, line.quantity.title))
+        _, _, value, between, *_ = words_of(line)
+        if line is not own and line.value is not None and value != words_of(own)[2]:
+            others.setdefault(verb, []).append(f"{line.joint}, {line.quantity.title.lower()} {value}{f' ({between})' if between else ''}")
+    if not others:
+        return ""
+    said = [f"{_WHY[verb]}, and states {'; '.join(values)}" for verb, values in others.items()]
+    return f"The table has the values of armrs {' and '.join(sources)}. {'. '.join(said)}."
+
+
+_WHY = {
+    "identify": "The page of identify fits a spring, resistance to speed and friction to every joint",
+    "passive": "The page of passive reads slow movements alone",
+    "gap": "The page of gap fits only what the recordings ask for, and beside it everything else that it found",
+    "spasticity": "The page of spasticity fits a reflex beside resistance and friction",
+}
+"""Why an analysis states another number than the one before it."""
 
 
 def _apart(lines: Sequence[Line]) -> list[str]:

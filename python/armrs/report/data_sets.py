@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..io.dataset import Dataset, load_dataset
-from . import figures, live, moving, plain
-from .recording import recording
+from . import figures, live, moving, plain, recording
 from .tables import Table
 from .view import View
 
@@ -22,9 +21,15 @@ MOST_RECORDINGS = 6
 
 
 def recordings(dataset: Dataset | None) -> figures.Figures:
-    """Return a drawing of one trial of each movement."""
-    trials = [] if dataset is None else list({t.configuration: t for t in reversed(dataset.trials)}.values())[::-1]
-    return {trial.configuration: partial(recording, trial, dataset.model) for trial in trials[:MOST_RECORDINGS] if dataset is not None}
+    """Return how the arm stood in one trial of each movement, and what was recorded of it."""
+    if dataset is None:
+        return {}
+    trials = list({t.configuration: t for t in reversed(dataset.trials)}.values())[::-1]
+    made: dict[str, Callable[[], figures.Drawn]] = {}
+    for trial in trials[:MOST_RECORDINGS]:
+        made |= {f"{trial.configuration}, arm": partial(recording.arm, trial, dataset.model)}
+        made |= {trial.configuration: partial(recording.channels, trial, dataset.model)}
+    return made
 
 
 def verdict(result: Mapping[str, Any]) -> str:

@@ -140,7 +140,7 @@ def _history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
         colour = plotting.ORANGE if course["changed"] else plotting.BLUE
         ax.errorbar(place, course["values"], 2.0 * np.asarray(course["stds"]), fmt="o-", color=colour, capsize=3)
         ax.set_xticks(place, [date[2:] for date in course["dates"]], rotation=45, fontsize="small")
-        ax.set(title=f"{tables.course_label(course)}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
+        ax.set(title=f"{tables.typeset(tables.course_label(course))}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
         ax.title.set_fontsize("small")
     for ax in axes[len(courses) :]:
         ax.remove()

@@ -26,35 +26,70 @@ _SAME = 0.06
 
 def recording(trial: Trial, model: Model | None = None) -> Drawn:
     """Draw a trial: with a model also the arm as a stick figure in five instants."""
-    names = [f"q{j}" for j in range(1, trial.q.shape[1] + 1)] if model is None else [joint.name for joint in model.joints]
-    panels = _panels(trial, names)
-    rows = -(-len(panels) // 2)
-    tall = 1.9 * rows + 0.4
     if model is None:
-        figure = plotting.figure(10.4, tall)
-        axes = figure.subplots(rows, 2, squeeze=False, sharex=True).ravel()
-    else:
-        figure = plotting.figure(10.4, tall + 4.2)
-        grid = figure.add_gridspec(2, 1, height_ratios=(4.2, tall))
-        postures(trial, model, figure.add_subplot(grid[0]))
-        axes = grid[1].subgridspec(rows, 2).subplots(squeeze=False, sharex=True).ravel()
-    t = trial.t - trial.t[0]
+        return channels(trial)
+    panels = _panels(trial, _names(trial, model))
+    tall = _height(panels)
+    figure = plotting.figure(10.4, tall + 4.2)
+    grid = figure.add_gridspec(2, 1, height_ratios=(4.2, tall))
+    postures(trial, model, figure.add_subplot(grid[0]))
+    _over_time(trial, panels, grid[1].subgridspec(*_shape(panels)).subplots(squeeze=False, sharex=True).ravel())
+    return Drawn(_file("recording", trial), "What was recorded", f"{_CHANNELS.format(trial.file)} Above, {_ARM}", figure)
+
+
+def arm(trial: Trial, model: Model) -> Drawn:
+    """Draw the arm of a trial in five instants."""
+    figure = plotting.figure(10.4, 3.0)
+    postures(trial, model, figure.subplots())
+    return Drawn(_file("arm", trial), "How the arm stood", f"{trial.file}: {_ARM}", figure)
+
+
+def channels(trial: Trial, model: Model | None = None) -> Drawn:
+    """Draw each channel of a trial over time, under the names of the joints of a model."""
+    panels = _panels(trial, _names(trial, model))
+    figure = plotting.figure(10.4, _height(panels))
+    _over_time(trial, panels, figure.subplots(*_shape(panels), squeeze=False, sharex=True).ravel())
+    return Drawn(_file("recording", trial), "What was recorded", _CHANNELS.format(trial.file), figure)
+
+
+_CHANNELS = "{}: each channel as it was read, in the units and directions of armrs."
+_ARM = (
+    "the arm in five instants, pale to dark, with the force on it (blue) and gravity (grey). If it stands otherwise than it stood, the "
+    "angles are counted otherwise; carried at rest, the force points up."
+)
+_Panel = tuple[str, np.ndarray, str]
+"""Label, values and colour of a channel."""
+
+
+def _file(what: str, trial: Trial) -> str:
+    return f"{what}-{slug(trial.configuration)}-{trial.repeat}"
+
+
+def _names(trial: Trial, model: Model | None) -> list[str]:
+    return [f"q{j}" for j in range(1, trial.q.shape[1] + 1)] if model is None else [joint.name for joint in model.joints]
+
+
+def _shape(panels: list[_Panel]) -> tuple[int, int]:
+    """Return rows and columns."""
+    columns = 2 if len(panels) <= 4 else 3
+    return -(-len(panels) // columns), columns
+
+
+def _height(panels: list[_Panel]) -> float:
+    return 1.9 * _shape(panels)[0] + 0.4
+
+
+def _over_time(trial: Trial, panels: list[_Panel], axes: np.ndarray) -> None:
+    """Draw the channels, row by row; the lowest of each column has the numbers of the axis of time."""
+    columns = _shape(panels)[1]
     for k, (ax, (label, values, colour)) in enumerate(zip(axes, panels, strict=False)):
-        ax.plot(t, values, color=colour, lw=1.2)
+        ax.plot(trial.t - trial.t[0], values, color=colour, lw=1.2)
         ax.set_title(label, fontsize="medium")
-        if k >= len(panels) - 2:
+        if k >= len(panels) - columns:
             ax.set_xlabel("time [s]")
             ax.tick_params(labelbottom=True)
     for ax in axes[len(panels) :]:
         ax.remove()
-    text = f"{trial.file}: each channel as it was read, in the units and directions of armrs."
-    if model is not None:
-        text += (
-            " Above, the arm from its first joint to the hand in five instants, pale to dark; blue arrows are the force on the arm, "
-            "the grey arrow is gravity. If the arm stands otherwise than it stood, the angles are counted otherwise; carried at rest, "
-            "the force points up."
-        )
-    return Drawn(f"recording-{slug(trial.configuration)}-{trial.repeat}", "What was recorded", text, figure)
 
 
 def plot(trial: Trial, model: Model | None) -> np.ndarray:
@@ -116,8 +151,8 @@ def _arrow(ax: Axes, start: np.ndarray, along: np.ndarray, colour: str, alpha: f
     ax.plot(*end, alpha=0.0)  # what is annotated does not widen the axes
 
 
-def _panels(trial: Trial, names: list[str]) -> list[tuple[str, np.ndarray, str]]:
-    """Return label, values and colour of each channel that was measured."""
+def _panels(trial: Trial, names: list[str]) -> list[_Panel]:
+    """Return each channel that was measured."""
     blue, orange, green, grey = plotting.BLUE, plotting.ORANGE, plotting.GREEN, plotting.GREY
     panels = [(f"{name}, angle [°]", np.degrees(q), blue) for name, q in zip(names, trial.q.T, strict=True)]
     if trial.force_on_arm is not None:

@@ -325,14 +325,14 @@ def movements(data: Mapping[str, Any]) -> Table:
     """Return planned movements: repeats and speeds."""
     rows = [
         [
-            f"movement {k}",
+            str(k),
             m["repeats"],
             f"{m['speed_rad_s']:.3g}",
             f"{m['acceleration_rad_s2']:.3g}",
         ]
         for k, m in enumerate(data["movements"], start=1)
     ]
-    return Table(["", "repeats", "speed [rad/s]", "acceleration [rad/s²]"], rows)
+    return Table(["movement", "repeats", "speed [rad/s]", "acceleration [rad/s²]"], rows)
 
 
 def history(courses: Sequence[Mapping[str, Any]]) -> Table:
@@ -350,7 +350,7 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
     head = ["parameter", "unit", "sessions", "last", *columns]
     # The session before is all before the second one.
     shown = {0: 4, 1: 4, 2: 7}.get(max((len(c["dates"]) for c in courses), default=0), len(head))
-    return Table(head[:shown], [row[:shown] for row in rows], left=2)
+    return Table(head[:shown], [row[:shown] for row in rows], left=2, symbols=True)
 
 
 def comparison(data: Mapping[str, Any]) -> Table:

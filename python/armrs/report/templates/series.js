@@ -1,6 +1,6 @@
 document.querySelectorAll(".series").forEach(section => {
   const data = JSON.parse(section.querySelector("script").textContent), t = data.t_s, end = t.length - 1;
-  const wide = 720, high = 210, left = 56, right = 10, top = 24, foot = 28, inner = wide - left - right;
+  const wide = 480, high = 190, left = 52, right = 10, top = 24, foot = 28, inner = wide - left - right;
   const boxes = [...section.querySelectorAll("input[type=checkbox]")], told = section.querySelector("output");
   const on = name => boxes.find(box => box.value === name).checked;
   const svg = (name, attributes, parent, text) => {

@@ -42,7 +42,8 @@ def gap(result: GapFound) -> Figures:
         figures["maps"] = partial(missing_torque, [j.name for j in result.dataset.model.joints], missing)
     if result.search_trace:
         figures["search_trace"] = partial(_search_trace, result)
-    return figures | {_name_of(k, e): partial(_effect, result, k, e) for k, e in enumerate(result.effects)}
+    by_joint = sorted(enumerate(result.effects), key=lambda numbered: numbered[1].joint or np.inf)
+    return figures | {_name_of(k, e): partial(_effect, result, k, e) for k, e in by_joint}
 
 
 def steps_of(result: GapFound) -> list[str]:

@@ -60,7 +60,7 @@ def drawn_arm(result: GapFound, ax: Axes) -> None:
     joints = [j.name for j in dataset.model.joints]
     marked = {place for effect in result.effects for place in marks(effect, catalogue()[effect.kind])}
     lines = []
-    for effect in result.effects:
+    for effect in sorted(result.effects, key=lambda e: e.joint or np.inf):
         named = f"{joints[effect.joint - 1]}: " if effect.joint else f"{effect.channel}: " if effect.channel else ""
         here = f"{effect.joint}  {named}" if effect.joint else f"■  {named}" if catalogue()[effect.kind].where != "frame" else "g  "
         lines.append((here + _words(effect), plotting.INK if getattr(effect, "decided", True) is not False else plotting.RED))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ verdict = headline.headline
 _TELLS = 5.0
 """Standard deviations from which on a movement tells two effects apart."""
 _BETTER = 10.0
-"""Units of twice the log-likelihood from which an alternative explains more, and not just as much."""
+"""Units of twice the log-likelihood from which an alternative explains more or less, and not just as much."""
 
 
 def size(effect: Mapping[str, Any]) -> str:
@@ -38,7 +39,12 @@ def chance(effect: Mapping[str, Any]) -> str:
 def named(result: Mapping[str, Any]) -> list[str]:
     """Return the named effects, a line each: what it is, its formula, its size, and how likely it is by chance."""
     joints = result["data"]["joints"]
-    return [f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}; by chance {chance(e)}." for e in result["effects"]]
+    return [f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}; by chance {chance(e)}." for e in _by_joint(result)]
+
+
+def _by_joint(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the named effects joint by joint, as the page for a clinician has them; behind them those of no joint."""
+    return sorted(result["effects"], key=lambda effect: effect["joint"] or math.inf)
 
 
 def is_led(result: Mapping[str, Any]) -> bool:
@@ -90,12 +96,24 @@ def others(result: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def tie(result: Mapping[str, Any]) -> str:
+    """Return by how much alternatives may explain the data less and still not be told apart."""
+    worse = any((a.get("worse") or 0.0) > _BETTER for effect in result["effects"] for a in effect["alternatives"])
+    beyond = ", or by what a law that is not exact may miss" if worse else ""
+    return (
+        f"These explain the data as well, or less by up to {_BETTER:.0f} units of twice the log-likelihood{beyond}: on these movements "
+        "they cannot be told apart."
+    )
+
+
 def _separating(alternative: Mapping[str, Any]) -> str:
     """Say which movement would tell, and how well; nothing where none was looked for."""
     separation = alternative.get("separation")
     if separation is None:
         return ""
     now, then = (digits(separation[key], 2) for key in ("now", "then"))
+    if (alternative.get("worse") or 0.0) > _BETTER:
+        now += ", which the law that is not exact may make"
     if separation["then"] < _TELLS:
         best = alternative["separating_movement"]
         return f"none of the movements tried would; the best, {best}, leaves them {then} standard deviations apart (now {now})."
@@ -205,7 +223,7 @@ def missing(data: Mapping[str, Any]) -> Table:
     """Return the named effects with their estimates."""
     rows: list[list[object]] = []
     repeated = any(effect.get("without") is not None for effect in data["effects"])
-    for effect in data["effects"]:
+    for effect in _by_joint(data):
         place = effect["joint"] or effect["channel"]
         alone = f"{effect['share']:.0%}" if effect["share"] > 0.005 else "< 1 %"
         if repeated:
