@@ -151,6 +151,12 @@ def test_the_rule_of_the_verdict(change: dict[str, Any], verdict: str) -> None:
     assert verdict_of(**({"named": True, "is_open": False, "z": 0.0, "ratio": 1.0, "share": 0.0} | change)) == verdict
 
 
+def test_an_open_torque_is_told_with_its_unit() -> None:
+    """`0.027 Nm` stood beside `N m` everywhere else."""
+    told = result("unexplained", DRY, gap={"tau2_Nm": channel(0.5, 0.13, 0.027, 0.018)})
+    assert any("off by 0.027 N m, where repeats" in line for line in left(told)) and "0.027 N m, where" in headline(told)
+
+
 def test_what_has_no_interval_has_no_columns_for_it() -> None:
     """Under two columns of dashes it was said that the intervals were widened."""
     bare = {**DRY, "share": 0.5, "parameters": {"torque": {"value": 0.161, "std": None, "interval": None, "unit": "N m"}}}

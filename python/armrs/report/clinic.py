@@ -191,8 +191,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
         for source, result in zip(sources, results, strict=True):
             if name(result) != name(results[0]):
                 raise BadInput("data, name", name(result), f"the session of the others, {name(results[0])!r}", file=source)
-        sourced = [(str(result["verb"]), line) for result in results for line in lines_of(result, norms)]
-        found = [line for _, line in sourced]
+        found = [line for result in results for line in lines_of(result, norms)]
         joints = results[0]["data"]["joints"]
         lines = sorted(_once(found), key=lambda line: joints.index(line.joint))
         page = {
@@ -201,7 +200,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "measured": measured(results),
             "lines": lines,
             "words": [words_of(line) for line in lines],
-            "estimates": estimates(sourced),
+            "estimates": estimates(lines, results),
             "unusual": unusual(lines, results),
             "notes": [*_apart(found), *notes(results)],
             "since": max((c["dates"][-2] for r in results for c in r.get("history", ()) if len(c["dates"]) > 1), default=None),
@@ -221,15 +220,15 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
     return target
 
 
-def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = ()) -> list[Line]:
-    """Return the lines of a result, joint by joint."""
+def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = (), *, bare: bool = False) -> list[Line]:
+    """Return the lines of a result, joint by joint; with `bare` also of effects that have no interval."""
     joints = result["data"]["joints"]
     usual = {(n.kind, n.name, n.joint): n for n in norms}
     courses = {(c["kind"], c["name"], c["joint"]): c for c in result.get("history", ())}
     if result["verb"] == "passive":
         return _slow_lines(result, usual, courses)
     if result["verb"] in ("gap", "spasticity"):
-        return _effect_lines(result, usual, courses)
+        return _effect_lines(result, usual, courses, bare)
     lines = []
     for j, joint in enumerate(joints, start=1):
         for quantity in QUANTITIES:
@@ -256,20 +255,23 @@ def _once(lines: Sequence[Line]) -> list[Line]:
     return list(first.values())
 
 
-def estimates(sourced: Sequence[tuple[str, Line]]) -> str:
+def estimates(lines: Sequence[Line], results: Sequence[Mapping[str, Any]]) -> str:
     """Return whose values a page shows, and what the other analyses state where it is another number, and why."""
-    shown = _once([line for _, line in sourced])
-    sources = dict.fromkeys(verb for verb, line in sourced if any(line is own for own in shown) and line.value is not None)
-    others: dict[str, list[str]] = {}
-    for verb, line in sourced:
-        own = next(o for o in shown if (o.joint, o.quantity.title) == (line.joint, line.quantity.title))
-        _, _, value, between, *_ = words_of(line)
-        if line is not own and line.value is not None and value != words_of(own)[2]:
-            others.setdefault(verb, []).append(f"{line.joint}, {line.quantity.title.lower()} {value}{f' ({between})' if between else ''}")
-    if not others:
-        return ""
-    said = [f"{_WHY[verb]}, and states {'; '.join(values)}" for verb, values in others.items()]
-    return f"The table has the values of armrs {' and '.join(sources)}. {'. '.join(said)}."
+    left, sources, others = list(lines), [], []
+    for result in results:
+        stated = {(line.joint, line.quantity.title): line for line in lines_of(result, bare=True) if line.value is not None}
+        pairs = [(own, stated[key]) for own in lines if (key := (own.joint, own.quantity.title)) in stated]
+        told = []
+        for own, line in pairs:
+            cells = words_of(line)
+            if own in left and (own.value, own.interval) == (line.value, line.interval):
+                left.remove(own)
+                sources.append(result["verb"])
+            elif cells[2] != words_of(own)[2]:
+                told.append(f"{own.joint}, {own.quantity.title.lower()} {cells[2]}{cells[3] and f' ({cells[3]})'}")
+        if told:
+            others.append(f"{_WHY[result['verb']]}, and states {'; '.join(told)}.")
+    return f"The table has the values of armrs {' and '.join(dict.fromkeys(sources))}. {' '.join(others)}" if others else ""
 
 
 _WHY = {
@@ -321,7 +323,7 @@ def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: M
     return lines
 
 
-def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]]) -> list[Line]:
+def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]], bare: bool) -> list[Line]:
     """Return the effects of joints that were found, in all trials and without an alternative."""
     lines = []
     for effect in result["effects"]:
@@ -329,12 +331,13 @@ def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses:
             continue
         for quantity in QUANTITIES:
             found = effect["parameters"].get(quantity.parameter) if effect["kind"] == quantity.kind else None
-            if found is None or found.get("interval") is None:
+            if found is None or (found.get("interval") is None and not bare):
                 continue
             key = (quantity.kind, quantity.parameter, effect["joint"])
             own = counted(result, effect["joint"], quantity)
             joint = result["data"]["joints"][effect["joint"] - 1]
-            value, ends = _in_unit(found["value"], quantity, own), _between(found["interval"], quantity, own)
+            value = _in_unit(found["value"], quantity, own)
+            ends = None if found.get("interval") is None else _between(found["interval"], quantity, own)
             lines.append(Line(joint, quantity, value, ends, usual.get(key), _trend(courses.get(key), quantity, own), counted=own))
     return lines
 

@@ -20,15 +20,15 @@ MOST_RECORDINGS = 6
 """So many movements of a session are drawn, one trial of each."""
 
 
-def recordings(dataset: Dataset | None) -> figures.Figures:
-    """Return how the arm stood in one trial of each movement, and what was recorded of it."""
+def recordings(dataset: Dataset | None, section: str = "") -> figures.Figures:
+    """Return how the arm stood in one trial of each movement, and what was recorded of it, for a section of the report."""
     if dataset is None:
         return {}
     trials = list({t.configuration: t for t in reversed(dataset.trials)}.values())[::-1]
     made: dict[str, Callable[[], figures.Drawn]] = {}
     for trial in trials[:MOST_RECORDINGS]:
-        made |= {f"{trial.configuration}, arm": partial(recording.arm, trial, dataset.model)}
-        made |= {trial.configuration: partial(recording.channels, trial, dataset.model)}
+        made |= {f"{trial.configuration}, arm": partial(recording.arm, trial, dataset.model, section)}
+        made |= {trial.configuration: partial(recording.channels, trial, dataset.model, section)}
     return made
 
 
@@ -101,5 +101,5 @@ def first_trial(dataset: Dataset | None) -> live.Live:
 
 
 CHECKED = View(checked_data, lambda result, _: recordings(result.dataset), lambda result: first_trial(result.dataset))
-IMPORTED = View(imported_data, lambda result, _: recordings(load_dataset(result.folder)))
+IMPORTED = View(imported_data, lambda result, _: recordings(load_dataset(result.folder), "first"))
 RECORDED = View(recorded_data, lambda result, _: recordings(result.dataset), lambda result: first_trial(result.dataset))

@@ -37,19 +37,19 @@ def recording(trial: Trial, model: Model | None = None) -> Drawn:
     return Drawn(_file("recording", trial), "What was recorded", f"{_CHANNELS.format(trial.file)} Above, {_ARM}", figure)
 
 
-def arm(trial: Trial, model: Model) -> Drawn:
+def arm(trial: Trial, model: Model, section: str = "") -> Drawn:
     """Draw the arm of a trial in five instants."""
     figure = plotting.figure(10.4, 3.0)
     postures(trial, model, figure.subplots())
-    return Drawn(_file("arm", trial), "How the arm stood", f"{trial.file}: {_ARM}", figure)
+    return Drawn(_file("arm", trial), "How the arm stood", f"{trial.file}: {_ARM}", figure, section)
 
 
-def channels(trial: Trial, model: Model | None = None) -> Drawn:
+def channels(trial: Trial, model: Model | None = None, section: str = "") -> Drawn:
     """Draw each channel of a trial over time, under the names of the joints of a model."""
     panels = _panels(trial, _names(trial, model))
     figure = plotting.figure(10.4, _height(panels))
     _over_time(trial, panels, figure.subplots(*_shape(panels), squeeze=False, sharex=True).ravel())
-    return Drawn(_file("recording", trial), "What was recorded", _CHANNELS.format(trial.file), figure)
+    return Drawn(_file("recording", trial), "What was recorded", _CHANNELS.format(trial.file), figure, section)
 
 
 _CHANNELS = "{}: each channel as it was read, in the units and directions of armrs."

@@ -15,7 +15,7 @@ DECIDED_BY = {
 }
 """What decided a value, in plain words."""
 
-_UNITS = {"1": ""}
+_UNITS = {"1": "", "Nm": "N m"}
 _MOST_DECIMALS = 6
 """With more, a number is written with a power of ten."""
 

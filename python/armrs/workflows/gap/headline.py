@@ -164,7 +164,7 @@ def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
     channel = gap[name]
     quantity, held_in = name.rsplit("_", 1)
     quantity = spoken(quantity)
-    held_in = {"Nm": "N m"}.get(held_in, held_in)
+    held_in = unit(held_in)
     floor = f", where repeats differ by {channel['floor']:.2g} {held_in}" if channel["floor"] else ""
     floor += place(result, name) if shown else ""
     value = left(channel)

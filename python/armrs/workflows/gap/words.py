@@ -279,7 +279,7 @@ def gap(data: Mapping[str, Any]) -> Table:
         values = [None if channel[step] is None else f"{channel[step]:.3g}" for step in steps]
         rows.append(
             [
-                f"{quantity} [{'N m' if held_in == 'Nm' else held_in}]",
+                f"{quantity} [{unit(held_in)}]",
                 *values,
                 *([closed] if named else []),
                 "open" if name in opened else None,
