@@ -122,6 +122,20 @@ def test_every_problem_is_listed_with_its_next_step(session: Path, tmp_path: Pat
     assert any("Fy stays at" in p.text for p in lines) and any("50 samples a second, where most trials have 100" in p.text for p in lines)
 
 
+def test_the_next_step_fits_the_cell(session: Path, tmp_path: Path) -> None:
+    """Of a decimal comma and of a column that stands twice it was: correct its unit, its sign, or its values."""
+    folder = changed(session, tmp_path / "set", {"slow_1": same, "slow_2": same})
+    first, second = folder / "trials" / "slow_1.csv", folder / "trials" / "slow_2.csv"
+    head, _, rows = first.read_text(encoding="utf-8").partition("\n")
+    quoted = "\n".join(",".join(f'"{cell.replace(".", ",")}"' for cell in row.split(",")) for row in rows.splitlines())
+    first.write_text(f"{head}\n{quoted}\n", encoding="utf-8")
+    head, _, rows = second.read_text(encoding="utf-8").partition("\n")
+    second.write_text(f"{head},q1_rad\n" + "\n".join(f"{row},0.5" for row in rows.splitlines()) + "\n", encoding="utf-8")
+    steps = {Path(p.text.partition(":")[0]).name: p.next_step for p in check_dataset(folder).problems if p.level == "error"}
+    assert steps["slow_1.csv"] == "write decimal points, or import the recording again: armrs import reads decimal commas"
+    assert steps["slow_2.csv"] == "rename or remove one of the two"
+
+
 def test_commands_end_with_the_next(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["check", str(session)]) == 0
     assert capsys.readouterr().out.splitlines()[-1].startswith(f"Next: armrs identify {session} -o identified, then armrs gap")

@@ -476,7 +476,7 @@ def test_whole_turns_are_taken_out(session: Session) -> None:
     write_rows(session, values)
     data = armrs.load_dataset(session.folder)
     np.testing.assert_allclose(data.trials[0].q[:, 0], smooth, atol=1e-11)
-    assert data.warnings == ("trials/slow_1.csv: column q1_rad jumps by whole turns 1 times: they were taken out",)
+    assert data.warnings == ("trials/slow_1.csv: column q1_rad jumps by whole turns once: they were taken out",)
 
 
 def test_seconds_since_1970_are_welcome(session: Session) -> None:

@@ -229,6 +229,8 @@ def test_maps_tell_what_was_visited_and_the_law_has_a_legend(found: armrs.GapFou
     visited, pale, clear = (np.ma.masked_invalid(mesh.get_array()) for mesh in ax.collections[:3])
     assert to_hex(ax.get_facecolor()) == plotting.FAINT.lower() and visited.mask.any()
     assert np.array_equal(~visited.mask, ~pale.mask | ~clear.mask) and set(visited.compressed()) == {0.0}
+    worth = [line for line in drawn["summary"].figure.axes[1].lines if line.get_marker() == "o"]
+    assert worth and not any(line.get_clip_on() for line in worth)
     law = next(one for name, one in drawn.items() if name.startswith("effect-1")).figure.axes[0]
     assert [text.get_text() for text in law.get_legend().get_texts()] == ["named effect", "measured"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from armrs import BadInput
 from armrs.cli import main
 from armrs.io.muscle_activity import onset
 from armrs.model import Effect, Model
+from armrs.report import clinic_results, plotting
 from armrs.workflows.plan import Instruments, Limits
 from armrs.workflows.plan_stretches import plan_stretches
 from patients import Patient
@@ -120,3 +122,13 @@ def test_a_plan_of_stretches_expects_what_patients_scatter_by() -> None:
     assert 0.3 < planned.predictions[0].std / np.std(found, ddof=1) < 2.0
     with pytest.raises(BadInput, match="fastest stretch"):
         plan_stretches(model, dataclasses.replace(limits, speed=0.5), 1)
+
+
+def test_markers_at_the_axis_are_whole() -> None:
+    """Of slow stretches the reflex is zero, and half of each marker lay below the axis."""
+    slow = SimpleNamespace(speed=0.2, peak_moment=1.5, elastic=1.4, resisting=0.1, reflex=0.0, catch_angle=np.nan, catch_speed=np.nan)
+    found = SimpleNamespace(joint=1, stretches=[slow], reflex=SimpleNamespace(found=False))
+    with plotting.style():
+        left = clinic_results._stretches(None, found, "elbow").figure.axes[0]  # type: ignore[arg-type]
+    assert min(float(line.get_ydata()[0]) for line in left.lines) == 0.0 == left.get_ylim()[0]
+    assert not any(line.get_clip_on() for line in left.lines)

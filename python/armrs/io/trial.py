@@ -396,7 +396,8 @@ def _unwrapped(column: columns.Column, values: np.ndarray, warnings: list[str]) 
     turns[np.abs(steps - _TURN * turns) > 0.1 * _TURN] = 0.0
     if not turns.any():
         return values
-    warnings.append(f"column {column.name} jumps by whole turns {int(np.count_nonzero(turns))} times: they were taken out")
+    count = int(np.count_nonzero(turns))
+    warnings.append(f"column {column.name} jumps by whole turns {f'{count} times' if count > 1 else 'once'}: they were taken out")
     result = values.copy()
     result[there[1:]] -= _TURN * np.cumsum(turns)
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -181,6 +182,10 @@ def _remedy(error: ArmrsError) -> str:
     for start, step in _FILES.items():
         if place.startswith(start):
             return step
+    if re.search(r"found '[-+]?\d+,\d+(e[-+]?\d+)?'", str(error)):
+        return "write decimal points, or import the recording again: armrs import reads decimal commas"
+    if str(error.found).endswith(" twice"):
+        return "rename or remove one of the two"
     if "dead sensor" in (error.hint or ""):
         return "repair the sensor and record again, or leave the trial out of dataset.toml"
     if "if read otherwise" in str(error.found):
