@@ -136,6 +136,21 @@ def test_the_next_step_fits_the_cell(session: Path, tmp_path: Path) -> None:
     assert steps["slow_2.csv"] == "rename or remove one of the two"
 
 
+def test_a_model_in_other_units_hides_nothing_and_brings_nothing_else(session: Path, tmp_path: Path) -> None:
+    """Without a model each trial was said to have columns of joints that it does not have."""
+    folder = changed(session, tmp_path / "set", {})
+    model = folder / "model.toml"
+    text = model.read_text(encoding="utf-8")
+    for pattern, factor, level, said in (
+        (r"(mass) = ([\d.]+)", 1000.0, "error", ["grams?"]),
+        (r"(length|com) = ([\d.]+)", 100.0, "warning", ["[[arm.segment]] 1, length", "centimetres?"]),
+    ):
+        model.write_text(re.sub(pattern, lambda m, f=factor: f"{m[1]} = {f * float(m[2]):.6g}", text), encoding="utf-8")  # type: ignore[misc]
+        told = [p.text for p in check_dataset(folder).problems if p.level == level]
+        assert all(any(words in line for line in told) for words in said), told
+        assert level == "warning" or len(told) == 1
+
+
 def test_commands_end_with_the_next(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["check", str(session)]) == 0
     assert capsys.readouterr().out.splitlines()[-1].startswith(f"Next: armrs identify {session} -o identified, then armrs gap")

@@ -65,7 +65,9 @@ def _stretches(result: Spasticity, found: JointReflex, name: str) -> Drawn:
         ("reflex", "reflex", plotting.RED),
     ):
         left.plot(speed, [getattr(s, part) for s in found.stretches], "o", color=colour, ms=5, clip_on=False, label=label)
-    left.plot(speed, [s.peak_moment for s in found.stretches], "D", color=plotting.BLUE, ms=6, mfc="none", clip_on=False, label="peak, measured")
+    left.plot(
+        speed, [s.peak_moment for s in found.stretches], "D", color=plotting.BLUE, ms=6, mfc="none", clip_on=False, label="peak, measured"
+    )
     left.set(xlabel="speed of the stretch [°/s]", ylabel="largest moment [N m]", title="What resists")
     left.set_ylim(bottom=0.0)
     left.legend(fontsize="small")

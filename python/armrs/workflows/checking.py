@@ -16,6 +16,7 @@ from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
 from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, read_entry
+from ..io.samples import header_of
 from ..io.trial import Trial, moving_bases, still_angles
 from ..model import Description, Model
 from ..tabular import Tabular, Tidy
@@ -25,6 +26,8 @@ from .importing.clock import lateness
 
 _LATE, _LATE_BY = 0.06, 2.0
 """Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
+_LONG = 3.0
+"""Length of a segment from which on its unit is asked for [m]."""
 _APART = 0.01
 """Mean distance of hand and handle from which on it is told [m]: ten times the default placement of the handle."""
 _SAME_RATE = 0.02
@@ -136,6 +139,11 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
         why = "no model" if model is None else "no trial can be read"
         return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
     problems += [_warned(line) for line in model.warnings]
+    problems += [
+        Problem("warning", f"[[arm.segment]] {k}, length: found {s.length:.4g} m (centimetres?)", "state lengths and com in metres")
+        for k, s in enumerate(model.segments, start=1)
+        if s.length > _LONG
+    ]
     if description.model is None:
         problems.append(_warned(NO_MODEL))
     dataset = Dataset(name_of(path, description), model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
@@ -230,12 +238,21 @@ def _trials(folder: Path, description: Description, model: Model | None, problem
     trials = []
     for entry in description.trials:
         path = folder / entry.file
-        joints = model.n_joints if model is not None else 1
-        reading = _caught(partial(read_entry, path, entry, joints, description), problems)
+        if model is not None:
+            joints: int | None = model.n_joints
+        else:
+            joints = _caught(partial(_joints_of, path), problems)
+        reading = None if joints is None else _caught(partial(read_entry, path, entry, joints, description), problems)
         if reading is not None and model is not None:
             problems += [_warned(f"{path}: {line}") for line in reading.warnings]
             trials.append(reading.trial)
     return trials
+
+
+def _joints_of(path: Path) -> int:
+    """Return of how many joints a trial has angles; where the model cannot be read, nothing else tells."""
+    numbers = [int(found[1]) for name in header_of(path) if (found := re.match(r"q([1-9])_", name))]
+    return max(numbers, default=1)
 
 
 def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
