@@ -24,7 +24,9 @@ def page() -> str:
         "In a model an effect is a table `[[effect]]` with `kind`, where it acts, and its parameters; what is left out takes its default.",
         "Dry friction has a `smoothing`. Above 0 the sign of the speed is `tanh(q̇/smoothing)`: a joint at rest creeps, and an explicit "
         "step must resolve the steep slope at rest. With `smoothing = 0` friction is set-valued: `sgn(q̇)` in motion, and at rest whatever "
-        "holds the joint, up to the same torque. Simulation solves that law at any step: joints stick, slip, and switch at located times.",
+        "holds the joint, up to the same torque. Simulation solves that law at any step: joints stick, slip, and switch at located times. "
+        "`simulate`, `record` and `sweep` solve it too in place of the default smoothing where that is too steep for the usual step: "
+        "[accuracy](conventions.md#accuracy-of-a-simulated-run).",
     ]
     for place in places:
         blocks.append(f"## {place[0].upper()}{place[1:]}")

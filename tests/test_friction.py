@@ -125,7 +125,7 @@ def test_rapier_with_set_valued_friction_is_compared_with_half_the_step(tmp_path
 @pytest.mark.parametrize("name", STRONG)
 def test_smooth_friction_too_steep_for_the_step_ends_with_status_1(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     """With a step that is asked for: the force was off by up to twice its size, with status 0."""
-    path = written(tmp_path, "".join(effect(kind, joint, **values) for kind, joint, values in STRONG[name]))
+    path = written(tmp_path, "".join(effect(kind, joint, **values, smoothing=0.012) for kind, joint, values in STRONG[name]))
     movement = tmp_path / "movement.toml"
     movement.write_text("[movement]\nwaypoints_deg = [[-60, 60], [-48, 60], [-60, 72]]\nspeed_rad_s = 1.0\nacceleration_rad_s2 = 4.0\n")
     status = main(["simulate", str(path), "--movement", str(movement), "--dt", "0.00025", "--json", "-"])
@@ -133,6 +133,33 @@ def test_smooth_friction_too_steep_for_the_step_ends_with_status_1(tmp_path: Pat
     assert json.loads(printed.out)["half_step"]["force_share"] > 0.01
     assert status == 1
     assert "smoothing = 0" in printed.err
+
+
+@pytest.mark.parametrize("name", ["coulomb", "stribeck", "thixotropy"])
+def test_friction_too_steep_for_the_usual_step_sticks_by_default(tmp_path: Path, name: str) -> None:
+    """It is chosen before the run, whatever the step, and the run says so; a sixteenth of the step and more was needed."""
+    way = np.radians([[-60, 60], [-48, 60], [-60, 72]])
+    movement = armrs.Movement(way, speed=1.0, acceleration=4.0)
+    path = written(tmp_path, "".join(effect(kind, joint, **values) for kind, joint, values in STRONG[name]))
+    usual, fine = (armrs.simulate(path, movement, dt=dt) for dt in (None, 0.25e-3 / 20))
+    angle, force = judged(usual, fine)
+    assert usual.settings["dt_s"] == 0.25e-3
+    assert usual.model.effects[-1].parameters["smoothing"] == 0.0
+    assert not usual.warnings
+    assert angle < 0.01
+    assert force < 0.01
+
+
+def test_the_friction_that_a_joint_states_sticks_too(tmp_path: Path) -> None:
+    """Only where it is too steep: the other joint keeps its key."""
+    model = armrs.load_model(written(tmp_path, ""))
+    first, second = model.joints
+    stated = model.replace(joints=(first.replace(coulomb=0.02), second.replace(coulomb=5.0)))
+    start = {"start": np.array([-0.4, 0.9]), "start_speed": np.zeros(2), "duration": 0.3}
+    run = armrs.simulate(stated, None, **start)
+    assert [joint.coulomb for joint in run.model.joints] == [0.02, 0.0]
+    assert [(e.kind, e.joint, dict(e.parameters)) for e in run.model.effects] == [("coulomb", 2, {"torque": 5.0, "smoothing": 0.0})]
+    assert np.all(run.q[:, 1] == 0.9)
 
 
 def judged(run: armrs.Simulated, fine: armrs.Simulated) -> tuple[float, float]:
@@ -144,7 +171,7 @@ def judged(run: armrs.Simulated, fine: armrs.Simulated) -> tuple[float, float]:
 @pytest.mark.parametrize("name", STRONG)
 def test_without_a_step_one_is_taken_that_follows_the_friction(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     """`armrs simulate` printed 1126 N for 336 N."""
-    path = written(tmp_path, "".join(effect(kind, joint, **values) for kind, joint, values in STRONG[name]))
+    path = written(tmp_path, "".join(effect(kind, joint, **values, smoothing=0.012) for kind, joint, values in STRONG[name]))
     way = np.radians([[-60, 60], [-48, 60], [-60, 72]])
     usual = armrs.simulate(path, armrs.Movement(way, speed=1.0, acceleration=4.0))
     fine = armrs.simulate(path, armrs.Movement(way, speed=1.0, acceleration=4.0), dt=usual.settings["dt_s"] / 4)

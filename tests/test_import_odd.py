@@ -244,3 +244,14 @@ def test_files_that_all_state_a_wrong_unit_are_alike(recording: Recording, tmp_p
     other = write_text(tmp_path / "slow_3.csv", [names[0], "q1_deg", *names[2:]], repeated(values, 3))
     with pytest.raises(armrs.BadInput, match=r"slow_3\.csv"):
         armrs.import_recordings([*files, other], tmp_path / "other", model=KNOWN)
+
+
+def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, recording: Recording) -> None:
+    """An encoder that has counted five turns: the data set was written, refused, and left behind."""
+    samples = values(recording)
+    samples[:, 1] += 1800.0
+    source = tmp_path / "slow_1.csv"
+    source.write_text("\n".join([";".join(["time [s]", *GERMAN[1:]]), *rows(samples, decimal=".")]) + "\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"out/trials/slow_1\.csv.*looks like degrees"):
+        armrs.import_recordings([source], tmp_path / "out", model=KNOWN)
+    assert not (tmp_path / "out").exists()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import struct
 import zipfile
+import zlib
 from collections.abc import Callable
 from io import BytesIO
 from random import Random
@@ -141,7 +142,7 @@ def member(random: Random, data: bytes) -> bytes:
     try:
         with zipfile.ZipFile(BytesIO(data)) as source:
             entries = [(info.filename, source.read(info)) for info in source.infolist()]
-    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError, NotImplementedError):
+    except (zipfile.BadZipFile, zlib.error, OSError, ValueError, RuntimeError, NotImplementedError, EOFError):
         return flip(random, data)
     if not entries:
         return data

@@ -491,11 +491,13 @@ fn effects(spec: &ArmSpec, table: &mut Vec<Variable>) -> Result<(), Refused> {
                 unit,
                 min,
                 max,
+                or_zero,
                 ..
             } = *parameter;
+            let least = if or_zero { 0.0 } else { min };
             table.push(Variable {
                 start: Some(start),
-                range: (min, max),
+                range: (least, max),
                 description: format!("Effect {}{place}: {name}.", effect.kind),
                 ..Variable::new(
                     Quantity::Effect(k, p),

@@ -16,7 +16,8 @@ from ..io.trial import Trial
 from ..model import Effect, Model, load_model
 from ..tabular import Framed, Tidy
 from ..workflows.movement import Movement
-from ..workflows.simulate import DEFAULT_DT, DEFAULT_RATE, CoreRun, driven
+from ..workflows.simulate import DEFAULT_RATE, CoreRun, driven
+from ..workflows.stiction import DEFAULT_DT
 
 
 @dataclass(frozen=True, eq=False)

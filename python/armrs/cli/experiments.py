@@ -88,13 +88,12 @@ def simulate(
     from ..workflows.accuracy import WRONG, step_error
     from ..workflows.movement import load_movement
     from ..workflows.simulate import is_doubtful
+    from ..workflows.stiction import sticking_said
     from ..workflows.streamed import stream
 
     if (movement is None) == (trial is None):
-        found = Text("neither" if movement is None else "both")
-        raise BadInput("--movement, --trial", found, "one of them")
-    suffix = samples_suffix(to, out)
-    folder = writable(out, json)
+        raise BadInput("--movement, --trial", Text("neither" if movement is None else "both"), "one of them")
+    suffix, folder = samples_suffix(to, out), writable(out, json)
     arm = load_model(model)
     reading = None if trial is None else _single_trial(trial, arm.n_joints)
     measured = None if reading is None else reading.trial
@@ -124,7 +123,7 @@ def simulate(
             from ..report.results import write_simulated
 
             written = write_simulated(result, plain, folder, suffix=suffix, trial=measured)
-        warnings = [*result.warnings, *(() if halved is None else halved.warnings)]
+        warnings = [*sticking_said(arm), *result.warnings, *(() if halved is None else halved.warnings)]
     console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *warnings])
     present(lambda: plain, json, lambda: words.simulated(plain, written))
     worst = max(plain["energy"]["error_share"], 0.0 if halved is None else halved.share)

@@ -14,7 +14,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from ..model import Model, load_model
-from ..workflows.simulate import DEFAULT_DT
+from ..workflows.stiction import DEFAULT_DT
 from .partner import Partner, Status, StepResult, Variable, listed
 
 PORTS = ("force", "motion")

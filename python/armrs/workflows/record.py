@@ -22,7 +22,8 @@ from ..model import AddedMass, Effect, Model
 from ..tabular import Tabular, Tidy
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .movement import Movement
-from .simulate import DEFAULT_DT, Channel, CoreRun, Sensors, Simulated, driven, simulate
+from .simulate import Channel, CoreRun, Sensors, Simulated, driven, simulate
+from .stiction import DEFAULT_DT
 
 if TYPE_CHECKING:
     from .._armrs import _Controlled

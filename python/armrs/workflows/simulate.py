@@ -15,7 +15,6 @@ import numpy as np
 from .. import _armrs, checks
 from .._armrs import Readings as Readings
 from .._armrs import Recording as Recording
-from ..catalogue import catalogue
 from ..errors import BadInput, SimulationError, Text
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Model, load_model
@@ -23,13 +22,10 @@ from ..tabular import Labelled, Series, Tabular, Tidy
 from ..telling import telling
 from .accuracy import EnergyBalance, energy_balance
 from .movement import Movement
+from .stiction import DEFAULT_DT, smoothings, steps_to_try, sticking
 
-DEFAULT_DT = 0.25e-3
-"""Step of the simulation [s]."""
 CHATTER = 1e-5
 """Share of the energy exchanged that smooth friction loses when the step does not resolve it."""
-FINER = (1, 4, 16, 64)
-"""Steps within `DEFAULT_DT` that are tried in turn, until one resolves the dry friction."""
 DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
 RUNAWAY = 30.0
@@ -246,30 +242,12 @@ def is_doubtful(run: Run) -> str | None:
     Rapier does not locate where set-valued friction sticks and slips. Smooth friction whose slope at rest is too steep for the step
     chatters, and loses energy while it does: at 1e-5 of what is exchanged the force is off by up to 0.2 %.
     """
-    speeds = _smoothings(run.model)
+    speeds = smoothings(run.model)
     if run.settings["engine"] == "rapier" and 0.0 in speeds:
         return "rapier does not locate where set-valued friction sticks and slips"
     if any(speed > 0.0 for speed in speeds) and run.balance.share > CHATTER:
         return "the dry friction may be too steep for the step"
     return None
-
-
-def steps_to_try(model: Model, *, engine: str, integrator: str | None, dt: float | None) -> tuple[float, ...]:
-    """Return the steps that a run is made with in turn, until one resolves its dry friction [s].
-
-    A step that is asked for is taken. Smooth dry friction is so steep at rest that an explicit step has to follow it: with the
-    fourth-order method, whose energy says whether it does, shorter steps are tried. Set-valued friction is solved at any step.
-    """
-    if dt is not None:
-        return (dt,)
-    explicit = engine == "native" and integrator in (None, "rk4")
-    return tuple(DEFAULT_DT / n for n in (FINER if explicit and any(speed > 0.0 for speed in _smoothings(model)) else FINER[:1]))
-
-
-def _smoothings(model: Model) -> list[float]:
-    """Return the speeds over which dry friction changes its sign [rad/s]; infinite for what joints state."""
-    speeds = [effect.parameters[p.name] for effect in model.effects for p in catalogue()[effect.kind].parameters if p.or_zero]
-    return speeds + [np.inf for joint in model.joints if joint.coulomb > 0.0]
 
 
 def warnings(run: Run) -> tuple[str, ...]:
@@ -323,7 +301,8 @@ def simulate(
         Of the native engine: fourth order, taken when absent, or semi-implicit first order.
     dt : float, optional
         Step [s]. When absent 0.25 ms, or a 4th, 16th or 64th of it where smooth dry friction is too steep for it: the longest with which
-        less than 1e-5 of the exchanged energy is unaccounted for.
+        less than 1e-5 of the exchanged energy is unaccounted for. At any step, constant friction with the default smoothing that is too
+        steep for 0.25 ms is set-valued: `smoothing` is 0 there in `model` of the run.
     rate : float, optional
         Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps. Sensors read this recording at a rate of their own,
         `sensors.rate`, which may not be larger: what is in between is not recorded. When absent, 50 Hz, or that of faster sensors.
@@ -346,7 +325,7 @@ def simulate(
     checks.instance("sensors", sensors, Sensors, type(None))
     if rate is None:
         rate = DEFAULT_RATE if sensors is None else max(DEFAULT_RATE, sensors.rate)
-    model = checks.loaded("model", model, Model, load_model)
+    model = sticking(checks.loaded("model", model, Model, load_model))
 
     def run(step: float) -> Simulated:
         asked = _asked(

@@ -17,7 +17,8 @@ from ..io.trial import Trial
 from ..model import Model
 from .accuracy import EnergyBalance, energy_balance
 from .movement import Movement
-from .simulate import PIECE, Simulated, digested, is_doubtful, simulate_in_pieces, steps_to_try, warnings
+from .simulate import PIECE, Simulated, digested, is_doubtful, simulate_in_pieces, warnings
+from .stiction import steps_to_try, sticking
 
 
 class Streamed:
@@ -125,6 +126,7 @@ def stream(model: Model, drive: Movement | Trial | None, near: Path | None = Non
     near : path, optional
         On whose disk samples may be kept for that time: this folder, or where it is to be.
     """
+    model = sticking(model)
     tried = steps_to_try(model, engine=options.get("engine", "native"), integrator=options.get("integrator"), dt=options.pop("dt", None))
     for step in tried:
         with contextlib.ExitStack() as stack:

@@ -12,9 +12,18 @@ fn both() -> [ArmSpec; 2] {
     })
 }
 
+/// An arm whose friction sticks.
+fn sticking() -> ArmSpec {
+    let mut spec = ArmSpec::sample();
+    for effect in &mut spec.effects {
+        effect.values[1] = 0.0;
+    }
+    spec
+}
+
 #[test]
 fn rows_are_sound() {
-    for spec in both() {
+    for spec in both().into_iter().chain([sticking()]) {
         let table = variables(&spec).unwrap();
         let names: HashSet<_> = table.iter().map(|v| v.name.as_str()).collect();
         assert_eq!(names.len(), table.len());

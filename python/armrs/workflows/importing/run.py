@@ -14,6 +14,7 @@ import numpy as np
 from ... import checks
 from ...errors import BadInput, BadInputs, Text
 from ...io import files
+from ...io.dataset import load_dataset
 from ...io.raw import RawTable
 from ...io.raw.units import unit
 from ...io.samples import write_samples
@@ -534,6 +535,11 @@ def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: 
         content = Description(folder.resolve().name, "model.toml", entries, force_on=side, subject=subject, tolerance=tolerance)
         files.write_text(part / "dataset.toml", content.to_toml(), kind=".toml")
         files.write_text(part / FILE, kept.to_toml(), kind=".toml")
+        try:
+            load_dataset(part)
+        except BadInput as error:  # what could not be read again is not written
+            problems = error.problems if isinstance(error, BadInputs) else (error,)
+            raise BadInputs.of([p.within(file=folder / Path(p.file or part).relative_to(part)) for p in problems]) from None
         return [*written, part / "model.toml", part / "dataset.toml", part / FILE]
 
     written = files.write_whole(folder, write)
