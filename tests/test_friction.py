@@ -257,6 +257,37 @@ def test_a_run_that_loses_energy_says_so(tmp_path: Path, capsys: pytest.CaptureF
     assert "take a shorter step" in printed.err
 
 
+@pytest.mark.parametrize("motion", ["measured", "simulated"])
+def test_a_joint_that_rests_under_load_does_not_bend_its_friction(tmp_path: Path, motion: str) -> None:
+    """One joint moves and the other is held by its friction: rows that took this for no friction read 0 and 0.1 N m for 0.139 N m."""
+    torques, viscosity, step = (0.139, 0.161), 0.05, np.radians(20.0)
+    effects = "".join(
+        effect("coulomb", k, torque=torque, smoothing=0.0) + effect("viscous", k, viscosity=viscosity)
+        for k, torque in enumerate(torques, 1)
+    )
+    arm = armrs.load_model(written(tmp_path, effects)).replace(robot=armrs.Robot((0.45, 0.45), base=(1.0, -0.1)))
+    trials = []
+    for name, posture in (("low", (-60.0, 60.0)), ("high", (-20.0, 80.0))):
+        way = np.radians(posture) + step * np.array([[0, 0], [1, 0], [0, 0], [-1, 0], [0, 0], [0, 1], [0, 0], [0, -1], [0, 0]])
+        movement = armrs.Movement(way, speed=0.5, acceleration=2.0, pause=0.5, shape="smooth")
+        run = armrs.simulate(arm, movement, rate=100.0, sensors=armrs.Sensors(rate=100.0), seeds=[0, 1])
+        for repeat, read in enumerate(run.readings, start=1):
+            columns = {column: getattr(read, column) for column in ("q", "force_on_arm", "robot_q")}
+            trials.append(armrs.Trial(f"{name} {repeat}", name, repeat, "fit", read.time, **columns))
+    halved = [
+        e.replace(parameters={**e.parameters, next(iter(e.parameters)): 0.5 * next(iter(e.parameters.values()))}) for e in arm.effects
+    ]
+    guess = arm.replace(effects=tuple(halved), segment_uncertainty=0.05)
+    found = armrs.identify(armrs.Dataset("one joint at a time", guess, tuple(trials), synthetic=True), motion=motion, with_effects=())
+    friction = {e.joint: e for e in found.parameters if e.kind == "coulomb"}
+    for joint, torque in enumerate(torques, start=1):
+        assert friction[joint].value == pytest.approx(torque, rel=0.02)
+        assert abs(friction[joint].value - torque) < 4.0 * friction[joint].std
+    # At rest the friction takes whatever the model leaves: what is shown there is what was measured.
+    assert found.residual_rms["fit"]["tau1_Nm"] < 0.02 * np.std(found.explained[0].measured[:, 0])
+    assert np.abs(found.explained[0].measured[0]).max() > 1.0
+
+
 def own(law: Callable[..., np.ndarray]) -> None:
     """Declare a law of one parameter."""
     armrs.own_effect(

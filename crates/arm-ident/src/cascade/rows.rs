@@ -6,7 +6,7 @@ use crate::regression::calibration::{Nearby, Prediction, influence as of_calibra
 use crate::regression::equation::gradient;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
-use crate::regression::measured_motion::{low_pass, speed, speed_noise};
+use crate::regression::measured_motion::{low_pass, slowest, speed, speed_noise};
 use crate::regression::preprocessing::{Pieces, filtered};
 use crate::regression::rows::Rows;
 use crate::regression::trial::{Model, Trial};
@@ -17,12 +17,6 @@ use arm_numerics::signal::derivative::{first, second};
 
 /// Direction is read from angles below this frequency \[Hz\]: a quasi-static movement has nothing above.
 pub(super) const DIRECTION_CUTOFF: f64 = 1.0;
-
-/// A joint moves where its speed is this many standard deviations of the speed's noise.
-pub(super) const DEAD_BAND: f64 = 3.0;
-
-/// Slowest speed that counts as motion \[rad/s\], however little noise there is.
-pub(super) const SLOWEST: f64 = 1e-4;
 
 /// Periods of the direction's cutoff next to rest or a turn that do not count as motion: the filter moves a start forward by no more,
 /// and its ringing beside a movement has one sign for less than twice as long.
@@ -78,6 +72,7 @@ impl<'a, const N: usize> Building<'a, N> {
                 qd: rest.clone(),
                 qdd: rest,
                 base: None,
+                rest: [0.0; N],
             },
             moving: moving_at(trial, cutoff)?,
             speed,
@@ -191,7 +186,7 @@ pub(super) fn motion<const N: usize>(
             q[i][j] = smooth[i];
             speeds[i][j] = qd[i];
         }
-        moves[j] = moving(&qd, f64::max(DEAD_BAND * noise[j], SLOWEST), turn);
+        moves[j] = moving(&qd, slowest(noise[j]), turn);
     }
     Ok((q, speeds, moves))
 }
@@ -227,6 +222,7 @@ fn moving_at<const N: usize>(trial: &Trial<N>, cutoff: f64) -> Result<Kinematics
         qd: vec![Joints::zeros(); trial.len()],
         qdd: vec![Joints::zeros(); trial.len()],
         base: None,
+        rest: [0.0; N],
     };
     for j in 0..N {
         let angles: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();

@@ -57,9 +57,12 @@ fn condensed<const N: usize>(
         let thinning = Thinning::new(trial, cutoff)?;
         lengths.push(thinning.lengths());
         thinning.stream::<N>(
-            unknowns.len(),
+            rows.width(),
             |count| rows.next(count),
-            |_, kept| noise.condense(&mut condenser, &kept, 0..kept.samples.len()),
+            |_, mut kept| {
+                kept.columns.truncate(unknowns.len());
+                noise.condense(&mut condenser, &kept, 0..kept.samples.len())
+            },
         )?;
     }
     // What cannot be fitted later cannot be judged either.

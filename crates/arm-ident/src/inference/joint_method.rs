@@ -11,7 +11,9 @@ use crate::regression::equation::{Building, effect_value, value_of};
 use crate::regression::instrument::Instrument;
 use crate::regression::measured_motion::widened;
 use crate::regression::measured_motion::{candidates, measured, relative_speed_noise};
-use crate::regression::preprocessing::{Noise, Pieces, filtered, repeat_deviations, residual};
+use crate::regression::preprocessing::{
+    Noise, Pieces, apart, filtered, repeat_deviations, residual,
+};
 use crate::regression::sensitivity::{HELD, damped};
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
@@ -434,12 +436,16 @@ fn prepare<const N: usize>(
         if !simulate || (trial.role == Role::Test && !can_simulate(trial)) {
             let motion = measured(trial, cutoff)?;
             let mut rows = Building::new((&model, unknowns), trial, &motion);
-            return filtered(trial, cutoff, unknowns.len(), |count| rows.next(count));
+            let pieces = filtered(trial, cutoff, rows.width(), |count| rows.next(count))?;
+            return Ok(apart(pieces, unknowns.len()));
         }
         let course = simulated(&model, trial, cutoff).map_err(|error| error.in_trial(k))?;
         let motion = course.at_samples();
         let mut rows = Instrument::new((&model, unknowns), trial, (&course, &motion), delay);
-        filtered(trial, cutoff, unknowns.len(), |count| rows.next(count))
+        let pieces = filtered(trial, cutoff, rows.building.width(), |count| {
+            rows.next(count)
+        })?;
+        Ok(apart(pieces, unknowns.len()))
     };
     trials.iter().enumerate().map(of_trial).collect()
 }

@@ -158,10 +158,11 @@ pub(crate) fn explain<const N: usize>(pieces: &Pieces, x: &[f64]) -> Explained<N
     for piece in pieces {
         out.samples.extend(&piece.samples);
         let rest = residual(piece, x);
-        for (m, r) in piece.rhs.chunks_exact(N).zip(rest.chunks_exact(N)) {
-            out.measured.push(arm_core::Joints::from_column_slice(m));
+        for (k, r) in rest.chunks_exact(N).enumerate() {
+            let measured = arm_core::Joints::from_fn(|j, _| piece.measured(k * N + j));
             out.fitted
-                .push(arm_core::Joints::from_fn(|j, _| m[j] - r[j]));
+                .push(arm_core::Joints::from_fn(|j, _| measured[j] - r[j]));
+            out.measured.push(measured);
         }
     }
     out

@@ -2,6 +2,9 @@
 //!
 //! One row a joint: `Y π + R(ρ) + C c = τ + Jᵀ F − R_held − rotor`, with inertial parameters π, linear parameters ρ of the
 //! fitted effects and small imperfections c of the measurement, each through its first-order influence on the row.
+//!
+//! Where a joint rests, set-valued dry friction resists with whatever holds it: nothing follows from its row, which is zero there. The equation
+//! of every other row is exact, and a low-pass of both sides leaves it so.
 
 use crate::regression::calibration::{Nearby, Prediction, influence};
 use crate::regression::internal_state::InternalStates;
@@ -25,6 +28,8 @@ pub(crate) struct Building<'a, const N: usize> {
     pub(crate) regressed: Vec<Effect<f64>>,
     /// Where imperfections of the measurement are among the unknowns.
     pub(crate) prediction: Option<Prediction<N>>,
+    /// Joints with set-valued dry friction.
+    pub(crate) dry: [bool; N],
     /// Samples that are built.
     pub(crate) built: usize,
 }
@@ -44,7 +49,30 @@ impl<'a, const N: usize> Building<'a, N> {
             memory: InternalStates::new(model),
             regressed: regressed(model, unknowns),
             prediction: Prediction::of_unknowns(unknowns, model),
+            dry: sticking(model),
             built: 0,
+        }
+    }
+
+    /// Columns of the rows: one for each unknown and, where some joint sticks, one of [`Rows::held`].
+    pub fn width(&self) -> usize {
+        self.unknowns.len() + usize::from(self.dry.contains(&true))
+    }
+
+    /// Whether set-valued friction holds a joint in a sample.
+    pub fn rests(&self, sample: usize, joint: usize) -> bool {
+        self.dry[joint] && self.motion.qd[sample][joint].abs() <= self.motion.rest[joint]
+    }
+
+    /// Takes what resting joints hold out of the right-hand side.
+    pub fn take_held(&self, rows: &mut Rows) {
+        let Some(held) = rows.columns.get_mut(self.unknowns.len()) else {
+            return;
+        };
+        for (k, &i) in rows.samples.iter().enumerate() {
+            for j in (0..N).filter(|&j| self.rests(i, j)) {
+                held[k * N + j] = core::mem::take(&mut rows.rhs[k * N + j]);
+            }
         }
     }
 
@@ -52,7 +80,9 @@ impl<'a, const N: usize> Building<'a, N> {
     pub fn next(&mut self, count: usize) -> Rows {
         let samples = self.built..self.built + count;
         self.built = samples.end;
-        Rows::of_samples::<N>(self.unknowns.len(), samples, |rows, k| self.sample(rows, k))
+        let mut rows = Rows::of_samples::<N>(self.width(), samples, |rows, k| self.sample(rows, k));
+        self.take_held(&mut rows);
+        rows
     }
 
     fn sample(&mut self, rows: &mut Rows, k: usize) {
@@ -95,7 +125,9 @@ impl<'a, const N: usize> Building<'a, N> {
             if let Source::Segment(s, moment) = unknown.source {
                 explained += column * value_of(&chain, s, moment);
             }
-            values[here.clone()].copy_from_slice(column.as_slice());
+            let told =
+                Joints::<f64, N>::from_fn(|j, _| if self.rests(i, j) { 0.0 } else { column[j] });
+            values[here.clone()].copy_from_slice(told.as_slice());
         }
         // What the rigid arm does besides the unknown moments: rotors, held normal moments, held segments.
         for (j, value) in rows.rhs[here].iter_mut().enumerate() {
@@ -122,6 +154,12 @@ pub fn value_of<const N: usize>(chain: &Chain<f64, N>, segment: usize, moment: M
         Moment::Normal => s.mass * s.com[1],
         Moment::Inertia => s.inertia + s.mass * (s.com[0] * s.com[0] + s.com[1] * s.com[1]),
     }
+}
+
+/// The joints that set-valued dry friction can hold.
+fn sticking<const N: usize>(model: &Model<N>) -> [bool; N] {
+    let dry = |j| move |e: &Effect<f64>| e.index == j && e.is_dry();
+    core::array::from_fn(|j| model.fitted.iter().chain(&model.held).any(dry(j)))
 }
 
 /// The fitted effects as their columns see them: where amplitude · rest is an unknown, the amplitude acts about zero.

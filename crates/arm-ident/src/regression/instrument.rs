@@ -77,6 +77,7 @@ impl<'a, const N: usize> Instrument<'a, N> {
                 - resisting_torque(&model.held, &at.motion, &self.memory.held);
             left.copy_from_slice(rest.as_slice());
         }
+        self.building.take_held(&mut rows);
         for (unknown, column) in unknowns.iter().zip(&rows.columns) {
             let value = match unknown.source {
                 Source::Segment(k, moment) => value_of(&model.chain, k, moment),

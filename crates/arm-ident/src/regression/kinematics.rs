@@ -13,6 +13,8 @@ pub struct Kinematics<const N: usize> {
     pub qdd: Vec<Joints<f64, N>>,
     /// Acceleration of the first joint \[m/s²\], where its path was measured; else it rests.
     pub base: Option<Vec<Plane<f64>>>,
+    /// Speed of each joint up to which it may rest \[rad/s\]: of a simulated motion zero, else what noise makes of rest.
+    pub rest: [f64; N],
 }
 
 impl<const N: usize> Kinematics<N> {

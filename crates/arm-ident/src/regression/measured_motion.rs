@@ -51,13 +51,15 @@ pub fn measured<const N: usize>(
     trial: &Trial<N>,
     cutoff: f64,
 ) -> Result<Kinematics<N>, IdentError> {
-    let filter = low_pass(motion_cutoff(cutoff, trial.rate), trial.rate)?;
+    let band = motion_cutoff(cutoff, trial.rate);
+    let filter = low_pass(band, trial.rate)?;
     let step = 1.0 / trial.rate;
     let mut motion = Kinematics {
         q: trial.q.clone(),
         qd: vec![Joints::zeros(); trial.len()],
         qdd: vec![Joints::zeros(); trial.len()],
         base: base_acceleration(trial, &filter)?,
+        rest: speed_noise(trial, band).map(slowest),
     };
     for j in 0..N {
         let qd = speed(trial, j, &filter)?;
@@ -215,10 +217,17 @@ pub fn is_quiet(relative_noise: &[f64]) -> bool {
     relative_noise.iter().all(|&share| share <= QUIET)
 }
 
-/// Dry friction is smoothed over this many standard deviations of the speed's noise.
+/// A joint moves where its speed is this many standard deviations of the speed's noise; dry friction is smoothed over as many.
 const DEAD_BAND: f64 = 3.0;
 
-/// The model with dry friction that changes its sign no faster than the noise of measured speeds.
+/// Slowest speed that counts as motion \[rad/s\], with this noise of the speed.
+pub(crate) fn slowest(noise: f64) -> f64 {
+    /// However little noise there is.
+    const LEAST: f64 = 1e-4;
+    f64::max(DEAD_BAND * noise, LEAST)
+}
+
+/// The model with smooth dry friction that changes its sign no faster than the noise of measured speeds.
 pub(crate) fn widened<'a, const N: usize>(
     model: &Model<N>,
     trials: impl Iterator<Item = &'a Trial<N>>,
@@ -229,7 +238,9 @@ pub(crate) fn widened<'a, const N: usize>(
         let noise = speed_noise(trial, motion_cutoff(cutoff, trial.rate));
         for effect in model.fitted.iter_mut().chain(&mut model.held) {
             let noise = noise.get(effect.index).copied().unwrap_or(0.0);
-            widen(effect, DEAD_BAND * noise);
+            if !effect.is_dry() {
+                widen(effect, DEAD_BAND * noise);
+            }
         }
     }
     model

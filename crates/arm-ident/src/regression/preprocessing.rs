@@ -129,6 +129,16 @@ impl Thinning {
     }
 }
 
+/// The same with what joints hold at rest, the column behind those of the unknowns, beside them.
+pub fn apart(mut pieces: Pieces, unknowns: usize) -> Pieces {
+    for rows in &mut pieces {
+        rows.held = (rows.columns.len() > unknowns)
+            .then(|| rows.columns.pop())
+            .flatten();
+    }
+    pieces
+}
+
 /// Low-passes all columns and the right-hand side of a trial alike, keeps one sample in some, and drops what a gap or an end has touched.
 ///
 /// Rows are asked for a stretch at a time, so that those of the whole trial are never held.
@@ -153,6 +163,7 @@ pub fn filtered<const N: usize>(
         rhs: Vec::with_capacity(n.len() * N),
         samples: Vec::with_capacity(n.len()),
         fits: None,
+        held: None,
     };
     let mut pieces: Pieces = thinning.kept.iter().map(room).collect();
     thinning.stream::<N>(unknowns, build, |piece, rows| {
@@ -371,7 +382,7 @@ fn redundancy<const N: usize>(pieces: &[Vec<f64>]) -> Result<[f64; N], IdentErro
     Ok(out)
 }
 
-/// Deviations of the right-hand sides of repeats from their mean, scaled by `√(n/(n−1))`.
+/// Deviations of what repeats measured, at rest too, from their mean, scaled by `√(n/(n−1))`.
 ///
 /// * `repeats` - filtered rows of trials of one movement
 ///
@@ -386,15 +397,12 @@ pub fn repeat_deviations(repeats: &[&Pieces]) -> Option<Vec<Vec<f64>>> {
     {
         return None;
     }
-    let mean = |i: usize| repeats.iter().map(|p| p[0].rhs[i]).sum::<f64>() / n as f64;
+    let mean = |i: usize| repeats.iter().map(|p| p[0].measured(i)).sum::<f64>() / n as f64;
     let correction = libm::sqrt(n as f64 / (n as f64 - 1.0));
     let means: Vec<f64> = (0..first.rhs.len()).map(mean).collect();
     let deviation = |p: &&Pieces| {
-        p[0].rhs
-            .iter()
-            .zip(&means)
-            .map(|(v, m)| (v - m) * correction)
-            .collect()
+        let apart = means.iter().enumerate().map(|(i, m)| p[0].measured(i) - m);
+        apart.map(|v| v * correction).collect()
     };
     Some(repeats.iter().map(deviation).collect())
 }

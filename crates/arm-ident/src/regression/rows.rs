@@ -15,12 +15,19 @@ pub struct Rows {
     pub samples: Vec<usize>,
     /// Which rows the cascade fits, laid out like `rhs`; all where there is none.
     pub fits: Option<Vec<bool>>,
+    /// Torque that is held by joints at rest and therefore not in `rhs` \[N m\], laid out like it; none where no joint sticks.
+    pub held: Option<Vec<f64>>,
 }
 
 impl Rows {
     /// Whether the row at a place in `rhs` is fitted.
     pub fn fits(&self, at: usize) -> bool {
         self.fits.as_ref().is_none_or(|fits| fits[at])
+    }
+
+    /// Measured torque of the row at a place in `rhs`, with what is held at rest \[N m\].
+    pub fn measured(&self, at: usize) -> f64 {
+        self.rhs[at] + self.held.as_ref().map_or(0.0, |held| held[at])
     }
 
     /// Rows of some samples, one after another.
@@ -47,6 +54,7 @@ impl Rows {
             rhs: vec![0.0; length],
             samples,
             fits: None,
+            held: None,
         }
     }
 }

@@ -72,6 +72,7 @@ impl<const N: usize> Course<N> {
             qd: joints(&recording.qd),
             qdd: joints(&recording.qdd),
             base: None,
+            rest: [0.0; N],
         };
         let fine = Trial {
             force_on_arm: Some(force.map(|f| [f[0], f[1]]).collect()),
@@ -92,6 +93,7 @@ impl<const N: usize> Course<N> {
             qd: pick(&self.motion.qd),
             qdd: pick(&self.motion.qdd),
             base: None,
+            rest: [0.0; N],
         }
     }
 
@@ -171,7 +173,8 @@ impl<const N: usize> Answers<'_, N> {
                 }
                 if i % parts == 0 {
                     let torque = slopes.mass * moved.qdd + own_damping * moved.qd;
-                    out.extend(torque.iter());
+                    let rests = |j: usize| self.direct.rests(i, j);
+                    out.extend((0..N).map(|j| if rests(j) { 0.0 } else { torque[j] }));
                 }
             }
         }
@@ -215,10 +218,27 @@ impl<const N: usize> Answers<'_, N> {
         };
         // At rest, in the first instant, only angles give way.
         let whole = match i {
-            0 => slopes.stiffness,
+            0 => stuck_at_start(slopes.stiffness, &self.direct.dry),
             _ => slopes.of_step(1.0 / fine.rate),
         };
         let inverse = whole.try_inverse().unwrap_or_else(SMatrix::zeros);
         (slopes, own.damping, inverse)
     }
+}
+
+/// The stiffness at the start of a run, where dry friction holds the last joints that stick, as many as the handle leaves free.
+fn stuck_at_start<const N: usize>(
+    mut stiffness: SMatrix<f64, N, N>,
+    dry: &[bool; N],
+) -> SMatrix<f64, N, N> {
+    for j in (0..N)
+        .rev()
+        .filter(|&j| dry[j])
+        .take(N.saturating_sub(HELD))
+    {
+        stiffness.row_mut(j).fill(0.0);
+        stiffness.column_mut(j).fill(0.0);
+        stiffness[(j, j)] = 1.0;
+    }
+    stiffness
 }

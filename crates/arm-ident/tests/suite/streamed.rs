@@ -24,6 +24,7 @@ fn raw(samples: usize) -> (Rows, Trial<2>) {
         rhs: column(),
         samples: (0..samples).collect(),
         fits: None,
+        held: None,
     };
     let trial = Trial {
         valid: (0..samples).map(|i| i % 7000 != 3500).collect(),
@@ -44,6 +45,7 @@ fn part_by_part(all: &Rows) -> impl FnMut(usize) -> Rows + '_ {
             rhs: part(&all.rhs),
             samples: samples.collect(),
             fits: None,
+            held: None,
         }
     }
 }
