@@ -274,6 +274,7 @@ mod tests {
             qd: column(|v| v),
             qdd: column(still),
             base: None,
+            rest: [0.0],
         };
         let trials = [InMotion {
             trial: &trial,
