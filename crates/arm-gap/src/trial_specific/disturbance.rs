@@ -91,10 +91,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         let shapes = self.shapes_in(point, trial);
         let asked: Vec<Asked> = shapes.into_iter().filter_map(see).collect();
         let mut clearest: Vec<(f64, &Asked)> = Vec::new();
-        let friction = most_friction(&point.hypothesis.effects());
+        let held = held_either_way(&point.hypothesis.effects());
         let possible = asked
             .iter()
-            .filter(|one| self.is_finding(one, suspect, friction));
+            .filter(|one| self.is_finding(one, suspect, held));
         for one in possible {
             let gain = one.gain(&suspect.deviation) / scale;
             let same = |(_, c): &&mut (f64, &Asked)| c.place() == one.place();
@@ -125,17 +125,15 @@ impl<const N: usize> PreparedSession<'_, N> {
 
     /// Whether what is asked is a finding in a trial, whatever its size: of two repeats both deviate alike, and the disturbed one is further
     /// from the model; what moves within what the calibration promises of it is none.
-    /// A burst below twice the dry friction of the arm is none either: a joint that sticks holds any torque within plus and minus its
-    /// friction, so that two repeats differ by up to twice as much.
     ///
-    /// * `friction` - of the joint that has most \[N m\]
-    fn is_finding(&self, one: &Asked, suspect: &Compared, friction: f64) -> bool {
+    /// * `held` - see [`held_either_way`]
+    fn is_finding(&self, one: &Asked, suspect: &Compared, held: f64) -> bool {
         let own = dot(&one.row, &suspect.own).abs();
         let further = |other: &Vec<f64>| own > dot(&one.row, other).abs();
         let probe = one.effect.kind.probe();
         let promised = match (probe.nature, probe.promise) {
             (Nature::Slip, _) => self.session.tolerance.handle_placement,
-            (Nature::Burst, _) => 2.0 * friction,
+            (Nature::Burst, _) => held,
             (_, Some(_)) => self.session.tolerance.angle_offset(),
             (_, None) => 0.0,
         };
@@ -244,14 +242,22 @@ impl Compared {
     }
 }
 
-/// The dry friction of the joint that has most \[N m\].
-fn most_friction(effects: &[Effect<f64>]) -> f64 {
+/// Torque by which two repeats may differ where a joint sticks \[N m\]: it holds any torque within plus and minus its dry friction. A burst
+/// below is none. Of the joint that has most.
+fn held_either_way(effects: &[Effect<f64>]) -> f64 {
     let is_torque = |e: &&Effect<f64>| e.kind.info().parameters[0].unit == "N m";
     let dry = effects
         .iter()
         .filter(|e| e.on && e.kind.smoothed_by().is_some());
-    dry.filter(is_torque)
+    2.0 * dry
+        .filter(is_torque)
         .fold(0.0, |most, e| f64::max(most, e.parameters[0]))
+}
+
+/// Whether a disturbance is a burst that dry friction of the final model may hold: it was found before that friction was.
+pub(crate) fn is_held(one: &TrialSpecific, effects: &[Effect<f64>]) -> bool {
+    let is_burst = one.effect.kind.probe().nature == Nature::Burst;
+    is_burst && one.effect.parameters[0].abs() <= held_either_way(effects)
 }
 
 /// A whitened residual less the mean of its repeats, scaled to the noise of one trial.
@@ -307,8 +313,28 @@ mod tests {
             of(Kind::Coulomb, 1, 0.2),
             of(Kind::LoadFriction, 1, 0.9),
         ];
-        assert_eq!(most_friction(&effects), 0.2);
-        assert_eq!(most_friction(&effects[..1]), 0.0);
+        assert_eq!(held_either_way(&effects), 0.4);
+        assert_eq!(held_either_way(&effects[..1]), 0.0);
+    }
+
+    #[test]
+    fn a_burst_that_the_final_friction_may_hold_is_none() {
+        let of = |kind: &str, size: f64| TrialSpecific {
+            effect: Effect::new(Kind::named(kind).expect("known"), 0).with(&[size]),
+            sd: Vec::new(),
+            trial: Some(0),
+            gain: 50.0,
+            rivals: Vec::new(),
+            locked: false,
+            columns: Vec::new(),
+            sizes: Vec::new(),
+        };
+        let dry = [Effect::<f64>::new(Kind::Coulomb, 1).with(&[0.2])];
+        assert!(is_held(&of("voluntary", -0.39), &dry) && !is_held(&of("voluntary", 0.41), &dry));
+        assert!(
+            !is_held(&of("handle_slip", 0.01), &dry),
+            "a slip is no torque"
+        );
     }
 
     #[test]
