@@ -1,20 +1,16 @@
-//! The questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
+//! A question that a session can answer: a kind of the catalogue at a place in a shape, and what is free in it.
 
 use arm_core::effect::{
-    Effect, Kind, Local, MAX_STATES, Motion, Nature, Place, Question, Values, advance_states,
-    resisting_torque,
+    Effect, Kind, MAX_STATES, Motion, Nature, Place, Question, advance_states, resisting_torque,
 };
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
-use arm_numerics::statistics::extent::extent;
 
-use crate::GapError;
-use crate::candidates::refined_shapes::{held, refined};
+use crate::candidates::refined_shapes::{held, is_plainer, refined};
 use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
-use crate::data::session::{ComparisonMode, Session};
+use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linearization_point::{Change, LinearizationPoint};
-use crate::sensitivity::response::Response;
 
 /// Share of a joint's torque that an effect has in the change with which its response is taken.
 const SHARE: f64 = 0.02;
@@ -62,7 +58,7 @@ impl Candidate {
     }
 
     /// Refines no shape, and leaves those of which only an expected value is known, as a latency, at the default of the catalogue.
-    fn keep_shapes(&mut self, question: &Question) {
+    pub(super) fn keep_shapes(&mut self, question: &Question) {
         self.refined.clear();
         for &(p, _) in question.expected {
             self.effect.parameters[p] = self.effect.kind.info().parameters[p].default;
@@ -73,6 +69,11 @@ impl Candidate {
     /// Number of shapes that a fit refines: of two explanations that are as good, the one with fewer is meant.
     pub fn shapes(&self) -> f64 {
         (usize::from(self.rest.is_some()) + self.refined.len()) as f64
+    }
+
+    /// Whether it fits best in a shape in which it is another, plainer law.
+    pub fn is_plainer(&self, effect: &Effect<f64>) -> bool {
+        is_plainer(&self.refined, effect)
     }
 
     /// Whether it is about the same kind at the same place.
@@ -239,156 +240,6 @@ impl Candidate {
     }
 }
 
-/// All candidates of a session with their responses; those that the movements do not excite are left out.
-pub struct Library {
-    /// The questions.
-    pub candidates: Vec<Candidate>,
-    /// Responses to the columns of each.
-    pub responses: Vec<Vec<Response>>,
-}
-
-impl Library {
-    /// Asks the whole catalogue, linearised at an anchor.
-    ///
-    /// * `periodic` - frequency \[Hz\] and phase \[rad\] of a periodic residual of the handle, where there is one
-    ///
-    /// # Errors
-    /// As [`PreparedSession::responses`].
-    pub fn build<const N: usize>(
-        prepared: &PreparedSession<N>,
-        point: &LinearizationPoint<N>,
-        periodic: Option<[f64; 2]>,
-    ) -> Result<Self, GapError> {
-        Self::of(prepared, point, |_, _| true, periodic.as_slice())
-    }
-
-    /// Asks what may act in one joint alone.
-    ///
-    /// # Errors
-    /// As [`PreparedSession::responses`].
-    pub fn of_joint<const N: usize>(
-        prepared: &PreparedSession<N>,
-        point: &LinearizationPoint<N>,
-        joint: usize,
-    ) -> Result<Self, GapError> {
-        let here = |kind: Kind, index| kind.info().place == Place::Joint && index == joint;
-        Self::of(prepared, point, here, &[])
-    }
-
-    /// Asks what is periodic alone, in waves of the given frequencies \[Hz\] and phases \[rad\].
-    ///
-    /// # Errors
-    /// As [`PreparedSession::responses`].
-    pub fn of_waves<const N: usize>(
-        prepared: &PreparedSession<N>,
-        point: &LinearizationPoint<N>,
-        waves: &[[f64; 2]],
-    ) -> Result<Self, GapError> {
-        let periodic = |kind: Kind, _| kind.probe().nature == Nature::Periodic;
-        Self::of(prepared, point, periodic, waves)
-    }
-
-    fn of<const N: usize>(
-        prepared: &PreparedSession<N>,
-        point: &LinearizationPoint<N>,
-        is_asked: impl Fn(Kind, usize) -> bool,
-        waves: &[[f64; 2]],
-    ) -> Result<Self, GapError> {
-        let hypothesis = &point.hypothesis;
-        let motions = motions(prepared, point);
-        let mut candidates = Vec::new();
-        for kind in prepared.session.kinds() {
-            // What the passive base has is no question any more.
-            let new = |&i: &usize| is_asked(kind, i) && !prepared.has_in_base(kind, i);
-            for index in places(prepared.session, kind).filter(new) {
-                for asked in kind.probe().questions.iter().enumerate() {
-                    let mut plain = Effect::new(kind, index);
-                    hypothesis.share_rest(&mut plain);
-                    let mut own = ask(prepared.session, &motions, plain, asked, waves);
-                    // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
-                    if !prepared.repeated && kind.probe().nature != Nature::Periodic {
-                        own.iter_mut().for_each(|c| c.keep_shapes(asked.1));
-                    }
-                    candidates.extend(own);
-                }
-            }
-        }
-        let changes = |c: &Candidate| c.changes(prepared.session, hypothesis);
-        let changes: Vec<_> = candidates.iter().flat_map(changes).collect();
-        let mut all = prepared.each_response(point, &changes).into_iter();
-        let mut kept = Vec::new();
-        let mut responses = Vec::new();
-        for candidate in candidates {
-            let own: Vec<_> = all.by_ref().take(candidate.width()).collect();
-            let own: Vec<Response> = match own.into_iter().collect() {
-                // What cannot be changed a little there cannot be asked there.
-                Err(GapError::Simulation { .. }) => continue,
-                other => other?,
-            };
-            let moves = |r: &Response| r.0.iter().flatten().flatten().any(|v| *v != 0.0);
-            if own.iter().all(moves) {
-                kept.push(candidate);
-                responses.push(own);
-            }
-        }
-        Ok(Self {
-            candidates: kept,
-            responses,
-        })
-    }
-
-    /// Adds named effects in the shapes that they have; where each stands, and the coefficients of its columns.
-    ///
-    /// # Errors
-    /// As [`PreparedSession::responses`].
-    pub fn add_named<const N: usize>(
-        &mut self,
-        prepared: &PreparedSession<N>,
-        point: &LinearizationPoint<N>,
-        named: &[(Candidate, Effect<f64>)],
-    ) -> Result<Vec<Option<Twin>>, GapError> {
-        let mut places = Vec::new();
-        for (own, mut effect) in named.iter().cloned() {
-            let mut sizes: Vec<f64> = own.free.iter().map(|&p| effect.parameters[p]).collect();
-            if let Some(rest) = own.rest {
-                // With a rest angle the columns are the effect there and one unit further on, which must be possible.
-                let most = effect.kind.info().parameters[rest].max;
-                if effect.parameters[rest] + 1.0 > most {
-                    effect.parameters[rest] -= 1.0;
-                    sizes.insert(0, 0.0);
-                } else {
-                    sizes.push(0.0);
-                }
-            }
-            let Some(exact) = Candidate::again(prepared, point, effect, &own.free) else {
-                places.push(None);
-                continue;
-            };
-            let changes = exact.changes(prepared.session, &point.hypothesis);
-            match prepared.responses(point, &changes) {
-                Ok(own) => self.responses.push(own),
-                Err(GapError::Simulation { .. }) => {
-                    places.push(None);
-                    continue;
-                }
-                Err(other) => return Err(other),
-            }
-            let place = self.candidates.len();
-            places.push(Some(Twin { place, sizes }));
-            self.candidates.push(exact);
-        }
-        Ok(places)
-    }
-}
-
-/// A named effect among the questions.
-pub struct Twin {
-    /// Its place.
-    pub place: usize,
-    /// The coefficients of its columns.
-    pub sizes: Vec<f64>,
-}
-
 /// What an effect must gain to be named: the threshold, Schwarz' price of its numbers, and that of the shapes that were tried.
 ///
 /// * `rows` - rows of data that decide it
@@ -398,7 +249,7 @@ pub fn price(width: usize, tried: usize, rows: usize) -> f64 {
 
 /// What is known of the numbers of an effect beforehand: of the first one in a joint by the weight that the joint bears, and of shapes
 /// what the question says.
-fn expected<const N: usize>(
+pub(super) fn expected<const N: usize>(
     session: &Session<N>,
     effect: &Effect<f64>,
     question: &Question,
@@ -411,55 +262,15 @@ fn expected<const N: usize>(
     size.into_iter().chain(shapes).map(Free::expected).collect()
 }
 
-/// Where a kind may act in a session.
-fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
-    let led = session.comparison == ComparisonMode::Led;
-    // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them, nor of what a
-    // weight or an inertia could as well be.
-    let swings_freely = session.swings_freely();
-    match kind.info().place {
-        Place::Segment | Place::Hand | Place::Frame if swings_freely => 0..0,
-        Place::Joint if swings_freely && holds_at_rest(kind) => 0..0,
-        Place::Joint => usize::from(kind.crosses())..N,
-        Place::Segment | Place::AngleSensor => 0..N,
-        Place::Frame | Place::Hand => 0..1,
-        Place::ForceSensor if led => 0..2,
-        Place::Contact | Place::Sensors if led => 0..1,
-        Place::ForceSensor | Place::Contact | Place::Sensors => 0..0,
-    }
-}
-
-/// Whether a kind resists a joint that does not move yet: springs do, also those that fade, and rotors.
-fn holds_at_rest(kind: Kind) -> bool {
-    let mut effect = Effect::<f64>::new(kind, 1);
-    for question in kind.probe().questions {
-        for &p in question.free {
-            effect.parameters[p] = 1.0;
-        }
-    }
-    let starting = Local {
-        time: 0.0,
-        q: 0.7,
-        qd: 0.0,
-        qdd: 1.0,
-        proximal_q: 0.5,
-        joint_force: 1.0,
-        memory: [1.0; MAX_STATES],
-    };
-    let gradient = effect.gradient(&starting);
-    let free = kind.probe().questions.iter().flat_map(|q| q.free);
-    effect.torque(&starting) != 0.0 || free.into_iter().any(|&p| gradient[p] != 0.0)
-}
-
 /// The joint motion of a group's reference, sample by sample.
-struct Movement<const N: usize> {
-    motion: Vec<Motion<f64, N>>,
+pub(super) struct Movement<const N: usize> {
+    pub motion: Vec<Motion<f64, N>>,
     interval: f64,
     /// Size of the torque in each joint.
     torque: [f64; N],
 }
 
-fn motions<const N: usize>(
+pub(super) fn motions<const N: usize>(
     prepared: &PreparedSession<N>,
     point: &LinearizationPoint<N>,
 ) -> Vec<Movement<N>> {
@@ -496,77 +307,12 @@ fn motions<const N: usize>(
     prepared.parallel(prepared.references.len(), one)
 }
 
-/// The candidates of one question about a kind at a place.
-///
-/// * `plain` - the effect, with what it shares with others in its place
-fn ask<const N: usize>(
-    session: &Session<N>,
-    movements: &[Movement<N>],
-    mut plain: Effect<f64>,
-    (number, question): (usize, &'static Question),
-    waves: &[[f64; 2]],
-) -> Vec<Candidate> {
-    let nature = plain.kind.probe().nature;
-    if matches!(nature, Nature::Rhythm | Nature::Burst | Nature::Slip) {
-        return Vec::new();
-    }
-    for &p in question.free {
-        plain.parameters[p] = 0.0;
-    }
-    let mut shapes = vec![plain];
-    if nature == Nature::Periodic {
-        // A kind that is periodic refines its frequency and its phase.
-        let shape = |wave: &[f64; 2]| {
-            let mut shape = plain;
-            for (&p, value) in question.refined.iter().zip(wave) {
-                shape.parameters[p] = *value;
-            }
-            shape
-        };
-        shapes = waves.iter().map(shape).collect();
-    }
-    let joint = plain.index.min(N - 1);
-    let angles = || extent(movements.iter().flat_map(|m| &m.motion).map(|m| m.q[joint]));
-    for (p, values) in question.shapes {
-        let (low, high) = angles();
-        let values = match values {
-            Values::Each(list) => list.to_vec(),
-            Values::Highest => vec![high],
-            Values::Lowest => vec![low],
-            Values::Middle => vec![0.5 * (low + high)],
-        };
-        let shaped = |mut shape: Effect<f64>, value: f64| {
-            shape.parameters[*p] = value;
-            shape
-        };
-        let each = |&shape| values.iter().map(move |&value| shaped(shape, value));
-        shapes = shapes.iter().flat_map(each).collect();
-    }
-    let tried = shapes.len();
-    let candidate = |effect: Effect<f64>| {
-        let mut candidate = Candidate {
-            effect,
-            question: number,
-            free: question.free.to_vec(),
-            rest: question.rest,
-            refined: refined(session, &effect, question),
-            tried,
-            step: question.step,
-            price: 0.0,
-            spread: 1.0,
-            expected: expected(session, &effect, question),
-        };
-        if candidate.step == 0.0 {
-            candidate.step = torque_step(movements, &candidate)?;
-        }
-        Some(candidate)
-    };
-    shapes.into_iter().filter_map(candidate).collect()
-}
-
 /// The amplitude with which the effect's torque is a small share of what its joint carries, or the largest that the kind
 /// allows; `None` where it has none.
-fn torque_step<const N: usize>(movements: &[Movement<N>], candidate: &Candidate) -> Option<f64> {
+pub(super) fn torque_step<const N: usize>(
+    movements: &[Movement<N>],
+    candidate: &Candidate,
+) -> Option<f64> {
     /// Share of the joint's torque that one unit of the effect must make: what less of it changes drowns in rounding.
     const LEAST: f64 = 1e-6;
     let joint = candidate.effect.index;

@@ -1,6 +1,7 @@
 //! Shapes that a fit refines, and their limits: a law whose shape lies beyond what the trials can show is another, plainer law there.
 
 use arm_core::effect::{Effect, Nature, Question};
+use arm_ident::regression::trial::Trial;
 
 use crate::data::session::Session;
 
@@ -32,31 +33,57 @@ pub(crate) fn held(effect: &Effect<f64>) -> Option<usize> {
 /// Smallest and largest value that a fit may give a refined shape.
 ///
 /// A relaxation that takes longer than a trial is a spring, one that is over between two samples is a viscosity; an excess of friction
-/// that fades below [`CREEP`] is the friction of a joint that creeps.
+/// that fades below [`CREEP`] is the friction of a joint that creeps, and one that does not fade up to the fastest speed is Coulomb's.
 fn limits<const N: usize>(
     session: &Session<N>,
     effect: &Effect<f64>,
     parameter: usize,
 ) -> (f64, f64) {
     let info = &effect.kind.info().parameters[parameter];
-    let whole = (info.min, info.max);
     let probe = effect.kind.probe();
     let is_known = |q: &Question| q.expected.iter().any(|e| e.0 == parameter);
-    if probe.nature != Nature::Lasting || probe.questions.iter().any(is_known) {
-        return whole;
-    }
-    let dry = effect.kind.smoothed_by();
-    match info.unit {
+    let has_own = probe.nature != Nature::Lasting || probe.questions.iter().any(is_known);
+    let is_rest = effect.kind.smoothed_by() == Some(parameter);
+    let (least, most) = match info.unit {
+        _ if has_own || is_rest => (info.min, info.max),
         "s" => {
             let lengths = session.trials.iter().map(|t| t.len() as f64 / t.rate);
-            (
-                f64::max(info.min, SHORTEST),
-                f64::min(info.max, lengths.fold(SHORTEST, f64::max)),
-            )
+            (SHORTEST, lengths.fold(SHORTEST, f64::max))
         }
-        "rad/s" if dry.is_some_and(|p| p != parameter) => (f64::max(info.min, CREEP), info.max),
-        _ => whole,
-    }
+        "rad/s" => (CREEP, fastest(session, effect.index).max(CREEP)),
+        _ => (info.min, info.max),
+    };
+    (f64::max(info.min, least), f64::min(info.max, most))
+}
+
+/// Fastest mean speed of a joint over a quarter of a second \[rad/s\], which noise of the angles hardly changes.
+fn fastest<const N: usize>(session: &Session<N>, joint: usize) -> f64 {
+    const SPAN: f64 = 0.25;
+    let of_trial = |trial: &Trial<N>| {
+        let apart = ((SPAN * trial.rate) as usize).max(1);
+        let pairs = trial.q.iter().zip(trial.q.iter().skip(apart));
+        let moved = pairs.fold(0.0, |most, (a, b)| {
+            f64::max(most, (b[joint] - a[joint]).abs())
+        });
+        moved * trial.rate / apart as f64
+    };
+    session.trials.iter().map(of_trial).fold(0.0, f64::max)
+}
+
+/// Whether a fit has driven a refined shape to a limit at which the law is another, plainer one.
+///
+/// Friction that does not recover within a trial is thixotropic still: what was broken down stays so.
+pub(crate) fn is_plainer(refined: &[(usize, (f64, f64))], effect: &Effect<f64>) -> bool {
+    /// Share of a limit that counts as the limit.
+    const NEAR: f64 = 1e-6;
+    let info = effect.kind.info();
+    refined.iter().any(|&(p, (least, most))| {
+        let (value, parameter) = (effect.parameters[p], &info.parameters[p]);
+        let lasts = parameter.unit == "s" && effect.kind.smoothed_by().is_some();
+        let at_least = least > parameter.min && value <= least * (1.0 + NEAR);
+        let at_most = !lasts && most < parameter.max && value >= most * (1.0 - NEAR);
+        at_least || at_most
+    })
 }
 
 #[cfg(test)]
@@ -102,7 +129,8 @@ mod tests {
         };
         assert_eq!(of("relaxation", "time"), (SHORTEST, 12.0));
         assert_eq!(of("thixotropy", "recovery"), (SHORTEST, 12.0));
-        assert_eq!(of("stribeck", "speed").0, CREEP);
+        // Joints at rest have no speed at which an excess could fade.
+        assert_eq!(of("stribeck", "speed"), (CREEP, CREEP));
         // The speed below which friction creeps, and a latency of which something is known, have their own limits.
         let whole = |kind: &str, p: usize| {
             let info = &Kind::named(kind).expect("known").info().parameters[p];
@@ -110,5 +138,43 @@ mod tests {
         };
         assert_eq!(of("stribeck", "smoothing"), whole("stribeck", 2));
         assert_eq!(of("stretch_reflex", "latency"), whole("stretch_reflex", 3));
+    }
+
+    #[test]
+    fn the_fastest_speed_is_a_mean_over_a_quarter_of_a_second() {
+        let mut session = of_lengths(&[4.0]);
+        // 0.8 rad/s from 1 to 3 s, and one sample that is off by 0.02 rad, 1 rad/s between samples.
+        let angle = |i: usize| 0.8 * (i as f64 / 50.0).clamp(1.0, 3.0);
+        let off = |i: usize| if i == 20 { 0.02 } else { 0.0 };
+        session.trials[0].q = (0..200)
+            .map(|i| Joints::from([angle(i) + off(i)]))
+            .collect();
+        assert!((fastest(&session, 0) - 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_law_at_the_limit_of_its_shape_is_a_plainer_one() {
+        let relaxation = Effect::<f64>::new(Kind::Relaxation, 0).with(&[1.0, 12.0]);
+        let limits = [(1, (SHORTEST, 12.0))];
+        assert!(is_plainer(&limits, &relaxation));
+        assert!(is_plainer(&limits, &relaxation.with(&[1.0, SHORTEST])));
+        assert!(!is_plainer(&limits, &relaxation.with(&[1.0, 11.9])));
+        // Its own limits say nothing of the session.
+        let info = &Kind::Relaxation.info().parameters[1];
+        let own = [(1, (info.min, info.max))];
+        assert!(!is_plainer(&own, &relaxation.with(&[1.0, info.max])));
+        let kind = Kind::Thixotropy;
+        let recovery = kind
+            .info()
+            .parameters
+            .iter()
+            .position(|p| p.name == "recovery");
+        let recovery = recovery.expect("a parameter");
+        let mut thixotropy = Effect::<f64>::new(kind, 0);
+        thixotropy.parameters[recovery] = 12.0;
+        let limits = [(recovery, (SHORTEST, 12.0))];
+        assert!(!is_plainer(&limits, &thixotropy));
+        thixotropy.parameters[recovery] = SHORTEST;
+        assert!(is_plainer(&limits, &thixotropy));
     }
 }

@@ -3,7 +3,7 @@
 use arm_numerics::Matrix;
 
 use crate::GapError;
-use crate::candidates::candidate::Library;
+use crate::candidates::library::Library;
 use crate::data::noise::{Noise, dot};
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::priors;

@@ -3,7 +3,8 @@
 use arm_core::effect::Effect;
 
 use crate::GapError;
-use crate::candidates::candidate::{Candidate, Library};
+use crate::candidates::candidate::Candidate;
+use crate::candidates::library::Library;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::Hypothesis;

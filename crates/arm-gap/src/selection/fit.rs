@@ -49,6 +49,12 @@ impl<const N: usize> Fitted<N> {
         ENOUGH + SHARE * (self.cost - self.rows as f64).max(0.0)
     }
 
+    /// Whether a named effect has come to a shape in which it is another, plainer law.
+    pub(crate) fn has_plainer(&self) -> bool {
+        let mut named = std::iter::zip(&self.asked, &self.hypothesis.named);
+        named.any(|(asked, effect)| asked.is_plainer(effect))
+    }
+
     /// The numbers of the named effects that a fit may change.
     pub fn named(&self) -> Vec<Coordinate> {
         named(&self.hypothesis, &self.asked)

@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
-use crate::candidates::candidate::{Candidate, Library, Twin};
+use crate::candidates::candidate::Candidate;
+use crate::candidates::library::{Library, Twin};
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
@@ -180,6 +181,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 let worth = gain / scale - candidate.price * candidate.spread;
                 let worth = if gain < least {
                     worth.min(gain - least)
+                } else if candidate.is_plainer(&fitted.hypothesis.named[slot]) {
+                    worth.min(-gain)
                 } else {
                     worth
                 };
@@ -398,6 +401,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let Some(&effect) = rival.hypothesis.named.last() else {
                 continue;
             };
+            if asked.is_plainer(&effect) {
+                continue;
+            }
             rivals.push(Rival {
                 alternative: Alternative {
                     candidate: asked,

@@ -8,7 +8,8 @@ use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::distributions::chi_square_tail;
 
 use crate::GapError;
-use crate::candidates::candidate::{Candidate, Library, Twin};
+use crate::candidates::candidate::Candidate;
+use crate::candidates::library::{Library, Twin};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};

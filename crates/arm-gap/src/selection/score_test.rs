@@ -4,7 +4,8 @@ use arm_numerics::linalg::matrix::add_scaled;
 use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
-use crate::candidates::candidate::{Library, Twin, price};
+use crate::candidates::candidate::price;
+use crate::candidates::library::{Library, Twin};
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, priors};
 use crate::selection::fit::{Fitted, regularise};

@@ -1,7 +1,8 @@
 //! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
 
 use crate::GapError;
-use crate::candidates::candidate::{Candidate, Library};
+use crate::candidates::candidate::Candidate;
+use crate::candidates::library::Library;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
@@ -296,7 +297,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let worth = gain / score_test.scale - price;
             let simple = worth - self.price_of_shapes(&asked);
             tried.push((asked, gain));
-            if worth > 0.0 {
+            if worth > 0.0 && !fitted.has_plainer() {
                 worthy.push((simple, fitted));
             }
         }

@@ -3,7 +3,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use crate::candidates::candidate::Library;
+use crate::candidates::library::Library;
 use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
 use crate::selection::score_test::ScoreTest;

@@ -1,7 +1,8 @@
 //! The catalogue as questions: what each costs, where it is asked, and what it finds.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place};
-use arm_gap::candidates::candidate::{Library, THRESHOLD, price};
+use arm_gap::candidates::candidate::{THRESHOLD, price};
+use arm_gap::candidates::library::Library;
 use arm_gap::data::prepared_session::PreparedSession;
 
 use crate::sessions::session;

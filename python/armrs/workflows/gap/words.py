@@ -227,7 +227,8 @@ def missing(data: Mapping[str, Any]) -> Table:
         place = effect["joint"] or effect["channel"]
         alone = f"{effect['share']:.0%}" if effect["share"] > 0.005 else "< 1 %"
         if repeated:
-            alone = "–" if effect.get("without") is None else digits(effect.get("without"), 2)
+            without = effect.get("without")
+            alone = "–" if without is None else digits(without, 2)
         fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
         for k, (name, value) in enumerate((fitted or effect["parameters"]).items()):
             head = [effect["kind"], place, alone] if k == 0 else ["", "", ""]
