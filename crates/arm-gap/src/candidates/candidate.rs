@@ -1,25 +1,18 @@
 //! A question that a session can answer: a kind of the catalogue at a place in a shape, and what is free in it.
 
-use arm_core::effect::{
-    Effect, Kind, MAX_STATES, Motion, Nature, Place, Question, advance_states, resisting_torque,
-};
-use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
+use arm_core::effect::{Effect, Kind, Nature, Place, Question};
 
 use crate::candidates::refined_shapes::{held, is_plainer, refined};
+use crate::candidates::torque_step::{motions, torque_step};
 use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linearization_point::{Change, LinearizationPoint};
 
-/// Share of a joint's torque that an effect has in the change with which its response is taken.
-const SHARE: f64 = 0.02;
 /// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
 /// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.
 pub const THRESHOLD: f64 = 12.0;
-/// Torque below which a joint counts as unloaded \[N m\].
-const UNLOADED: f64 = 0.05;
-
 /// One question: a kind at a place in a shape, with what is free in it.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -96,7 +89,7 @@ impl Candidate {
     }
 
     /// The effect whose response each column is: one unit of it.
-    fn unit(&self, column: usize, size: f64) -> Effect<f64> {
+    pub(super) fn unit(&self, column: usize, size: f64) -> Effect<f64> {
         let mut effect = self.effect;
         match self.rest {
             Some(rest) => {
@@ -158,7 +151,11 @@ impl Candidate {
             expected: expected(prepared.session, &effect, question),
         };
         if candidate.step == 0.0 {
-            candidate.step = torque_step(&motions(prepared, point), &candidate)?;
+            candidate.step = torque_step(
+                &motions(prepared, point),
+                candidate.unit(0, 1.0),
+                candidate.free[0],
+            )?;
         }
         Some(candidate)
     }
@@ -260,115 +257,4 @@ pub(super) fn expected<const N: usize>(
     let size = size.map(|sd| (0, [0.0, sd]));
     let shapes = question.expected.iter().copied();
     size.into_iter().chain(shapes).map(Free::expected).collect()
-}
-
-/// The joint motion of a group's reference, sample by sample.
-pub(super) struct Movement<const N: usize> {
-    pub motion: Vec<Motion<f64, N>>,
-    interval: f64,
-    /// Size of the torque in each joint.
-    torque: [f64; N],
-}
-
-pub(super) fn motions<const N: usize>(
-    prepared: &PreparedSession<N>,
-    point: &LinearizationPoint<N>,
-) -> Vec<Movement<N>> {
-    let one = |group: usize| {
-        let course = &prepared.courses[prepared.references[group]];
-        let state = |i: usize| match (course.motion(), point.lines.get(group)) {
-            (Some(motion), _) => (motion.q[i], motion.qd[i], motion.qdd[i]),
-            (None, Some(line)) => line.state(i),
-            (None, None) => (Joints::zeros(), Joints::zeros(), Joints::zeros()),
-        };
-        let chain = &prepared.session.chain;
-        let mut square = [0.0; N];
-        let count = course.seen[0].len();
-        let motion = (0..count)
-            .map(|i| {
-                let (q, qd, qdd) = state(i);
-                let pose = Pose::new(&q);
-                let torque = inverse_dynamics(chain, &pose, &qd, &qdd);
-                for (sum, value) in square.iter_mut().zip(torque.iter()) {
-                    *sum += value * value / count as f64;
-                }
-                let through = joint_force(chain, &pose, (&qd, &qdd), [0.0; 2]);
-                let mut at = Motion::new(i as f64 / course.rate, q, qd).with_joint_force(&through);
-                at.qdd = qdd;
-                at
-            })
-            .collect();
-        Movement {
-            motion,
-            interval: 1.0 / course.rate,
-            torque: square.map(|s| libm::sqrt(s).max(UNLOADED)),
-        }
-    };
-    prepared.parallel(prepared.references.len(), one)
-}
-
-/// The amplitude with which the effect's torque is a small share of what its joint carries, or the largest that the kind
-/// allows; `None` where it has none.
-pub(super) fn torque_step<const N: usize>(
-    movements: &[Movement<N>],
-    candidate: &Candidate,
-) -> Option<f64> {
-    /// Share of the joint's torque that one unit of the effect must make: what less of it changes drowns in rounding.
-    const LEAST: f64 = 1e-6;
-    let joint = candidate.effect.index;
-    let mut largest = 0.0;
-    for movement in movements {
-        let mut square = 0.0;
-        let effect = candidate.unit(0, 1.0);
-        let mut memory = [[0.0; MAX_STATES]];
-        let mut before: Option<&Motion<f64, N>> = None;
-        for at in &movement.motion {
-            if let Some(from) = before.replace(at) {
-                advance_states(&[effect], (from, at), &mut memory, movement.interval);
-            }
-            let torque = resisting_torque(&[effect], at, &memory)[joint];
-            square += torque * torque;
-        }
-        let size = libm::sqrt(square / movement.motion.len().max(1) as f64);
-        largest = f64::max(largest, size / movement.torque[joint]);
-    }
-    // A slow movement hardly feels what grows with speed: no step beyond what the parameter may be.
-    let info = &candidate.effect.kind.info().parameters[candidate.free[0]];
-    (largest > LEAST).then(|| f64::min(SHARE / largest, 0.5 * info.max))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// One unit of viscosity makes as many newton metres as the joint has radians a second.
-    #[test]
-    fn a_response_is_taken_with_a_fiftieth_of_the_torque_of_the_joint() {
-        let candidate = Candidate {
-            effect: Effect::new(Kind::Viscous, 0).with(&[0.0]),
-            question: 0,
-            free: vec![0],
-            rest: None,
-            refined: Vec::new(),
-            tried: 1,
-            step: 0.0,
-            price: 0.0,
-            spread: 1.0,
-            expected: Vec::new(),
-        };
-        let step = |speed: f64| {
-            let motion = Motion::new(0.0, Joints::from([0.0]), Joints::from([speed]));
-            let movement = Movement {
-                motion: vec![motion; 3],
-                interval: 0.01,
-                torque: [10.0],
-            };
-            torque_step(&[movement], &candidate)
-        };
-        assert!((step(0.5).expect("a step") - 0.4).abs() < 1e-12);
-        assert!(step(0.8e-5).is_none());
-        // No more than half of what the parameter may be.
-        let most = Kind::Viscous.info().parameters[0].max;
-        assert_eq!(step(1.2e-5), Some(f64::min(0.5 * most, 0.02 / 1.2e-6)));
-    }
 }

@@ -4,8 +4,9 @@ use arm_core::effect::{Effect, Kind, Local, MAX_STATES, Nature, Place, Question,
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
-use crate::candidates::candidate::{Candidate, Movement, expected, motions, torque_step};
+use crate::candidates::candidate::{Candidate, expected};
 use crate::candidates::refined_shapes::refined;
+use crate::candidates::torque_step::{Movement, motions, torque_step};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -262,7 +263,7 @@ fn ask<const N: usize>(
             expected: expected(session, &effect, question),
         };
         if candidate.step == 0.0 {
-            candidate.step = torque_step(movements, &candidate)?;
+            candidate.step = torque_step(movements, candidate.unit(0, 1.0), candidate.free[0])?;
         }
         Some(candidate)
     };

@@ -4,3 +4,4 @@ pub mod candidate;
 pub mod library;
 pub(crate) mod refined_shapes;
 pub mod tabulated;
+mod torque_step;
