@@ -184,3 +184,15 @@ def test_no_verb_replaces_the_report_of_another(slow_arm: Path, tmp_path: Path, 
         line = refused(capsys, *arguments, "-o", out)
         assert "report.html: file: found the report of armrs identify, allowed a folder of its own: another -o DIR" in line
     assert (out / "report.html").read_bytes() == page and not (out / "simulated.json").exists()
+
+
+def test_a_page_of_someone_else_is_not_replaced(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "out" / "report.html"
+    page.parent.mkdir()
+    page.write_text("<p>the laboratory's own page</p>", encoding="utf-8")
+    assert (
+        cli.main(["simulate", str(slow_arm / "truth.toml"), "--trial", str(slow_arm / "trials" / "slow_1.csv"), "-o", str(page.parent)])
+        == 2
+    )
+    assert "report.html: file: found a page that armrs did not make, allowed a folder of its own" in capsys.readouterr().err
+    assert page.read_text(encoding="utf-8") == "<p>the laboratory's own page</p>" and [page] == list(page.parent.iterdir())

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib import rcParams
 from matplotlib.colors import rgb_to_hsv, to_hex, to_rgb
+from matplotlib.font_manager import FontProperties, findfont, get_font
 
 import armrs
 from armrs.report import plotting
@@ -84,6 +86,15 @@ def test_the_film_names_the_colours_that_it_has() -> None:
     for name, colour in colours.items():
         low, high = hues[said[name]]
         assert low < 360.0 * rgb_to_hsv(to_rgb(colour))[0] < high
+
+
+def test_pages_and_figures_share_a_typeface() -> None:
+    """Where it is installed; the page names Verdana, which is drawn alike, where it is not."""
+    css = (ROOT / "python" / "armrs" / "report" / "templates" / "page.css").read_text(encoding="utf-8")
+    first = re.search(r"^body \{[^}]*? font: [^\"]*\"([^\"]+)\", Verdana", css, flags=re.M)
+    with plotting.style():
+        drawn = findfont(FontProperties(family=rcParams["font.family"]))
+    assert first is not None and get_font(drawn).family_name == first[1]
 
 
 def test_what_the_readme_shows_is_installed_and_short() -> None:

@@ -225,10 +225,12 @@ def _at_work(name: str, pattern: re.Pattern[str]) -> bool:
 
 
 def refuse_page_of_another(path: Path, maker: str | None) -> None:
-    """Refuse to replace a page that another verb made: its figures and numbers would stay behind without it."""
+    """Refuse to replace a page that another verb made, whose figures and numbers would stay behind without it, or that none made."""
     there = _maker(path) if path.is_file() else None
-    if there is not None and there != maker:
-        raise BadInput("file", Text(f"the report of armrs {there}"), "a folder of its own: another -o DIR", file=path)
+    if there == maker or not path.is_file() or path.stat().st_size == 0:
+        return
+    found = "a page that armrs did not make" if there is None else f"the report of armrs {there}"
+    raise BadInput("file", Text(found), "a folder of its own: another -o DIR", file=path)
 
 
 def _maker(path: Path) -> str | None:
