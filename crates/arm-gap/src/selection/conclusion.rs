@@ -11,7 +11,6 @@ use crate::selection::model_selection::Named;
 use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep};
 use crate::selection::set_apart::SetApart;
 use crate::trial_specific::component::TrialSpecific;
-use crate::trial_specific::disturbance::is_held;
 
 /// What was found.
 #[derive(Clone, Debug)]
@@ -67,8 +66,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             (amended, point, named) =
                 self.judged((amended, point), &calibrated, judging, progress)?;
         }
-        let effects = amended.hypothesis.effects();
-        apart.trial_specific.retain(|one| !is_held(one, &effects));
         progress("measuring what is left", 0.9)?;
         let mut precision = self.precision(&point, &amended, scale)?;
         for one in &named {
@@ -98,6 +95,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if let Some((hypothesis, known)) = self.refined(&amended) {
             (amended.hypothesis, precision) = (hypothesis, known);
         }
+        apart.without_held(&amended.hypothesis.effects());
         self.courses = std::mem::take(&mut apart.measured);
         let in_trials = self.in_every_trial((&mut calibrated, &mut amended), &mut apart)?;
         for law in base {

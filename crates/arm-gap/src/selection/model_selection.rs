@@ -398,12 +398,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
             let likeness = twin.map_or(0.0, |t| score_test.likeness(t.place, choice.members[0]));
-            let Some(&effect) = rival.hypothesis.named.last() else {
+            let effect = rival.hypothesis.named.last().copied();
+            let Some(effect) = effect.filter(|effect| !asked.is_plainer(effect)) else {
                 continue;
             };
-            if asked.is_plainer(&effect) {
-                continue;
-            }
             rivals.push(Rival {
                 alternative: Alternative {
                     candidate: asked,

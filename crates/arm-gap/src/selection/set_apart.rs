@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use arm_core::effect::Effect;
+
 use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::prediction::Course;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::search_state::{Progress, SearchState, Settled};
 use crate::trial_specific::component::{SLOW, TrialSpecific};
+use crate::trial_specific::disturbance::is_held;
 use crate::trial_specific::tremor_detection::Line;
 
 /// Most disturbances of single trials that are named.
@@ -20,6 +23,13 @@ pub(crate) struct SetApart<const N: usize> {
     pub periodic: Option<[f64; 2]>,
     /// The courses as they were measured.
     pub measured: Vec<Arc<Course<N>>>,
+}
+
+impl<const N: usize> SetApart<N> {
+    /// Drops bursts that dry friction of the final model may hold.
+    pub fn without_held(&mut self, effects: &[Effect<f64>]) {
+        self.trial_specific.retain(|one| !is_held(one, effects));
+    }
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
