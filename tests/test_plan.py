@@ -182,6 +182,14 @@ def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture
         (["--angles-deg=-10:-80,20:110"], "angles of joint 1: found -0.174533 to -1.39626 rad, allowed the smaller angle first"),
         (["--angles-deg=-80:-10,20:110", "--speed-rad-s", "nan"], "--speed-rad-s: found nan"),
         (["--angles-deg=-80:-10,20:110", "--robot-acceleration-rad-s2", "0"], "--robot-acceleration-rad-s2: found 0"),
+        (
+            ["--angles-deg=-80:-10,20:110", "--acceleration-rad-s2", "1e-9"],
+            "found 1e-09, allowed at least 0.00017 rad/s²: to turn by 1° within 20 s",
+        ),
+        (
+            ["--angles-deg=-80:-10,20:110", "--speed-rad-s", "1e-6"],
+            "found 1e-06, allowed at least 0.00087 rad/s: to turn by 1° within 20 s",
+        ),
         (["--angles-deg=-80:-10,20:110", "--repeats", "0"], "repeats: found 0"),
         (["--angles-deg=-80:-10,20:110", "--with", "frition"], "nearest known"),
         (["--angles-deg=-80:-10,20:110", "--force-n", "1", "--evaluations", "3"], "in the nearest of 3 movements, allowed 1 N"),

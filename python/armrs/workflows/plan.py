@@ -58,6 +58,10 @@ class Instruments:
         checks.instance("tolerance", self.tolerance, Tolerance)
 
 
+LEAST_TURN = np.radians(1.0)
+"""What a joint must be able to turn in a trial, from rest to rest [rad]."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """What a planned movement must respect.
@@ -103,6 +107,13 @@ class Limits:
         checks.number("robot_acceleration", self.robot_acceleration, above=0.0, most=1e4, unit="rad/s²")
         checks.number("force", self.force, above=0.0, most=1e4, unit="N")
         checks.number("duration", self.duration, above=0.0, most=600.0, unit="s")
+        # A movement that takes for ever is simulated before anything can say that it is too long.
+        for name, unit, least in (
+            ("speed", "rad/s", LEAST_TURN / self.duration),
+            ("acceleration", "rad/s²", 4.0 * LEAST_TURN / self.duration**2),
+        ):
+            if getattr(self, name) < least:
+                raise BadInput(name, getattr(self, name), f"at least {least:.2g} {unit}: to turn by 1° within {self.duration:g} s")
 
 
 MOST_UNCERTAIN = 0.5
