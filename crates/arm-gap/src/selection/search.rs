@@ -84,10 +84,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let after = kinds(&state.current);
             let rounds = state.search_trace.len();
             if turn < TURNS && after != before && !outcomes.contains(&after) {
-                outcomes.push(after);
+                outcomes.push(after.clone());
                 state = self.search_on(state, periodic, progress)?;
             }
-            if state.search_trace.len() == rounds {
+            // A search that comes back to where it was before has other effects than were judged.
+            if state.search_trace.len() == rounds && kinds(&state.current) == after {
                 return Ok((state, named));
             }
         }
