@@ -4,12 +4,14 @@ use arm_core::effect::{Effect, Nature, Question};
 use arm_ident::regression::trial::Trial;
 
 use crate::data::session::Session;
+use crate::data::valid_segments::SAMPLES_PER_PERIOD;
+use crate::measurement_model::prediction::BAND;
 
 /// Largest speed below which a joint with dry friction creeps \[rad/s\]; what friction does below is how the joint rests, no law of its
 /// own.
 pub(crate) const CREEP: f64 = 0.03;
 /// Shortest time that shows in the common band \[s\]: the distance of its samples.
-const SHORTEST: f64 = 0.08;
+const SHORTEST: f64 = 1.0 / (SAMPLES_PER_PERIOD * BAND);
 
 /// The shapes of an effect that are refined once it is named, with their limits: of friction that sticks, not the speed below which it
 /// would creep.

@@ -8,7 +8,7 @@ use arm_ident::regression::trial::Trial;
 use crate::measurement_model::prediction::{Channels, Course, away_from_gaps, margin};
 
 /// Samples kept for each period of the cutoff.
-const SAMPLES_PER_PERIOD: f64 = 2.5;
+pub(crate) const SAMPLES_PER_PERIOD: f64 = 2.5;
 /// Periods of the cutoff around rest, where dry friction holds a joint, that count as rest.
 const NEAR_REST: f64 = 0.6;
 /// Fewest samples of a segment: the highest order of the noise's autoregressions. Fewer lie at the edge of rest on both sides.

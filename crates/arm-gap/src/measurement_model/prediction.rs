@@ -22,7 +22,7 @@ pub type Channels = Vec<Vec<f64>>;
 ///
 /// Torques as well: an inverse dynamics of encoder angles that is low-passed as a whole is the equation of motion tested against smooth
 /// functions, so that what two differentiations add above the band drops out.
-const BAND: f64 = 5.0;
+pub(crate) const BAND: f64 = 5.0;
 /// Bandwidth of the handle's path, in bandwidths of the comparison: a robot that shakes at the edge of the comparison must
 /// keep its whole swing, or its forces are missed by newtons.
 const HANDLE_BAND: f64 = 4.0;
