@@ -72,7 +72,7 @@ pub use products::Products;
 pub use regressor::{Regressor, regressor};
 pub use robot::{Elbow, Robot};
 pub use scalar::{Real, Scalar};
-pub use setup::{Displaced, Reading, Setup};
+pub use setup::{Displaced, Reading, Setup, Wave};
 pub use trajectory::{Limits, Path, Profile, Route, Sample, Shape};
 
 /// A value for each joint or link: angles, speeds, torques.

@@ -21,6 +21,8 @@ pub struct Setup<T, const N: usize> {
     pub base_motion: Plane<T>,
     /// First joint angle at which the base stands at `base` \[rad\].
     pub base_rest: T,
+    /// How the base heaves, whatever the arm does.
+    pub heave: Wave<T>,
     /// Where the hand's handle is beside where the robot's angles put it.
     pub displaced: Displaced<T>,
     /// Delay of the force channels against the angles \[s\].
@@ -39,9 +41,16 @@ impl<T: Scalar, const N: usize> Setup<T, N> {
             placement: [T::ZERO; 2],
             base_motion: [T::ZERO; 2],
             base_rest: T::ZERO,
+            heave: Wave::still(),
             displaced: Displaced::nowhere(),
             force_delay: T::ZERO,
         }
+    }
+
+    /// Whether the handle stands where it is commanded, seen from a base that does not heave.
+    #[inline]
+    pub fn is_as_commanded(&self) -> bool {
+        !self.displaced.is_somewhere() && self.heave.is_still()
     }
 
     /// The chain of this rig.
@@ -56,16 +65,54 @@ impl<T: Scalar, const N: usize> Setup<T, N> {
 /// How far the handle is from where the robot's angles put it, as a function of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Displaced<T> {
-    /// Amplitude of a periodic error in y and z \[m\].
-    pub ripple: Plane<T>,
-    /// Its frequency \[Hz\].
-    pub frequency: T,
-    /// Its phase at time zero \[rad\].
-    pub phase: T,
+    /// A periodic error.
+    pub ripple: Wave<T>,
     /// Way of a slip in y and z \[m\].
     pub slip: Plane<T>,
     /// When it begins \[s\].
     pub slip_start: T,
+}
+
+/// A place that swings: `amplitude · sin(2π frequency t + phase)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wave<T> {
+    /// In y and z \[m\].
+    pub amplitude: Plane<T>,
+    /// \[Hz\]
+    pub frequency: T,
+    /// At time zero \[rad\].
+    pub phase: T,
+}
+
+impl<T: Scalar> Wave<T> {
+    /// One that does not swing.
+    pub fn still() -> Self {
+        Self {
+            amplitude: [T::ZERO; 2],
+            frequency: T::ZERO,
+            phase: T::ZERO,
+        }
+    }
+
+    /// Whether it does not swing, in no lane.
+    #[inline]
+    pub fn is_still(&self) -> bool {
+        let mut ways = self.amplitude.iter();
+        ways.all(|way| way.every(|way| way == 0.0))
+    }
+
+    /// Position \[m\], velocity \[m/s\] and acceleration \[m/s²\] at a time \[s\].
+    #[inline]
+    pub fn at(&self, time: T) -> [Plane<T>; 3] {
+        let omega = T::of(core::f64::consts::TAU) * self.frequency;
+        let (sin, cos) = (omega * time + self.phase).sin_cos();
+        let faster = omega.squared();
+        [
+            self.amplitude.map(|a| a * sin),
+            self.amplitude.map(|a| a * omega * cos),
+            self.amplitude.map(|a| -(a * faster * sin)),
+        ]
+    }
 }
 
 /// How long a slip of the handle takes \[s\].
@@ -75,9 +122,7 @@ impl<T: Scalar> Displaced<T> {
     /// Always where the robot's angles put it.
     pub fn nowhere() -> Self {
         Self {
-            ripple: [T::ZERO; 2],
-            frequency: T::ZERO,
-            phase: T::ZERO,
+            ripple: Wave::still(),
             slip: [T::ZERO; 2],
             slip_start: T::ZERO,
         }
@@ -86,15 +131,14 @@ impl<T: Scalar> Displaced<T> {
     /// Whether it is anywhere else, in any lane.
     #[inline]
     pub fn is_somewhere(&self) -> bool {
-        let mut ways = self.ripple.iter().chain(&self.slip);
-        !ways.all(|way| way.every(|way| way == 0.0))
+        let mut ways = self.slip.iter();
+        !(self.ripple.is_still() && ways.all(|way| way.every(|way| way == 0.0)))
     }
 
     /// Position \[m\], velocity \[m/s\] and acceleration \[m/s²\] beside where the robot's angles put it, at a time \[s\].
     #[inline]
     pub fn at(&self, time: T) -> [Plane<T>; 3] {
-        let omega = T::of(core::f64::consts::TAU) * self.frequency;
-        let (sin, cos) = (omega * time + self.phase).sin_cos();
+        let [swing, swinging, swung] = self.ripple.at(time);
         let rate = T::of(1.0 / SLIP_TIME);
         let s = ((time - self.slip_start) * rate).max(T::ZERO).min(T::ONE);
         let rest = T::ONE - s;
@@ -105,11 +149,10 @@ impl<T: Scalar> Displaced<T> {
         let and_slip = |swing: Plane<T>, slipped: T| -> Plane<T> {
             core::array::from_fn(|axis| swing[axis] + self.slip[axis] * slipped)
         };
-        let faster = omega.squared();
         [
-            and_slip(self.ripple.map(|a| a * sin), part),
-            and_slip(self.ripple.map(|a| a * omega * cos), speed),
-            and_slip(self.ripple.map(|a| -(a * faster * sin)), gain),
+            and_slip(swing, part),
+            and_slip(swinging, speed),
+            and_slip(swung, gain),
         ]
     }
 }

@@ -3,16 +3,16 @@
 use std::mem::discriminant;
 
 use arm_core::effect::Effect;
-use arm_core::{Contact, Displaced, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup};
+use arm_core::{Contact, Displaced, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup, Wave};
 
 use crate::divided_step::step_in_pieces;
 use crate::input_buffer::{Ahead, InputBuffer};
 use crate::model::{Link, Model};
 use crate::native::{PlainSteps, diverged};
 use crate::plain::Plain;
-use crate::prepare::{Prepared, commands, displace};
+use crate::prepare::{Prepared, commands};
 use crate::recorder::{Instant, Recorder, Row};
-use crate::state::{Input, State};
+use crate::state::{BaseMotion, Input, State};
 use crate::step::{Inputs, Memory, step};
 use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
 use arm_core::simd_dispatch::{Computation, dispatch};
@@ -86,8 +86,14 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && a.integrator() == b.integrator()
         && discriminant(&a.model.link) == discriminant(&b.model.link)
         && a.model.base.is_some() == b.model.base.is_some()
-        && a.setup.displaced.is_somewhere() == b.setup.displaced.is_somewhere()
+        && a.setup.is_as_commanded() == b.setup.is_as_commanded()
+        && a.model.heaves == b.model.heaves
         && kinds(a) == kinds(b)
+}
+
+/// Whether two runs are driven in the same way, seen from the base.
+fn same_drive<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
+    a.experiment.drive == b.experiment.drive && a.experiment.base == b.experiment.base
 }
 
 /// The run of a lane. A group of fewer than eight repeats its last one in the lanes left over.
@@ -160,13 +166,14 @@ impl<'a, const N: usize> Group<'a, N> {
         let setup = pack_setup(lane);
         let effects =
             (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
-        let model = Model::new(&setup, pack_link(lane, setup.contact), effects.collect())?;
+        let mut model = Model::new(&setup, pack_link(lane, setup.contact), effects.collect())?;
+        model.heaves = first.model.heaves;
         Ok(Self {
             prepared,
             plain: first.plain().and_then(|_| model.plain()),
-            one_drive: prepared.iter().all(|p| {
-                p.experiment.drive == first.experiment.drive && !p.setup.displaced.is_somewhere()
-            }),
+            one_drive: prepared
+                .iter()
+                .all(|p| same_drive(p, first) && p.setup.is_as_commanded()),
             common: InputBuffer::new(first.integrator()),
             own: InputBuffer::new(first.integrator()),
             commanded: Default::default(),
@@ -220,7 +227,7 @@ impl<'a, const N: usize> Group<'a, N> {
         let at = (&mut self.state, &mut self.memory);
         if self.one_drive {
             let ahead = self.common.ahead(next, most, |half_steps, out| {
-                commands(&first.experiment.drive, schedule, half_steps, out);
+                commands(first.experiment, schedule, half_steps, out);
             });
             return dispatch(Advance { steps, ahead, at });
         }
@@ -228,12 +235,12 @@ impl<'a, const N: usize> Group<'a, N> {
         let ahead = self.own.ahead(next, most, |half_steps, out| {
             for (i, inputs) in commanded.iter_mut().enumerate() {
                 inputs.clear();
-                let drive = &in_lane(prepared, i).experiment.drive;
-                commands(drive, schedule, half_steps, inputs);
+                let experiment = in_lane(prepared, i).experiment;
+                commands(experiment, schedule, half_steps, inputs);
             }
             for at in 0..half_steps.len() {
                 let mut input = pack_input(|i| commanded[i][at]);
-                displace(&mut input, setup);
+                input.stands_as_in(setup);
                 out.push(input);
             }
         });
@@ -448,6 +455,19 @@ fn pack_input<const N: usize>(input: impl Fn(usize) -> Input<f64, N>) -> Input<W
             acceleration: pack_plane(|i| inputs[i].handle.acceleration),
         },
         torque: Joints::from_fn(|j, _| pack(|i| inputs[i].torque[j])),
+        base: BaseMotion {
+            position: pack_plane(|i| inputs[i].base.position),
+            velocity: pack_plane(|i| inputs[i].base.velocity),
+            acceleration: pack_plane(|i| inputs[i].base.acceleration),
+        },
+    }
+}
+
+fn pack_wave<'a>(wave: impl Fn(usize) -> &'a Wave<f64>) -> Wave<Wide> {
+    Wave {
+        amplitude: pack_plane(|i| wave(i).amplitude),
+        frequency: pack(|i| wave(i).frequency),
+        phase: pack(|i| wave(i).phase),
     }
 }
 
@@ -471,10 +491,9 @@ fn pack_setup<'a, const N: usize>(lane: impl Fn(usize) -> &'a Prepared<'a, N>) -
         placement: pack_plane(|i| setup(i).placement),
         base_motion: pack_plane(|i| setup(i).base_motion),
         base_rest: pack(|i| setup(i).base_rest),
+        heave: pack_wave(|i| &setup(i).heave),
         displaced: Displaced {
-            ripple: pack_plane(|i| setup(i).displaced.ripple),
-            frequency: pack(|i| setup(i).displaced.frequency),
-            phase: pack(|i| setup(i).displaced.phase),
+            ripple: pack_wave(|i| &setup(i).displaced.ripple),
             slip: pack_plane(|i| setup(i).displaced.slip),
             slip_start: pack(|i| setup(i).displaced.slip_start),
         },

@@ -21,6 +21,8 @@ pub struct Experiment<const N: usize> {
     pub drive: Drive<N>,
     /// The robot whose joint angles are recorded; a path beyond its reach is refused.
     pub robot: Option<Robot<f64>>,
+    /// How far the base is from its place, y and z \[m\], where its path was measured.
+    pub base: Option<Series<2>>,
     /// Where it starts.
     pub start: Start<N>,
     /// Step \[s\], 0.25 ms unless set.
@@ -41,6 +43,7 @@ impl<const N: usize> Experiment<N> {
             effects: Vec::new(),
             drive,
             robot: None,
+            base: None,
             start: Start::Given {
                 q: Joints::zeros(),
                 qd: Joints::zeros(),

@@ -19,7 +19,7 @@ use arm_core::Joints;
 use instant::{Mode, Modes, Solved, modes};
 
 use crate::model::{Link, Model};
-use crate::state::{Input, State};
+use crate::state::{BaseMotion, Input, State};
 use crate::step::{self, Inputs, Jam, Memory, PROJECTIONS, remember, rk4};
 use crate::{Handle, Integrator};
 use arm_core::effect::States;
@@ -328,8 +328,8 @@ fn input_at<const N: usize>(inputs: &Inputs<f64, N>, h: f64, x: f64) -> Input<f6
     }
     let y = 1.0 - x;
     let parabola = |a: f64, b: f64, c: f64| y * (y - x) * a + 4.0 * x * y * b + x * (x - y) * c;
-    let plane = |of: &dyn Fn(&Handle<f64>) -> [f64; 2]| {
-        let [a, b, c] = [start, middle, end].map(|input| of(&input.handle));
+    let plane = |of: &dyn Fn(&Input<f64, N>) -> [f64; 2]| {
+        let [a, b, c] = [start, middle, end].map(of);
         [0, 1].map(|axis| parabola(a[axis], b[axis], c[axis]))
     };
     let (from, to) = (&start.handle, &end.handle);
@@ -341,9 +341,14 @@ fn input_at<const N: usize>(inputs: &Inputs<f64, N>, h: f64, x: f64) -> Input<f6
                     + x * x * (1.0 + 2.0 * y) * to.position[axis];
                 ends + h * x * y * (y * from.velocity[axis] - x * to.velocity[axis])
             }),
-            velocity: plane(&|handle| handle.velocity),
-            acceleration: plane(&|handle| handle.acceleration),
+            velocity: plane(&|input| input.handle.velocity),
+            acceleration: plane(&|input| input.handle.acceleration),
         },
         torque: Joints::from_fn(|j, _| parabola(start.torque[j], middle.torque[j], end.torque[j])),
+        base: BaseMotion {
+            position: plane(&|input| input.base.position),
+            velocity: plane(&|input| input.base.velocity),
+            acceleration: plane(&|input| input.base.acceleration),
+        },
     }
 }

@@ -5,12 +5,13 @@ use arm_core::effect::{
 };
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
-    Setup, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
+    Setup, forward_dynamics, gravity, joint_force, kinetic_energy, potential_energy, tip,
+    tip_velocity,
 };
 
 use crate::plain::{Plain, affine, apart, load, pull};
 use crate::state::{Input, Outcome, State, difference, powers, sum};
-use crate::terms::{MovingBase, Terms};
+use crate::terms::{MovingBase, Terms, add_inertia, unit_weight};
 
 /// How the tip is held.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +28,10 @@ pub(crate) enum Link<T> {
 pub(crate) struct Model<T, const N: usize> {
     pub chain: Chain<T, N>,
     pub base: Option<MovingBase<T, N>>,
+    /// Whether the base also moves by itself, as a function of time.
+    pub heaves: bool,
+    /// The arm under unit gravity against y and z: its gravity torques are those of an accelerated base.
+    unit_weight: [Chain<T, N>; 2],
     /// Where the handle is, unless at the tip.
     pub placement: Option<Placement<T>>,
     pub link: Link<T>,
@@ -90,6 +95,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             products: Products::of(&chain),
             chain,
             base: MovingBase::of(setup)?,
+            heaves: !setup.heave.is_still(),
+            unit_weight: unit_weight(setup)?,
             placement: Placement::of(setup),
             link,
             feels_joint_force: effects.iter().any(feels_joint_force),
@@ -184,6 +191,33 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         ]
     }
 
+    /// Torques of motors, and what the arm's inertia does against a base that is accelerated \[N m\].
+    ///
+    /// An arm on an accelerated base moves, as seen from there, as one at rest in another gravity.
+    #[inline(always)]
+    pub fn driving(&self, input: &Input<T, N>, pose: &Pose<T, N>) -> Joints<T, N> {
+        if self.heaves {
+            self.heaving(input, pose)
+        } else {
+            input.torque
+        }
+    }
+
+    /// Apart, so that the usual case stays small.
+    #[inline(never)]
+    fn heaving(&self, input: &Input<T, N>, pose: &Pose<T, N>) -> Joints<T, N> {
+        let rows = [0, 1].map(|axis| gravity(&self.unit_weight[axis], pose));
+        let [y, z] = input.base.acceleration;
+        let mut torque = input.torque;
+        for j in 0..N {
+            torque[j] -= y * rows[0][j] + z * rows[1][j];
+        }
+        if let Some(base) = &self.base {
+            torque[0] -= base.along([y, z]);
+        }
+        torque
+    }
+
     /// Sum of what all effects resist with besides dry friction \[N m\].
     #[inline(always)]
     pub fn resisting(&self, motion: &Motion<T, N>, memory: &[States<T>]) -> Joints<T, N> {
@@ -238,11 +272,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let mut motion = Motion::new(input.time, *q, *qd);
         let mut resisting = self.resisting(&motion, memory);
         let (mut force, lost) = self.contact(input, q, qd, &pose);
+        let driving = self.driving(input, &pose);
         let qdd = if self.in_link_form() && !self.feels_joint_force {
-            self.forward(&pose, qd, &difference(&input.torque, &resisting), force)
+            self.forward(&pose, qd, &difference(&driving, &resisting), force)
         } else {
             self.coupled(
-                input,
+                (input, &driving),
                 &pose,
                 &mut motion,
                 (memory, &mut resisting, &mut force),
@@ -255,7 +290,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         Outcome {
             qdd,
             force_on_arm: force,
-            power: powers((force, v), [&input.torque, &resisting], qd, lost),
+            power: powers((force, v), [&driving, &resisting], qd, lost),
             joint_force: motion.joint_force,
         }
     }
@@ -265,7 +300,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     #[inline(never)]
     fn coupled(
         &self,
-        input: &Input<T, N>,
+        (input, driving): (&Input<T, N>, &Joints<T, N>),
         pose: &Pose<T, N>,
         motion: &mut Motion<T, N>,
         (memory, resisting, force): (&[States<T>], &mut Joints<T, N>, &mut Plane<T>),
@@ -276,10 +311,10 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let mut qdd = Joints::<T, N>::repeat(T::ZERO);
         for pass in 0..self.passes() {
             if pass > 0 {
-                motion.joint_force = self.joint_force(pose, (&qd, &qdd), *force);
+                motion.joint_force = self.joint_force(pose, (&qd, &qdd), (*force, input));
                 *resisting = self.resisting(motion, memory);
             }
-            let torque = difference(&input.torque, resisting);
+            let torque = difference(driving, resisting);
             match &terms {
                 Some(terms) => (qdd, *force) = self.accelerations(input, &torque, *force, terms),
                 None => {
@@ -344,9 +379,9 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         &self,
         pose: &Pose<T, N>,
         moving: (&Joints<T, N>, &Joints<T, N>),
-        force: Plane<T>,
+        outside: (Plane<T>, &Input<T, N>),
     ) -> [T; N] {
-        let through = self.through_joints(pose, moving, force);
+        let through = self.through_joints(pose, moving, outside);
         through.map(|[y, z]| (y.squared() + z.squared()).sqrt())
     }
 
@@ -355,11 +390,14 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         &self,
         pose: &Pose<T, N>,
         (qd, qdd): (&Joints<T, N>, &Joints<T, N>),
-        force: Plane<T>,
+        (force, input): (Plane<T>, &Input<T, N>),
     ) -> [Plane<T>; N] {
         let mut through = joint_force(&self.chain, pose, (qd, qdd), force);
         if let Some(base) = &self.base {
-            base.add_joint_force(&self.chain, qdd, &mut through);
+            add_inertia(&self.chain, base.velocity(qdd), &mut through);
+        }
+        if self.heaves {
+            add_inertia(&self.chain, input.base.acceleration, &mut through);
         }
         through
     }

@@ -4,14 +4,14 @@ use std::array::from_fn;
 use std::ops::Range;
 
 use arm_core::effect::{Effect, Place};
-use arm_core::{Joints, Scalar, Setup};
+use arm_core::{Joints, Setup};
 
 use crate::discontinuities::Discontinuities;
 use crate::error::finite;
 use crate::model::{Link, Model};
 use crate::plain::Plain;
 use crate::schedule::Schedule;
-use crate::state::Input;
+use crate::state::{BaseMotion, Input};
 use crate::{
     Coupling, Drive, Experiment, Handle, HandlePath, Integrator, JointMotion, SimulationError,
     Start, stability, start,
@@ -46,7 +46,8 @@ impl<'a, const N: usize> Prepared<'a, N> {
     ) -> Result<Self, SimulationError> {
         let schedule = Schedule::of(experiment)?;
         let setup = experiment.altered()?;
-        let model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
+        let mut model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
+        model.heaves |= experiment.base.is_some();
         known(experiment, &schedule)?;
         let motion = reached(experiment, &schedule, 0..schedule.samples());
         let robot = if in_pieces {
@@ -97,19 +98,20 @@ impl<'a, const N: usize> Prepared<'a, N> {
     /// Handle as it stands in the hand, and torques at a time \[s\].
     #[inline]
     pub fn input(&self, time: f64) -> Input<f64, N> {
-        let mut input = command(&self.experiment.drive, time);
-        displace(&mut input, &self.setup);
+        let mut input = command(self.experiment, time);
+        input.stands_as_in(&self.setup);
         input
     }
 
     /// [`Prepared::input`] after each of some numbers of half steps, appended to `out`.
     pub fn inputs(&self, half_steps: &[usize], out: &mut Vec<Input<f64, N>>) {
         let from = out.len();
-        commands(&self.experiment.drive, &self.schedule, half_steps, out);
-        if self.setup.displaced.is_somewhere() {
-            for input in &mut out[from..] {
-                displace(input, &self.setup);
-            }
+        commands(self.experiment, &self.schedule, half_steps, out);
+        if self.setup.is_as_commanded() {
+            return;
+        }
+        for input in &mut out[from..] {
+            input.stands_as_in(&self.setup);
         }
     }
 
@@ -125,9 +127,9 @@ impl<'a, const N: usize> Prepared<'a, N> {
     }
 }
 
-/// What the drive commands at a time.
+/// What the drive commands at a time, seen from the base where its path was measured.
 #[inline]
-pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64, N> {
+pub(crate) fn command<const N: usize>(experiment: &Experiment<N>, time: f64) -> Input<f64, N> {
     let mut input = Input {
         time,
         handle: Handle {
@@ -136,12 +138,14 @@ pub(crate) fn command<const N: usize>(drive: &Drive<N>, time: f64) -> Input<f64,
             acceleration: [0.0; 2],
         },
         torque: Joints::zeros(),
+        base: BaseMotion::still(),
     };
-    match drive {
+    match &experiment.drive {
         Drive::Handle { path, .. } => input.handle = path.at(time),
         Drive::Torque(Some(series)) => input.torque = series.at(time).value.into(),
         Drive::Torque(None) => {}
     }
+    see_from_base(experiment, core::slice::from_mut(&mut input));
     input
 }
 
@@ -150,22 +154,36 @@ const ABREAST: usize = 16;
 
 /// [`command`] after each of some numbers of half steps, appended to `out`; the same bits.
 pub(crate) fn commands<const N: usize>(
-    drive: &Drive<N>,
+    experiment: &Experiment<N>,
     schedule: &Schedule,
     half_steps: &[usize],
     out: &mut Vec<Input<f64, N>>,
 ) {
-    let Drive::Handle { path, .. } = drive else {
+    let Drive::Handle { path, .. } = &experiment.drive else {
         let times = half_steps.iter().map(|&half| schedule.half_time(half));
-        out.extend(times.map(|time| command(drive, time)));
+        out.extend(times.map(|time| command(experiment, time)));
         return;
     };
+    let from = out.len();
     dispatch(Abreast {
         path,
         schedule,
         half_steps,
         out,
     });
+    see_from_base(experiment, &mut out[from..]);
+}
+
+/// Moves the base along its measured path, if there is one.
+#[inline]
+fn see_from_base<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input<f64, N>]) {
+    let Some(path) = &experiment.base else {
+        return;
+    };
+    for input in inputs {
+        let jet = path.at(input.time);
+        input.move_base([jet.value, jet.rate, jet.curvature]);
+    }
 }
 
 struct Abreast<'a, const N: usize> {
@@ -190,22 +208,9 @@ impl<const N: usize> Computation for Abreast<'_, N> {
                 time,
                 handle,
                 torque: Joints::zeros(),
+                base: BaseMotion::still(),
             }));
         }
-    }
-}
-
-/// Where the handle is beside where the robot's angles put it, on top of the commanded handle.
-#[inline]
-pub(crate) fn displace<T: Scalar, const N: usize>(input: &mut Input<T, N>, setup: &Setup<T, N>) {
-    if !setup.displaced.is_somewhere() {
-        return;
-    }
-    let [position, velocity, acceleration] = setup.displaced.at(input.time);
-    for axis in 0..2 {
-        input.handle.position[axis] += position[axis];
-        input.handle.velocity[axis] += velocity[axis];
-        input.handle.acceleration[axis] += acceleration[axis];
     }
 }
 
@@ -247,10 +252,14 @@ fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
         ("base motion", setup.base_motion[0]),
         ("base motion", setup.base_motion[1]),
         ("rest angle of the base", setup.base_rest),
-        ("ripple", setup.displaced.ripple[0]),
-        ("ripple", setup.displaced.ripple[1]),
-        ("ripple frequency", setup.displaced.frequency),
-        ("ripple phase", setup.displaced.phase),
+        ("ripple", setup.displaced.ripple.amplitude[0]),
+        ("ripple", setup.displaced.ripple.amplitude[1]),
+        ("ripple frequency", setup.displaced.ripple.frequency),
+        ("ripple phase", setup.displaced.ripple.phase),
+        ("heave", setup.heave.amplitude[0]),
+        ("heave", setup.heave.amplitude[1]),
+        ("heave frequency", setup.heave.frequency),
+        ("heave phase", setup.heave.phase),
         ("slip", setup.displaced.slip[0]),
         ("slip", setup.displaced.slip[1]),
         ("start of the slip", setup.displaced.slip_start),
@@ -288,24 +297,28 @@ pub(crate) fn known<const N: usize>(
     experiment: &Experiment<N>,
     schedule: &Schedule,
 ) -> Result<(), SimulationError> {
-    let (name, (from, to)) = match &experiment.drive {
-        Drive::Handle { path, .. } => ("the handle's path", path.span()),
-        Drive::Torque(Some(series)) => ("the joint torque", (series.start(), series.end())),
-        Drive::Torque(None) => return Ok(()),
+    let drive = match &experiment.drive {
+        Drive::Handle { path, .. } => Some(("the handle's path", path.span())),
+        Drive::Torque(series) => series
+            .as_ref()
+            .map(|s| ("the joint torque", (s.start(), s.end()))),
     };
+    let base = experiment.base.as_ref();
+    let base = base.map(|path| ("the path of the base", (path.start(), path.end())));
     let needed = schedule.time(schedule.steps);
     // The last sample may miss the end by rounding.
     let slack = 1e-6 * schedule.dt;
-    if from <= slack && needed <= to + slack {
-        Ok(())
-    } else {
-        Err(SimulationError::TooShort {
-            name,
-            from,
-            to,
-            needed,
-        })
+    for (name, (from, to)) in drive.into_iter().chain(base) {
+        if !(from <= slack && needed <= to + slack) {
+            return Err(SimulationError::TooShort {
+                name,
+                from,
+                to,
+                needed,
+            });
+        }
     }
+    Ok(())
 }
 
 /// Commanded robot motion at some samples, or why it does not get there; nothing without a robot.

@@ -60,7 +60,7 @@
 //! rigid coupling, about 25 µs with rotors.
 //!
 //! # What differs or is missing
-//! - A first joint that moves with its angle and segments without inertia are refused.
+//! - A first joint that moves with its angle or heaves, and segments without inertia, are refused.
 //! - A rotor turns against two segments, which no inertia of a body can express; it is a damper of rapier's motor,
 //!   which makes it exact but the solver slow: eight times as many sweeps. A rotor beyond about 15 times the inertia of the
 //!   segments that it turns needs still more; where they are by far too few the run does not stay finite.
@@ -190,6 +190,12 @@ fn check<const N: usize>(
         return Err(SimulationError::Unsupported {
             engine: "rapier",
             what: "a first joint that moves with its angle",
+        });
+    }
+    if model.heaves {
+        return Err(SimulationError::Unsupported {
+            engine: "rapier",
+            what: "a first joint that heaves",
         });
     }
     let Link::Compliant(contact) = &model.link else {

@@ -102,9 +102,10 @@ impl<T: Scalar> Row<T> {
         if let Some(friction) = &forces.friction {
             resisting = sum(&resisting, &friction.torque);
         }
+        let driving = model.driving(input, &pose);
         let load = model.load(
             &pose,
-            &difference(&input.torque, &resisting),
+            &difference(&driving, &resisting),
             forces.force_on_arm,
         );
         let parts = contributions(&model.chain, &pose, (qd, &forces.qdd), &load);
@@ -113,6 +114,7 @@ impl<T: Scalar> Row<T> {
             None => Joints::<T, N>::repeat(T::ZERO),
         };
         let handle = input.handle.position;
+        let in_room = |at: Plane<T>| [0, 1].map(|axis| at[axis] + input.base.position[axis]);
 
         let row = &mut self.0;
         row.clear();
@@ -120,9 +122,9 @@ impl<T: Scalar> Row<T> {
         for joints in [q, qd, &forces.qdd] {
             row.extend(joints.iter());
         }
-        row.extend(model.tip(q, &pose));
+        row.extend(in_room(model.tip(q, &pose)));
         if has_handle(model) {
-            row.extend(handle);
+            row.extend(in_room(handle));
         }
         row.extend(forces.force_on_arm);
         row.push(T::ZERO);
@@ -145,7 +147,7 @@ impl<T: Scalar> Row<T> {
             &parts.gravity,
             &frame,
             &resisting,
-            &input.torque,
+            &driving,
             &parts.contact,
         ] {
             row.extend(torque.iter());

@@ -121,7 +121,7 @@ fn holds<const N: usize>(
     }
     let (q, rest) = (Joints::from_fn(|i, _| x[i]), Joints::<f64, N>::zeros());
     let force = force(model, input, x);
-    let through = model.through_joints(&Pose::new(&q), (&rest, &rest), force);
+    let through = model.through_joints(&Pose::new(&q), (&rest, &rest), (force, input));
     let motion = Motion::new(0.0, q, rest).with_joint_force(&through);
     let most = dry_friction(
         &model.effects,
@@ -260,8 +260,9 @@ fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[
     let force = force(model, input, x);
     let terms = model.terms(&pose, &rest);
     let held = terms.tip_torque(force);
+    let driving = model.driving(input, &pose);
     let mut r: Vec<f64> = (0..N)
-        .map(|i| terms.bias[i] + resisting[i] - input.torque[i] - held[i])
+        .map(|i| terms.bias[i] + resisting[i] - driving[i] - held[i])
         .collect();
     if matches!(model.link, Link::Rigid) {
         r.extend(gap(model, input, &q));

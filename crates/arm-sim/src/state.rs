@@ -1,6 +1,6 @@
 //! What drives the arm at one instant, its state, and what follows from both.
 
-use arm_core::{Joints, Lanes, Plane, Scalar};
+use arm_core::{Joints, Lanes, Plane, Scalar, Setup};
 
 use crate::Handle;
 
@@ -11,6 +11,60 @@ pub(crate) struct Input<T, const N: usize> {
     pub handle: Handle<T>,
     /// Torques of motors \[N m\].
     pub torque: Joints<T, N>,
+    /// Where the base is; the handle is seen from there.
+    pub base: BaseMotion<T>,
+}
+
+/// A base that moves whatever the arm does.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BaseMotion<T> {
+    /// How far it is from its place \[m\].
+    pub position: Plane<T>,
+    /// \[m/s\]
+    pub velocity: Plane<T>,
+    /// \[m/s²\]
+    pub acceleration: Plane<T>,
+}
+
+impl<T: Scalar> BaseMotion<T> {
+    pub fn still() -> Self {
+        Self {
+            position: [T::ZERO; 2],
+            velocity: [T::ZERO; 2],
+            acceleration: [T::ZERO; 2],
+        }
+    }
+}
+
+impl<T: Scalar, const N: usize> Input<T, N> {
+    /// Puts the handle where it stands in a rig, beside where it is commanded, and the base where it heaves.
+    #[inline]
+    pub fn stands_as_in(&mut self, setup: &Setup<T, N>) {
+        if setup.displaced.is_somewhere() {
+            let [position, velocity, acceleration] = setup.displaced.at(self.time);
+            for axis in 0..2 {
+                self.handle.position[axis] += position[axis];
+                self.handle.velocity[axis] += velocity[axis];
+                self.handle.acceleration[axis] += acceleration[axis];
+            }
+        }
+        if !setup.heave.is_still() {
+            self.move_base(setup.heave.at(self.time));
+        }
+    }
+
+    /// Moves the base: position \[m\], velocity \[m/s\] and acceleration \[m/s²\].
+    #[inline]
+    pub fn move_base(&mut self, [position, velocity, acceleration]: [Plane<T>; 3]) {
+        for axis in 0..2 {
+            self.base.position[axis] += position[axis];
+            self.base.velocity[axis] += velocity[axis];
+            self.base.acceleration[axis] += acceleration[axis];
+            self.handle.position[axis] -= position[axis];
+            self.handle.velocity[axis] -= velocity[axis];
+            self.handle.acceleration[axis] -= acceleration[axis];
+        }
+    }
 }
 
 /// Angles, speeds and the work done so far.

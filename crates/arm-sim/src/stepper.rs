@@ -8,8 +8,8 @@ use crate::experiment::altered;
 use crate::friction::{self, advance};
 use crate::model::{Link, Model};
 use crate::native::{diverged, why};
-use crate::prepare::{assemble, displace};
-use crate::state::{Input, State};
+use crate::prepare::assemble;
+use crate::state::{BaseMotion, Input, State};
 use crate::step::{Inputs, Memory};
 use crate::{Handle, Integrator, SimulationError, stability, start};
 
@@ -82,8 +82,9 @@ fn input<const N: usize>(
             acceleration: a,
         },
         torque: outside.torque + outside.torque_rate * (outside.torque_age + later),
+        base: BaseMotion::still(),
     };
-    displace(&mut input, setup);
+    input.stands_as_in(setup);
     input
 }
 
@@ -126,7 +127,8 @@ pub struct Seen<const N: usize> {
 /// An arm that is advanced by communication steps through one of its ports.
 ///
 /// It makes the steps of [`simulate`](crate::simulate): with the same inputs at the same inner steps both have the same bits.
-/// A ripple of the robot and a slip of the handle come on top of the handle that the motion port is given, as encoders do not see it either.
+/// A ripple of the robot and a slip of the handle come on top of the handle that the motion port is given, as encoders do not see it either; a
+/// base that heaves does so in its own time.
 ///
 /// ```
 /// use arm_sim::{Outside, Port, Stepper, models};
@@ -356,7 +358,7 @@ impl<const N: usize> Stepper<N> {
         let tip = self.model.tip(q, &pose);
         let tip_velocity = self.model.tip_velocity(qd, &pose);
         let tip_acceleration = self.model.tip_acceleration(&self.state, &outcome.qdd);
-        let handle = &input.handle;
+        let (handle, base) = (&input.handle, &input.base);
         let less = |a: Plane<f64>, b: Plane<f64>| [a[0] - b[0], a[1] - b[1]];
         let force_rate = match &self.model.link {
             Link::Compliant(contact) => contact.force_rate(
@@ -366,10 +368,11 @@ impl<const N: usize> Stepper<N> {
             ),
             _ => outside.force_rate,
         };
+        let in_room = |a: Plane<f64>, b: Plane<f64>| [a[0] + b[0], a[1] + b[1]];
         Seen {
-            tip,
-            tip_velocity,
-            tip_acceleration,
+            tip: in_room(tip, base.position),
+            tip_velocity: in_room(tip_velocity, base.velocity),
+            tip_acceleration: in_room(tip_acceleration, base.acceleration),
             qdd: outcome.qdd,
             force_on_arm: outcome.force_on_arm,
             force_rate,
@@ -385,9 +388,10 @@ impl<const N: usize> Stepper<N> {
         let pose = Pose::new(q);
         let input = self.input(outside);
         let (force, _) = self.model.contact(&input, q, qd, &pose);
+        let (tip, velocity) = (self.model.tip(q, &pose), self.model.tip_velocity(qd, &pose));
         (
-            self.model.tip(q, &pose),
-            self.model.tip_velocity(qd, &pose),
+            [0, 1].map(|axis| tip[axis] + input.base.position[axis]),
+            [0, 1].map(|axis| velocity[axis] + input.base.velocity[axis]),
             force,
         )
     }

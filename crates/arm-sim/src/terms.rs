@@ -35,12 +35,11 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
         if u.iter().all(|u| u.every(|u| u == 0.0)) {
             return Ok(None);
         }
-        let against = |y, z| Chain::new(setup.segments, setup.base, [T::of(y), T::of(z)]);
         Ok(Some(Self {
             per_angle: u,
             rest: setup.base_rest,
             mass: setup.segments.iter().fold(T::ZERO, |m, s| m + s.mass),
-            unit_weight: [against(-1.0, 0.0)?, against(0.0, -1.0)?],
+            unit_weight: unit_weight(setup)?,
         }))
     }
 
@@ -55,6 +54,13 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
     #[inline]
     pub fn velocity(&self, qd: &Joints<T, N>) -> Plane<T> {
         self.per_angle.map(|u| u * qd[0])
+    }
+
+    /// Torque on the first joint that accelerates the whole arm so that it keeps up with an acceleration \[N m\].
+    #[inline]
+    pub fn along(&self, [y, z]: Plane<T>) -> T {
+        let [uy, uz] = self.per_angle;
+        self.mass * (uy * y + uz * z)
     }
 
     /// Derivative of the first moment to the joint angles, rows y and z \[kg m/rad\].
@@ -82,23 +88,6 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
         torque
     }
 
-    /// Adds to the forces through the joints what accelerates everything beyond them with the base \[N\].
-    pub fn add_joint_force(
-        &self,
-        chain: &Chain<T, N>,
-        qdd: &Joints<T, N>,
-        force: &mut [Plane<T>; N],
-    ) {
-        let acceleration = self.velocity(qdd);
-        let mut beyond = T::ZERO;
-        for (segment, force) in chain.segments().iter().zip(force.iter_mut()).rev() {
-            beyond += segment.mass;
-            for axis in 0..2 {
-                force[axis] += beyond * acceleration[axis];
-            }
-        }
-    }
-
     /// Kinetic and potential energy beyond those of the arm on a base at rest \[J\].
     pub fn energy(
         &self,
@@ -116,6 +105,31 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
         let [y, z] = self.displacement(q);
         let [gy, gz] = chain.gravity();
         [kinetic, -(self.mass * (gy * y + gz * z))]
+    }
+}
+
+/// An arm under unit gravity against y and against z.
+pub(crate) fn unit_weight<T: Scalar, const N: usize>(
+    setup: &Setup<T, N>,
+) -> Result<[Chain<T, N>; 2], Invalid> {
+    let against = |y, z| Chain::new(setup.segments, setup.base, [T::of(y), T::of(z)]);
+    Ok([against(-1.0, 0.0)?, against(0.0, -1.0)?])
+}
+
+/// Adds to the forces through the joints what accelerates everything beyond them with the base \[N\].
+///
+/// * `acceleration` - of the base \[m/s²\]
+pub(crate) fn add_inertia<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    acceleration: Plane<T>,
+    force: &mut [Plane<T>; N],
+) {
+    let mut beyond = T::ZERO;
+    for (segment, force) in chain.segments().iter().zip(force.iter_mut()).rev() {
+        beyond += segment.mass;
+        for axis in 0..2 {
+            force[axis] += beyond * acceleration[axis];
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 pub use super::place::Place;
 use super::probe::Probe;
-use crate::{Reading, Scalar, Setup};
+use crate::{Reading, Scalar, Setup, Wave};
 
 /// Most parameters that one effect has.
 pub const MAX_PARAMETERS: usize = 6;
@@ -243,6 +243,22 @@ pub(super) fn smooth_sign_slope<T: Scalar>(sign: T, speed: T, smoothing: T) -> T
 /// `smoothing` of all kinds of dry friction: zero for friction that sticks.
 pub(super) const SMOOTHING: Parameter =
     Parameter::shape("smoothing", "rad/s", 1e-4, 1.0, 0.01).or_zero();
+
+/// Parameters of what swings in place.
+pub(super) const WAVE: [Parameter; 4] = [
+    Parameter::shape("y", "m", -0.1, 0.1, 0.0),
+    Parameter::shape("z", "m", -0.1, 0.1, 0.0),
+    Parameter::shape("frequency", "Hz", 0.01, 100.0, 1.0),
+    Parameter::shape("phase", "rad", -7.0, 7.0, 0.0),
+];
+
+/// Adds the amplitudes of [`WAVE`] to a wave, which takes its frequency and phase.
+pub(super) fn add_wave<T: Scalar>(p: &Parameters<T>, wave: &mut Wave<T>) {
+    wave.amplitude[0] += p[0];
+    wave.amplitude[1] += p[1];
+    wave.frequency = p[2];
+    wave.phase = p[3];
+}
 
 /// Values for the leading parameters or states, zero for the others.
 #[inline]

@@ -223,6 +223,7 @@ catalogue! {
     segment_length::SegmentLength,
     gravity_tilt::GravityTilt,
     shoulder_motion::ShoulderMotion,
+    shoulder_heave::ShoulderHeave,
     backlash::Backlash,
     contact_compliance::ContactCompliance,
     contact_damping::ContactDamping,

@@ -10,7 +10,7 @@ use crate::common::Random;
 /// The stable names, as files and reports use them.
 const NAMES: &str = "viscous coulomb stribeck load_friction quadratic_drag angle_viscosity elastic cubic_elastic \
     relaxation thixotropy constant_moment end_range biarticular biarticular_end_range stretch_reflex tremor voluntary \
-    motor_inertia added_mass gravity_moment inertia segment_length gravity_tilt shoulder_motion \
+    motor_inertia added_mass gravity_moment inertia segment_length gravity_tilt shoulder_motion shoulder_heave \
     backlash contact_compliance contact_damping robot_ripple force_bias force_drift force_gain \
     force_misalignment angle_offset time_delay handle_slip";
 
@@ -108,7 +108,7 @@ fn addresses_are_those_of_the_interface() {
     for kind in KINDS {
         let expected = match kind.info().kind {
             "force_bias" | "force_drift" | "force_gain" => Some("channel"),
-            "added_mass" | "gravity_tilt" | "shoulder_motion" | "backlash"
+            "added_mass" | "gravity_tilt" | "shoulder_motion" | "shoulder_heave" | "backlash"
             | "contact_compliance" | "contact_damping" | "robot_ripple" | "force_misalignment"
             | "time_delay" | "handle_slip" => None,
             _ => Some("joint"),
@@ -228,7 +228,8 @@ fn defaults_do_nothing() {
         let mut altered = rig;
         effect.alter(&mut altered);
         // Frequencies and the like may change where nothing has that frequency.
-        altered.displaced.frequency = rig.displaced.frequency;
+        altered.displaced.ripple.frequency = rig.displaced.ripple.frequency;
+        altered.heave.frequency = rig.heave.frequency;
         assert_eq!(altered, rig, "{}", kind.info().kind);
         let before = reading(&mut random);
         let mut after = before;

@@ -2,7 +2,7 @@
 
 use arm_core::effect::{Effect, Kind, Local, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Displaced, Joints, Load, Pose, Reading, Segment, Setup, forward_dynamics,
+    Chain, Contact, Displaced, Joints, Load, Pose, Reading, Segment, Setup, Wave, forward_dynamics,
     gravity, inverse_dynamics, models,
 };
 
@@ -360,6 +360,13 @@ fn frame_in_the_head() {
     assert!(close(2.0 * y * -z / 100.0, 0.5), "sine of twice the angle");
     let moving = altered("shoulder_motion", 0, &[0.01, -0.02, 0.5]);
     assert_eq!((moving.base_motion, moving.base_rest), ([0.01, -0.02], 0.5));
+    let heaving = altered("shoulder_heave", 0, &[0.004, 0.012, 0.23, -0.5]);
+    let wave = Wave {
+        amplitude: [0.004, 0.012],
+        frequency: 0.23,
+        phase: -0.5,
+    };
+    assert_eq!(heaving.heave, wave);
 }
 
 #[test]
@@ -380,13 +387,12 @@ fn contact_in_the_head() {
     assert_eq!(loose.force_on_arm([0.0005, 0.003], [0.0; 2])[0], 0.0);
     assert!((loose.force_on_arm([0.0005, 0.003], [0.0; 2])[1] - 20.0).abs() < 1e-12);
     let rippled = altered("robot_ripple", 0, &[0.001, 0.002, 3.0, 0.5]);
-    let Displaced {
-        ripple,
-        frequency,
-        phase,
-        ..
-    } = rippled.displaced;
-    assert_eq!((ripple, frequency, phase), ([0.001, 0.002], 3.0, 0.5));
+    let wave = Wave {
+        amplitude: [0.001, 0.002],
+        frequency: 3.0,
+        phase: 0.5,
+    };
+    assert_eq!(rippled.displaced.ripple, wave);
     assert_eq!(altered("time_delay", 0, &[0.05]).force_delay, 0.05);
 }
 
@@ -409,9 +415,11 @@ fn a_handle_slips_once_and_stays() {
         assert!(velocity[0].abs() < 1e-12 && acceleration[1].abs() < 1e-12);
     }
     let both = Displaced {
-        ripple: [1e-4, 2e-4],
-        frequency: 3.0,
-        phase: 0.4,
+        ripple: Wave {
+            amplitude: [1e-4, 2e-4],
+            frequency: 3.0,
+            phase: 0.4,
+        },
         ..slip
     };
     let h = 1e-5;

@@ -150,7 +150,8 @@ fn numbers<T: Scalar>(rig: &Setup<T, 3>, reading: &Reading<T, 3>) -> Vec<T> {
         rig.base,
         rig.gravity,
         rig.base_motion,
-        rig.displaced.ripple,
+        rig.displaced.ripple.amplitude,
+        rig.heave.amplitude,
         rig.displaced.slip,
         reading.force_on_arm,
     ];
@@ -158,8 +159,10 @@ fn numbers<T: Scalar>(rig: &Setup<T, 3>, reading: &Reading<T, 3>) -> Vec<T> {
     all.extend(rig.rotor.iter().chain(reading.q.iter()));
     all.extend([
         rig.base_rest,
-        rig.displaced.frequency,
-        rig.displaced.phase,
+        rig.displaced.ripple.frequency,
+        rig.displaced.ripple.phase,
+        rig.heave.frequency,
+        rig.heave.phase,
         rig.displaced.slip_start,
         rig.force_delay,
     ]);

@@ -8,7 +8,8 @@ use arm_ident::regression::kinematics::Kinematics;
 use arm_ident::regression::measured_motion::{is_quiet, low_pass, measured, relative_speed_noise};
 use arm_ident::regression::trial::Trial;
 use arm_sim::{
-    Coupling, Drive, Experiment, HandlePath, Recording, Sensors, SimulationError, Start, simulate,
+    Coupling, Drive, Experiment, HandlePath, Interpolation, Recording, Sensors, Series,
+    SimulationError, Start, simulate,
 };
 
 use crate::GapError;
@@ -52,6 +53,8 @@ pub struct Course<const N: usize> {
     pub counted: Vec<bool>,
     times: Vec<f64>,
     handle: Vec<Plane<f64>>,
+    /// How far the base is from its place \[m\], where its path was measured and drives a simulation.
+    pub(crate) base: Option<Series<2>>,
     /// Angles and force on the arm that are measured at the start.
     pub(crate) start: Joints<f64, N>,
     pub(crate) start_force: Plane<f64>,
@@ -118,8 +121,8 @@ impl<const N: usize> Session<N> {
     ///
     /// # Errors
     /// [`GapError::Numerics`] for a trial too short for the filters.
-    pub fn course(&self, trial: usize) -> Result<Course<N>, GapError> {
-        let trial = &self.trials[trial];
+    pub fn course(&self, number: usize) -> Result<Course<N>, GapError> {
+        let trial = &self.trials[number];
         let band = BAND.min(0.2 * trial.rate);
         let raw = self.measured(trial);
         let seen = smooth(&raw, band, trial.rate)?;
@@ -133,6 +136,13 @@ impl<const N: usize> Session<N> {
                     .collect()
             }
             _ => Vec::new(),
+        };
+        let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 / trial.rate).collect();
+        let base = match &trial.base {
+            Some(path) if self.comparison == ComparisonMode::Led => {
+                Some(self.displacement((number, path), (band, trial.rate), &times)?)
+            }
+            _ => None,
         };
         let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
         let span = first..(first + START).min(trial.len());
@@ -158,12 +168,32 @@ impl<const N: usize> Session<N> {
             rate: trial.rate,
             band,
             counted: away_from_gaps(&trial.valid, margin),
-            times: (0..trial.len()).map(|i| i as f64 / trial.rate).collect(),
+            times,
             handle,
+            base,
             start,
             start_force,
             motion,
         })
+    }
+
+    /// How far a measured path of the first joint is from the place of the base, within the band of the comparison: what is faster
+    /// would be noise in its acceleration.
+    fn displacement(
+        &self,
+        (trial, path): (usize, &[Plane<f64>]),
+        (band, rate): (f64, f64),
+        times: &[f64],
+    ) -> Result<Series<2>, GapError> {
+        let place = self.chain.base();
+        let axis = |a: usize| path.iter().map(|p| p[a] - place[a]).collect::<Vec<_>>();
+        let [y, z] = [axis(0), axis(1)];
+        let smooth = smooth(&[y, z], band, rate)?;
+        let points: Vec<Plane<f64>> = (0..path.len())
+            .map(|i| [smooth[0][i], smooth[1][i]])
+            .collect();
+        let series = Series::new("path of the base", times, &points, Interpolation::Cubic);
+        series.map_err(|source| GapError::Simulation { trial, source })
     }
 
     fn measured(&self, trial: &Trial<N>) -> Channels {
@@ -230,6 +260,7 @@ impl<const N: usize> Session<N> {
         let duration = course.times[course.times.len() - 1];
         let mut experiment = Experiment::new(setup, drive, duration);
         experiment.effects = hypothesis.effects();
+        experiment.base.clone_from(&course.base);
         experiment.output_interval = Some(interval);
         let near = course.start(hypothesis);
         let limit = friction_limit(&experiment, &near);
@@ -361,6 +392,7 @@ impl<const N: usize> Session<N> {
         let mut channels = vec![Vec::with_capacity(course.times.len()); N];
         for (i, &time) in course.times.iter().enumerate() {
             let (q, qd, qdd) = true_motion(hypothesis, motion, i);
+            let chain = motion.felt(&chain, i);
             let q = q - offset;
             let pose = Pose::new(&q);
             let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);

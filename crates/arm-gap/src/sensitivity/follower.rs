@@ -28,10 +28,9 @@ impl<const N: usize> Linear<'_, N> {
         course: &Course<N>,
     ) -> Result<Channels, SimulationError> {
         let plant = Plant::new(self.session, changed)?;
-        let path = course.handle_path(changed)?;
         // A trial that was broken off needs no more than its own steps.
         let steps = self.steps_until(course.raw[0].len()).min(self.states.len());
-        let hands = hands(&path, steps, self.step);
+        let hands = hands(course, changed, (steps, self.step))?;
         let near = course.start(changed);
         let friction = self.session.friction_at_start(changed, course)?;
         let answer = self.follow(&plant, &hands, (&near, &friction));

@@ -112,7 +112,6 @@ impl<'a, const N: usize> Linear<'a, N> {
                 qdd: at(&recording.qdd, i),
             })
             .collect();
-        let path = course.handle_path(hypothesis)?;
         let mut linear = Self {
             session,
             course: Arc::clone(course),
@@ -137,7 +136,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             ),
             base: Vec::new(),
         };
-        let every = hands(&path, linear.records.len(), interval);
+        let every = hands(course, hypothesis, (linear.records.len(), interval))?;
         for (record, hand) in std::iter::zip(&linear.records, &every) {
             let force = balance(&plant, record, *hand, &[]).force;
             linear.recorded_force.push(force);
@@ -257,8 +256,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         } else {
             let own;
             let hands = if moves_handle {
-                let path = self.course.handle_path(changed)?;
-                own = hands(&path, self.states.len(), self.step);
+                own = hands(&self.course, changed, (self.states.len(), self.step))?;
                 &own
             } else {
                 &self.hands

@@ -5,10 +5,11 @@ use arm_core::{
     Chain, Contact, Joints, Placement, Plane, Pose, Setup, inverse_dynamics, jacobian, joint_force,
     static_torque, tip,
 };
-use arm_sim::{HandlePath, SimulationError};
+use arm_sim::SimulationError;
 
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::prediction::Course;
 use crate::measurement_model::start::is_rubbing;
 
 /// What moves a led arm, besides its own state.
@@ -46,22 +47,29 @@ impl<const N: usize> Plant<N> {
         })
     }
 
-    /// The chain as seen from its base, and how far and how fast the base has moved with the first joint.
+    /// The chain as seen from its base, and how far and how fast the base has moved, with the first joint and by itself.
     ///
     /// A base that is accelerated is one that stands in another gravity.
-    fn based(&self, state: &State<N>) -> (Chain<f64, N>, Hand) {
+    fn based(&self, state: &State<N>, base: Base) -> (Chain<f64, N>, [Plane<f64>; 2]) {
         let u = self.setup.base_motion;
-        if u == [0.0; 2] {
-            return (self.chain, ([0.0; 2], [0.0; 2]));
+        if u == [0.0; 2] && self.setup.heave.is_still() && base.is_none() {
+            return (self.chain, [[0.0; 2]; 2]);
         }
         let angle = state.q[0] - self.setup.base_rest;
+        let [mut at, mut rate, mut acceleration] = self.setup.heave.at(state.time);
+        let [further, faster, growing] = base.unwrap_or_default();
+        for axis in 0..2 {
+            at[axis] += u[axis] * angle + further[axis];
+            rate[axis] += u[axis] * state.qd[0] + faster[axis];
+            acceleration[axis] += u[axis] * state.qdd[0] + growing[axis];
+        }
         let mut setup = self.setup;
         for axis in 0..2 {
-            setup.gravity[axis] -= u[axis] * state.qdd[0];
+            setup.gravity[axis] -= acceleration[axis];
         }
         // The segments were accepted before, and gravity may be any.
         let chain = setup.chain().unwrap_or(self.chain);
-        (chain, (u.map(|u| u * angle), u.map(|u| u * state.qd[0])))
+        (chain, [at, rate])
     }
 
     /// Most that the set-valued dry friction of each joint can resist with \[N m\].
@@ -83,8 +91,9 @@ impl<const N: usize> Plant<N> {
             + self.friction(motion, memory).component_mul(way)
     }
 
-    /// The handle as it stands in the hand.
-    fn handle(&self, time: f64, (mut at, mut rate): Hand) -> Hand {
+    /// Position and velocity of the handle as it stands in the hand.
+    fn handle(&self, time: f64, hand: Hand) -> [Plane<f64>; 2] {
+        let [mut at, mut rate] = [hand.at, hand.rate];
         if self.setup.displaced.is_somewhere() {
             let [position, velocity, _] = self.setup.displaced.at(time);
             for axis in 0..2 {
@@ -92,12 +101,22 @@ impl<const N: usize> Plant<N> {
                 rate[axis] += velocity[axis];
             }
         }
-        (at, rate)
+        [at, rate]
     }
 }
 
-/// Position and velocity of the handle.
-pub(super) type Hand = (Plane<f64>, Plane<f64>);
+/// What leads the arm at one instant.
+#[derive(Clone, Copy)]
+pub(super) struct Hand {
+    /// Position of the handle \[m\].
+    at: Plane<f64>,
+    /// Its velocity \[m/s\].
+    rate: Plane<f64>,
+    base: Base,
+}
+
+/// How far the base is from its place \[m\], its velocity \[m/s\] and its acceleration \[m/s²\], where its path was measured.
+type Base = Option<[Plane<f64>; 3]>;
 
 /// The arm's own state at one instant.
 #[derive(Clone, Copy)]
@@ -147,8 +166,8 @@ pub(super) fn balance<const N: usize>(
     memory: &[States<f64>],
 ) -> Balance<N> {
     let pose = Pose::new(&state.q);
-    let (at, rate) = plant.handle(state.time, hand);
-    let (chain, (shift, drift)) = plant.based(state);
+    let [at, rate] = plant.handle(state.time, hand);
+    let (chain, [shift, drift]) = plant.based(state, hand.base);
     let place = tip(&chain, &pose);
     let moving = jacobian(&chain, &pose) * state.qd;
     let placement = Placement::of(&plant.setup);
@@ -178,13 +197,23 @@ pub(super) fn balance<const N: usize>(
     }
 }
 
-/// Where the handle is at every step.
-pub(super) fn hands<const N: usize>(path: &HandlePath<N>, count: usize, step: f64) -> Vec<Hand> {
+/// Where handle and base are at every step.
+pub(super) fn hands<const N: usize>(
+    course: &Course<N>,
+    hypothesis: &Hypothesis<N>,
+    (count, step): (usize, f64),
+) -> Result<Vec<Hand>, SimulationError> {
+    let path = course.handle_path(hypothesis)?;
     let (_, end) = path.span();
-    (0..count)
-        .map(|i| {
-            let handle = path.at((i as f64 * step).min(end));
-            (handle.position, handle.velocity)
-        })
-        .collect()
+    let hand = |i: usize| {
+        let time = (i as f64 * step).min(end);
+        let handle = path.at(time);
+        let base = course.base.as_ref().map(|path| path.at(time));
+        Hand {
+            at: handle.position,
+            rate: handle.velocity,
+            base: base.map(|jet| [jet.value, jet.rate, jet.curvature]),
+        }
+    };
+    Ok((0..count).map(hand).collect())
 }

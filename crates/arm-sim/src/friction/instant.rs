@@ -174,7 +174,7 @@ fn ambiguous<const N: usize>(
         qdd: solved.outcome.qdd,
         force: solved.outcome.force_on_arm,
     };
-    let through = model.through_joints(&pose, (qd, &answer.qdd), answer.force);
+    let through = model.through_joints(&pose, (qd, &answer.qdd), (answer.force, input));
     let motion = Motion::new(input.time, *q, *qd).with_joint_force(&through);
     let gain = |j: usize| {
         let slope = slope(model, &motion, memory, j);
@@ -253,12 +253,13 @@ pub(crate) fn solve<const N: usize>(
         wanted: ahead.map_or_else(Joints::zeros, |h| qd / h),
         memory,
     };
+    let driving = model.driving(input, &pose);
     let mut resisting = model.resisting(&motion, memory);
-    let mut found = rubbing.under(&arm, &mut motion, &difference(&input.torque, &resisting));
+    let mut found = rubbing.under(&arm, &mut motion, &difference(&driving, &resisting));
     if model.feels_besides_dry {
         for _ in 1..model.passes() {
             resisting = model.resisting(&motion, memory);
-            found = rubbing.under(&arm, &mut motion, &difference(&input.torque, &resisting));
+            found = rubbing.under(&arm, &mut motion, &difference(&driving, &resisting));
         }
     }
     let v = match &model.link {
@@ -270,7 +271,7 @@ pub(crate) fn solve<const N: usize>(
         outcome: Outcome {
             qdd: found.answer.qdd,
             force_on_arm: found.answer.force,
-            power: powers((found.answer.force, v), [&input.torque, &all], qd, lost),
+            power: powers((found.answer.force, v), [&driving, &all], qd, lost),
             joint_force: motion.joint_force,
         },
         dry: found.dry,
@@ -391,7 +392,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         let mut less = *answer;
         less.less(1.0, &column);
         self.model
-            .through_joints(self.pose, (self.qd, &less.qdd), less.force)
+            .through_joints(self.pose, (self.qd, &less.qdd), (less.force, self.input))
     }
 
     /// Takes from an answer what joints that stick do, so that these have the accelerations wanted of them.
@@ -499,7 +500,7 @@ impl<const N: usize> Rubbing<'_, N> {
                 return found(most, jam);
             }
             let moving = (arm.qd, &answer.qdd);
-            let through = model.through_joints(arm.pose, moving, answer.force);
+            let through = model.through_joints(arm.pose, moving, (answer.force, arm.input));
             *motion = motion.with_joint_force(&through);
             most = dry_friction(&model.effects, motion, self.memory);
             let missing = Joints::<f64, N>::from_fn(|j, _| way(j) * most[j] - slips[j]);

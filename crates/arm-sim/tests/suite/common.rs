@@ -32,6 +32,7 @@ pub fn several_effects() -> Vec<Effect<f64>> {
         Effect::new(Kind::AddedMass, 0).with(&[0.3]),
         Effect::new(Kind::RobotRipple, 0).with(&[0.0005, 0.0003, 2.0, 0.4]),
         Effect::new(Kind::ShoulderMotion, 0).with(&[0.01, 0.02, -1.1]),
+        Effect::new(Kind::ShoulderHeave, 0).with(&[0.002, 0.006, 0.4, 0.3]),
     ]
 }
 

@@ -8,6 +8,7 @@ mod energy;
 mod friction;
 mod friction_reference;
 mod golden;
+mod heave;
 mod long;
 mod pendulum;
 mod pieces;

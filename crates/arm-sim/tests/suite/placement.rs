@@ -10,7 +10,7 @@ use crate::common::{largest, smooth};
 const BESIDE: [f64; 2] = [0.012, -0.02];
 
 /// Three joints with effects that do not depend on the angle of the last.
-fn placed(effects: &[Effect<f64>]) -> Experiment<3> {
+pub fn placed(effects: &[Effect<f64>]) -> Experiment<3> {
     let mut experiment = smooth(1.0);
     experiment.setup.placement = BESIDE;
     experiment.effects = effects.to_vec();

@@ -328,6 +328,16 @@ fn what_rapier_cannot_do_is_refused() {
         "the rapier engine cannot simulate a first joint that moves with its angle"
     );
 
+    let mut heaving = smooth(0.1);
+    heaving
+        .effects
+        .push(Effect::new(Kind::ShoulderHeave, 0).with(&[0.01, 0.02]));
+    let refused = simulate_with(Engine::Rapier, &heaving);
+    assert_eq!(
+        refused.expect_err("a heaving base").to_string(),
+        "the rapier engine cannot simulate a first joint that heaves"
+    );
+
     let mut point_mass = free_swing();
     point_mass.setup.segments[1].inertia = 0.0;
     run(&point_mass);
