@@ -89,7 +89,7 @@ def test_both_engines_agree_where_nothing_is_hidden(world: Any, who: Any) -> Non
 
 
 KINDS = ["viscous", "coulomb", "elastic", "quadratic_drag", "cubic_elastic", "relaxation", "constant_moment", "biarticular"]
-KINDS += ["motor_inertia", "added_mass", "gravity_tilt", "contact_compliance", "stretch_reflex"]
+KINDS += ["motor_inertia", "added_mass", "gravity_tilt", "shoulder_heave", "contact_compliance", "stretch_reflex"]
 
 LEFT = {"coulomb": 0.2, "stretch_reflex": 0.02}
 """Largest part that may be left, for kinds with another one than the rest."""

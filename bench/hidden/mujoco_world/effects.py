@@ -46,6 +46,7 @@ SIZES: dict[str, tuple[tuple[tuple[float, float], ...], tuple[tuple[float, float
     "motor_inertia": (((0.15, 0.3), (0.05, 0.1), (0.008, 0.016)), ((0.05, 0.08), (0.015, 0.025), (0.003, 0.005))),
     "added_mass": (((0.4, 0.8),), ((0.2, 0.3),)),
     "gravity_tilt": (((0.06, 0.12),), ((0.025, 0.04),)),
+    "shoulder_heave": (((0.004, 0.012),), ((0.0015, 0.003),)),
     "contact_compliance": (((7e-5, 1.8e-4),), ((2.6e-5, 4.4e-5),)),
     "force_bias": (((3.0, 6.0),), ((1.4, 2.2),)),
     "force_drift": (((0.08, 0.2),), ((0.03, 0.05),)),
@@ -59,10 +60,11 @@ FAMILY = {
     **dict.fromkeys(("elastic", "cubic_elastic", "relaxation", "constant_moment", "biarticular"), "elasticity"),
     **dict.fromkeys(("stretch_reflex", "tremor", "voluntary"), "muscle"),
     **dict.fromkeys(("motor_inertia", "added_mass"), "segment"),
+    **dict.fromkeys(("gravity_tilt", "shoulder_heave"), "frame"),
     **dict.fromkeys(("force_bias", "force_drift", "force_gain", "force_misalignment"), "force"),
 }
 OUTSIDE = ("slack_tendon", "tendon_friction")
-FURTHER = ("stretch_reflex", "contact_compliance", "gravity_tilt", "force_bias", "tremor", "biarticular", "quadratic_drag", "relaxation",
+FURTHER = ("stretch_reflex", "contact_compliance", "gravity_tilt", "shoulder_heave", "force_bias", "tremor", "biarticular", "quadratic_drag", "relaxation",
            "voluntary", "force_misalignment", "time_delay")  # fmt: skip
 """Kinds beside the laws of little-known joints: none that a rest angle or a segment within its uncertainty could stand for."""
 
@@ -114,6 +116,10 @@ def _of_rig(kind: str, j: int, size: float, signed: float, at: float, who: Subje
         case "gravity_tilt":
             down = (9.81 * math.sin(signed), -9.81 * math.cos(signed))
             return Hidden(kind, {"angle": (signed, True)}, alter=lambda r: replace(r, gravity=down))
+        case "shoulder_heave":
+            y, hertz, phase = size * within(random, -0.5, 0.5), within(random, 0.15, 0.4), within(random, -1.5, 1.5)
+            parameters = {"y": (y, True), "z": (size, True), "frequency": (hertz, True), "phase": (phase, True)}
+            return Hidden(kind, parameters, alter=lambda r: replace(r, heave=(y, size, hertz, phase)))
         case "contact_compliance":
             soft = ((size, size), (size, 0.0), (0.0, size))[int(random.integers(3))]
 
@@ -155,7 +161,13 @@ def _of_muscle(kind: str, j: int, size: float, signed: float, fitted: list[tuple
         case "tremor":
             hertz = within(random, 4.0, 8.0)
             parameters = {"amplitude": (size, False), "frequency": (hertz, True)}
-            return Hidden(kind, parameters, j, motor=lambda r: Tremor(j, size, hertz, (within(r, 0.0, 6.28), within(r, 0.0, 6.28))))
+            same = (within(random, 0.0, 6.28), within(random, 0.0, 6.28))
+            in_phase = bool(random.uniform() < 1 / 3)
+
+            def tremble(r: Random) -> Tremor:
+                return Tremor(j, size, hertz, same if in_phase else (within(r, 0.0, 6.28), within(r, 0.0, 6.28)))
+
+            return Hidden(kind, parameters, j, motor=tremble)
         case "voluntary":
             number, trial = fitted[int(random.integers(len(fitted)))]
             width = within(random, 0.4, 0.9)

@@ -73,6 +73,8 @@ class Rig:
     damping: tuple[float, float] = (25.0, 25.0)
     hand_mass: float = 0.0
     cords: tuple[Cord, ...] = ()
+    heave: tuple[float, float, float, float] = (0.0, 0.0, 0.25, 0.0)
+    """How the shoulder heaves: y and z [m], frequency [Hz], phase when the recording begins [rad]."""
 
     def tip(self, q: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return where the hand ends [m]; `q` of shape (..., n)."""
@@ -191,6 +193,7 @@ def run(rig: Rig, path: np.ndarray, start: Sequence[float], servo: float, grip: 
     lead = round(LEAD_IN / STEP)
     every = round(RECORD / STEP)
     q, force, handle = [], [], []
+    turning = 2.0 * math.pi * rig.heave[2]
     angles, robot = data.qpos[:n].copy(), data.qpos[n : n + 2].copy()
     for k in range(-lead, len(path)):
         goal = path[max(k, 0)] + room
@@ -202,6 +205,10 @@ def run(rig: Rig, path: np.ndarray, start: Sequence[float], servo: float, grip: 
             s = min(1.0, max(0.0, (k * STEP - begin) / SLIP_TIME))
             part = s * s * (3.0 - 2.0 * s)
             model.site_pos[site] = nominal + np.array([part * way[0], 0.0, part * way[1]])
+        # The whole is seen from the shoulder: where that is accelerated, gravity is another one.
+        swing = np.array(rig.heave[:2]) * math.sin(turning * k * STEP + rig.heave[3])
+        goal = goal - swing
+        model.opt.gravity[[0, 2]] = np.array(rig.gravity) + turning**2 * swing
         data.ctrl[:2] = goal
         if torque is not None:
             data.ctrl[2 : 2 + n] = torque(k * STEP, data.qpos[:n], data.qvel[:n])
@@ -217,7 +224,7 @@ def run(rig: Rig, path: np.ndarray, start: Sequence[float], servo: float, grip: 
             # The sensor belongs to the state at the beginning of the step, which the step has left; the angles are taken there too.
             q.append(angles)
             force.append(data.sensordata.copy())
-            handle.append(robot - room)
+            handle.append(robot + swing - room)
         angles, robot = data.qpos[:n].copy(), data.qpos[n : n + 2].copy()
     truth = Truth(np.array(q), np.array(force), np.array(handle))
     if not (np.isfinite(truth.q).all() and np.abs(truth.q).max() < 4.0):

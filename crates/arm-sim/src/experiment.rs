@@ -113,7 +113,8 @@ pub enum Start<const N: usize> {
         /// Joint speeds.
         qd: Joints<f64, N>,
     },
-    /// At rest in the static equilibrium with the handle at its first position, found from angles near it \[rad\].
+    /// At rest in the static equilibrium with the handle at its first position, found from angles near it \[rad\]. On a base that moves the
+    /// joints move as the handle needs.
     Equilibrium {
         /// Where the search starts.
         near: Joints<f64, N>,

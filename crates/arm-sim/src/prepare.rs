@@ -74,7 +74,8 @@ impl<'a, const N: usize> Prepared<'a, N> {
             Start::Equilibrium { near } => {
                 // First near it: no equilibrium need be found of a contact that is refused anyhow.
                 stability::check(model, solver, near)?;
-                (start::equilibrium(model, &input, near)?, Joints::zeros())
+                let q = start::equilibrium(model, &input, near)?;
+                (q, start::following(model, &input, &q))
             }
         };
         stability::check(model, solver, &prepared.start.0)?;

@@ -110,6 +110,21 @@ fn nearest<const N: usize>(
     found
 }
 
+/// Speeds with which an arm on a heaving base keeps its tip at the handle, with the least energy of motion; none where the base stands still.
+pub(crate) fn following<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    q: &Joints<f64, N>,
+) -> Joints<f64, N> {
+    let led = matches!(model.link, Link::Compliant(_) | Link::Rigid);
+    if !(model.heaves && led) || N < 2 {
+        return Joints::zeros();
+    }
+    let terms = model.terms(&Pose::new(q), &Joints::zeros());
+    let constraint = terms.constraint();
+    constraint.response(constraint.force(input.handle.velocity))
+}
+
 /// Whether dry friction can hold what it has to hold.
 fn holds<const N: usize>(
     model: &Model<f64, N>,

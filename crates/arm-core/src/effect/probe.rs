@@ -87,6 +87,13 @@ pub enum Nature {
     Slip,
 }
 
+impl Nature {
+    /// Whether it has a frequency and a phase.
+    pub const fn swings(self) -> bool {
+        matches!(self, Self::Periodic | Self::Rhythm)
+    }
+}
+
 /// A promise of the calibration, see the table `[tolerance]` of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {

@@ -214,7 +214,7 @@ impl Candidate {
         let rest = self.rest.map(|p| (p, whole(p)));
         let share = match effect.kind.probe().nature {
             // A frequency that is a little off is out of step at the end of a trial.
-            Nature::Periodic => 0.0,
+            Nature::Periodic | Nature::Rhythm => 0.0,
             _ => 0.05,
         };
         let shapes = rest.iter().chain(&self.refined).map(|&(p, limits)| {

@@ -23,7 +23,7 @@ pub struct Library {
 impl Library {
     /// Asks the whole catalogue, linearised at an anchor.
     ///
-    /// * `periodic` - frequency \[Hz\] and phase \[rad\] of a periodic residual of the handle, where there is one
+    /// * `periodic` - frequency \[Hz\] and phase \[rad\] of what swings in phase in all trials, where there is something
     ///
     /// # Errors
     /// As [`PreparedSession::responses`].
@@ -48,7 +48,7 @@ impl Library {
         Self::of(prepared, point, here, &[])
     }
 
-    /// Asks what is periodic alone, in waves of the given frequencies \[Hz\] and phases \[rad\].
+    /// Asks what swings alone, in waves of the given frequencies \[Hz\] and phases \[rad\].
     ///
     /// # Errors
     /// As [`PreparedSession::responses`].
@@ -57,8 +57,8 @@ impl Library {
         point: &LinearizationPoint<N>,
         waves: &[[f64; 2]],
     ) -> Result<Self, GapError> {
-        let periodic = |kind: Kind, _| kind.probe().nature == Nature::Periodic;
-        Self::of(prepared, point, periodic, waves)
+        let swings = |kind: Kind, _| kind.probe().nature.swings();
+        Self::of(prepared, point, swings, waves)
     }
 
     fn of<const N: usize>(
@@ -79,7 +79,7 @@ impl Library {
                     hypothesis.share_rest(&mut plain);
                     let mut own = ask(prepared.session, &motions, plain, asked, waves);
                     // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
-                    if !prepared.repeated && kind.probe().nature != Nature::Periodic {
+                    if !prepared.repeated && !kind.probe().nature.swings() {
                         own.iter_mut().for_each(|c| c.keep_shapes(asked.1));
                     }
                     candidates.extend(own);
@@ -213,15 +213,15 @@ fn ask<const N: usize>(
     waves: &[[f64; 2]],
 ) -> Vec<Candidate> {
     let nature = plain.kind.probe().nature;
-    if matches!(nature, Nature::Rhythm | Nature::Burst | Nature::Slip) {
+    if matches!(nature, Nature::Burst | Nature::Slip) {
         return Vec::new();
     }
     for &p in question.free {
         plain.parameters[p] = 0.0;
     }
     let mut shapes = vec![plain];
-    if nature == Nature::Periodic {
-        // A kind that is periodic refines its frequency and its phase.
+    if nature.swings() {
+        // A kind that swings refines its frequency and its phase.
         let shape = |wave: &[f64; 2]| {
             let mut shape = plain;
             for (&p, value) in question.refined.iter().zip(wave) {

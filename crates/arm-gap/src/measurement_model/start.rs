@@ -81,10 +81,10 @@ impl<const N: usize> Session<N> {
         }
         let holding = (0..N).map(|j| Effect::new(Kind::ConstantMoment, j).with(&[friction[j]]));
         resting.effects.extend(holding);
-        let q = Joints::from_column_slice(&simulate(&resting)?.q[..N]);
+        let begun = simulate(&resting)?;
         Ok(Start::Given {
-            q,
-            qd: Joints::zeros(),
+            q: Joints::from_column_slice(&begun.q[..N]),
+            qd: Joints::from_column_slice(&begun.qd[..N]),
         })
     }
 }

@@ -55,7 +55,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         state = self.with_base_reconsidered(state, None, progress)?;
         if led {
             state = self.rhythm_asked_again(state, &mut apart, progress)?;
-            state = self.rhythm_of_the_robot(state, &mut apart, progress)?;
+            state = self.rhythm_in_phase(state, &mut apart, progress)?;
         }
         state = self.disturbances_asked_again(state, &mut apart)?;
         let (state, named) = self.judged_in_turns(state, apart.periodic, progress)?;

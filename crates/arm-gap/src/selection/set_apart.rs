@@ -19,7 +19,7 @@ const DISTURBANCES: usize = 4;
 pub(crate) struct SetApart<const N: usize> {
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
-    /// Frequency \[Hz\] and phase \[rad\] of a slow ripple of the robot, which is asked like other effects.
+    /// Frequency \[Hz\] and phase \[rad\] of what swings slowly and in phase in all trials, which is asked like other effects.
     pub periodic: Option<[f64; 2]>,
     /// The courses as they were measured.
     pub measured: Vec<Arc<Course<N>>>,
@@ -84,22 +84,28 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// Looks for a ripple of the robot in what is left, and searches once more beside it.
-    pub(crate) fn rhythm_of_the_robot(
+    /// Looks for what swings in phase in all trials, which repeats do not differ by, in what is left, and searches once more beside it.
+    pub(crate) fn rhythm_in_phase(
         &mut self,
         state: SearchState<'a, N>,
         apart: &mut SetApart<N>,
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
-        let found = self.rhythm(&state.point, Line::OfTheRobot)?.filter(|f| {
-            (f.locked || f.wave()[0] > SLOW)
-                && f.gain > state.least(&f.effect)
-                // What is left of a rhythm that was taken out has its frequency.
-                && !apart.trial_specific.iter().any(|a| a.swings_with(f))
-        });
+        let mut found = None;
+        for line in [Line::OfTheRobot, Line::InPhase] {
+            let is_new = |f: &TrialSpecific| {
+                f.gain > state.least(&f.effect)
+                    && (f.locked || line == Line::OfTheRobot && f.wave()[0] > SLOW)
+                    // What is left of a rhythm that was taken out has its frequency.
+                    && !apart.trial_specific.iter().any(|a| a.swings_with(f))
+            };
+            if found.is_none() {
+                found = self.rhythm(&state.point, line)?.filter(is_new);
+            }
+        }
         apart.periodic = match &found {
             Some(found) => Some(found.wave()).filter(|[frequency, _]| *frequency < SLOW),
-            None => self.slow_ripple((&state.current, &state.point), state.scale),
+            None => self.in_phase((&state.current, &state.point), state.scale),
         };
         if found.is_none() && apart.periodic.is_none() {
             return Ok(state);

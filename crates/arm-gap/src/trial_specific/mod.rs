@@ -4,6 +4,6 @@ pub mod component;
 pub(crate) mod contact_identification;
 pub mod disturbance;
 mod disturbance_shape;
-pub mod slow_ripple;
+pub mod in_phase;
 mod spectral_line;
 pub mod tremor_detection;

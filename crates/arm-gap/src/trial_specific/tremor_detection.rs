@@ -24,12 +24,14 @@ pub enum Line {
     BetweenRepeats,
     /// Where tip and handle come apart: only the robot can be behind it.
     OfTheRobot,
+    /// In all that is left: what has the same phase in every trial, which repeats do not differ by.
+    InPhase,
 }
 
 /// Slowest rhythm of muscles \[Hz\]: below it movements have power of their own.
 const SLOWEST_RHYTHM: f64 = 2.0;
 /// Slowest ripple of the robot \[Hz\].
-pub(crate) const SLOWEST_RIPPLE: f64 = 0.4;
+const SLOWEST_RIPPLE: f64 = 0.4;
 /// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
 const FASTEST_RIPPLE: f64 = 8.0;
 /// Gain in units of twice the log-likelihood below which a line is no rhythm: many frequencies and channels were looked at.
@@ -71,12 +73,14 @@ impl<const N: usize> PreparedSession<'_, N> {
                     .map(|(residual, &trial)| self.closure(residual, trial, &rig.contact))
                     .collect()
             }
+            Line::InPhase => residuals.clone(),
         };
         let all: Vec<&Channels> = told.iter().collect();
         // A robot mostly starts its movements in the same phase of what shakes it.
         let (lowest, sums) = match place {
             Line::BetweenRepeats => (SLOWEST_RHYTHM, &[Sum::Powers][..]),
             Line::OfTheRobot => (SLOWEST_RIPPLE, &[Sum::Swings, Sum::Powers][..]),
+            Line::InPhase => (SLOWEST_RHYTHM, &[Sum::Swings][..]),
         };
         let lines = sums.iter().filter_map(|sum| line(&all, rate, lowest, *sum));
         let named = |frequency: f64| self.swinging_at(frequency, place, (point, &residuals));

@@ -1,5 +1,5 @@
-//! A slow ripple of the robot: movements have power of their own where it swings, so that it is no line in a spectrum; but it keeps
-//! its phase from trial to trial, and is asked as other effects are, frequency by frequency.
+//! What swings slowly and in phase in all trials: the robot, the shoulder, a muscle. Movements have power of their own where it swings, so that
+//! it is no line in a spectrum; it is asked as other effects are, frequency by frequency.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -8,38 +8,41 @@ use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
 use crate::selection::score_test::ScoreTest;
 use crate::sensitivity::linearization_point::LinearizationPoint;
-use crate::trial_specific::component::SLOW;
-use crate::trial_specific::tremor_detection::{SLOWEST_RIPPLE, UNSTEADY};
+use crate::trial_specific::component::{SLOW, shapes_of};
+use crate::trial_specific::tremor_detection::UNSTEADY;
 
+/// Slowest frequency that is asked \[Hz\]: nobody breathes more slowly.
+const SLOWEST: f64 = 0.1;
+/// Turns of the phase over the longest trial that must be there: fewer are a drift.
+const LEAST_TURNS: f64 = 1.5;
 /// Turns of the phase, over the longest trial, between two frequencies that are asked.
 const TURNS: f64 = 0.7;
 /// Most frequencies that are asked: of trials so long that these are not enough a line in the spectrum tells as much.
 const MOST: usize = 120;
 /// Frequencies asked at a time: products of all their columns are kept.
-const AT_ONCE: usize = 24;
+const AT_ONCE: usize = 8;
 /// Frequencies asked to either side of the best one, and between it and the next.
 const CLOSER: i32 = 5;
 
 impl<const N: usize> PreparedSession<'_, N> {
-    /// Frequency \[Hz\] and phase \[rad\] of a slow ripple of the robot that is plain in all movements together, and alike in each;
-    /// `None` where there is none, trials are too long for it, or what was fitted cannot be followed a little further.
+    /// Frequency \[Hz\] and phase \[rad\] of what swings slowly, is plain in all movements together, and alike in each; `None` where there
+    /// is nothing, trials are too long for it, or what was fitted cannot be followed a little further.
     ///
     /// * `scale` - misfit for each degree of freedom
-    pub fn slow_ripple(
+    pub fn in_phase(
         &self,
         (fitted, point): (&Fitted<N>, &LinearizationPoint<N>),
         scale: f64,
     ) -> Option<[f64; 2]> {
         let longest = |&t: &usize| self.courses[t].seen[0].len() as f64 / self.courses[t].rate;
         let longest = self.references.iter().map(longest).fold(1.0, f64::max);
+        let slowest = f64::max(SLOWEST, LEAST_TURNS / longest);
         let step = TURNS / longest;
-        let count = libm::ceil((SLOW - SLOWEST_RIPPLE) / step) as usize + 1;
+        let count = libm::ceil((SLOW - slowest) / step) as usize + 1;
         if !self.repeated || count > MOST {
             return None;
         }
-        let coarse: Vec<f64> = (0..count)
-            .map(|k| SLOWEST_RIPPLE + step * k as f64)
-            .collect();
+        let coarse: Vec<f64> = (0..count).map(|k| slowest + step * k as f64).collect();
         let mut best: Option<Wave> = None;
         for frequencies in coarse.chunks(AT_ONCE) {
             best = better(best, self.waves_at(frequencies, (fitted, point)));
@@ -49,12 +52,17 @@ impl<const N: usize> PreparedSession<'_, N> {
         let closer: Vec<f64> = (-CLOSER..=CLOSER).map(closer).collect();
         let (_, wave) = better(best, self.waves_at(&closer, (fitted, point)))?;
         let (library, score_test) = self.scanned(&[wave], (fitted, point))?;
-        let choice = score_test.evaluate(&[0])?;
-        let tried = 2.0 * libm::log(count as f64) + self.price_of_shapes(&library.candidates);
-        let worth =
-            choice.gain / scale.max(1.0) - score_test.spread[0] * score_test.price[0] - tried;
-        let steady = score_test.unlike[0] < UNSTEADY * choice.gain;
-        (worth > 0.0 && steady).then_some(wave)
+        let is_plain = |c: usize| {
+            let Some(choice) = score_test.evaluate(&[c]) else {
+                return false;
+            };
+            let tried =
+                2.0 * libm::log(count as f64) + self.price_of_shapes(&library.candidates[c..=c]);
+            let worth =
+                choice.gain / scale.max(1.0) - score_test.spread[c] * score_test.price[c] - tried;
+            worth > 0.0 && score_test.unlike[c] < UNSTEADY * choice.gain
+        };
+        (0..score_test.len()).any(is_plain).then_some(wave)
     }
 
     fn scanned(
@@ -64,11 +72,10 @@ impl<const N: usize> PreparedSession<'_, N> {
     ) -> Option<(Library, ScoreTest)> {
         let library = Library::of_waves(self, point, waves).ok()?;
         let score_test = ScoreTest::new(self, fitted, point, &library).ok()?;
-        // One that cannot be asked is missing, and the others no longer stand in their places.
-        (library.candidates.len() == waves.len()).then_some((library, score_test))
+        Some((library, score_test))
     }
 
-    /// The frequency that explains most, with any phase and in both axes: its gain, and frequency and phase.
+    /// What explains most at one of some frequencies, with any phase and in both axes: its gain, and frequency and phase.
     fn waves_at(
         &self,
         frequencies: &[f64],
@@ -78,13 +85,22 @@ impl<const N: usize> PreparedSession<'_, N> {
             .iter()
             .flat_map(|&f| [[f, 0.0], [f, FRAC_PI_2]])
             .collect();
-        let (_, score_test) = self.scanned(&waves, (fitted, point))?;
-        let wave = |(k, &frequency): (usize, &f64)| {
-            let choice = score_test.evaluate(&[2 * k, 2 * k + 1])?;
+        let (library, score_test) = self.scanned(&waves, (fitted, point))?;
+        let of = |c: usize| {
+            let effect = &library.candidates[c].effect;
+            let [frequency, phase] = shapes_of(effect.kind).map(|p| effect.parameters[p]);
+            (effect.kind, effect.index, frequency, phase)
+        };
+        let wave = |sine: usize| {
+            let ((kind, index, frequency, _), cosine) = (of(sine), sine + 1);
+            if of(cosine) != (kind, index, frequency, FRAC_PI_2) {
+                return None;
+            }
+            let choice = score_test.evaluate(&[sine, cosine])?;
             let phase = common_phase(&choice.coefficients[0], &choice.coefficients[1]);
             Some((choice.gain, [frequency, phase]))
         };
-        let all = frequencies.iter().enumerate().map(wave);
+        let all = (1..score_test.len()).map(|cosine| wave(cosine - 1));
         all.fold(None, better)
     }
 }
