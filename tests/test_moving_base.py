@@ -118,11 +118,88 @@ def test_the_columns_are_written_read_and_warned_of(tmp_path: Path, capsys: pyte
     assert "the trunk, moves by" in capsys.readouterr().out
 
 
+HEAVE = (0.01, -0.03, 0.31)
+"""Amplitudes [m] and frequency [Hz]."""
+
+
+STEP = 4e-4
+"""Of MuJoCo [s]."""
+CARRIED = 1e6
+"""Mass of the base [kg], so large that the arm does not move it."""
+ROBOT = armrs.Robot((0.45, 0.45), (1.05, -0.10))
+
+
+def heaving(number: int, role: str) -> Trial:
+    """Return a trial of an arm on springs of 4 kN/m in MuJoCo, on a base that heaves along a measured path."""
+    world = mujoco.MjModel.from_xml_string(WORLD)
+    world.opt.timestep, world.opt.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    world.dof_damping[2:], world.body_mass[1] = VISCOSITY, CARRIED
+    data, site = mujoco.MjData(world), world.site("hand").id
+    time = np.arange(-5000, 20_000) * STEP
+    way = np.clip(time / 6.0, 0.0, 1.0)
+    turn = np.sin(2.0 * np.pi * way**3 * (10.0 - 15.0 * way + 6.0 * way**2))
+    angles = np.column_stack([-0.9 + 0.2 * turn * (1 + number % 2), 1.3 - 0.3 * turn])
+    handle = armrs.Arm.from_model(MODEL).forward_kinematics(angles)[:, :2]
+    speed = np.gradient(handle, STEP, axis=0)
+    omega, amplitude = 2.0 * np.pi * HEAVE[2], np.array(HEAVE[:2])
+    swing = np.sin(omega * time + 0.7 * number)[:, None] * amplitude
+    swinging = omega * np.cos(omega * time + 0.7 * number)[:, None] * amplitude
+    rows, jacobian = [], np.zeros((3, 4))
+    data.qpos[2:] = angles[0]
+    for k in range(len(time)):
+        data.qpos[:2], data.qvel[:2] = swing[k], swinging[k]
+        mujoco.mj_fwdPosition(world, data)
+        mujoco.mj_jacSite(world, data, jacobian, None, site)
+        force = 4000.0 * (handle[k] - data.site_xpos[site][1:]) + 30.0 * (speed[k] - (jacobian @ data.qvel)[1:])
+        if time[k] >= 0.0 and k % 25 == 0:
+            rows.append([time[k], *data.qpos[2:], *force, *data.qpos[:2], *handle[k]])
+        data.qfrc_applied[:] = jacobian[1:].T @ force
+        data.qfrc_applied[:2] = CARRIED * (-(omega**2) * swing[k] + [0.0, 9.81])
+        mujoco.mj_step(world, data)
+    table = np.array(rows)
+    noise = np.random.default_rng(number).standard_normal((len(table), 6)) * [4e-4, 4e-4, 0.05, 0.05, 2e-4, 2e-4]
+    y, z = (table[:, 7:9] - ROBOT.base).T
+    bend = np.arccos((y**2 + z**2 - 0.405) / 0.405)
+    first = np.arctan2(z, y) - np.arctan2(0.45 * np.sin(bend), 0.45 + 0.45 * np.cos(bend))
+    seen = table[:, 1:7] + noise
+    return Trial(
+        f"trials/m{number % 2}_{number}.csv", f"m{number % 2}", number + 1, role, table[:, 0], seen[:, :2], force_on_arm=seen[:, 2:4],
+        robot_q=np.column_stack([first, bend]), base=seen[:, 4:],
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def led() -> Dataset:
+    """Two movements, three times each to fit and once to test, of an arm of which all is known but the viscosity of its joints."""
+    model = MODEL.replace(robot=ROBOT, contact=armrs.Contact(stiffness=(4000.0, 4000.0), damping=(30.0, 30.0)), segment_uncertainty=0.02)
+    trials = tuple(heaving(k, "fit" if k < 6 else "test") for k in range(8))
+    return Dataset("heaving", model, trials)
+
+
+def test_a_led_arm_follows_the_path(led: Dataset) -> None:
+    """The closed chain is simulated on the base as it moves: MuJoCo's arm within what its sensors scatter."""
+    joints = tuple(j.replace(viscosity=v) for j, v in zip(MODEL.joints, VISCOSITY, strict=True))
+    model, drive = led.model.replace(joints=joints), led.trials[0]
+    off, blind = (
+        np.column_stack([run.q - drive.q[: len(run.q)], run.force_on_arm - drive.force_on_arm[: len(run.q)]]).std(axis=0)  # type: ignore[index]
+        for run in (armrs.simulate(model, d, rate=100.0) for d in (drive, dataclasses.replace(drive, base=None)))
+    )
+    assert (off[:2] < 6e-4).all() and (off[2:] < 0.08).all()
+    assert (blind[:2] > 10.0 * off[:2]).all()
+
+
+def test_the_gap_is_asked_on_the_base_as_it_moves(led: Dataset) -> None:
+    found = armrs.find_gap(led, separate=False)
+    assert sorted((e.kind, e.joint) for e in found.effects) == [("viscous", 1), ("viscous", 2)]
+    assert found.verdict == "explained"
+    for e in found.effects:
+        value = e.parameters["viscosity"]
+        assert value.interval[0] <= VISCOSITY[e.joint - 1] <= value.interval[1]
+
+
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda d: armrs.find_gap(d),
-        lambda d: armrs.simulate(d.model, d.trials[0]),
         lambda d: armrs.identify(d, method="cascade"),
         lambda d: armrs.identify(d, motion="simulated"),
     ],

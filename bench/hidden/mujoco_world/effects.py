@@ -64,8 +64,8 @@ FAMILY = {
     **dict.fromkeys(("force_bias", "force_drift", "force_gain", "force_misalignment"), "force"),
 }
 OUTSIDE = ("slack_tendon", "tendon_friction")
-FURTHER = ("stretch_reflex", "contact_compliance", "gravity_tilt", "shoulder_heave", "force_bias", "tremor", "biarticular", "quadratic_drag", "relaxation",
-           "voluntary", "force_misalignment", "time_delay")  # fmt: skip
+FURTHER = ("stretch_reflex", "contact_compliance", "gravity_tilt", "shoulder_heave", "force_bias", "tremor", "biarticular",
+           "quadratic_drag", "relaxation", "voluntary", "force_misalignment", "time_delay")  # fmt: skip
 """Kinds beside the laws of little-known joints: none that a rest angle or a segment within its uncertainty could stand for."""
 
 
@@ -161,11 +161,11 @@ def _of_muscle(kind: str, j: int, size: float, signed: float, fitted: list[tuple
         case "tremor":
             hertz = within(random, 4.0, 8.0)
             parameters = {"amplitude": (size, False), "frequency": (hertz, True)}
-            same = (within(random, 0.0, 6.28), within(random, 0.0, 6.28))
-            in_phase = bool(random.uniform() < 1 / 3)
+            same, in_phase = within(random, 0.0, 6.28), bool(random.uniform() < 1 / 3)
 
             def tremble(r: Random) -> Tremor:
-                return Tremor(j, size, hertz, same if in_phase else (within(r, 0.0, 6.28), within(r, 0.0, 6.28)))
+                own, swell = within(r, 0.0, 6.28), within(r, 0.0, 6.28)
+                return Tremor(j, size, hertz, (same if in_phase else own, swell))
 
             return Hidden(kind, parameters, j, motor=tremble)
         case "voluntary":

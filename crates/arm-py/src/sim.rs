@@ -30,6 +30,8 @@ pub struct Driven<'py> {
     acceleration: f64,
     pause: f64,
     rigid: bool,
+    /// How far the first joint is from its place at the times [m].
+    base: Option<PyReadonlyArray2<'py, f64>>,
 }
 
 /// Numerical settings, a Python `CoreRun`.
@@ -178,6 +180,7 @@ pub fn experiment<const N: usize>(
     drive: &Driven<'_>,
     settings: &Settings,
 ) -> PyResult<Experiment<N>> {
+    let base = base_path(drive)?;
     let (drive, first, natural) = driven(chain, rig, drive)?;
     // A whole number of recorded samples: not beyond the last sample of a drive, and up to the end of a movement.
     let whole = |d: f64| {
@@ -203,6 +206,7 @@ pub fn experiment<const N: usize>(
     let mut experiment = Experiment::new(rig.setup(chain), drive, duration);
     experiment.effects = rig.effects.clone();
     experiment.robot = rig.robot;
+    experiment.base = base;
     experiment.dt = settings.dt;
     experiment.output_interval = settings.output_interval;
     experiment.integrator = match settings.integrator.as_str() {
@@ -232,6 +236,16 @@ pub fn experiment<const N: usize>(
         },
     };
     Ok(experiment)
+}
+
+/// The measured path of the base, where there is one.
+fn base_path(drive: &Driven<'_>) -> PyResult<Option<Series<2>>> {
+    let (Some(base), Some(times)) = (&drive.base, &drive.times) else {
+        return Ok(None);
+    };
+    let (times, points) = (times.as_array().to_vec(), rows("path of the base", base)?);
+    let series = Series::new("path of the base", &times, &points, Interpolation::Cubic);
+    Ok(Some(series.map_err(simulation)?))
 }
 
 /// How long a drive lasts of itself [s].

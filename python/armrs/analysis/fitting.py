@@ -120,7 +120,7 @@ def fit_by_simulation(
         "force_noise": force_noise,
     }
     limits = [(effect, parameter, float(low), float(high)) for (effect, parameter, *_), (low, high) in zip(places, bounds, strict=True)]
-    found = _armrs.fit_by_simulation(_armrs.Rig(model), driven(drive, "compliant"), settings, recorded, limits)
+    found = _armrs.fit_by_simulation(_armrs.Rig(model), driven(model, drive, "compliant"), settings, recorded, limits)
     for (index, parameter, *_), value in zip(places, found.values, strict=True):
         effect = effects[index]
         key = catalogue()[effect.kind].parameters[parameter].name

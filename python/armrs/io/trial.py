@@ -185,12 +185,12 @@ class Trial:
 
 
 def refuse_moving_base(trials: Sequence[Trial]) -> None:
-    """Refuse a measured path of the first joint: whatever simulates the arm, or runs on a device, has it at rest."""
+    """Refuse a measured path of the first joint: the cascade, a fit along simulated motion and a device have it at rest."""
     for trial in trials:
         if trial.base is not None:
             found, allowed = (
                 Text("a first joint that moves"),
-                "none: identify, passive and spasticity alone follow a first joint that moves",
+                "none: identify (along measured motion), gap, simulate, passive and spasticity alone follow a first joint that moves",
             )
             raise BadInput("columns by, bz", found, allowed, file=trial.file)
 

@@ -247,7 +247,7 @@ class _Session:
             "fault": None if fault is None else _injected(fault),
             "seed": seed,
         }
-        return _armrs.control(_armrs.Rig(model), driven(movement, "compliant"), run, watch)
+        return _armrs.control(_armrs.Rig(model), driven(model, movement, "compliant"), run, watch)
 
     def _read(self, run: Run, repeat: int, true: Simulated, state: tuple[np.random.Generator, dict[str, Any]]) -> _Seen:
         """Let every device read the run."""

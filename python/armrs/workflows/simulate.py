@@ -16,7 +16,7 @@ from .. import _armrs, checks
 from .._armrs import Readings as Readings
 from .._armrs import Recording as Recording
 from ..errors import BadInput, SimulationError, Text
-from ..io.trial import Trial, refuse_moving_base
+from ..io.trial import Trial
 from ..model import Model, load_model
 from ..tabular import Labelled, Series, Tabular, Tidy
 from ..telling import telling
@@ -420,8 +420,6 @@ def _asked(
     checks.choice("engine", engine, ("native", "rapier"))
     integrator = _integrator(integrator, engine)
     checks.instance("drive", drive, Movement, Trial, type(None))
-    if isinstance(drive, Trial):
-        refuse_moving_base([drive])
     checks.number("dt", dt, above=0.0, unit="s")
     checks.number("rate", rate, above=0.0, unit="Hz")
     steps = 1.0 / (rate * dt)
@@ -431,7 +429,7 @@ def _asked(
         raise BadInput("dt, rate", _clock(dt, rate), f"a whole number of steps from sample to sample, not {steps:.6g}")
     if duration is not None:
         _check_duration(duration, dt, rate)
-    led = driven(drive, coupling)
+    led = driven(model, drive, coupling)
     if duration is not None and led.times is not None and duration > led.times[-1] + 1e-6 * dt:
         raise BadInput("duration", duration, f"at most {led.times[-1]:.10g} s, the length of the trial")
     if duration is None and led.times is not None and rate * led.times[-1] < 1.0:
@@ -507,6 +505,8 @@ class CoreDrive:
     speed: float = 0.0
     acceleration: float = 0.0
     pause: float = 0.0
+    base: np.ndarray | None = None
+    """How far the first joint is from the model's base at the times [m]."""
 
 
 @dataclass(frozen=True)
@@ -522,7 +522,16 @@ class CoreRun:
     qd: list[float] | None = None
 
 
-def driven(drive: Movement | Trial | None, coupling: str) -> CoreDrive:
+BASE_BAND = 5.0
+"""Band of a measured path of the first joint [Hz], as in `gap`: what is faster would be noise in its acceleration."""
+
+
+def _displacement(model: Model, path: np.ndarray, rate: float) -> np.ndarray:
+    """Return how far a measured path of the first joint is from the base of the model [m], low-passed."""
+    return _armrs.low_pass_both_ways(path - np.asarray(model.base), rate, min(BASE_BAND, 0.2 * rate), 4)
+
+
+def driven(model: Model, drive: Movement | Trial | None, coupling: str) -> CoreDrive:
     """Return a drive as the core takes it."""
     rigid = coupling == "rigid"
     if isinstance(drive, Movement):
@@ -532,12 +541,18 @@ def driven(drive: Movement | Trial | None, coupling: str) -> CoreDrive:
         if values is None:
             raise BadInput("columns", "neither robot angles nor joint torques", "qr1_rad and qr2_rad, or tau1_Nm …", file=drive.file)
         there = np.isfinite(values).all(axis=1)
+        if drive.base is not None:
+            there &= np.isfinite(drive.base).all(axis=1)
         upto = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
         if not there[:upto].all() or not upto:
             lost = float(drive.t[int(np.argmin(there))])
             what = "robot angles" if kind == "robot" else "joint torques"
+            if drive.base is not None:
+                what = f"{what} or path of the first joint"
             raise BadInput(what, Text(f"none at {lost:g} s"), "samples without a gap: they drive the arm", file=drive.file)
-        return CoreDrive(kind, rigid, np.array(values[:upto]), np.array(drive.t[:upto] - drive.t[0]))
+        times = np.array(drive.t[:upto] - drive.t[0])
+        base = None if drive.base is None else _displacement(model, drive.base[:upto], drive.rate)
+        return CoreDrive(kind, rigid, np.array(values[:upto]), times, base=base)
     return CoreDrive("free", rigid)
 
 

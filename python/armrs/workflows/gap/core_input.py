@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ... import _armrs, checks
 from ...io.dataset import Dataset, refuse_other_arms
-from ...io.trial import Trial, refuse_moving_base
+from ...io.trial import Trial
 from ...model import Model, Tolerance
 from ..identify import bridged
 
@@ -42,7 +42,6 @@ class SearchSettings:
 def core_trials(dataset: Dataset) -> list[Trial]:
     """Return the trials for the core."""
     refuse_other_arms(dataset)
-    refuse_moving_base(dataset.trials)
     return [bridged(t) for t in dataset.trials]
 
 
