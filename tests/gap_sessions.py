@@ -17,8 +17,8 @@ def model(*effects: armrs.Effect) -> armrs.Model:
     return armrs.Model(segments, joints, segment_uncertainty=0.02, robot=ROBOT, contact=contact, effects=effects)
 
 
-def session(*hidden: armrs.Effect, seed: int = 0) -> Dataset:
-    """Return a session that the rapier engine makes: two movements, three repeats to fit and one to test of each."""
+def session(*hidden: armrs.Effect, seed: int = 0, engine: str = "rapier") -> Dataset:
+    """Return a session that an engine makes: two movements, three repeats to fit and one to test of each."""
     movements = {
         "slow": armrs.Movement(np.radians([[-60, 50], [-30, 50], [-30, 85], [-60, 50]]), speed=0.4, acceleration=1.6, shape="smooth"),
         "fast": armrs.Movement(np.radians([[-50, 80], [-20, 40], [-50, 80]]), speed=1.0, acceleration=4.0, shape="smooth"),
@@ -27,7 +27,7 @@ def session(*hidden: armrs.Effect, seed: int = 0) -> Dataset:
     trials = []
     for number, (name, movement) in enumerate(movements.items()):
         run = armrs.simulate(
-            model(*hidden), movement, engine="rapier", rate=100.0, sensors=sensors, seeds=range(seed + 4 * number, seed + 4 * number + 4)
+            model(*hidden), movement, engine=engine, rate=100.0, sensors=sensors, seeds=range(seed + 4 * number, seed + 4 * number + 4)
         )
         for repeat, read in enumerate(run.readings, start=1):
             trials.append(

@@ -158,6 +158,33 @@ def test_a_slow_ripple_below_the_noise_is_seen_in_all_trials_together() -> None:
     assert values["y"].value == pytest.approx(8e-5, abs=2.5e-5)
 
 
+@pytest.mark.parametrize(
+    ("engine", "kind", "joint", "parameters"),
+    [
+        # A muscle may tremble slowly, or too fast for the band that is compared.
+        ("rapier", "tremor", 2, {"amplitude": 0.08, "frequency": 1.3, "phase": 0.7}),
+        ("rapier", "tremor", 1, {"amplitude": 0.15, "frequency": 6.1, "phase": 0.7}),
+        # The rapier engine cannot.
+        ("native", "shoulder_heave", None, {"y": 1e-3, "z": 3e-3, "frequency": 0.31, "phase": 0.7}),
+    ],
+)
+def test_what_swings_with_the_same_phase_in_every_trial_is_seen(
+    engine: str, kind: str, joint: int | None, parameters: dict[str, float]
+) -> None:
+    result = armrs.find_gap(session(armrs.Effect(kind, joint, parameters=parameters), engine=engine), threads=2, separate=False)
+    assert [(e.kind, e.joint) for e in result.effects] == [(kind, joint)]
+    assert result.verdict == "explained"
+    found = {name: value.value for name, value in result.effects[0].parameters.items()}
+
+    def turned(wave: dict[str, float]) -> float:
+        # In the middle of the trials: at their start a phase is as uncertain as the frequency makes it.
+        return 2.0 * np.pi * wave["frequency"] * 2.0 + wave["phase"]
+
+    assert np.cos(turned(found) - turned(parameters)) > 0.99
+    for name, value in parameters.items():
+        assert name == "phase" or found[name] == pytest.approx(value, rel=0.1), name
+
+
 def test_a_rhythm_that_a_strong_effect_hides_is_seen_once_that_is_named() -> None:
     spring = armrs.Effect("elastic", 1, parameters={"stiffness": 4.0, "rest": -0.3})
     tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.1, "frequency": 4.4})

@@ -22,7 +22,7 @@ use arm_numerics::signal::spectrum::{Sum, line};
 pub enum Line {
     /// In what repeats differ by, where the model's own errors cancel: a rhythm of muscles has another phase in every trial.
     BetweenRepeats,
-    /// Where tip and handle come apart: only the robot can be behind it.
+    /// Where tip and handle come apart: the robot is behind it, or a muscle that starts with every trial.
     OfTheRobot,
     /// In all that is left: what has the same phase in every trial, which repeats do not differ by.
     InPhase,
@@ -83,7 +83,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             Line::InPhase => (SLOWEST_RHYTHM, &[Sum::Swings][..]),
         };
         let lines = sums.iter().filter_map(|sum| line(&all, rate, lowest, *sum));
-        let named = |frequency: f64| self.swinging_at(frequency, place, (point, &residuals));
+        let named = |frequency: f64| self.swinging_at(frequency, (point, &residuals));
         Ok(lines.filter_map(named).next())
     }
 
@@ -91,14 +91,10 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn swinging_at(
         &self,
         frequency: f64,
-        place: Line,
         (point, residuals): (&LinearizationPoint<N>, &[Channels]),
     ) -> Option<TrialSpecific> {
         let mut best: Vec<(f64, Explained)> = Vec::new();
         for columns in self.swings(frequency) {
-            if place == Line::OfTheRobot && columns[0].kind.probe().nature != Nature::Periodic {
-                continue;
-            }
             let answers = self.answers(point, frequency, &columns);
             if let Some(explained) = self.explain(residuals, frequency, (&columns, &answers)) {
                 let worth = explained.gain - 8.0 * columns.len() as f64;
