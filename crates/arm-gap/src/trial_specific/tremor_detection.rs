@@ -230,7 +230,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         list
     }
 
-    /// A rhythm with the size that simulated runs give it: what it shows to first order on a coarse grid is off by as much as
+    /// A rhythm with the size and phase that simulated runs give it: what it shows to first order on a coarse grid is off by as much as
     /// a tenth where an arm nearly rings with it. `None` where it cannot be simulated.
     ///
     /// Its standard deviation counts how sizes scatter from trial to trial.
@@ -268,7 +268,8 @@ impl<const N: usize> PreparedSession<'_, N> {
         let square = sizes.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>();
         let scatter = libm::sqrt(square / (n * (n - 1.0).max(1.0)));
         let mut effect = trial_specific.effect;
-        for &p in free_of(effect.kind) {
+        let [_, phase] = shapes_of(effect.kind);
+        for &p in free_of(effect.kind).iter().chain([&phase]) {
             let info = &effect.kind.info().parameters[p];
             effect.parameters[p] = explained.effect.parameters[p].clamp(info.min, info.max);
         }
