@@ -23,7 +23,7 @@ def main() -> None:
     text = GUIDE.read_text(encoding="utf-8")
     name, law = re.search(r"^```rust (\S+)\n(.*?)^```", text, flags=re.M | re.S).groups()  # type: ignore[union-attr]
     entry = re.search(r"add `(\w+::\w+,)` to `catalogue!`", text)[1]  # type: ignore[index]
-    line = re.search(r"in `effects.rs`: `(.*),`;", text)[1]  # type: ignore[index]
+    line = re.search(r"in `effects.rs`: `(.*?),` says", text)[1]  # type: ignore[index]
     kind = Path(name).stem
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "armrs"

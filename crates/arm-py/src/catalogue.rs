@@ -31,7 +31,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("parameters", parameters)?;
         entry.set_item("first_joint", if kind.crosses() { 2 } else { 1 })?;
         entry.set_item("family", kind.family().name())?;
-        entry.set_item("searched", !kind.probe().questions.is_empty())?;
+        entry.set_item("searched", !kind.prior().parts.is_empty())?;
         entry.set_item("address", info.place.address())?;
         entry.set_item("own", matches!(kind, Kind::Own(_)))?;
         list.append(entry)?;

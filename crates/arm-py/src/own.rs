@@ -3,9 +3,7 @@
 use std::cell::RefCell;
 use std::sync::{Mutex, PoisonError};
 
-use arm_core::effect::{
-    Info, Kind, MAX_PARAMETERS, Own, Parameter, Place, Probe, Question, Values,
-};
+use arm_core::effect::{Info, Kind, MAX_PARAMETERS, Own, Parameter, Part, Place, Prior, Values};
 use arm_gap::candidates::tabulated::{Grid, Tabulated};
 use numpy::ndarray::Array1;
 use numpy::{IntoPyArray, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -70,7 +68,7 @@ pub fn declare(
         knee,
         count: [angles.max(4), speeds.max(4)],
     };
-    let probe = Probe::lasting(leak(vec![question(&parameters)]));
+    let prior = Prior::lasting(leak(vec![part(&parameters)]));
     let info: &'static Info = Box::leak(Box::new(Info {
         kind: name.leak(),
         place: Place::Joint,
@@ -88,24 +86,24 @@ pub fn declare(
             })
             .ok()
     };
-    let law = Box::leak(Box::new(Tabulated::new(info, probe, grid, Box::new(ask))));
+    let law = Box::leak(Box::new(Tabulated::new(info, prior, grid, Box::new(ask))));
     arm_model::declare(Kind::Own(Own::new(law))).map_err(refused)
 }
 
-/// How a search asks for the kind: all linear parameters are free, shapes with values are tried and refined.
+/// The one part of the kind: all linear parameters are its sizes, shapes with values occur with them.
 ///
 /// A kind lives as long as the program, like those of the catalogue: models and results refer to it.
-fn question(parameters: &[Asked]) -> Question {
+fn part(parameters: &[Asked]) -> Part {
     let linear = parameters.iter().take_while(|p| p.5).count();
-    let free: &'static [usize] = leak((0..linear).collect());
-    let refined: &'static [usize] = leak((linear..parameters.len()).collect());
+    let sizes: &'static [usize] = leak((0..linear).collect());
+    let varying: &'static [usize] = leak((linear..parameters.len()).collect());
     let shapes: Vec<(usize, Values)> = parameters
         .iter()
         .enumerate()
         .filter(|(_, p)| !p.6.is_empty())
         .map(|(k, p)| (k, Values::Each(leak(p.6.clone()))))
         .collect();
-    Question::of(free).shaped(leak(shapes)).refining(refined)
+    Part::of(sizes).shaped(leak(shapes)).varying(varying)
 }
 
 fn parameter((name, unit, min, max, default, linear, _): Asked) -> Parameter {

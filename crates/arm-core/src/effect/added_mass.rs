@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Body, Scalar, Setup};
 
 /// A point mass at the tip of the last segment, such as a payload in the hand.
@@ -15,7 +15,7 @@ impl Law for AddedMass {
         parameters: &[Parameter::linear("mass", "kg", 0.0, 50.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.02)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(0.02)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         if let Some(segment) = setup.segments.last_mut() {

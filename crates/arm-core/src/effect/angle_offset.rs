@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Promise, Question};
+use super::prior::{Prior, Promise, Part};
 use crate::{Reading, Scalar};
 
 /// An offset of the sensor of one joint angle, as of a misplaced marker.
@@ -15,7 +15,7 @@ impl Law for AngleOffset {
         parameters: &[Parameter::shape("offset", "rad", -3.2, 3.2, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(2e-3)]).promised(Promise::AngleOffset);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(2e-3)]).promised(Promise::AngleOffset);
 
     #[inline]
     fn distort<T: Scalar, const N: usize>(

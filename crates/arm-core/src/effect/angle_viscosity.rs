@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Probe};
+use super::prior::{Family, Prior};
 use crate::Scalar;
 
 /// A viscosity that depends on the angle: it goes in a straight line from one value to another over a range of angles, and stays
@@ -21,7 +21,7 @@ impl Law for AngleViscosity {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::UNASKED.in_family(Family::Rate);
+    const PRIOR: Prior = Prior::NONE.in_family(Family::Rate);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

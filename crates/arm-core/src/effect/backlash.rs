@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Scalar, Setup};
 
 /// Free play of the handle in the hand: the spring of the contact acts only beyond it.
@@ -18,7 +18,7 @@ impl Law for Backlash {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(2e-4)]).missing(0.003);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).small(2e-4)]).missing(0.003);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         for axis in 0..2 {

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Probe, Question, Values};
+use super::prior::{Family, Prior, Part, Values};
 use crate::Scalar;
 
 /// Position of the ratio among the parameters.
@@ -28,10 +28,10 @@ impl Law for Biarticular {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[1.0, 0.5]))])
         .resting(2)
-        .refining(&[1])
+        .varying(&[1])
         .expecting(&[(RATIO, EXPECTED_RATIO)])]).in_family(Family::TwoJoints).typically(1.0);
     const CROSSES: bool = true;
 

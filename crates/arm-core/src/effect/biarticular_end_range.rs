@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Probe};
+use super::prior::{Family, Prior};
 use crate::Scalar;
 
 /// The steep rise of passive moment towards both ends of a range of motion that depends on the joint before, as of a muscle or
@@ -28,7 +28,7 @@ impl Law for BiarticularEndRange {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::UNASKED.in_family(Family::TwoJoints);
+    const PRIOR: Prior = Prior::NONE.in_family(Family::TwoJoints);
     const CROSSES: bool = true;
 
     #[inline]

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Scalar, Setup};
 
 /// Compliance of hand and handle beyond that of the model, in series with it.
@@ -20,7 +20,7 @@ impl Law for ContactCompliance {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(5e-6)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).small(5e-6)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         for axis in 0..2 {

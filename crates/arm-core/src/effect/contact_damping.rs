@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Scalar, Setup};
 
 /// Damping of the contact beyond that of the model; the sum is never negative.
@@ -18,7 +18,7 @@ impl Law for ContactDamping {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).stepping(10.0)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).small(10.0)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         for axis in 0..2 {

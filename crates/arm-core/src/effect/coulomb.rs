@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Family, Probe, Question};
+use super::prior::{Family, Prior, Part};
 use crate::Scalar;
 
 /// Dry friction: a torque against the direction of motion, whatever the speed.
@@ -23,7 +23,7 @@ impl Law for Coulomb {
     };
     const SMOOTHED_BY: Option<usize> = Some(1);
     const RATE_INDEPENDENT: bool = true;
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03).in_family(Family::Dry).typically(0.1).passive();
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])]).missing(0.03).in_family(Family::Dry).typically(0.1).passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Probe, Question, Values};
+use super::prior::{Prior, Part, Values};
 use crate::Scalar;
 
 /// A spring that is soft about its rest angle and stiffens with the third power of the deflection.
@@ -18,9 +18,9 @@ impl Law for CubicElastic {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Middle)])
-        .refining(&[1])])
+        .varying(&[1])])
     .missing(0.002).typically(2.0);
 
     #[inline]

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Probe, Question, Values};
+use super::prior::{Prior, Part, Values};
 use crate::Scalar;
 
 /// A linear spring about a rest angle.
@@ -18,7 +18,7 @@ impl Law for Elastic {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Middle)])
         .resting(1)]).typically(1.0).passive();
 

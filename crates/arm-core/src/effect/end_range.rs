@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Probe, Question, Values};
+use super::prior::{Prior, Part, Values};
 use crate::Scalar;
 
 /// The steep rise of passive moment towards both ends of the range of motion (double exponential).
@@ -23,13 +23,13 @@ impl Law for EndRange {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[
-        Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[
+        Part::of(&[0])
             .shaped(&[(2, Values::Each(&[5.0, 8.0, 12.0])), (3, Values::Highest)])
-            .refining(&[2]),
-        Question::of(&[1])
+            .varying(&[2]),
+        Part::of(&[1])
             .shaped(&[(2, Values::Each(&[5.0, 8.0, 12.0])), (4, Values::Lowest)])
-            .refining(&[2]),
+            .varying(&[2]),
     ])
     .missing(0.05);
 

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Promise, Question};
+use super::prior::{Prior, Promise, Part};
 use crate::{Reading, Scalar};
 
 /// An offset of one channel of the force sensor (N, for `Mx` N m).
@@ -17,7 +17,7 @@ impl Law for ForceBias {
         parameters: &[Parameter::linear("bias", "N", -100.0, 100.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.1)]).promised(Promise::ForceBias);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(0.1)]).promised(Promise::ForceBias);
 
     #[inline]
     fn distort<T: Scalar, const N: usize>(

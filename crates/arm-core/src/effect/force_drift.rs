@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Reading, Scalar};
 
 /// An offset of one channel of the force sensor that grows with time from zero at the start of the trial (N/s, for `Mx`
@@ -16,7 +16,7 @@ impl Law for ForceDrift {
         parameters: &[Parameter::linear("rate", "N/s", -100.0, 100.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.02)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(0.02)]);
 
     #[inline]
     fn distort<T: Scalar, const N: usize>(

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Promise, Question};
+use super::prior::{Prior, Promise, Part};
 use crate::{Reading, Scalar};
 
 /// A wrong gain of one channel of the force sensor; −0.1 reads a tenth too little.
@@ -15,7 +15,7 @@ impl Law for ForceGain {
         parameters: &[Parameter::linear("gain", "1", -0.9, 10.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(0.01)]).promised(Promise::ForceGain);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(0.01)]).promised(Promise::ForceGain);
 
     #[inline]
     fn distort<T: Scalar, const N: usize>(

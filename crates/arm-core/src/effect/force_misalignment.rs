@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Reading, Scalar};
 
 /// A force sensor that is mounted at an angle: it reads a force turned counter-clockwise.
@@ -15,7 +15,7 @@ impl Law for ForceMisalignment {
         parameters: &[Parameter::shape("angle", "rad", -3.2, 3.2, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(5e-3)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(5e-3)]);
 
     #[inline]
     fn distort<T: Scalar, const N: usize>(

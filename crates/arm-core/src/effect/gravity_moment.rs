@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Scalar, Setup};
 
 /// A change of the first moment m·l of a segment: its centre of mass lies elsewhere along the segment.
@@ -18,7 +18,7 @@ impl Law for GravityMoment {
         parameters: &[Parameter::linear("moment", "kg m", -5.0, 5.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(2e-3)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(2e-3)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, index: usize, setup: &mut Setup<T, N>) {
         if let Some(segment) = setup.segments.get_mut(index) {

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Scalar, Setup};
 
 /// A tilt of the frame of measurement against the plumb line, counter-clockwise as gravity is seen to turn.
@@ -15,7 +15,7 @@ impl Law for GravityTilt {
         parameters: &[Parameter::shape("angle", "rad", -0.5, 0.5, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(5e-3)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(5e-3)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         let (sin, cos) = p[0].sin_cos();

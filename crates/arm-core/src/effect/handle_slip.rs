@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Nature, Probe, Question};
+use super::prior::{Nature, Prior, Part};
 use crate::{Scalar, Setup};
 
 /// A handle that slips in the hand once and stays there: the hand then stands further than the robot's angles say.
@@ -21,8 +21,8 @@ impl Law for HandleSlip {
         ],
         states: 0,
     };
-    const PROBE: Probe =
-        Probe::lasting(&[Question::of(&[0, 1]).stepping(1e-4)]).of_nature(Nature::Slip);
+    const PRIOR: Prior =
+        Prior::lasting(&[Part::of(&[0, 1]).small(1e-4)]).of_nature(Nature::Slip);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.displaced.slip[0] += p[0];

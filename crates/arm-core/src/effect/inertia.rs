@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question};
+use super::prior::{Prior, Part};
 use crate::{Scalar, Setup};
 
 /// A change of the moment of inertia of a segment about its centre of mass.
@@ -15,7 +15,7 @@ impl Law for Inertia {
         parameters: &[Parameter::linear("change", "kg m²", -1.0, 10.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(1e-3)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, index: usize, setup: &mut Setup<T, N>) {
         if let Some(segment) = setup.segments.get_mut(index) {

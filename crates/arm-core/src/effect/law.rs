@@ -1,7 +1,7 @@
 //! What a kind of effect is.
 
 pub use super::place::Place;
-use super::probe::Probe;
+use super::prior::Prior;
 use crate::{Reading, Scalar, Setup, Wave};
 
 /// Most parameters that one effect has.
@@ -165,8 +165,8 @@ pub trait Law {
     /// friction. Where that parameter is zero the friction is set-valued: [`Law::dry`] against the motion, and at rest whatever
     /// holds the joint up to that, which a simulation solves for.
     const SMOOTHED_BY: Option<usize> = None;
-    /// How a search asks for it.
-    const PROBE: Probe = Probe::FIRST;
+    /// What is known of it before any data.
+    const PRIOR: Prior = Prior::FIRST;
 
     /// Torque with which the joint resists \[N m\].
     fn torque<T: Scalar>(_p: &Parameters<T>, _at: &Local<T>) -> T {

@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Family, Probe, Question};
+use super::prior::{Family, Prior, Part};
 use crate::Scalar;
 
 /// Dry friction that grows with the force through the joint, as in a plain bearing.
@@ -25,7 +25,7 @@ impl Law for LoadFriction {
     };
     const FEELS_FORCE: bool = true;
     const SMOOTHED_BY: Option<usize> = Some(1);
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1])]).missing(0.03).in_family(Family::Dry);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])]).missing(0.03).in_family(Family::Dry);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

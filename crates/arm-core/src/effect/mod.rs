@@ -12,7 +12,7 @@ mod law;
 #[cfg_attr(not(feature = "own"), path = "own_absent.rs")]
 mod own;
 mod place;
-mod probe;
+mod prior;
 mod state;
 
 pub use law::{
@@ -22,7 +22,7 @@ pub use own::Own;
 #[cfg(feature = "own")]
 pub use own::OwnLaw;
 pub use place::Place;
-pub use probe::{Family, Nature, Probe, Promise, Question, Values};
+pub use prior::{Family, Nature, Part, Prior, Promise, Values};
 pub use state::{advance_states, any_state};
 
 use crate::{Chain, Contact, Invalid, Joints, Plane, Reading, Scalar, Setup, joints};
@@ -52,9 +52,9 @@ macro_rules! catalogue {
         }
 
         impl Kind {
-            /// How a search asks for it.
-            pub fn probe(self) -> Probe {
-                match self { $(Self::$law => <$module::$law as Law>::PROBE,)* Self::Own(own) => own.probe() }
+            /// What is known of it before any data.
+            pub fn prior(self) -> Prior {
+                match self { $(Self::$law => <$module::$law as Law>::PRIOR,)* Self::Own(own) => own.prior() }
             }
             /// What it acts on.
             pub const fn acts_on(self) -> ActsOn {
@@ -62,7 +62,7 @@ macro_rules! catalogue {
             }
             /// The family of effects that it belongs to.
             pub fn family(self) -> Family {
-                self.probe().family.unwrap_or(Family::of_place(self.info().place))
+                self.prior().family.unwrap_or(Family::of_place(self.info().place))
             }
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {

@@ -1,5 +1,5 @@
 use super::law::{ActsOn, Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Probe, Question};
+use super::prior::{Family, Prior, Part};
 use crate::{Scalar, Setup};
 
 /// The rotor of a drive, as felt at the joint: its inertia times the square of the gear ratio.
@@ -19,7 +19,7 @@ impl Law for MotorInertia {
         states: 0,
     };
     const ACTS_ON: ActsOn = ActsOn::Arm;
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(1e-3)]).in_family(Family::Segment);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(1e-3)]).in_family(Family::Segment);
 
     fn gradient<T: Scalar>(_p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
         leading([at.qdd])

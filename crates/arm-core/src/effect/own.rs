@@ -3,7 +3,7 @@ use core::fmt;
 use core::hash::{Hash, Hasher};
 
 use super::law::{Info, Local, MAX_PARAMETERS, MAX_STATES, Parameters, States};
-use super::probe::Probe;
+use super::prior::Prior;
 use crate::Scalar;
 
 /// The law of a joint effect that the catalogue does not hold.
@@ -48,9 +48,9 @@ use crate::Scalar;
 pub trait OwnLaw: Sync {
     /// Name, parameters, formula and reference; parameters in which the torque is linear come first.
     fn info(&self) -> &'static Info;
-    /// How a search asks for it.
-    fn probe(&self) -> Probe {
-        Probe::FIRST
+    /// What is known of it before any data.
+    fn prior(&self) -> Prior {
+        Prior::FIRST
     }
     /// Whether it looks at [`Local::joint_force`].
     fn feels_force(&self) -> bool {
@@ -78,8 +78,8 @@ impl Own {
         self.0.info()
     }
 
-    pub(super) fn probe(self) -> Probe {
-        self.0.probe()
+    pub(super) fn prior(self) -> Prior {
+        self.0.prior()
     }
 
     pub(super) fn feels_force(self) -> bool {

@@ -1,7 +1,7 @@
 //! Without the feature `own` there is no kind but those of the catalogue: this one has no value.
 
 use super::law::{Info, Local, Parameters, States};
-use super::probe::Probe;
+use super::prior::Prior;
 use crate::Scalar;
 
 /// A kind of one's own; none can be made without the feature `own`.
@@ -13,7 +13,7 @@ impl Own {
         match self {}
     }
 
-    pub(super) fn probe(self) -> Probe {
+    pub(super) fn prior(self) -> Prior {
         match self {}
     }
 

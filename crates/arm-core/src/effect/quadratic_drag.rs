@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Probe};
+use super::prior::{Family, Prior};
 use crate::Scalar;
 
 /// Resistance with the square of the joint's speed, as of a body in air or water.
@@ -15,7 +15,7 @@ impl Law for QuadraticDrag {
         parameters: &[Parameter::linear("drag", "N m s²/rad²", 0.0, 100.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::FIRST.in_family(Family::Rate).typically(0.2);
+    const PRIOR: Prior = Prior::FIRST.in_family(Family::Rate).typically(0.2);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

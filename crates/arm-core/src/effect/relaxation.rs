@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, States, leading};
-use super::probe::{Probe, Question, Values};
+use super::prior::{Prior, Part, Values};
 use crate::Scalar;
 
 /// A spring in series with a damper (Maxwell element): its torque fades when the joint rests.
@@ -20,9 +20,9 @@ impl Law for Relaxation {
         ],
         states: 1,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[0.3, 1.0, 3.0]))])
-        .refining(&[1])])
+        .varying(&[1])])
     .missing(0.002).typically(1.0);
 
     #[inline]

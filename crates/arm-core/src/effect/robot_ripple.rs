@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameters, Place, WAVE, add_wave};
-use super::probe::{Nature, Probe, Question};
+use super::prior::{Nature, Prior, Part};
 use crate::{Scalar, Setup};
 
 /// A periodic error of the robot's position, as of gears or of vibration.
@@ -17,7 +17,7 @@ impl Law for RobotRipple {
         parameters: &WAVE,
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).refining(&[2, 3]).stepping(1e-4)])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).varying(&[2, 3]).small(1e-4)])
         .of_nature(Nature::Periodic);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {

@@ -1,5 +1,5 @@
 use super::law::{ActsOn, Info, Law, Parameters, Place, WAVE, add_wave};
-use super::probe::{Nature, Probe, Question};
+use super::prior::{Nature, Prior, Part};
 use crate::{Scalar, Setup};
 
 /// A first joint that heaves, as the shoulder of a person who breathes or of a trunk that rocks.
@@ -18,7 +18,7 @@ impl Law for ShoulderHeave {
         states: 0,
     };
     const ACTS_ON: ActsOn = ActsOn::Rig;
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1]).refining(&[2, 3]).stepping(1e-4)])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).varying(&[2, 3]).small(1e-4)])
         .of_nature(Nature::Periodic);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {

@@ -1,5 +1,5 @@
 use super::law::{ActsOn, Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Question, Values};
+use super::prior::{Prior, Part, Values};
 use crate::{Scalar, Setup};
 
 /// A first joint that does not stay in place but moves with its own angle, as a shoulder does.
@@ -22,9 +22,9 @@ impl Law for ShoulderMotion {
         states: 0,
     };
     const ACTS_ON: ActsOn = ActsOn::Rig;
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0, 1])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1])
         .shaped(&[(2, Values::Middle)])
-        .stepping(1e-5)]);
+        .small(1e-5)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.base_motion[0] += p[0];

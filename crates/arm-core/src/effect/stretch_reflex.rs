@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, States, leading};
-use super::probe::{Family, Probe, Question, Values};
+use super::prior::{Family, Prior, Part, Values};
 use crate::Scalar;
 
 /// Resistance to stretch faster than a threshold, as in spasticity, after a latency.
@@ -32,13 +32,13 @@ impl Law for StretchReflex {
         ],
         states: 3,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[
             (1, Values::Each(&[0.15, 0.3, 0.5])),
             (2, Values::Each(&[1.0, -1.0, 0.0])),
             (LATENCY, Values::Each(&[EXPECTED_LATENCY[0]])),
         ])
-        .refining(&[1, LATENCY])
+        .varying(&[1, LATENCY])
         .expecting(&[(LATENCY, EXPECTED_LATENCY)])])
     .missing(0.1).in_family(Family::Muscle).typically(0.2);
 

@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Family, Probe, Question, Values};
+use super::prior::{Family, Prior, Part, Values};
 use crate::Scalar;
 
 /// The excess of dry friction at low speed, which fades as the joint moves faster.
@@ -25,9 +25,9 @@ impl Law for Stribeck {
         states: 0,
     };
     const SMOOTHED_BY: Option<usize> = Some(2);
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])
-        .refining(&[1, 2])])
+        .varying(&[1, 2])])
     .missing(0.05).in_family(Family::Dry).typically(0.1);
 
     #[inline]

@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, States, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::probe::{Family, Probe, Question, Values};
+use super::prior::{Family, Prior, Part, Values};
 use crate::Scalar;
 
 /// Friction and stiffness of a structure that breaks down in motion and builds up again at rest.
@@ -28,12 +28,12 @@ impl Law for Thixotropy {
         states: 1,
     };
     const SMOOTHED_BY: Option<usize> = Some(5);
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[
             (3, Values::Each(&[0.03, 0.1, 0.3])),
             (4, Values::Each(&[1.0, 3.0, 10.0])),
         ])
-        .refining(&[3, 4])])
+        .varying(&[3, 4])])
     .missing(0.05).in_family(Family::Dry).typically(0.1);
 
     #[inline]

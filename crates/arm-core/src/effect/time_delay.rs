@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::probe::{Probe, Promise, Question};
+use super::prior::{Prior, Promise, Part};
 use crate::{Scalar, Setup};
 
 /// The force channels lag behind the joint angles, or with a negative value lead.
@@ -15,7 +15,7 @@ impl Law for TimeDelay {
         parameters: &[Parameter::shape("delay", "s", -1.0, 1.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).stepping(4e-3)]).promised(Promise::TimeDelay);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(4e-3)]).promised(Promise::TimeDelay);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.force_delay += p[0];

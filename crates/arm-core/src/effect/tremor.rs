@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Nature, Probe, Question};
+use super::prior::{Family, Nature, Part, Prior};
 use crate::Scalar;
 
 /// A rhythmic torque of the muscles.
@@ -21,7 +21,7 @@ impl Law for Tremor {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::lasting(&[Question::of(&[0]).refining(&[1, 2])])
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1, 2])])
         .of_nature(Nature::Rhythm)
         .in_family(Family::Muscle);
 

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Probe};
+use super::prior::{Family, Prior};
 use crate::Scalar;
 
 /// Resistance in proportion to the joint's speed.
@@ -15,7 +15,7 @@ impl Law for Viscous {
         parameters: &[Parameter::linear("viscosity", "N m s/rad", 0.0, 100.0, 0.0)],
         states: 0,
     };
-    const PROBE: Probe = Probe::FIRST.in_family(Family::Rate).typically(0.2).passive();
+    const PRIOR: Prior = Prior::FIRST.in_family(Family::Rate).typically(0.2).passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::probe::{Family, Nature, Probe};
+use super::prior::{Family, Nature, Prior};
 use crate::Scalar;
 
 /// A burst of muscle torque: a smooth pulse that starts and ends with zero slope and is highest in its middle.
@@ -22,7 +22,7 @@ impl Law for Voluntary {
         ],
         states: 0,
     };
-    const PROBE: Probe = Probe::FIRST.of_nature(Nature::Burst).in_family(Family::Muscle);
+    const PRIOR: Prior = Prior::FIRST.of_nature(Nature::Burst).in_family(Family::Muscle);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

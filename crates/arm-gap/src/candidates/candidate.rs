@@ -1,6 +1,6 @@
 //! A question that a session can answer: a kind of the catalogue at a place in a shape, and what is free in it.
 
-use arm_core::effect::{Effect, Kind, Nature, Place, Question};
+use arm_core::effect::{Effect, Kind, Nature, Part, Place};
 
 use crate::candidates::refined_shapes::{held, is_plainer, refined};
 use crate::candidates::torque_step::{motions, torque_step};
@@ -51,9 +51,9 @@ impl Candidate {
     }
 
     /// Refines no shape, and leaves those of which only an expected value is known, as a latency, at the default of the catalogue.
-    pub(super) fn keep_shapes(&mut self, question: &Question) {
+    pub(super) fn keep_shapes(&mut self, part: &Part) {
         self.refined.clear();
-        for &(p, _) in question.expected {
+        for &(p, _) in part.expected {
             self.effect.parameters[p] = self.effect.kind.info().parameters[p].default;
             self.expected.retain(|e| e.parameter != p);
         }
@@ -132,9 +132,9 @@ impl Candidate {
         mut effect: Effect<f64>,
         free: &[usize],
     ) -> Option<Self> {
-        let questions = effect.kind.probe().questions;
-        let number = questions.iter().position(|q| q.free == free)?;
-        let question = &questions[number];
+        let parts = effect.kind.prior().parts;
+        let number = parts.iter().position(|part| part.sizes == free)?;
+        let part = &parts[number];
         for &p in free {
             effect.parameters[p] = 0.0;
         }
@@ -142,13 +142,13 @@ impl Candidate {
             effect,
             question: number,
             free: free.to_vec(),
-            rest: question.rest,
-            refined: refined(prepared.session, &effect, question),
+            rest: part.rest,
+            refined: refined(prepared.session, &effect, part),
             tried: 1,
-            step: question.step,
+            step: part.small,
             price: 0.0,
             spread: 1.0,
-            expected: expected(prepared.session, &effect, question),
+            expected: expected(prepared.session, &effect, part),
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(
@@ -212,7 +212,7 @@ impl Candidate {
         let whole = |p: usize| (info.parameters[p].min, info.parameters[p].max);
         let free = self.free.iter().map(|&p| (p, whole(p), self.step));
         let rest = self.rest.map(|p| (p, whole(p)));
-        let share = match effect.kind.probe().nature {
+        let share = match effect.kind.prior().nature {
             // A frequency that is a little off is out of step at the end of a trial.
             Nature::Periodic | Nature::Rhythm => 0.0,
             _ => 0.05,
@@ -245,16 +245,16 @@ pub fn price(width: usize, tried: usize, rows: usize) -> f64 {
 }
 
 /// What is known of the numbers of an effect beforehand: of the first one in a joint by the weight that the joint bears, and of shapes
-/// what the question says.
+/// what the kind says.
 pub(super) fn expected<const N: usize>(
     session: &Session<N>,
     effect: &Effect<f64>,
-    question: &Question,
+    part: &Part,
 ) -> Vec<Free> {
-    let typical = effect.kind.probe().typical;
+    let typical = effect.kind.prior().typical;
     let in_joint = typical != 0.0 && effect.kind.info().place == Place::Joint;
     let size = in_joint.then(|| typical * session.weight_moment(effect.index.min(N - 1)));
     let size = size.map(|sd| (0, [0.0, sd]));
-    let shapes = question.expected.iter().copied();
+    let shapes = part.expected.iter().copied();
     size.into_iter().chain(shapes).map(Free::expected).collect()
 }

@@ -1,6 +1,6 @@
 //! All questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
 
-use arm_core::effect::{Effect, Kind, Local, MAX_STATES, Nature, Place, Question, Values};
+use arm_core::effect::{Effect, Kind, Local, MAX_STATES, Nature, Part, Place, Values};
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
@@ -57,7 +57,7 @@ impl Library {
         point: &LinearizationPoint<N>,
         waves: &[[f64; 2]],
     ) -> Result<Self, GapError> {
-        let swings = |kind: Kind, _| kind.probe().nature.swings();
+        let swings = |kind: Kind, _| kind.prior().nature.swings();
         Self::of(prepared, point, swings, waves)
     }
 
@@ -74,13 +74,13 @@ impl Library {
             // What the passive base has is no question any more.
             let new = |&i: &usize| is_asked(kind, i) && !prepared.has_in_base(kind, i);
             for index in places(prepared.session, kind).filter(new) {
-                for asked in kind.probe().questions.iter().enumerate() {
+                for part in kind.prior().parts.iter().enumerate() {
                     let mut plain = Effect::new(kind, index);
                     hypothesis.share_rest(&mut plain);
-                    let mut own = ask(prepared.session, &motions, plain, asked, waves);
+                    let mut own = ask(prepared.session, &motions, plain, part, waves);
                     // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
-                    if !prepared.repeated && !kind.probe().nature.swings() {
-                        own.iter_mut().for_each(|c| c.keep_shapes(asked.1));
+                    if !prepared.repeated && !kind.prior().nature.swings() {
+                        own.iter_mut().for_each(|c| c.keep_shapes(part.1));
                     }
                     candidates.extend(own);
                 }
@@ -183,8 +183,8 @@ fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<u
 /// Whether a kind resists a joint that does not move yet: springs do, also those that fade, and rotors.
 fn holds_at_rest(kind: Kind) -> bool {
     let mut effect = Effect::<f64>::new(kind, 1);
-    for question in kind.probe().questions {
-        for &p in question.free {
+    for part in kind.prior().parts {
+        for &p in part.sizes {
             effect.parameters[p] = 1.0;
         }
     }
@@ -198,25 +198,25 @@ fn holds_at_rest(kind: Kind) -> bool {
         memory: [1.0; MAX_STATES],
     };
     let gradient = effect.gradient(&starting);
-    let free = kind.probe().questions.iter().flat_map(|q| q.free);
-    effect.torque(&starting) != 0.0 || free.into_iter().any(|&p| gradient[p] != 0.0)
+    let sizes = kind.prior().parts.iter().flat_map(|part| part.sizes);
+    effect.torque(&starting) != 0.0 || sizes.into_iter().any(|&p| gradient[p] != 0.0)
 }
 
-/// The candidates of one question about a kind at a place.
+/// The candidates of one question: a part of a kind at a place.
 ///
 /// * `plain` - the effect, with what it shares with others in its place
 fn ask<const N: usize>(
     session: &Session<N>,
     movements: &[Movement<N>],
     mut plain: Effect<f64>,
-    (number, question): (usize, &'static Question),
+    (number, part): (usize, &'static Part),
     waves: &[[f64; 2]],
 ) -> Vec<Candidate> {
-    let nature = plain.kind.probe().nature;
+    let nature = plain.kind.prior().nature;
     if matches!(nature, Nature::Burst | Nature::Slip) {
         return Vec::new();
     }
-    for &p in question.free {
+    for &p in part.sizes {
         plain.parameters[p] = 0.0;
     }
     let mut shapes = vec![plain];
@@ -224,7 +224,7 @@ fn ask<const N: usize>(
         // A kind that swings refines its frequency and its phase.
         let shape = |wave: &[f64; 2]| {
             let mut shape = plain;
-            for (&p, value) in question.refined.iter().zip(wave) {
+            for (&p, value) in part.varying.iter().zip(wave) {
                 shape.parameters[p] = *value;
             }
             shape
@@ -233,7 +233,7 @@ fn ask<const N: usize>(
     }
     let joint = plain.index.min(N - 1);
     let angles = || extent(movements.iter().flat_map(|m| &m.motion).map(|m| m.q[joint]));
-    for (p, values) in question.shapes {
+    for (p, values) in part.shapes {
         let (low, high) = angles();
         let values = match values {
             Values::Each(list) => list.to_vec(),
@@ -253,14 +253,14 @@ fn ask<const N: usize>(
         let mut candidate = Candidate {
             effect,
             question: number,
-            free: question.free.to_vec(),
-            rest: question.rest,
-            refined: refined(session, &effect, question),
+            free: part.sizes.to_vec(),
+            rest: part.rest,
+            refined: refined(session, &effect, part),
             tried,
-            step: question.step,
+            step: part.small,
             price: 0.0,
             spread: 1.0,
-            expected: expected(session, &effect, question),
+            expected: expected(session, &effect, part),
         };
         if candidate.step == 0.0 {
             candidate.step = torque_step(movements, candidate.unit(0, 1.0), candidate.free[0])?;

@@ -1,6 +1,6 @@
 //! Shapes that a fit refines, and their limits: a law whose shape lies beyond what the trials can show is another, plainer law there.
 
-use arm_core::effect::{Effect, Nature, Question};
+use arm_core::effect::{Effect, Nature, Part};
 use arm_ident::regression::trial::Trial;
 
 use crate::data::session::Session;
@@ -18,9 +18,9 @@ const SHORTEST: f64 = 1.0 / (SAMPLES_PER_PERIOD * BAND);
 pub(crate) fn refined<const N: usize>(
     session: &Session<N>,
     effect: &Effect<f64>,
-    question: &Question,
+    part: &Part,
 ) -> Vec<(usize, (f64, f64))> {
-    let shapes = question.refined.iter();
+    let shapes = part.varying.iter();
     shapes
         .filter(|&&p| Some(p) != held(effect))
         .map(|&p| (p, limits(session, effect, p)))
@@ -42,9 +42,9 @@ fn limits<const N: usize>(
     parameter: usize,
 ) -> (f64, f64) {
     let info = &effect.kind.info().parameters[parameter];
-    let probe = effect.kind.probe();
-    let is_known = |q: &Question| q.expected.iter().any(|e| e.0 == parameter);
-    let has_own = probe.nature != Nature::Lasting || probe.questions.iter().any(is_known);
+    let prior = effect.kind.prior();
+    let is_known = |part: &Part| part.expected.iter().any(|e| e.0 == parameter);
+    let has_own = prior.nature != Nature::Lasting || prior.parts.iter().any(is_known);
     let is_rest = effect.kind.smoothed_by() == Some(parameter);
     let (least, most) = match info.unit {
         _ if has_own || is_rest => (info.min, info.max),

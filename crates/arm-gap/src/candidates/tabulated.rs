@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use arm_core::effect::{Info, Local, MAX_PARAMETERS, OwnLaw, Parameters, Probe};
+use arm_core::effect::{Info, Local, MAX_PARAMETERS, OwnLaw, Parameters, Prior};
 
 /// Tables that are kept: a fit comes back to the shapes it has tried.
 const KEPT: usize = 24;
@@ -86,7 +86,7 @@ type Tables = Arc<Vec<Vec<f64>>>;
 /// A law of one's own by its tables.
 pub struct Tabulated {
     info: &'static Info,
-    probe: Probe,
+    prior: Prior,
     /// Number of leading parameters in which the torque is linear.
     linear: usize,
     grid: Grid,
@@ -101,10 +101,10 @@ thread_local! {
 
 impl Tabulated {
     /// A law whose tables are made when a shape is first met.
-    pub fn new(info: &'static Info, probe: Probe, grid: Grid, tabulate: Tabulate) -> Self {
+    pub fn new(info: &'static Info, prior: Prior, grid: Grid, tabulate: Tabulate) -> Self {
         Self {
             info,
-            probe,
+            prior,
             linear: info.parameters.iter().take_while(|p| p.linear).count(),
             grid,
             tabulate,
@@ -155,8 +155,8 @@ impl OwnLaw for Tabulated {
         self.info
     }
 
-    fn probe(&self) -> Probe {
-        self.probe
+    fn prior(&self) -> Prior {
+        self.prior
     }
 
     fn torque(&self, p: &Parameters<f64>, at: &Local<f64>) -> f64 {
@@ -227,7 +227,7 @@ mod tests {
                 all(&|_, v| v * v.abs()),
             ])
         });
-        Tabulated::new(&INFO, Probe::FIRST, GRID, tabulate)
+        Tabulated::new(&INFO, Prior::FIRST, GRID, tabulate)
     }
 
     fn at(q: f64, qd: f64) -> Local<f64> {
@@ -276,7 +276,7 @@ mod tests {
             let fails = first.swap(false, std::sync::atomic::Ordering::Relaxed);
             if fails { None } else { good(p) }
         };
-        let law = Tabulated::new(&INFO, Probe::FIRST, GRID, Box::new(once));
+        let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(once));
         let p = [1.0, 0.0, 0.2, 0.0, 0.0, 0.0];
         assert!(law.torque(&p, &at(1.0, 0.0)).is_nan());
         assert!((law.torque(&p, &at(1.0, 0.0)) - libm::sin(5.0)).abs() < 1e-6);
@@ -290,14 +290,14 @@ mod tests {
             let torque = inner.torque(&[1.0, 0.0, 0.2, 0.0, 0.0, 0.0], &at(0.0, 0.0));
             good(p).filter(|_| torque == 0.0)
         };
-        let law = Tabulated::new(&INFO, Probe::FIRST, GRID, Box::new(asks));
+        let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(asks));
         let p = [1.0, 0.0, 0.5, 0.0, 0.0, 0.0];
         assert!((law.torque(&p, &at(1.0, 0.0)) - libm::sin(2.0)).abs() < 1e-6);
     }
 
     #[test]
     fn a_law_that_fails_is_not_a_number() {
-        let law = Tabulated::new(&INFO, Probe::FIRST, GRID, Box::new(|_| None));
+        let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(|_| None));
         assert!(law.torque(&[1.0; 6], &at(0.0, 0.0)).is_nan());
         assert_eq!(law.torque(&[0.0; 6], &at(0.0, 0.0)), 0.0);
     }

@@ -1,7 +1,7 @@
 //! The laws of joints that the model leaves without one, as measured motion has them.
 //!
 //! A rigid model of literature values cannot follow a person: its free wrist falls. What every passive joint may have, springs with
-//! a rest angle, viscosity and dry friction ([`arm_core::effect::Probe::passive`]), is linear in the equation of motion, and is
+//! a rest angle, viscosity and dry friction ([`arm_core::effect::Prior::passive`]), is linear in the equation of motion, and is
 //! identified together with the segments: along the measured motion or, where a joint's speed is noise, along the simulated one.
 
 use std::cell::LazyCell;
@@ -167,7 +167,7 @@ impl<const N: usize> Session<N> {
             }
             effect
         };
-        let passive = || KINDS.iter().filter(|k| k.probe().passive);
+        let passive = || KINDS.iter().filter(|k| k.prior().passive);
         joints
             .iter()
             .flat_map(|&joint| passive().map(move |&kind| law(joint, kind)))
@@ -212,7 +212,7 @@ impl<const N: usize> Session<N> {
     fn passive(&self, effect: Effect<f64>) -> Passive {
         /// Change of a law's size that a response is taken with, as a share of its typical size.
         const STEP: f64 = 0.01;
-        let sd = effect.kind.probe().typical * self.weight_moment(effect.index);
+        let sd = effect.kind.prior().typical * self.weight_moment(effect.index);
         let size = Free {
             parameter: 0,
             mean: 0.0,

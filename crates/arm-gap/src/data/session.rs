@@ -84,7 +84,7 @@ impl<const N: usize> Session<N> {
     pub fn given(&self) -> Hypothesis<N> {
         let mut calibration = Vec::new();
         for &kind in KINDS {
-            let Some(promise) = kind.probe().promise else {
+            let Some(promise) = kind.prior().promise else {
                 continue;
             };
             if self.comparison == ComparisonMode::Torque && promise != Promise::AngleOffset {
@@ -172,7 +172,7 @@ impl<const N: usize> Session<N> {
             }
         }
         for (e, effect) in given.calibration.iter().enumerate() {
-            if let Some(promise) = effect.kind.probe().promise {
+            if let Some(promise) = effect.kind.prior().promise {
                 let sd = self.promised(promise);
                 add(Target::Calibration(e), sd, f64::NEG_INFINITY, f64::INFINITY);
             }

@@ -26,7 +26,7 @@ const TURNS: usize = 2;
 
 /// Whether an effect swings with a phase of its own in every trial: muscles do, and so does what shakes a robot fast.
 fn is_rhythm(effect: &Effect<f64>) -> bool {
-    match effect.kind.probe().nature {
+    match effect.kind.prior().nature {
         Nature::Rhythm => true,
         Nature::Periodic => effect.parameters[shapes_of(effect.kind)[0]] > SLOW,
         Nature::Lasting | Nature::Burst | Nature::Slip => false,

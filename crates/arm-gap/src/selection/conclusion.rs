@@ -69,7 +69,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         progress("measuring what is left", 0.9)?;
         let mut precision = self.precision(&point, &amended, scale)?;
         for one in &named {
-            let missed = one.gain * amended.asked[one.slot].kind().probe().missed;
+            let missed = one.gain * amended.asked[one.slot].kind().prior().missed;
             let is_own = |t| matches!(t, Target::Named(own, _) if own == one.slot);
             precision.widen(is_own, Precision::ALONG * missed);
             let joint = joint_of(&amended.hypothesis, Target::Named(one.slot, 0));
@@ -78,7 +78,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         for law in &base {
             let known = self.session.effects.len() + law.base;
-            let missed = law.gain * law.question.kind().probe().missed;
+            let missed = law.gain * law.question.kind().prior().missed;
             precision.widen(
                 |t| matches!(t, Target::Known(own, _) if own == known),
                 Precision::ALONG * missed,

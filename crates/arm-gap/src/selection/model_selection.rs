@@ -46,7 +46,7 @@ fn mimicked(effect: &Effect<f64>, by: &Effect<f64>, gain: f64) -> f64 {
     };
     let (own, other) = (joints(effect), joints(by));
     let is_near = own.start < other.end && other.start < own.end;
-    by.kind.probe().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
+    by.kind.prior().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
 }
 
 /// The most that an effect may explain without being there beside named ones that together explain so much.
@@ -295,7 +295,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn tie(&self, own: &Candidate, gain: f64) -> f64 {
         match self.repeated {
             true => TIE,
-            false => TIE.max(own.kind().probe().missed * gain),
+            false => TIE.max(own.kind().prior().missed * gain),
         }
     }
 
@@ -455,7 +455,7 @@ mod tests {
     #[test]
     fn an_effect_must_explain_more_than_the_law_of_another_misses() {
         let friction = Effect::<f64>::new(Kind::Coulomb, 1);
-        let missed = friction.kind.probe().missed;
+        let missed = friction.kind.prior().missed;
         assert_eq!(missed, 0.03);
         let in_joint = |kind, joint| mimicked(&Effect::<f64>::new(kind, joint), &friction, 1000.0);
         assert_eq!(in_joint(Kind::Viscous, 1), 1000.0 * missed);

@@ -377,7 +377,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut rivals = rivals.unwrap_or_default();
         for rival in &mut rivals {
             let alternative = &mut rival.alternative;
-            if !alternative.candidate.kind().probe().passive {
+            if !alternative.candidate.kind().prior().passive {
                 alternative.worse += ODDS;
             }
         }
@@ -385,7 +385,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         law.better = rivals
             .iter()
             // A law that few joints have is asked beside the base, and does not take its place.
-            .filter(|r| r.alternative.candidate.kind().probe().passive)
+            .filter(|r| r.alternative.candidate.kind().prior().passive)
             .find(|r| self.takes_over(&r.alternative, own, 0.0))
             .map(|r| r.fitted.clone());
         law.alternatives = self.ties(rivals, &law.question, law.gain);

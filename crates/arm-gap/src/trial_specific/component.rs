@@ -104,7 +104,7 @@ mod tests {
     fn rhythms_are_one_where_they_are_nearer_than_a_third_of_a_hertz() {
         let kinds = arm_core::effect::KINDS.iter().copied();
         let mut swinging =
-            kinds.filter(|k| matches!(k.probe().nature, Nature::Rhythm | Nature::Periodic));
+            kinds.filter(|k| matches!(k.prior().nature, Nature::Rhythm | Nature::Periodic));
         let (one, other) = (
             swinging.next().expect("a kind"),
             swinging.next().expect("another"),
@@ -128,7 +128,7 @@ mod tests {
         let kinds = arm_core::effect::KINDS.iter();
         let burst = kinds
             .copied()
-            .find(|k| k.probe().nature == Nature::Burst)
+            .find(|k| k.prior().nature == Nature::Burst)
             .expect("a burst");
         let mut one = rhythm(burst, 0.0, Some(0));
         one.effect = Effect::new(burst, 0).with(&[0.5, 2.0, 0.3]);

@@ -130,8 +130,8 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn is_finding(&self, one: &Asked, suspect: &Compared, held: f64) -> bool {
         let own = dot(&one.row, &suspect.own).abs();
         let further = |other: &Vec<f64>| own > dot(&one.row, other).abs();
-        let probe = one.effect.kind.probe();
-        let promised = match (probe.nature, probe.promise) {
+        let prior = one.effect.kind.prior();
+        let promised = match (prior.nature, prior.promise) {
             (Nature::Slip, _) => self.session.tolerance.handle_placement,
             (Nature::Burst, _) => held,
             (_, Some(_)) => self.session.tolerance.angle_offset(),
@@ -256,7 +256,7 @@ fn held_either_way(effects: &[Effect<f64>]) -> f64 {
 
 /// Whether a disturbance is a burst that dry friction of the final model may hold: it was found before that friction was.
 pub(crate) fn is_held(one: &TrialSpecific, effects: &[Effect<f64>]) -> bool {
-    let is_burst = one.effect.kind.probe().nature == Nature::Burst;
+    let is_burst = one.effect.kind.prior().nature == Nature::Burst;
     is_burst && one.effect.parameters[0].abs() <= held_either_way(effects)
 }
 

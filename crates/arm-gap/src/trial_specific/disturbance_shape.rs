@@ -27,8 +27,8 @@ impl<const N: usize> PreparedSession<'_, N> {
     ) -> Option<Shape> {
         /// Torque that is small and yet seen \[N m\].
         const TORQUE: f64 = 1e-2;
-        let question = effect.kind.probe().questions.first()?;
-        let (sizes, unit) = (question.free, question.step);
+        let part = effect.kind.prior().parts.first()?;
+        let (sizes, unit) = (part.sizes, part.small);
         let unit = if unit > 0.0 { unit } else { TORQUE };
         let line = point.lines.get(self.group_of[trial])?;
         let column = |&p: &usize| {
@@ -54,7 +54,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let course = &self.courses[self.references[self.group_of[trial]]];
         let count = course.raw[0].len();
         let starts = (count as f64 / course.rate / EVERY) as usize;
-        let of = |nature: Nature| KINDS.iter().filter(move |k| k.probe().nature == nature);
+        let of = |nature: Nature| KINDS.iter().filter(move |k| k.prior().nature == nature);
         let mut effects: Vec<Effect<f64>> = Vec::new();
         for (&kind, j) in of(Nature::Burst).flat_map(|k| (0..N).map(move |j| (k, j))) {
             for long in LONG {
@@ -234,7 +234,7 @@ pub(super) fn timed(
     /// Shortest and longest burst \[s\].
     const DURATION: (f64, f64) = (0.1, 3.0);
     if !matches!(
-        best.effect.kind.probe().nature,
+        best.effect.kind.prior().nature,
         Nature::Burst | Nature::Slip
     ) {
         return best;

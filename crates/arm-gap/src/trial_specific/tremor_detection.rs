@@ -211,13 +211,13 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn swings(&self, frequency: f64) -> Vec<Vec<Effect<f64>>> {
         let mut list = Vec::new();
         for &kind in KINDS {
-            match kind.probe().nature {
+            match kind.prior().nature {
                 Nature::Rhythm => {
                     list.extend((0..N).map(|j| vec![swinging(kind, j, 0, frequency)]));
                 }
                 Nature::Periodic => {
-                    let axes: Vec<Effect<f64>> = kind.probe().questions[0]
-                        .free
+                    let axes: Vec<Effect<f64>> = kind.prior().parts[0]
+                        .sizes
                         .iter()
                         .map(|&p| swinging(kind, 0, p, frequency))
                         .collect();
@@ -241,7 +241,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     ) -> Option<TrialSpecific> {
         let residuals = self.raw_residuals(point).ok()?;
         let frequency = trial_specific.wave()[0];
-        let size = trial_specific.effect.parameters[free_of(trial_specific.effect.kind)[0]].abs();
+        let size = trial_specific.effect.parameters[sizes_of(trial_specific.effect.kind)[0]].abs();
         let shown = |group: usize, named: Option<Effect<f64>>| {
             let mut hypothesis = point.hypothesis.clone();
             hypothesis.named.extend(named);
@@ -269,7 +269,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let scatter = libm::sqrt(square / (n * (n - 1.0).max(1.0)));
         let mut effect = trial_specific.effect;
         let [_, phase] = shapes_of(effect.kind);
-        for &p in free_of(effect.kind).iter().chain([&phase]) {
+        for &p in sizes_of(effect.kind).iter().chain([&phase]) {
             let info = &effect.kind.info().parameters[p];
             effect.parameters[p] = explained.effect.parameters[p].clamp(info.min, info.max);
         }
@@ -415,7 +415,7 @@ impl Explained {
     /// Whether it is plain enough to be named at a frequency \[Hz\].
     fn is_plain(&self, frequency: f64) -> bool {
         // The steps of encoders sound in the springs of the contact: what looks like a fast ripple is that.
-        let periodic = self.effect.kind.probe().nature == Nature::Periodic;
+        let periodic = self.effect.kind.prior().nature == Nature::Periodic;
         let sounds = periodic && frequency >= FASTEST_RIPPLE;
         self.gain > LEAST_GAIN && self.share > SEEN && self.is_steady() && !sounds
     }
@@ -429,7 +429,7 @@ impl Explained {
         // Of each swing the noise makes two numbers, which gain one unit each.
         let noise = 2.0 * self.columns.len() as f64 * trials / self.gain;
         let alike = sum * sum / (trials * square);
-        self.effect.kind.probe().nature != Nature::Periodic || 1.0 - alike < UNSTEADY + noise
+        self.effect.kind.prior().nature != Nature::Periodic || 1.0 - alike < UNSTEADY + noise
     }
 }
 
@@ -438,7 +438,7 @@ const UNIT: f64 = 1e-3;
 
 /// Position of the size that is one in a swing.
 fn size_of(swing: &Effect<f64>) -> usize {
-    let free = free_of(swing.kind);
+    let free = sizes_of(swing.kind);
     let one = free.iter().find(|&&p| swing.parameters[p] == 1.0);
     one.copied().unwrap_or(free[0])
 }
@@ -460,14 +460,14 @@ fn sized_at(swing: &Effect<f64>, frequency: f64, size: f64) -> Effect<f64> {
     effect
 }
 
-fn free_of(kind: Kind) -> &'static [usize] {
-    kind.probe().questions[0].free
+fn sizes_of(kind: Kind) -> &'static [usize] {
+    kind.prior().parts[0].sizes
 }
 
 /// A kind that swings with one of its sizes at one, the others at zero.
 fn swinging(kind: Kind, index: usize, size: usize, frequency: f64) -> Effect<f64> {
     let mut effect = Effect::new(kind, index);
-    for &p in free_of(kind) {
+    for &p in sizes_of(kind) {
         effect.parameters[p] = 0.0;
     }
     effect.parameters[size] = 1.0;
@@ -507,7 +507,7 @@ mod tests {
 
     fn of_nature(nature: Nature) -> Effect<f64> {
         let mut kinds = KINDS.iter().copied();
-        let kind = kinds.find(|k| k.probe().nature == nature);
+        let kind = kinds.find(|k| k.prior().nature == nature);
         Effect::new(kind.expect("a kind of each nature"), 0)
     }
 

@@ -45,7 +45,7 @@ fn every_kind_is_asked_wherever_it_may_act_and_answers() {
     let sensors = KINDS
         .iter()
         .filter(|k| k.info().place == Place::ForceSensor);
-    for &kind in sensors.filter(|k| !k.probe().questions.is_empty()) {
+    for &kind in sensors.filter(|k| !k.prior().parts.is_empty()) {
         assert!(asked(kind, 0) && asked(kind, 1), "{kind:?}");
     }
 }

@@ -81,7 +81,7 @@ fn tense(friction: f64, amplitude: f64) -> Session<2> {
 #[test]
 fn a_burst_is_found_with_its_joint_and_not_below_twice_the_dry_friction() {
     let found = disturbance(&tense(0.2, 0.8)).expect("a burst");
-    assert_eq!(found.effect.kind.probe().nature, Nature::Burst);
+    assert_eq!(found.effect.kind.prior().nature, Nature::Burst);
     assert_eq!((found.effect.index, found.trial), (1, Some(1)));
     let [amplitude, start, duration, ..] = found.effect.parameters;
     assert!((amplitude - 0.8).abs() < 0.1, "{found:?}");
@@ -119,7 +119,7 @@ fn a_robot_that_shakes_is_told_by_handle_and_hand_that_come_apart() {
     };
     assert!(ripple(0.0).is_none());
     let found = ripple(1e-3).expect("a ripple");
-    assert_eq!(found.effect.kind.probe().nature, Nature::Periodic);
+    assert_eq!(found.effect.kind.prior().nature, Nature::Periodic);
     assert!((found.wave()[0] - 4.3).abs() < 0.05, "{found:?}");
     assert!(found.locked, "in the same phase in every trial");
     let axes = &found.effect.parameters[..2];

@@ -40,7 +40,7 @@ pub fn middle<'a, const N: usize>(trials: impl Iterator<Item = &'a Trial<N>>, jo
 pub(crate) fn typical<const N: usize>(model: &Model<N>, fit: &[&Trial<N>], share: f64) -> Model<N> {
     let mut start = model.clone();
     for effect in &mut start.fitted {
-        let (joint, size) = (effect.index.min(N - 1), effect.kind.probe().typical);
+        let (joint, size) = (effect.index.min(N - 1), effect.kind.prior().typical);
         if size > 0.0 {
             effect.parameters[0] = share * size * weight_moment(&model.chain, joint);
         }

@@ -130,9 +130,9 @@ pub fn unknowns<const N: usize>(
 
 /// Amplitude and rest angle among the parameters of a spring whose torque is linear in both amplitude and amplitude · rest.
 pub fn spring(effect: &Effect<f64>) -> Option<(usize, usize)> {
-    let probe = effect.kind.probe();
-    let mut questions = probe.questions.iter();
-    questions.find_map(|question| question.rest.map(|rest| (question.free[0], rest)))
+    let prior = effect.kind.prior();
+    let mut parts = prior.parts.iter();
+    parts.find_map(|part| part.rest.map(|rest| (part.sizes[0], rest)))
 }
 
 /// The unknown that a spring's rest angle is: amplitude · rest. A constant moment fitted in the same joint takes its place, and so do

@@ -1,12 +1,13 @@
-//! How a search asks whether a kind is there.
+//! What is known of a kind before any data: what bodies and rigs have of it, and how it shows. How a search uses that stands there.
 
 use super::place::Place;
 
-/// What a kind tells those who look for it in data.
+/// What is known of a kind before any data.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Probe {
-    /// Separate questions, each about parameters that are free together.
-    pub questions: &'static [Question],
+pub struct Prior {
+    /// What of it may be there without the rest of it. None where nothing is known from which a search could start: such a kind is
+    /// simulated, and identified where a model has it.
+    pub parts: &'static [Part],
     /// How it comes and goes.
     pub nature: Nature,
     /// What of it the calibration of a rig promises to be small.
@@ -17,11 +18,11 @@ pub struct Probe {
     pub family: Option<Family>,
     /// Typical size of its first parameter, for one N m of the arm's weight moment; zero where nothing is known.
     pub typical: f64,
-    /// Whether it belongs to every passive joint, so that a joint without any law is asked for it first.
+    /// Whether every passive joint has it.
     pub passive: bool,
 }
 
-/// Effects that answer one question, of which movements may not tell the members apart.
+/// Effects of one mechanism, of which movements may not tell the members apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Dry friction.
@@ -77,7 +78,7 @@ impl Family {
 pub enum Nature {
     /// Always there, in every trial alike.
     Lasting,
-    /// Periodic and locked to the start of the trial: its frequency is read off the data first.
+    /// Periodic and locked to the start of the trial.
     Periodic,
     /// A rhythm with another phase in every trial.
     Rhythm,
@@ -107,24 +108,24 @@ pub enum Promise {
     TimeDelay,
 }
 
-/// One question about a kind.
+/// A part of an effect that may be there without the others, as the stop at one end of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Question {
-    /// Positions of the parameters that are free; with all of them zero the effect does nothing.
-    pub free: &'static [usize],
-    /// Shapes that are tried, in every combination; other parameters stay at their defaults.
+pub struct Part {
+    /// Positions of its sizes: with all of them zero it does nothing.
+    pub sizes: &'static [usize],
+    /// Shapes that occur, in every combination; other parameters have their defaults.
     pub shapes: &'static [(usize, Values)],
-    /// Position of a rest angle: the torque is linear in amplitude and amplitude · rest together.
+    /// Position of a rest angle: the torque is linear in size and size · rest together.
     pub rest: Option<usize>,
-    /// Shapes that are refined once the effect is found.
-    pub refined: &'static [usize],
-    /// What is known of a shape before the data, where something is: its position, expected value and standard deviation.
+    /// Shapes that differ from one body or rig to the next by more than movements can hide.
+    pub varying: &'static [usize],
+    /// What is known of a shape, where something is: its position, expected value and standard deviation.
     pub expected: &'static [(usize, [f64; 2])],
-    /// Change of a free parameter that is small and yet seen; zero where the size of the torque tells it.
-    pub step: f64,
+    /// Change of a size that is small and yet seen; zero where the size of the torque tells it.
+    pub small: f64,
 }
 
-/// Values of a shape that are tried.
+/// Values of a shape that occur.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Values {
     /// These.
@@ -137,20 +138,20 @@ pub enum Values {
     Middle,
 }
 
-impl Question {
-    /// About one parameter in which a joint torque is linear.
-    pub const fn of(parameter: &'static [usize]) -> Self {
+impl Part {
+    /// The part with these sizes.
+    pub const fn of(sizes: &'static [usize]) -> Self {
         Self {
-            free: parameter,
+            sizes,
             shapes: &[],
             rest: None,
-            refined: &[],
+            varying: &[],
             expected: &[],
-            step: 0.0,
+            small: 0.0,
         }
     }
 
-    /// With shapes that are tried.
+    /// With shapes that occur.
     pub const fn shaped(self, shapes: &'static [(usize, Values)]) -> Self {
         Self { shapes, ..self }
     }
@@ -163,27 +164,27 @@ impl Question {
         }
     }
 
-    /// With shapes that are refined once the effect is found.
-    pub const fn refining(self, refined: &'static [usize]) -> Self {
-        Self { refined, ..self }
+    /// With shapes that vary.
+    pub const fn varying(self, varying: &'static [usize]) -> Self {
+        Self { varying, ..self }
     }
 
-    /// With something known of shapes before the data.
+    /// With something known of shapes.
     pub const fn expecting(self, expected: &'static [(usize, [f64; 2])]) -> Self {
         Self { expected, ..self }
     }
 
-    /// With a step of its own.
-    pub const fn stepping(self, step: f64) -> Self {
-        Self { step, ..self }
+    /// With a small change of a size.
+    pub const fn small(self, small: f64) -> Self {
+        Self { small, ..self }
     }
 }
 
-impl Probe {
-    /// One question about a lasting effect.
-    pub const fn lasting(questions: &'static [Question]) -> Self {
+impl Prior {
+    /// A lasting effect of these parts.
+    pub const fn lasting(parts: &'static [Part]) -> Self {
         Self {
-            questions,
+            parts,
             nature: Nature::Lasting,
             promise: None,
             missed: 2e-5,
@@ -193,11 +194,11 @@ impl Probe {
         }
     }
 
-    /// No question: the kind can be simulated and identified where a model has it, and no search asks for it.
-    pub const UNASKED: Self = Self::lasting(&[]);
+    /// Nothing from which a search could start.
+    pub const NONE: Self = Self::lasting(&[]);
 
-    /// Whether its first parameter is there.
-    pub const FIRST: Self = Self::lasting(&[Question::of(&[0])]);
+    /// A part whose size is the first parameter.
+    pub const FIRST: Self = Self::lasting(&[Part::of(&[0])]);
 
     /// With a law that may miss a share of what it shows.
     pub const fn missing(self, missed: f64) -> Self {
