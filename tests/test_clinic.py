@@ -80,6 +80,20 @@ def test_angles_are_counted_as_in_the_laboratory(norms: tuple[clinic.Norm, ...])
     assert "from the horizontal" in clinic.measured([result()])[2]
 
 
+def test_what_is_followed_is_drawn_as_the_table_counts_it() -> None:
+    """Before, the figure had `elastic 1 stiffness` in N m/rad below a table of stiffness in N m per 10°."""
+    as_there = {"signs": [-1, 1], "zero_deg": [-90.0, 0.0], "words": "as in the laboratory: hanging"}
+    stiffness = result()["history"][0]
+    rest = stiffness | {"name": "rest", "values": [-1.0, -0.9], "stds": [0.1, 0.2]}
+    other = stiffness | {"kind": "segment", "name": "m1*l1"}
+    one, two = clinic.followed([result(data=result()["data"] | {"angles": as_there}, history=[stiffness, rest, other])])
+    assert (one["name"], one["joint"], one["unit"]) == ("shoulder: stiffness", None, "N m per 10°")
+    assert one["values"] == pytest.approx([0.9 * math.radians(10.0), 1.8 * math.radians(10.0)])
+    assert two["name"] == "shoulder: resting angle"
+    assert two["values"] == pytest.approx([-(math.degrees(angle) + 90.0) for angle in (-1.0, -0.9)])
+    assert two["stds"] == pytest.approx([math.degrees(0.1), math.degrees(0.2)])
+
+
 def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
     """Identify and gap of one session had a line each for the stiffness of the shoulder."""
     parameters = {"stiffness": {"value": 2.5, "interval": [2.4, 2.6]}, "rest": {"value": -1.0, "interval": [-1.1, -0.9]}}

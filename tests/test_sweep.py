@@ -263,6 +263,13 @@ def test_moments_in_pieces_are_moments_of_the_whole() -> None:
     assert moments.std == pytest.approx(values.std(ddof=1), rel=1e-9)
 
 
+def test_what_does_not_vary_has_no_spread_of_rounding() -> None:
+    """A mass that nothing measures stood in the table as ± 6.2e-15 kg."""
+    moments = Moments()
+    moments.add(np.array([2.087, np.nextafter(2.087, 3.0), 2.087]))
+    assert moments.std == 0.0
+
+
 @pytest.mark.parametrize(
     ("table", "low", "high", "mean"),
     [

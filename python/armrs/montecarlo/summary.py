@@ -15,6 +15,8 @@ from .store import Store
 SAMPLE = 20_000
 """So many values of each quantity are kept, the first ones: for percentiles and figures."""
 _REASONS = 5
+_ROUNDING = 1e-14
+"""Values that differ by less than this, relative to their mean, are the same."""
 _FOUND = re.compile(r"found [^,]*,")
 """What differs between cases that failed for one reason."""
 
@@ -40,8 +42,11 @@ class Moments:
 
     @property
     def std(self) -> float | None:
-        """Standard deviation of one value."""
-        return math.sqrt(self.squares / (self.n - 1)) if self.n > 1 else None
+        """Standard deviation of one value; 0 where all are the same to rounding."""
+        if self.n < 2:
+            return None
+        found = math.sqrt(self.squares / (self.n - 1))
+        return found if found > _ROUNDING * abs(self.mean) else 0.0
 
     @property
     def average(self) -> float | None:

@@ -404,9 +404,7 @@ def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> l
 
 def _trends(results: Sequence[Mapping[str, Any]]) -> html.Picture | None:
     """Draw what is followed over the sessions, where there are several."""
-    courses = [c for result in results for c in result.get("history", ()) if len(c["dates"]) > 1]
-    shown = {(q.kind, q.parameter) for q in (*QUANTITIES, *SLOW)}
-    known = [c for c in courses if (c["kind"], str(c["name"]).partition(" in ")[0]) in shown][:MOST_TRENDS]
+    known = followed(results)[:MOST_TRENDS]
     if not known:
         return None
     with plotting.style():
@@ -414,6 +412,24 @@ def _trends(results: Sequence[Mapping[str, Any]]) -> html.Picture | None:
         image = io.BytesIO()
         plotting.write_png(drawn.figure, image)
     return html.Picture("trends.png", drawn.title, drawn.text, html.data_uri(image.getvalue()))
+
+
+def followed(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return what is followed over the sessions with the names, the units and the zero of the table."""
+    by_name = {(q.kind, q.parameter): q for q in (*QUANTITIES, *SLOW)}
+    found = []
+    for result in results:
+        for course in result.get("history", ()):
+            parameter, _, movement = str(course["name"]).partition(" in ")
+            quantity = by_name.get((course["kind"], parameter))
+            if quantity is None or len(course["dates"]) < 2:
+                continue
+            own = counted(result, course["joint"], quantity)
+            said = f"{result['data']['joints'][course['joint'] - 1]}: {quantity.title.lower()}{movement and f', {movement}'}"
+            values = [_in_unit(value, quantity, own) for value in course["values"]]
+            stds = [quantity.factor * std for std in course["stds"]]
+            found.append({**course, "name": said, "joint": None, "unit": quantity.unit, "values": values, "stds": stds})
+    return found
 
 
 def measured(results: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -139,7 +139,7 @@ def _history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
         place = np.arange(len(course["dates"]))
         colour = plotting.ORANGE if course["changed"] else plotting.BLUE
         ax.errorbar(place, course["values"], 2.0 * np.asarray(course["stds"]), fmt="o-", color=colour, capsize=3)
-        ax.set_xticks(place, [date[2:] for date in course["dates"]], rotation=45, fontsize="small")
+        ax.set_xticks(place, course["dates"], rotation=30, ha="right", fontsize="small")
         ax.set(title=f"{tables.typeset(tables.course_label(course))}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
         ax.title.set_fontsize("small")
     for ax in axes[len(courses) :]:
@@ -176,7 +176,7 @@ def _movements(movements: Sequence[Mapping[str, Any]], model: Model) -> Drawn:
             here = [n for n, other in enumerate(poses) if np.hypot(*(other[-1] - pose[-1])) < 0.01]
             if k == here[0]:
                 numbers = ", ".join(str(n + 1) for n in here)
-                ax.annotate(numbers, pose[-1], xytext=(5, 3), textcoords="offset points", fontsize=9)
+                ax.annotate(numbers, pose[-1], xytext=(5, 3), textcoords="offset points", fontsize=9, path_effects=plotting.halo())
         ax.plot(*hand.T, color=plotting.GREY, lw=1.0, ls="--")
         ax.set(title=f"movement {number}", xlabel="forward, y [m]", ylabel="up, z [m]" if (number - 1) % columns == 0 else "")
         ax.set_aspect("equal", adjustable="box", anchor="C")

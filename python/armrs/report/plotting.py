@@ -101,6 +101,13 @@ def figure(width: float, height: float) -> Figure:
     return made
 
 
+def halo() -> list[Any]:
+    """Return a white rim for words that stand on lines."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=3.0, foreground="white")]
+
+
 def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
     """Write a figure as the PNG image that stands in reports."""
     with style():

@@ -130,7 +130,15 @@ def postures(trial: Trial, model: Model, ax: Axes) -> None:
         near = next((place for place in times if np.hypot(*(points[-1] - place)) < _SAME * reach), tuple(points[-1]))
         times.setdefault(near, []).append(f"{trial.t[k] - trial.t[0]:.3g} s")
     for place, said in times.items():
-        ax.annotate(", ".join(said), (place[0], place[1]), xytext=(8, -6), textcoords="offset points", fontsize=9, va="top")
+        ax.annotate(
+            ", ".join(said),
+            (place[0], place[1]),
+            xytext=(8, -6),
+            textcoords="offset points",
+            fontsize=9,
+            va="top",
+            path_effects=plotting.halo(),
+        )
     ax.plot(*base, marker="s", ms=11, color=plotting.INK, zorder=3)
     down = base + np.array([-0.25 * reach, 0.0])
     _arrow(ax, down, np.array([0.0, -0.25 * reach * np.sign(model.gravity)]), plotting.GREY)
@@ -163,4 +171,4 @@ def _panels(trial: Trial, names: list[str]) -> list[_Panel]:
         panels += [(f"{name}, measured torque [N m]", tau, green) for name, tau in zip(names, trial.tau.T, strict=True)]
     if trial.robot_q is not None:
         panels += [(f"robot's joint {k}, angle [°]", np.degrees(q), grey) for k, q in enumerate(trial.robot_q.T, start=1)]
-    return panels + [(name, values, grey) for name, values in trial.emg.items()]
+    return panels + [(f"EMG {name[4:].replace('_uV', ' [µV]').replace('_', ' ')}", emg, grey) for name, emg in trial.emg.items()]
