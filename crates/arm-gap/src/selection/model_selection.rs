@@ -132,6 +132,32 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         ))
     }
 
+    /// What a named effect may explain without being there: the imperfect shape of another one that is named, or of a law of the base.
+    ///
+    /// * `slot`, `less` - the effect, and what was fitted without it
+    /// * `gains` - of all that are named
+    /// * `base` - laws of the base, and what each gains
+    fn mimicked_beside(
+        &self,
+        (fitted, slot, less): (&Fitted<N>, usize, &Fitted<N>),
+        (gains, base): (&[f64], &[(Effect<f64>, f64)]),
+        point: &LinearizationPoint<N>,
+    ) -> f64 {
+        let candidate = &fitted.asked[slot];
+        let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
+        let others = others.map(|o| (fitted.asked[o].effect, gains[o]));
+        // A second dry law may be the imperfect shape of the first one, which explains less beside it than by itself.
+        let is_dry = candidate.kind().smoothed_by().is_some() && less.cost.is_finite();
+        let dry = is_dry
+            .then(|| self.gain_of_dry_law(point, less, candidate.effect.index))
+            .flatten();
+        others
+            .chain(base.iter().copied())
+            .chain(dry)
+            .map(|(other, gain)| mimicked(&candidate.effect, &other, gain))
+            .fold(0.0, f64::max)
+    }
+
     /// Goes back: effects that are no longer worth their price are taken out.
     pub(crate) fn pruned(
         &self,
@@ -166,18 +192,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     gain = gain.min(self.foretold(&point, &less)? - with);
                 }
                 // Less may be the imperfect shape of another one, or of a law of the base.
-                let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
-                let others = others.map(|o| (fitted.asked[o].effect, gains[o]));
-                // A second dry law may be the imperfect shape of the first one, which explains less beside it than by itself.
-                let is_dry = candidate.kind().smoothed_by().is_some() && less.cost.is_finite();
-                let dry = is_dry
-                    .then(|| self.gain_of_dry_law(&point, &less, candidate.effect.index))
-                    .flatten();
-                let least = others
-                    .chain(base.iter().copied())
-                    .chain(dry)
-                    .map(|(other, gain)| mimicked(&candidate.effect, &other, gain))
-                    .fold(floor, f64::max);
+                let beside = self.mimicked_beside((&fitted, slot, &less), (&gains, &base), &point);
+                let least = f64::max(floor, beside);
                 let worth = gain / scale - candidate.price * candidate.spread;
                 let worth = if gain < least {
                     worth.min(gain - least)
@@ -224,25 +240,26 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 None => Vec::new(),
             };
-            for (slot, twin) in twins.iter().enumerate() {
+            let without = (0..twins.len()).map(|slot| self.without(&fitted, slot, &point));
+            let without = without.collect::<Result<Vec<_>, _>>()?;
+            let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
+            for (slot, (twin, less)) in std::iter::zip(&twins, &without).enumerate() {
                 progress(
                     "comparing alternatives",
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 )?;
-                let less = self.without(&fitted, slot, &point)?;
-                let gain = (less.cost - fitted.cost).min(f64::MAX);
+                let gain = gains[slot].min(f64::MAX);
                 let rivals = match &library {
                     // Of what cannot be followed without it nothing can be said.
                     Some(library) if less.cost.is_finite() => {
-                        let place = (slot, &less, twin.as_ref());
+                        let place = (slot, less, twin.as_ref());
                         let found = self.rivals(&fitted, place, (&point, library), scale);
                         found.unwrap_or_default()
                     }
                     _ => Vec::new(),
                 };
                 // A shape that is refined may stand for what the law of another one misses.
-                let explained = calibrated.cost - less.cost;
-                let bent = mimicked_by_any(&fitted.asked[slot].effect, &less.asked, explained);
+                let bent = self.mimicked_beside((&fitted, slot, less), (&gains, &[]), &point);
                 let better = rivals.iter().find(|r| {
                     self.takes_over(
                         &r.alternative,
