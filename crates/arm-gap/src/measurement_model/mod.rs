@@ -1,5 +1,6 @@
 //! What the channels would read if a hypothesis were true.
 
+mod base_path;
 pub mod hypothesis;
 pub mod in_trial;
 pub mod prediction;

@@ -8,8 +8,8 @@ use arm_ident::regression::kinematics::Kinematics;
 use arm_ident::regression::measured_motion::{is_quiet, low_pass, measured, relative_speed_noise};
 use arm_ident::regression::trial::Trial;
 use arm_sim::{
-    Coupling, Drive, Experiment, HandlePath, Interpolation, Recording, Sensors, Series,
-    SimulationError, Start, simulate,
+    Coupling, Drive, Experiment, HandlePath, Recording, Sensors, Series, SimulationError, Start,
+    simulate,
 };
 
 use crate::GapError;
@@ -138,12 +138,7 @@ impl<const N: usize> Session<N> {
             _ => Vec::new(),
         };
         let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 / trial.rate).collect();
-        let base = match &trial.base {
-            Some(path) if self.comparison == ComparisonMode::Led => {
-                Some(self.displacement((number, path), (band, trial.rate), &times)?)
-            }
-            _ => None,
-        };
+        let base = self.base_path(number, band, &times)?;
         let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
         let span = first..(first + START).min(trial.len());
         let count = span.len() as f64;
@@ -175,25 +170,6 @@ impl<const N: usize> Session<N> {
             start_force,
             motion,
         })
-    }
-
-    /// How far a measured path of the first joint is from the place of the base, within the band of the comparison: what is faster
-    /// would be noise in its acceleration.
-    fn displacement(
-        &self,
-        (trial, path): (usize, &[Plane<f64>]),
-        (band, rate): (f64, f64),
-        times: &[f64],
-    ) -> Result<Series<2>, GapError> {
-        let place = self.chain.base();
-        let axis = |a: usize| path.iter().map(|p| p[a] - place[a]).collect::<Vec<_>>();
-        let [y, z] = [axis(0), axis(1)];
-        let smooth = smooth(&[y, z], band, rate)?;
-        let points: Vec<Plane<f64>> = (0..path.len())
-            .map(|i| [smooth[0][i], smooth[1][i]])
-            .collect();
-        let series = Series::new("path of the base", times, &points, Interpolation::Cubic);
-        series.map_err(|source| GapError::Simulation { trial, source })
     }
 
     fn measured(&self, trial: &Trial<N>) -> Channels {
