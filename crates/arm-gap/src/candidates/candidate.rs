@@ -35,6 +35,8 @@ pub struct Candidate {
     pub price: f64,
     /// How much more its score scatters between repeats than the noise tells.
     pub spread: f64,
+    /// What it gained when it was last judged beside the others that are named, in units of cost; infinite before.
+    pub gained: f64,
     /// What is known of its numbers before the data: the sizes that an arm of this weight may have.
     pub expected: Vec<Free>,
 }
@@ -148,6 +150,7 @@ impl Candidate {
             step: part.small,
             price: 0.0,
             spread: 1.0,
+            gained: f64::INFINITY,
             expected: expected(prepared.session, &effect, part),
         };
         if candidate.step == 0.0 {

@@ -260,6 +260,7 @@ fn ask<const N: usize>(
             step: part.small,
             price: 0.0,
             spread: 1.0,
+            gained: f64::INFINITY,
             expected: expected(session, &effect, part),
         };
         if candidate.step == 0.0 {

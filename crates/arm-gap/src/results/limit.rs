@@ -161,6 +161,7 @@ mod tests {
             step: 1.0,
             price: 0.0,
             spread: 1.0,
+            gained: f64::INFINITY,
             expected: Vec::new(),
         };
         Ruled {

@@ -49,9 +49,12 @@ fn mimicked(effect: &Effect<f64>, by: &Effect<f64>, gain: f64) -> f64 {
     by.kind.prior().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
 }
 
-/// The most that an effect may explain without being there beside named ones that together explain so much.
+/// The most that an effect may explain without being there beside named ones that together explain so much: each by itself what it gained when
+/// it was judged.
 pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explained: f64) -> f64 {
-    let each = named.iter().map(|c| mimicked(effect, &c.effect, explained));
+    let each = named
+        .iter()
+        .map(|c| mimicked(effect, &c.effect, c.gained.min(explained)));
     each.fold(0.0, f64::max)
 }
 
@@ -178,6 +181,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &point));
             let without = without.collect::<Result<Vec<_>, _>>()?;
             let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
+            for (candidate, &gain) in std::iter::zip(&mut fitted.asked, &gains) {
+                candidate.gained = gain;
+            }
             // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
             let foretold = match self.repeated {
                 true => None,
