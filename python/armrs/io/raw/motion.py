@@ -11,7 +11,7 @@ from .. import c3d
 from ..markers import markers_of
 from ..opensim import read_motion, read_trc
 from ..samples import parquet_table
-from .table import RawTable, Remark, column, remarks_of
+from .table import RawColumn, RawTable, Remark, column, remarks_of
 
 PARQUET_SUFFIXES = (".parquet",)
 MOTION_SUFFIXES = (".mot", ".sto")
@@ -22,7 +22,7 @@ _NO_ANGLE = re.compile(r"force|moment|torque|emg|_[vp][xyz]$|_t[xyz]$|_f[xyz]$",
 
 
 def read_parquet(path: Path) -> RawTable:
-    """Read the numeric columns of a Parquet file."""
+    """Read the numeric columns of a Parquet file, and time stamps as the time since the first [s]."""
     import pyarrow as pa
 
     table = parquet_table(path)
@@ -33,9 +33,17 @@ def read_parquet(path: Path) -> RawTable:
         if pa.types.is_floating(kind) or pa.types.is_integer(kind):
             values = table.column(name).cast(pa.float64()).to_numpy()
             columns.append(column(name, np.ascontiguousarray(values, dtype=np.float64)))
+        elif pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+            columns.append(RawColumn(name, "timestamp", "s", _seconds(table.column(name).to_numpy())))
         else:
             remarks += remarks_of(name, ["" if cell is None else str(cell) for cell in table.column(name).to_pylist()])
     return RawTable(path, path.stem, tuple(columns), remarks=tuple(remarks))
+
+
+def _seconds(stamps: np.ndarray) -> np.ndarray:
+    """Return the time since the first stamp [s]; NaN where there is none."""
+    known = stamps[~np.isnat(stamps)]
+    return (stamps - known[0]) / np.timedelta64(1, "s") if len(known) else np.full(len(stamps), np.nan)
 
 
 def read_motion_table(path: Path) -> RawTable:

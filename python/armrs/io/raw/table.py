@@ -19,7 +19,7 @@ _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>
 _AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
 _SAYS_LITTLE = re.compile(r"[xyzlr]|\d+", flags=re.IGNORECASE)
 """Names that say little by themselves."""
-_AFTER_LAST = re.compile(r"^(?P<name>.*[^_\s/])[_\s/](?P<unit>[^_\s]+)$")
+_BEFORE_UNIT = re.compile(r"\s*[/,]\s*|[_\s]+")
 
 
 class NoTable(BadInput):
@@ -95,15 +95,21 @@ class RawTable:
 
 
 def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
-    """Return a column; without `unit`, the unit is split off its name where one is recognised."""
+    """Return a column; without `unit`, the unit is split off its name where one is recognised.
+
+    >>> [(one.label, one.unit) for one in (column(name, np.empty(0)) for name in ("Kraft / kN", "omega rad/s", "q1_deg", "Zeit [ms]"))]
+    [('Kraft', 'kN'), ('omega', 'rad/s'), ('q1', 'deg'), ('Zeit', 'ms')]
+    """
     text = " ".join(name.split())
     if unit:
         return RawColumn(name, text, unit, values)
     if match := _IN_BRACKETS.match(text):
         return RawColumn(name, match["name"], match["unit"].strip(), values)
-    for pattern in (_AFTER_IN, _AFTER_LAST):
-        if (match := pattern.match(text)) and match["unit"].lower() in UNITS:
-            return RawColumn(name, match["name"], match["unit"], values)
+    if (match := _AFTER_IN.match(text)) and match["unit"].lower() in UNITS:
+        return RawColumn(name, match["name"], match["unit"], values)
+    for match in _BEFORE_UNIT.finditer(text):  # the first that leaves a unit: deg/s, not s
+        if match.start() and text[match.end() :].lower() in UNITS:
+            return RawColumn(name, text[: match.start()], text[match.end() :], values)
     return RawColumn(name, text, "", values)
 
 

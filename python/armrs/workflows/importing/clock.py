@@ -15,12 +15,16 @@ _RATE = 50.0
 """Rate at which signals are compared [Hz]."""
 _COARSE = 0.04
 """Steps of the shift over all shifts [s]."""
-_NEAR = 0.35
+NEAR = 0.35
 """The posture alone tells the shift to this [s]; within it the equation of motion is asked."""
 _STEP, _LONGEST, _SETTLED, _ROUNDS = 0.01, 0.05, 1e-5, 40
 """Steps of the shift [s]: over which slopes are taken, the longest in one round, and the one that ends the rounds."""
 _TOGETHER = 1.1
 """One shift holds for all recordings where it leaves at most so many times what a shift for each does."""
+_ENDS = 2.0
+"""Recordings that begin and end within so many steps of each other seem to be on one clock."""
+_COMPARED = 0.25
+"""Least part of the angles on which two shifts are compared."""
 _SMOOTH = 0.06
 """Angles are averaged over this before they are differentiated [s]."""
 _CREEP = 0.02
@@ -45,6 +49,12 @@ class Shift:
 
     seconds: float
     explained: float
+
+
+def together(t: np.ndarray, force_t: np.ndarray) -> bool:
+    """Whether angles and forces begin and end at the same times [s]: then their clocks are at most `NEAR` apart."""
+    step = max(float(np.median(np.diff(stamps))) for stamps in (t, force_t))
+    return bool(max(abs(t[0] - force_t[0]), abs(t[-1] - force_t[-1])) <= _ENDS * step)
 
 
 def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) -> list[Shift]:
@@ -100,7 +110,7 @@ def lateness(model: Model, t: np.ndarray, q: np.ndarray, force_on_arm: np.ndarra
         As in `Recording`, on one clock.
     """
     good = np.isfinite(q).all(axis=1) & np.isfinite(force_on_arm).all(axis=1)
-    fit = _Fit.of(model, Recording(t[good], q[good], t[good], force_on_arm[good]), _LATEST + _COARSE)
+    fit = _Fit.of(model, Recording(t[good], q[good], t[good], force_on_arm[good]), [0.0], _LATEST + _COARSE)
     best = 0.0
     for width, step in ((_LATEST, _COARSE), (_COARSE, 0.25 * _COARSE)):
         tried = [float(shift) for shift in best + np.arange(-width, width + 0.5 * step, step)]
@@ -131,6 +141,11 @@ class Recording:
     near: float = 0.0
     one_file: bool = False
 
+    @property
+    def one_clock(self) -> bool:
+        """Whether both seem to be on one clock: they stand in one file, or begin and end together."""
+        return self.one_file or together(self.t, self.force_t)
+
 
 def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
     """Return for each recording the shift near what `align` found at which the equation of motion explains the contact torques best [s].
@@ -144,21 +159,39 @@ def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
     Notes
     -----
     In one slow movement, a delay and a viscosity look alike. All recordings share the laws of the joints; and one shift holds for all,
-    as where one trigger starts both devices, if that explains the torques about as well. Where both clocks stand in one file, they are
-    the same if that explains the torques about as well.
+    as where one trigger starts both devices, if that explains the torques about as well. Where both seem to be on one clock, they are
+    if that explains the torques about as well. A movement that repeats itself may have been taken a period off; so the shift of every
+    recording is tried for all. Shifts are compared on the samples that have forces at both: what a longer shift leaves out, such as a
+    jerk at the start, is no argument for it.
     """
-    fits = [_Fit.of(model, recording, _NEAR + _STEP) for recording in recordings]
     near = np.array([recording.near for recording in recordings])
-    each = _descended(fits, near, near, together=False)
-    least = _left(fits, each)
-    if all(r.one_file for r in recordings) and np.abs(near).max() <= _NEAR and _left(fits, 0.0 * near) <= _AS_GOOD * least:
-        return [0.0] * len(recordings)
-    common = np.full(len(near), np.median(each))
-    if np.abs(common - near).max() <= _NEAR:
-        common = _descended(fits, common, near, together=True)
-        if _left(fits, common) <= _TOGETHER * least:
-            return common.tolist()
-    return each.tolist()
+    each = _descended(_fits(model, recordings, near), near, near, together=False)
+    if all(recording.one_clock for recording in recordings):
+        fits = _fits(model, recordings, each, 0.0 * near)
+        if fits and _left(fits, 0.0 * near) <= _AS_GOOD * _left(fits, _descended(fits, each, near, together=False)):
+            return [0.0] * len(recordings)
+    best, held = _TOGETHER, each
+    if len(recordings) == 1:
+        return each.tolist()
+    for shift in _distinct([float(np.median(each)), *near.tolist()]):
+        start = np.full(len(near), shift)
+        fits = _fits(model, recordings, each, start)
+        if not fits:
+            continue
+        common = _descended(fits, start, start, together=True)
+        times = _left(fits, common) / max(_left(fits, _descended(fits, each, near, together=False)), 1e-300)
+        if times <= best:
+            best, held = times, common
+    return held.tolist()
+
+
+def _distinct(shifts: Sequence[float]) -> list[float]:
+    """Return shifts of which none can be reached from another one."""
+    found: list[float] = []
+    for shift in shifts:
+        if all(abs(shift - other) > NEAR for other in found):
+            found.append(shift)
+    return found
 
 
 @dataclass(frozen=True)
@@ -172,8 +205,8 @@ class _Fit:
     values: np.ndarray
 
     @classmethod
-    def of(cls, model: Model, recording: Recording, widest: float) -> _Fit:
-        """Return that of the samples that have forces at every shift up to `widest` [s] from the one that was found."""
+    def of(cls, model: Model, recording: Recording, shifts: Sequence[float], widest: float) -> _Fit:
+        """Return that of the samples that have forces at every shift up to `widest` [s] from each of these."""
         good, seen = np.isfinite(recording.q).all(axis=1), np.isfinite(recording.force_on_arm).all(axis=1)
         t, clock = recording.t[good], recording.force_t[seen]
         grid = np.arange(t[0], t[-1], 1.0 / _RATE)
@@ -186,7 +219,7 @@ class _Fit:
         own = np.zeros((n, joints, 4 * joints))
         for j in range(joints):
             own[:, j, 4 * j : 4 * j + 4] = np.column_stack([angles[:, j], speeds[:, j], np.tanh(speeds[:, j] / _CREEP), np.ones(n)])
-        inside = (grid - recording.near - widest >= clock[0]) & (grid - recording.near + widest <= clock[-1])
+        inside = (grid - max(shifts) - widest >= clock[0]) & (grid - min(shifts) + widest <= clock[-1])
         design = np.concatenate([rows, own], axis=2)[inside]
         return cls(grid[inside], design, kernels.jacobian(angles)[inside], clock, recording.force_on_arm[seen])
 
@@ -194,6 +227,13 @@ class _Fit:
         """Return the torque of the contact force, joint by joint in one column, with the clock of the forces shifted [s]."""
         force = np.column_stack([np.interp(self.grid - shift, self.clock, column) for column in self.values.T])
         return np.einsum("nij,ni->nj", self.jacobian, force).ravel()
+
+
+def _fits(model: Model, recordings: Sequence[Recording], *hypotheses: np.ndarray) -> list[_Fit]:
+    """Return what the equation of motion asks of samples with forces at the shifts of all hypotheses; nothing where these are few."""
+    fits = [_Fit.of(model, r, shifts, NEAR + _STEP) for r, shifts in zip(recordings, np.column_stack(hypotheses).tolist(), strict=True)]
+    enough = all(len(fit.grid) >= _COMPARED * (r.t[-1] - r.t[0]) * _RATE for fit, r in zip(fits, recordings, strict=True))
+    return fits if enough or len(hypotheses) == 1 else []
 
 
 def _left(fits: Sequence[_Fit], shifts: Sequence[float] | np.ndarray) -> float:
@@ -205,7 +245,7 @@ def _left(fits: Sequence[_Fit], shifts: Sequence[float] | np.ndarray) -> float:
 
 
 def _descended(fits: Sequence[_Fit], shifts: np.ndarray, near: np.ndarray, *, together: bool) -> np.ndarray:
-    """Return the shifts to which steps of Gauss and Newton lead, within `_NEAR` of what was found; `together` keeps their differences."""
+    """Return the shifts to which steps of Gauss and Newton lead, within `NEAR` of what was found; `together` keeps their differences."""
     design = np.concatenate([fit.design.reshape(-1, fit.design.shape[2]) for fit in fits])
     ends = np.cumsum([0, *(fit.design.shape[0] * fit.design.shape[1] for fit in fits)])
     for _ in range(_ROUNDS):
@@ -215,7 +255,7 @@ def _descended(fits: Sequence[_Fit], shifts: np.ndarray, near: np.ndarray, *, to
         torque = np.concatenate([fit.torque(float(shift)) for fit, shift in zip(fits, shifts, strict=True)])
         columns = slopes.sum(axis=1, keepdims=True) if together else slopes
         steps = np.linalg.lstsq(np.hstack([design, -columns]), torque, rcond=None)[0][design.shape[1] :]
-        moved = np.clip(shifts + np.clip(steps, -_LONGEST, _LONGEST), near - _NEAR, near + _NEAR)
+        moved = np.clip(shifts + np.clip(steps, -_LONGEST, _LONGEST), near - NEAR, near + NEAR)
         if np.abs(moved - shifts).max() < _SETTLED:
             return moved
         shifts = moved

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
+from dataclasses import replace as changed
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,23 @@ from ...io.raw import RawColumn, RawTable
 from ...io.raw.units import unit
 from .recipe import Channel
 
-_TIME = {"t", "time", "zeit", "zeitstempel", "timestamp", "temps", "tiempo", "tempo", "cas", "seconds", "sekunden", "elapsed", "xvalue"}
+_TIME = {
+    "t",
+    "time",
+    "zeit",
+    "zeitstempel",
+    "timestamp",
+    "temps",
+    "tiempo",
+    "tempo",
+    "cas",
+    "seconds",
+    "sekunden",
+    "elapsed",
+    "xvalue",
+    "messzeit",
+    "laufzeit",
+}
 _JOINTS = (
     {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral", "oberarm", "upperarm", "humerus"},
     {
@@ -62,6 +79,10 @@ _DEGREES_FROM = 7.0
 """An angle whose unit is not stated and that exceeds this [rad] is in degrees: no joint turns by more than a turn."""
 _RATES = (4.0, 20000.0)
 """Sample rates that recordings have [Hz]."""
+_FORWARD_AND_UP = {("x", "y"): ("x", "y"), ("x", "z"): ("x", "z"), ("y", "z"): ("y", "z"), ("x", "y", "z"): ("y", "z")}
+"""Axes of a force sensor -> the one forward and the one up. Of three alike, the first is taken to point sideways."""
+_SIDEWAYS = 0.05
+"""Of three components, one that is at most this part of the largest points sideways (root mean square)."""
 _DEFAULT_UNIT = {"angle": "rad", "speed": "rad/s", "force": "N", "moment": "Nm"}
 _MILLIMETRES_FROM = 5.0
 """A position whose unit is not stated and that exceeds this [m] is in millimetres: no arm reaches farther."""
@@ -121,7 +142,9 @@ def symbol_of(column: RawColumn) -> str | None:
 def _force(tokens: Sequence[str], dimension: str | None) -> str | None:
     is_force = dimension == "force" or (dimension is None and _mentions(tokens, _FORCE - {"f"}))
     axis = next((_AXES[token] for token in reversed(tokens) if token in _AXES), None)
-    fused = next((token for token in tokens if re.fullmatch(r"f[xyz]", token)), None)
+    # Of a force by its unit any letter may stand before the axis; OpenSim calls the components of a force vx, vy and vz.
+    letters = "[a-z]" if dimension == "force" else "[fv]" if is_force else "f"
+    fused = next((token for token in tokens if re.fullmatch(f"{letters}[xyz]", token)), None)
     if fused and dimension in (None, "force"):
         return f"F{fused[1]}"
     if is_force and axis:
@@ -237,6 +260,41 @@ def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequen
         text = "mm" if most > _MILLIMETRES_FROM else "m"
         return Channel(symbol, column.name, text, sign, f"{why}; no unit stated; values up to {most:.3g}, so in {text}")
     return Channel(symbol, column.name, _DEFAULT_UNIT[dimension], sign, f"{why}; no unit stated, so {_DEFAULT_UNIT[dimension]}")
+
+
+def plane(channels: Sequence[Channel], tables: Sequence[RawTable]) -> tuple[list[Channel], list[str]]:
+    """Return channels with forces and positions named in the plane of armrs, y forward and z up, and what was decided."""
+    found, notes = list(channels), []
+    for kind, said in (("F", "force"), ("P", "position")):
+        own = {f"{kind}x", f"{kind}y", f"{kind}z"}
+        names = {f"{kind}y": f"{kind}y", f"{kind}z": f"{kind}z"}
+        three = [c for c in found if c.symbol in own]
+        if not any(c.why.startswith("as --map") for c in three if c.symbol in names):
+            axes = tuple(sorted(c.symbol[1] for c in three))
+            sideways = _sideways(three, tables) if kind == "F" and len(axes) == len(own) else None
+            if sideways is not None:
+                axes = tuple(axis for axis in axes if axis != sideways)
+            if axes in _FORWARD_AND_UP:
+                forward, up = _FORWARD_AND_UP[axes]
+                names = {f"{kind}{forward}": f"{kind}y", f"{kind}{up}": f"{kind}z"}
+                if (forward, up) != ("y", "z"):
+                    least = f", {sideways} as sideways, where next to no force acts" if sideways is not None else ""
+                    notes.append(f"{said} axes: {forward} is taken as forward, {up} as up{least}")
+        found = [changed(c, symbol=names.get(c.symbol, c.symbol)) for c in found if c.symbol in names or c.symbol not in own]
+    return [c for c in found if c.symbol not in ("My", "Mz")], notes
+
+
+def _sideways(three: Sequence[Channel], tables: Sequence[RawTable]) -> str | None:
+    """Return the axis along which next to no force acts."""
+    size = {c.symbol[1]: _root_mean_square(c, tables) * (known.factor if (known := unit(c.unit)) else 1.0) for c in three}
+    least = min(size, key=lambda axis: size[axis])
+    return least if size[least] <= _SIDEWAYS * max(size.values()) and sorted(size.values())[1] > _SIDEWAYS * max(size.values()) else None
+
+
+def _root_mean_square(channel: Channel, tables: Sequence[RawTable]) -> float:
+    values = np.concatenate([c.values for table in tables for c in table.columns if c.name == channel.column] or [np.zeros(0)])
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
 
 
 def went_back(name: str, values: np.ndarray, sample: int, table: RawTable) -> BadInput:

@@ -27,8 +27,6 @@ from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
 from .samples import cleaned
 
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
-_FORWARD_AND_UP = {("x", "y"): ("x", "y"), ("x", "z"): ("x", "z"), ("y", "z"): ("y", "z"), ("x", "y", "z"): ("y", "z")}
-"""Axes of a force sensor -> the one forward and the one up. Of three, the first is taken to point sideways."""
 _NAMED = 8
 """Columns that a line names at most."""
 
@@ -259,7 +257,7 @@ def _decided(
             *(c for c in own if c.symbol[0] in "FM"),
             *(changed(c, symbol="t of forces") for c in own if c.symbol == "t"),
         ]
-    channels, axes = _plane(channels)
+    channels, axes = columns.plane(channels, force_tables or [n.table for n in named])
     _complete(channels, model.n_joints, named[0].table, problems)
     _alike([n.table for n in named], [c for c in channels if not force_tables or c.symbol[0] not in "FM"], problems)
     _alike(force_tables, [c for c in channels if c.symbol[0] in "FM"], problems)
@@ -360,22 +358,6 @@ def _present(mapped: Mapping[str, tuple[str, int]], table: RawTable) -> dict[str
     return found
 
 
-def _plane(channels: list[Channel]) -> tuple[list[Channel], list[str]]:
-    """Return the channels with forces and positions named in the plane of armrs: y forward, z up."""
-    notes = []
-    for kind, said in (("F", "force"), ("P", "position")):
-        own = {f"{kind}x", f"{kind}y", f"{kind}z"}
-        axes = tuple(sorted(c.symbol[1] for c in channels if c.symbol in own))
-        names = {f"{kind}y": f"{kind}y", f"{kind}z": f"{kind}z"}
-        if axes in _FORWARD_AND_UP and not any(c.why.startswith("as --map") for c in channels if c.symbol in names):
-            forward, up = _FORWARD_AND_UP[axes]
-            names = {f"{kind}{forward}": f"{kind}y", f"{kind}{up}": f"{kind}z"}
-            if (forward, up) != ("y", "z"):
-                notes.append(f"{said} axes: {forward} is taken as forward, {up} as up")
-        channels = [changed(c, symbol=names.get(c.symbol, c.symbol)) for c in channels if c.symbol in names or c.symbol not in own]
-    return [c for c in channels if c.symbol not in ("My", "Mz")], notes
-
-
 def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, problems: list[BadInput]) -> None:
     symbols = {c.symbol for c in channels}
     # A column that was refused for its unit or its values is not missing.
@@ -419,10 +401,11 @@ def _aligned(
     except BadInput as error:
         problems.append(error.within(file=named.forces.path))
         return _Read(trial, named.table, named.forces)
-    reads = [_Read(changed(trial, force_shift=shift.seconds), named.table, named.forces) for shift in shifts]
-    if len(reads) == 1:
-        return reads[0]
-    return min(reads, key=lambda read: _unexplained(read, channels, model, given))
+    seconds = [shift.seconds for shift in shifts]
+    if clock.together(_values(named.table, _by(channels, "t")), _values(named.forces, _by(channels, "t of forces"))):
+        seconds = [shift for shift in seconds if abs(shift) <= clock.NEAR] or [0.0]
+    reads = [_Read(changed(trial, force_shift=shift), named.table, named.forces) for shift in seconds]
+    return reads[0] if len(reads) == 1 else min(reads, key=lambda read: _unexplained(read, channels, model, given))
 
 
 def _unexplained(read: _Read, channels: Sequence[Channel], model: Model, given: Mapping[str, object]) -> float:
