@@ -462,7 +462,8 @@ def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: Tolerance, abo
     for e in calibration:
         promised = _promised(e, tolerance)
         if above * promised < abs(e.value) <= to * promised:
-            lines.append(f"{e.name} came out as {e.value:.3g} {e.unit}, {abs(e.value) / promised:.1f} times the declared tolerance")
+            size = f"{e.value:.3g}" if e.unit == "1" else f"{e.value:.3g} {e.unit}"
+            lines.append(f"{e.name} came out as {size}, {abs(e.value) / promised:.1f} times the declared tolerance")
     return tuple(lines)
 
 
