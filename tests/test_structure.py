@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import pytest
 
 import structure
+from armrs.catalogue import catalogue
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "python" / "armrs"
@@ -93,7 +95,6 @@ def test_folders_do_not_know_what_is_above_them() -> None:
 
 
 NAMED = {
-    "crates/arm-capi/src/arm.rs": "an effect that is off",
     "crates/arm-cosim/src/spec.rs": "a sample",
     "crates/arm-gap/src/measurement_model/start.rs": "the torque that holds a joint is a constant moment",
     "crates/arm-model/src/joint.rs": "the keys of a joint are short for effects",
@@ -110,6 +111,29 @@ def test_a_kind_of_effect_is_named_in_its_own_file() -> None:
     crates = [path for path in RUST if not is_test(path) and own not in path.parents and "examples" not in path.parts]
     named = {path.relative_to(ROOT).as_posix() for path in crates if structure.variants(path, "Kind") & kinds}
     assert {name for name in named if name.startswith("crates/")} - {"crates/crosscheck/src/main.rs"} == set(NAMED)
+
+
+NAMED_IN_PYTHON = {
+    "io/multibody/joints.py": "a rotor is what other formats call armature",
+    "io/multibody/mjcf.py": "a fixed tendon is a spring over two joints",
+    "report/clinic.py": "the numbers that a clinician reads, in plain words",
+    "workflows/demo.py": "the brakes that the demo hides",
+    "workflows/plan_stretches.py": "stretches are planned for reflexes",
+    "workflows/record.py": "a torque that differs between repeats is a constant moment",
+    "workflows/spasticity.py": "what is asked is the reflex",
+}
+"""Modules of the package, but for the thesis, that name a kind of effect, and why."""
+
+
+def test_python_names_no_kind_of_effect_without_a_reason() -> None:
+    """Names that are also those of other quantities, such as `inertia` and `elastic`, say nothing."""
+    kinds = {k.kind for k in catalogue().values()} - {"inertia", "elastic", "force_gain", "angle_offset"}
+    found = set()
+    for path in PACKAGE.rglob("*.py"):
+        strings = (node.value for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Constant))
+        if path.parent.name != "thesis" and kinds & {s for s in strings if isinstance(s, str)}:
+            found.add(path.relative_to(PACKAGE).as_posix())
+    assert found == set(NAMED_IN_PYTHON)
 
 
 # ---- that each rule finds what it is for

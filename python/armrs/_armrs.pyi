@@ -16,6 +16,7 @@ from .workflows.simulate import CoreDrive, CoreRun, Sensors
 
 __all__ = [
     "DECISIONS",
+    "JOINT_LAWS",
     "MISFIT",
     "SAMPLE_STATUSES",
     "SPEED_NOISE_ALLOWED",
@@ -102,6 +103,8 @@ DECISIONS: tuple[str, str, str]
 MISFIT: float
 STILL: float
 SPEED_NOISE_ALLOWED: float
+JOINT_LAWS: tuple[tuple[str, str, str], ...]
+"""The laws that a `[[joint]]` states: the key of the size of each, its kind, and the parameter that the size is."""
 SAMPLE_STATUSES: list[str]
 
 # ---- what the functions return: these names are there for type checkers alone

@@ -70,6 +70,8 @@ class Kind:
     """Lowest joint at which it can stand; 2 where it also acts in the joint before."""
     family: str = ""
     """The family of effects that it belongs to: of its members movements may not tell one from another."""
+    rate_independent: bool = False
+    """Whether its torque is a constant, or one whose sign alone follows the motion: what a quasi-static analysis can find."""
     searched: bool = True
     """Whether `armrs gap` asks for it; others are simulated and identified where a model or `with_effects` has them."""
     own: bool = False

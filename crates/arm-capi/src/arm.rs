@@ -4,7 +4,7 @@ use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
 
 use arm_core::effect::{
-    ActsOn, Effect, KINDS, Kind, MAX_STATES, Motion, States, applied, resisting_torque,
+    ActsOn, Effect, KINDS, MAX_STATES, Motion, States, applied, resisting_torque,
 };
 use arm_core::{
     Chain, Equation, Load, Pose, Segment, forward_dynamics, gravity, inverse_dynamics, jacobian,
@@ -265,7 +265,7 @@ fn plausible(chain: &Chain<armrs_real, ARMRS_JOINTS>) -> Result<(), Refusal> {
 fn off() -> Effect<armrs_real> {
     Effect {
         on: false,
-        ..Effect::new(Kind::Viscous, 0)
+        ..Effect::new(KINDS[0], 0)
     }
 }
 

@@ -62,6 +62,12 @@ const KEYS: [Key; 4] = [
     },
 ];
 
+/// The laws that a joint states: the key of the size of each, its kind, and the parameter that the size is, in the order of the keys.
+pub fn joint_laws() -> impl Iterator<Item = (&'static str, Kind, &'static str)> {
+    let sizes = KEYS.iter().filter(|key| key.size);
+    sizes.map(|key| (key.name, key.kind, key.parameter))
+}
+
 impl Key {
     /// The bounds of the catalogue.
     fn bounds(&self) -> Bounds {

@@ -51,7 +51,7 @@ pub use contact::Contact;
 pub use dataset::{AddedMass, Description, ForceOn, Role, TrialEntry};
 pub use effect::{Channel, Effect, Site};
 pub use fields::{Bounds, Fields};
-pub use joint::Joint;
+pub use joint::{Joint, joint_laws};
 pub use model::{MAX_SEGMENTS, Model, Parts};
 pub use parameter::{Object, ParameterId, ParameterInfo};
 pub use refused::{Refused, nearest, unknown};

@@ -2,7 +2,16 @@
 
 use arm_core::effect::Kind;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyList, PyTuple};
+
+/// Adds constants to the module.
+pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    let laws = arm_model::joint_laws().map(|(key, kind, size)| (key, kind.info().kind, size));
+    m.add(
+        "JOINT_LAWS",
+        PyTuple::new(m.py(), laws.collect::<Vec<_>>())?,
+    )
+}
 
 /// All kinds of effects, those of one's own last: name, where, parameters with units and bounds, formula, reference.
 #[pyfunction]
@@ -31,6 +40,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("parameters", parameters)?;
         entry.set_item("first_joint", if kind.crosses() { 2 } else { 1 })?;
         entry.set_item("family", kind.family().name())?;
+        entry.set_item("rate_independent", kind.is_rate_independent())?;
         entry.set_item("searched", !kind.prior().parts.is_empty())?;
         entry.set_item("address", info.place.address())?;
         entry.set_item("own", matches!(kind, Kind::Own(_)))?;

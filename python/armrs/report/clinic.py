@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import checks
+from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from . import figures, html, pages, plotting
@@ -523,10 +524,16 @@ def doubts(results: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             yield "the analysis does not describe all that was measured"
         if any(e.get("caveat") for e in estimates):
             yield "speeds are noise to a good part"
-        if any(e["kind"] == "coulomb" and e["decided_by"] == "data" and e["interval"][0] > 0.0 for e in estimates):
+        if any(_is_dry(e["kind"]) and e["decided_by"] == "data" and e["interval"][0] > 0.0 for e in estimates):
             yield _MOVING
         if result.get("verdict") == "unexplained":
             yield "something acts on the arm that has no name"
+
+
+def _is_dry(kind: str) -> bool:
+    """Whether an estimate is of dry friction."""
+    known = catalogue().get(kind)
+    return known is not None and known.family == "dry"
 
 
 def _picture(lines: Sequence[Line], doubted: Sequence[str]) -> html.Picture | None:

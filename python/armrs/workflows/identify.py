@@ -348,36 +348,38 @@ def _not_quasi_static(moved: Sequence[float]) -> list[str]:
 
 LEVELS: dict[str, Any] = {"least": 0.5, "most": 0.999999}
 """Probabilities that intervals may have."""
-_IN_CASCADE = ("coulomb", "constant_moment")
-"""Effects that the cascade finds; others it holds at what the model says."""
 
 
 def cascade_can(with_effects: Sequence[str], motion: str) -> None:
-    """Refuse what the cascade would silently leave out."""
+    """Refuse what the cascade would silently leave out: it holds what depends on the rate at what the model says."""
+    found = [name for name, kind in _joint_kinds().items() if kind.rate_independent]
     for kind in with_effects:
-        if kind in _joint_kinds() and kind not in _IN_CASCADE:
-            raise BadInput("with_effects", kind, f"{' or '.join(_IN_CASCADE)} for the cascade, or the joint method")
+        if kind in _joint_kinds() and kind not in found:
+            raise BadInput("with_effects", kind, f"{' or '.join(found)} for the cascade, or the joint method")
     if motion == "simulated":
         raise BadInput("motion", motion, "measured for the cascade, or the joint method")
 
 
 def _left_out(method: str, effects: Sequence[Effect]) -> tuple[str, ...]:
     """Return what the method leaves out of the model, a line each."""
-    rotors = [e.joint for e in effects if e.kind == "motor_inertia"] if method == "cascade" else []
-    return tuple(f"the cascade takes no inertia into account, and so not the motor_inertia of joint {joint}" for joint in rotors)
+    kinds = _joint_kinds()
+    rotors = [e for e in effects if e.kind in kinds and kinds[e.kind].family == "segment"] if method == "cascade" else []
+    return tuple(f"the cascade takes no inertia into account, and so not the {e.kind} of joint {e.joint}" for e in rotors)
 
 
 def _unmoved(method: str, parameters: Sequence[Estimate]) -> tuple[str, ...]:
     """Return the joints of whose dry friction the cascade finds nothing, a line each."""
-    joints = [e.joint for e in parameters if method == "cascade" and e.kind == "coulomb" and e.decided_by == "prior"]
+    kinds = _joint_kinds()
+    dry = [e for e in parameters if e.kind in kinds and kinds[e.kind].family == "dry"] if method == "cascade" else []
+    joints = [e.joint for e in dry if e.decided_by == "prior"]
     return tuple(
         f"joint {joint} never moves steadily in one direction: the cascade cannot identify its dry friction, nor use its torque"
         for joint in joints
     )
 
 
-PASSIVE_LAWS = ("elastic", "viscous", "coulomb")
-"""What resists in every passive joint (equation 3.12 of the thesis)."""
+PASSIVE_LAWS = tuple(kind for _, kind, _ in _armrs.JOINT_LAWS)
+"""What resists in every passive joint (equation 3.12 of the thesis): the laws that a joint of a model states."""
 _NO_LAWS = ("segment", "muscle")
 """Families of joint effects that say nothing of how a passive joint resists."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .. import _armrs
-from ..catalogue import catalogue
+from ..catalogue import Parameter, catalogue
 from ..model import Effect, Model
 
 DEFAULT_DT = 0.25e-3
@@ -16,8 +16,6 @@ FINER = (1, 4, 16, 64)
 """Steps within `DEFAULT_DT` that are tried in turn, until one resolves the dry friction."""
 FOLLOWED = 2.785
 """Largest rate of decay that a step of the classical fourth-order method follows, times the step."""
-_SIZES = {"coulomb": "torque", "stribeck": "torque", "thixotropy": "friction"}
-"""Torque of a dry law. Not of `load_friction`: where that is so steep, it has mostly no single answer if it is set-valued."""
 
 
 def sticking(model: Model) -> Model:
@@ -56,12 +54,19 @@ def _too_steep(model: Model) -> Iterator[tuple[Effect, str]]:
     """Give the dry laws with the default smoothing whose slope at rest the usual step cannot follow, and the name of that parameter."""
     agility = np.diag(np.linalg.inv(_armrs.Arm.from_model(model).inertia(np.zeros(model.n_joints))))
     for law in model.all_effects:
-        if law.kind not in _SIZES or law.joint is None:
+        size = catalogue()[law.kind].parameters[0]
+        # Not where the size is a share of the force through the joint: so steep, such friction has mostly no single answer if set-valued.
+        if law.joint is None or size.unit != "N m":
             continue
-        (smoothing,) = (p for p in catalogue()[law.kind].parameters if p.or_zero)
-        rate = law.parameters[_SIZES[law.kind]] / smoothing.default * agility[law.joint - 1]
-        if law.parameters[smoothing.name] == smoothing.default and rate * DEFAULT_DT > FOLLOWED:
-            yield law, smoothing.name
+        for smoothing in _smoothings(law):
+            rate = law.parameters[size.name] / smoothing.default * agility[law.joint - 1]
+            if law.parameters[smoothing.name] == smoothing.default and rate * DEFAULT_DT > FOLLOWED:
+                yield law, smoothing.name
+
+
+def _smoothings(effect: Effect) -> list[Parameter]:
+    """Return the parameter that makes dry friction smooth, where a law has some."""
+    return [p for p in catalogue()[effect.kind].parameters if p.or_zero]
 
 
 def steps_to_try(model: Model, *, engine: str, integrator: str | None, dt: float | None) -> tuple[float, ...]:
@@ -78,5 +83,5 @@ def steps_to_try(model: Model, *, engine: str, integrator: str | None, dt: float
 
 def smoothings(model: Model) -> list[float]:
     """Return the speeds over which dry friction changes its sign [rad/s]; infinite for what joints state."""
-    speeds = [effect.parameters[p.name] for effect in model.effects for p in catalogue()[effect.kind].parameters if p.or_zero]
+    speeds = [effect.parameters[p.name] for effect in model.effects for p in _smoothings(effect)]
     return speeds + [np.inf for joint in model.joints if joint.coulomb > 0.0]

@@ -1,7 +1,9 @@
 //! Models: what is accepted, what is refused and in which words, that writing loses nothing, and the identity of parameters.
 
 use arm_core::effect::{KINDS, Kind};
-use arm_model::{Contact, Effect, Joint, Model, ParameterId, Parts, Refused, Segment, Site};
+use arm_model::{
+    Contact, Effect, Joint, Model, ParameterId, Parts, Refused, Segment, Site, joint_laws,
+};
 
 pub const MODEL: &str = r#"[arm]
 gravity = 9.81
@@ -297,6 +299,26 @@ fn laws_of_joints_are_effects_like_any_other() {
         (again.joints[0].stiffness, again.effects.as_slice()),
         (0.0, &[soft][..])
     );
+}
+
+/// What a `[[joint]]` states is what the catalogue says every passive joint has.
+#[test]
+fn joints_state_the_laws_of_every_passive_joint() {
+    let stated: Vec<_> = joint_laws()
+        .map(|(key, kind, size)| (key, kind.info().kind, size))
+        .collect();
+    let laws = [
+        ("stiffness", "elastic", "stiffness"),
+        ("viscosity", "viscous", "viscosity"),
+        ("coulomb", "coulomb", "torque"),
+    ];
+    assert_eq!(stated, laws);
+    let passive = KINDS.iter().filter(|kind| kind.prior().passive);
+    let mut passive: Vec<_> = passive.map(|kind| kind.info().kind).collect();
+    let mut stated = laws.map(|(_, kind, _)| kind);
+    passive.sort_unstable();
+    stated.sort_unstable();
+    assert_eq!(passive, stated);
 }
 
 #[test]

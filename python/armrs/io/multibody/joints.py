@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 
+from ... import _armrs
 from ...errors import BadInput, Text
 from ...model import Effect, Model
 
@@ -36,7 +37,7 @@ class Laws:
     others: list[Effect] = field(default_factory=list)
 
 
-_LAWS = {"elastic": ("stiffness", "stiffness"), "viscous": ("viscosity", "viscosity"), "coulomb": ("coulomb", "torque")}
+_LAWS = {kind: (key, parameter) for key, kind, parameter in _armrs.JOINT_LAWS}
 _LAWS_OF_ROTORS = {"motor_inertia": ("rotor", "inertia")}
 
 
