@@ -119,6 +119,20 @@ def test_load_cells_read_the_brakes_and_muscles_their_activity(experiment: Path,
     assert max(s[~during & ((trial.t < 0.4) | (trial.t > 1.0))].max() for s in sides) < 8.0
 
 
+def test_load_cells_read_every_dry_law(experiment: Path, tmp_path: Path) -> None:
+    """Thixotropy resists beside Coulomb's torque where a movement sets out after a rest, before its structure has broken down."""
+    text = EXPERIMENT.replace("emg = true", "brake_noise_Nm = 0.001")
+    friction = '[[effect]]\nkind = "thixotropy"\njoint = 1\nfriction = 0.3\nbreakdown = 0.05\nrecovery = 100.0\n\n[[movement]]'
+    experiment.write_text(text.replace("[[movement]]", friction), encoding="utf-8")
+    trial = armrs.record(experiment, tmp_path / "out").dataset.trials[0]
+    assert trial.tau is not None
+    # Of the 0.3 N m a part has broken down before the speed is beyond the smoothing; without them there are 0.15 N m.
+    assert 0.25 < np.abs(trial.tau[:, 0]).max() < 0.45
+    assert np.abs(trial.tau[:, 1]).max() == pytest.approx(0.1, abs=0.01)
+    # The structure has gone when the joint is 0.2 rad away, four times the angle of breakdown: e^-4 of 0.3 N m are 0.005.
+    assert np.abs(trial.tau[-1, 0]) < 0.16
+
+
 @pytest.mark.parametrize(
     ("fault", "reason"),
     [

@@ -15,6 +15,7 @@ import pytest
 import armrs
 from armrs import BadInput, _armrs
 from armrs.io import files
+from armrs.report.tables import label, symbol
 
 CLASSES: dict[str, dict[str, Any]] = {
     "Value": {"value": 0.4, "std": 0.01, "unit": "N m s/rad", "interval": (0.38, 0.42)},
@@ -199,6 +200,16 @@ def test_a_recording_and_what_is_read_of_it_are_objects(slow_arm: Path) -> None:
     assert np.array_equal(again.q, read.q) and repr(again) == f"Readings({len(run.t)} samples)"
     with pytest.raises(AttributeError):
         read.q = None  # type: ignore[misc]
+
+
+def test_a_sum_in_a_name_makes_no_combination() -> None:
+    """What an estimate is, its kind says: a kind of one's own may have a parameter with a sum in its name, and a combination none."""
+    given = (1, 0.2, 0.01, "N m", (0.18, 0.22), "data")
+    effect = armrs.Estimate("height+depth", given[0], "detent", *given[1:])
+    combination = armrs.Estimate("h1", given[0], "combination", *given[1:])
+    assert str(effect) == "detent height+depth = 0.2 ± 0.01 N m" and str(combination) == "h1 = 0.2 ± 0.01 N m"
+    assert label({"name": effect.name, "kind": effect.kind}).startswith("detent ")
+    assert label({"name": combination.name, "kind": combination.kind}) == symbol("h1")
 
 
 def test_what_a_value_rests_on_is_one_of_three() -> None:
