@@ -1,7 +1,7 @@
 //! The closed chain at one instant: from state and drive to accelerations, forces and powers.
 
 use arm_core::effect::{
-    Effect, Local, MAX_STATES, Motion, States, any_state, resisting_besides_dry, resisting_torque,
+    Effect, Local, Motion, States, any_state, resisting_besides_dry, resisting_torque,
 };
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
@@ -488,13 +488,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 /// Tries how much dry friction there is in an effect at a speed.
 fn dry_at<T: Scalar>(effect: &Effect<T>, speed: f64) -> T {
     effect.dry(&Local {
-        time: T::ZERO,
-        q: T::ZERO,
-        qd: T::of(speed),
-        qdd: T::ZERO,
-        proximal_q: T::ZERO,
         joint_force: T::ONE,
-        memory: [T::ZERO; MAX_STATES],
+        ..Local::moving(T::ZERO, T::of(speed))
     })
 }
 
@@ -510,15 +505,7 @@ fn falls<T: Scalar>(effect: &Effect<T>) -> bool {
 
 /// Tries whether the force through the joint changes an effect's torque; no kind is named here.
 fn feels_joint_force<T: Scalar>(effect: &Effect<T>) -> bool {
-    let mut at = Local {
-        time: T::ZERO,
-        q: T::of(0.1),
-        qd: T::ONE,
-        qdd: T::ZERO,
-        proximal_q: T::ZERO,
-        joint_force: T::ZERO,
-        memory: [T::ZERO; MAX_STATES],
-    };
+    let mut at = Local::moving(T::of(0.1), T::ONE);
     let without = effect.torque(&at);
     at.joint_force = T::ONE;
     !(effect.torque(&at) - without).every(|d| d == 0.0)

@@ -118,13 +118,27 @@ class Run(Protocol):
         """Give the samples in order, as runs of at most `PIECE` of them."""
 
 
+class Doubted:
+    """What may be wrong with a recorded run, by its samples."""
+
+    @cached_property
+    def balance(self: Run) -> EnergyBalance:
+        """What of the energy of the run is not accounted for."""
+        return energy_balance(self.pieces())
+
+    @property
+    def warnings(self: Run) -> tuple[str, ...]:
+        """What is hardly a movement of an arm, or not accounted for, a line each."""
+        return warnings(self)
+
+
 def _samples(columns: dict[str, Any]) -> dict[str, Any]:
     """Return what a run keeps of its columns by name, and all of them."""
     return {"t": columns["time"]} | {name: columns[name] for name in ("q", "qd", "qdd", "force_on_arm")} | {"columns": columns}
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated(Tabular, Series):
+class Simulated(Doubted, Tabular, Series):
     """A recorded run; rows are samples.
 
     Attributes
@@ -202,16 +216,6 @@ class Simulated(Tabular, Series):
             if values is not None:
                 digest.values(values)
         return digest.value()
-
-    @cached_property
-    def balance(self) -> EnergyBalance:
-        """What of the energy of the run is not accounted for."""
-        return energy_balance(self.pieces())
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is hardly a movement of an arm, or not accounted for, a line each."""
-        return warnings(self)
 
     @property
     def samples(self) -> int:

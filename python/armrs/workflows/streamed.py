@@ -15,13 +15,12 @@ from ..errors import SimulationError
 from ..io import files
 from ..io.trial import Trial
 from ..model import Model
-from .accuracy import EnergyBalance, energy_balance
 from .movement import Movement
-from .simulate import PIECE, Simulated, digested, is_doubtful, simulate_in_pieces, warnings
+from .simulate import PIECE, Doubted, Simulated, digested, is_doubtful, simulate_in_pieces
 from .stiction import steps_to_try, sticking
 
 
-class Streamed:
+class Streamed(Doubted):
     """A run that is read a piece at a time; made by `stream`.
 
     Attributes
@@ -99,16 +98,6 @@ class Streamed:
                 for start in range(0, self.samples, PIECE):
                     digest.values(self._read(name, start))
         return digest.value()
-
-    @cached_property
-    def balance(self) -> EnergyBalance:
-        """What of the energy of the run is not accounted for."""
-        return energy_balance(self.pieces())
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is hardly a movement of an arm, or not accounted for, a line each."""
-        return warnings(self)
 
 
 def _arrays(piece: Simulated) -> dict[str, np.ndarray]:

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Body, Scalar, Setup};
 
 /// A point mass at the tip of the last segment, such as a payload in the hand.

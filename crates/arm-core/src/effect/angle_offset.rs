@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Promise, Part};
+use super::prior::{Part, Prior, Promise};
 use crate::{Reading, Scalar};
 
 /// An offset of the sensor of one joint angle, as of a misplaced marker.

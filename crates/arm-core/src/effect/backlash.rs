@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Scalar, Setup};
 
 /// Free play of the handle in the hand: the spring of the contact acts only beyond it.

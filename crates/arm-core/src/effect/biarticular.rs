@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::prior::{Family, Prior, Part, Values};
+use super::prior::{Family, Part, Prior, Values};
 use crate::Scalar;
 
 /// Position of the ratio among the parameters.

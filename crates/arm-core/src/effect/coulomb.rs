@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::prior::{Family, Prior, Part};
+use super::prior::{Family, Part, Prior};
 use crate::Scalar;
 
 /// Dry friction: a torque against the direction of motion, whatever the speed.

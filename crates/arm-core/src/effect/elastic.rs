@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::prior::{Prior, Part, Values};
+use super::prior::{Part, Prior, Values};
 use crate::Scalar;
 
 /// A linear spring about a rest angle.

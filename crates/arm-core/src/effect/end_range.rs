@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::prior::{Prior, Part, Values};
+use super::prior::{Part, Prior, Values};
 use crate::Scalar;
 
 /// The steep rise of passive moment towards both ends of the range of motion (double exponential).

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Promise, Part};
+use super::prior::{Part, Prior, Promise};
 use crate::{Reading, Scalar};
 
 /// An offset of one channel of the force sensor (N, for `Mx` N m).

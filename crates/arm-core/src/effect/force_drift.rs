@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Reading, Scalar};
 
 /// An offset of one channel of the force sensor that grows with time from zero at the start of the trial (N/s, for `Mx`

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Reading, Scalar};
 
 /// A force sensor that is mounted at an angle: it reads a force turned counter-clockwise.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Scalar, Setup};
 
 /// A change of the first moment m·l of a segment: its centre of mass lies elsewhere along the segment.

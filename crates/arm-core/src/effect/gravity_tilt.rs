@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Scalar, Setup};
 
 /// A tilt of the frame of measurement against the plumb line, counter-clockwise as gravity is seen to turn.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Nature, Prior, Part};
+use super::prior::{Nature, Part, Prior};
 use crate::{Scalar, Setup};
 
 /// A handle that slips in the hand once and stays there: the hand then stands further than the robot's angles say.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Scalar, Setup};
 
 /// A change of the moment of inertia of a segment about its centre of mass.

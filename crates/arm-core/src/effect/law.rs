@@ -119,6 +119,22 @@ pub struct Local<T> {
     pub memory: States<T>,
 }
 
+impl<T: Scalar> Local<T> {
+    /// A joint at an angle and a speed, with nothing else: at the start, without states, and no force through it.
+    #[inline]
+    pub fn moving(q: T, qd: T) -> Self {
+        Self {
+            time: T::ZERO,
+            q,
+            qd,
+            qdd: T::ZERO,
+            proximal_q: T::ZERO,
+            joint_force: T::ZERO,
+            memory: [T::ZERO; MAX_STATES],
+        }
+    }
+}
+
 /// What an effect acts on, and so who can apply it: a controller that knows only the arm applies the first two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]

@@ -1,5 +1,5 @@
 use super::law::{ActsOn, Info, Law, Local, Parameter, Parameters, Place, leading};
-use super::prior::{Family, Prior, Part};
+use super::prior::{Family, Part, Prior};
 use crate::{Scalar, Setup};
 
 /// The rotor of a drive, as felt at the joint: its inertia times the square of the gear ratio.

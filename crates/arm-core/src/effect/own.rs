@@ -42,8 +42,7 @@ use crate::Scalar;
 /// let kind = Kind::Own(Own::new(&DETENT));
 /// let effect = Effect::<f64>::new(kind, 1).with(&[0.2]);
 /// assert_eq!(effect.validate(2), Ok(()));
-/// let at = Local { time: 0.0, q: 0.05, qd: 0.0, qdd: 0.0, proximal_q: 0.0, joint_force: 0.0, memory: [0.0; 3] };
-/// assert_eq!(effect.torque(&at), 0.2 * libm::sin(0.5));
+/// assert_eq!(effect.torque(&Local::moving(0.05, 0.0)), 0.2 * libm::sin(0.5));
 /// ```
 pub trait OwnLaw: Sync {
     /// Name, parameters, formula and reference; parameters in which the torque is linear come first.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, States, leading};
-use super::prior::{Prior, Part, Values};
+use super::prior::{Part, Prior, Values};
 use crate::Scalar;
 
 /// A spring in series with a damper (Maxwell element): its torque fades when the joint rests.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameters, Place, WAVE, add_wave};
-use super::prior::{Nature, Prior, Part};
+use super::prior::{Nature, Part, Prior};
 use crate::{Scalar, Setup};
 
 /// A periodic error of the robot's position, as of gears or of vibration.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part};
+use super::prior::{Part, Prior};
 use crate::{Scalar, Setup};
 
 /// A change of the length of a segment; its centre of mass stays where it is from the proximal joint.

@@ -1,5 +1,5 @@
 use super::law::{ActsOn, Info, Law, Parameters, Place, WAVE, add_wave};
-use super::prior::{Nature, Prior, Part};
+use super::prior::{Nature, Part, Prior};
 use crate::{Scalar, Setup};
 
 /// A first joint that heaves, as the shoulder of a person who breathes or of a trunk that rocks.

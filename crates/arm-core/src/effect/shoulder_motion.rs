@@ -1,5 +1,5 @@
 use super::law::{ActsOn, Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Part, Values};
+use super::prior::{Part, Prior, Values};
 use crate::{Scalar, Setup};
 
 /// A first joint that does not stay in place but moves with its own angle, as a shoulder does.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, States, leading};
-use super::prior::{Family, Prior, Part, Values};
+use super::prior::{Family, Part, Prior, Values};
 use crate::Scalar;
 
 /// Resistance to stretch faster than a threshold, as in spasticity, after a latency.

@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::prior::{Family, Prior, Part, Values};
+use super::prior::{Family, Part, Prior, Values};
 use crate::Scalar;
 
 /// The excess of dry friction at low speed, which fades as the joint moves faster.

@@ -2,7 +2,7 @@ use super::law::{
     Info, Law, Local, Parameter, Parameters, Place, SMOOTHING, States, leading, smooth_sign,
     smooth_sign_slope,
 };
-use super::prior::{Family, Prior, Part, Values};
+use super::prior::{Family, Part, Prior, Values};
 use crate::Scalar;
 
 /// Friction and stiffness of a structure that breaks down in motion and builds up again at rest.

@@ -1,5 +1,5 @@
 use super::law::{Info, Law, Parameter, Parameters, Place};
-use super::prior::{Prior, Promise, Part};
+use super::prior::{Part, Prior, Promise};
 use crate::{Scalar, Setup};
 
 /// The force channels lag behind the joint angles, or with a negative value lead.

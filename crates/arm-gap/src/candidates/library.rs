@@ -249,13 +249,15 @@ fn ask<const N: usize>(
         shapes = shapes.iter().flat_map(each).collect();
     }
     let tried = shapes.len();
+    // The same for every shape: none of them changes whether friction sticks.
+    let refined = refined(session, &plain, part);
     let candidate = |effect: Effect<f64>| {
         let mut candidate = Candidate {
             effect,
             question: number,
             free: part.sizes.to_vec(),
             rest: part.rest,
-            refined: refined(session, &effect, part),
+            refined: refined.clone(),
             tried,
             step: part.small,
             price: 0.0,

@@ -190,7 +190,7 @@ impl OwnLaw for Tabulated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use arm_core::effect::{MAX_STATES, Parameter, Place};
+    use arm_core::effect::{Parameter, Place};
 
     const INFO: Info = Info {
         kind: "spring and drag",
@@ -230,18 +230,6 @@ mod tests {
         Tabulated::new(&INFO, Prior::FIRST, GRID, tabulate)
     }
 
-    fn at(q: f64, qd: f64) -> Local<f64> {
-        Local {
-            time: 0.0,
-            q,
-            qd,
-            qdd: 0.0,
-            proximal_q: 0.0,
-            joint_force: 0.0,
-            memory: [0.0; MAX_STATES],
-        }
-    }
-
     /// A cubic between points at distance h errs by up to 3/128 · h⁴ · the fourth derivative: 0.01⁴/0.2⁴ of a sine of 0.2 rad;
     /// 0.0648⁴ · 2⁴ of a square of the speed, which is an exponential of where it stands in the table.
     #[test]
@@ -252,7 +240,7 @@ mod tests {
             let (q, qd) = (-1.9 + 0.0076 * f64::from(i), 3.0 * libm::sin(f64::from(i)));
             let exact = 0.7 * libm::sin(q / 0.2) - 0.3 * qd * qd.abs();
             let bound = 3.0 / 128.0 * (0.7 * 6.25e-6 + 0.3 * qd * qd * 16.0 * 1.774e-5);
-            assert!((law.torque(&p, &at(q, qd)) - exact).abs() < bound);
+            assert!((law.torque(&p, &Local::moving(q, qd)) - exact).abs() < bound);
         }
     }
 
@@ -262,8 +250,11 @@ mod tests {
         for pitch in [0.2, 0.5, 0.2] {
             let p = [1.0, 0.0, pitch, 0.0, 0.0, 0.0];
             let exact = libm::sin(1.0 / pitch);
-            assert!((law.torque(&p, &at(1.0, 0.0)) - exact).abs() < 1e-6);
-            assert_eq!(law.torque(&p, &at(2.0, 0.0)), law.torque(&p, &at(5.0, 0.0)));
+            assert!((law.torque(&p, &Local::moving(1.0, 0.0)) - exact).abs() < 1e-6);
+            assert_eq!(
+                law.torque(&p, &Local::moving(2.0, 0.0)),
+                law.torque(&p, &Local::moving(5.0, 0.0))
+            );
         }
         assert_eq!(law.kept.read().map(|k| k.len()).ok(), Some(2));
     }
@@ -278,8 +269,8 @@ mod tests {
         };
         let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(once));
         let p = [1.0, 0.0, 0.2, 0.0, 0.0, 0.0];
-        assert!(law.torque(&p, &at(1.0, 0.0)).is_nan());
-        assert!((law.torque(&p, &at(1.0, 0.0)) - libm::sin(5.0)).abs() < 1e-6);
+        assert!(law.torque(&p, &Local::moving(1.0, 0.0)).is_nan());
+        assert!((law.torque(&p, &Local::moving(1.0, 0.0)) - libm::sin(5.0)).abs() < 1e-6);
     }
 
     #[test]
@@ -287,18 +278,18 @@ mod tests {
         let inner: &'static Tabulated = Box::leak(Box::new(law()));
         let good = law().tabulate;
         let asks = move |p: &[f64]| {
-            let torque = inner.torque(&[1.0, 0.0, 0.2, 0.0, 0.0, 0.0], &at(0.0, 0.0));
+            let torque = inner.torque(&[1.0, 0.0, 0.2, 0.0, 0.0, 0.0], &Local::moving(0.0, 0.0));
             good(p).filter(|_| torque == 0.0)
         };
         let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(asks));
         let p = [1.0, 0.0, 0.5, 0.0, 0.0, 0.0];
-        assert!((law.torque(&p, &at(1.0, 0.0)) - libm::sin(2.0)).abs() < 1e-6);
+        assert!((law.torque(&p, &Local::moving(1.0, 0.0)) - libm::sin(2.0)).abs() < 1e-6);
     }
 
     #[test]
     fn a_law_that_fails_is_not_a_number() {
         let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(|_| None));
-        assert!(law.torque(&[1.0; 6], &at(0.0, 0.0)).is_nan());
-        assert_eq!(law.torque(&[0.0; 6], &at(0.0, 0.0)), 0.0);
+        assert!(law.torque(&[1.0; 6], &Local::moving(0.0, 0.0)).is_nan());
+        assert_eq!(law.torque(&[0.0; 6], &Local::moving(0.0, 0.0)), 0.0);
     }
 }

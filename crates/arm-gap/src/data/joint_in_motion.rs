@@ -3,7 +3,7 @@
 //! Dry friction holds a joint at rest with whatever is needed. A regression over all samples takes that for a spring that is too soft and
 //! for friction that is too small, the more so the longer the joint rests.
 
-use arm_core::effect::{Effect, Local, MAX_STATES};
+use arm_core::effect::{Effect, Local};
 use arm_core::{Chain, Joints, Pose, inverse_dynamics, static_torque};
 use arm_ident::regression::kinematics::Kinematics;
 use arm_ident::regression::measured_motion::measured;
@@ -210,15 +210,7 @@ impl Moving {
     }
 
     fn local(&self, i: usize) -> Local<f64> {
-        Local {
-            time: 0.0,
-            q: self.q[i],
-            qd: self.qd[i],
-            qdd: 0.0,
-            proximal_q: 0.0,
-            joint_force: 0.0,
-            memory: [0.0; MAX_STATES],
-        }
+        Local::moving(self.q[i], self.qd[i])
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use arm_core::effect::{Local, MAX_STATES, Place};
+use arm_core::effect::{Local, Place};
 use arm_core::{Pose, jacobian};
 
 use crate::data::prepared_session::{PreparedSession, Rest};
@@ -127,20 +127,13 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
             continue;
         }
         let at = |speed: f64| {
-            let local = Local {
-                time: 0.0,
-                q: 0.0,
-                qd: speed,
-                qdd: 0.0,
-                proximal_q: 0.0,
-                joint_force: 1.0,
-                memory: [0.0; MAX_STATES],
+            let torque = |qd: f64| {
+                effect.torque(&Local {
+                    joint_force: 1.0,
+                    ..Local::moving(0.0, qd)
+                })
             };
-            0.5 * (effect.torque(&local)
-                - effect.torque(&Local {
-                    qd: -speed,
-                    ..local
-                }))
+            0.5 * (torque(speed) - torque(-speed))
         };
         dry[effect.index] |= at(CRAWL) > 0.5 * at(MOTION).abs() && at(CRAWL) > 0.0;
     }
@@ -152,18 +145,10 @@ mod tests {
     use arm_core::effect::{Effect, Kind};
 
     use super::*;
+    use crate::measurement_model::hypothesis::tests::plain;
 
     fn with(known: Vec<Effect<f64>>) -> Hypothesis<2> {
-        Hypothesis {
-            segments: [[0.0; 3]; 2],
-            contact: [[0.0; 2]; 2],
-            shift: [0.0; 2],
-            placement: [0.0; 2],
-            eccentricity: [[0.0; 2]; 2],
-            known,
-            calibration: Vec::new(),
-            named: Vec::new(),
-        }
+        Hypothesis { known, ..plain() }
     }
 
     #[test]
@@ -174,6 +159,8 @@ mod tests {
         };
         assert_eq!(of("coulomb", &[0.2, 0.0]), [false, true]);
         assert_eq!(of("coulomb", &[0.2, 0.01]), [false, true]);
+        // At the speed of a crawl it is three quarters of its size.
+        assert_eq!(of("coulomb", &[0.2, 0.03]), [false, true]);
         // So smooth that it is half as large at 0.03 rad/s: it does not hold the joint.
         assert_eq!(of("coulomb", &[0.2, 0.1]), [false; 2]);
         assert_eq!(of("coulomb", &[0.0, 0.0]), [false; 2]);

@@ -214,7 +214,7 @@ pub fn departure<const N: usize>(hypothesis: &Hypothesis<N>, coordinates: &[Coor
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use arm_core::effect::Kind;
 
     use super::*;
@@ -223,7 +223,8 @@ mod tests {
         Effect::new(kind, index).with(&[size])
     }
 
-    fn plain() -> Hypothesis<2> {
+    /// The model as given, with nothing in it.
+    pub(crate) fn plain() -> Hypothesis<2> {
         Hypothesis {
             segments: [[0.0; 3]; 2],
             contact: [[0.0; 2]; 2],
