@@ -239,3 +239,52 @@ impl<const N: usize> Session<N> {
         weight_moment(&self.chain, joint)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement_model::prediction::tests::resting;
+
+    #[test]
+    fn a_joint_hardly_moves_up_to_a_hundredth_of_a_radian() {
+        let still = |range: f64| {
+            let mut session = resting(100.0);
+            // One period in the two seconds of the trial, far below the cutoff of 5 Hz.
+            for (i, q) in session.trials[0].q.iter_mut().enumerate() {
+                q[0] = 0.5 * range * libm::sin(core::f64::consts::PI * i as f64 / 100.0);
+            }
+            session.hardly_moving()
+        };
+        assert_eq!(still(0.0095), [true, true]);
+        assert_eq!(still(0.0105), [false, true]);
+    }
+
+    /// A spring as large as the weight of the arm beyond its joint, at rest within a radian of the middle.
+    #[test]
+    fn a_law_of_the_base_is_expected_at_its_typical_size() {
+        let session = resting(100.0);
+        let spring = Effect::new(Kind::Elastic, 1).with(&[0.0, 0.4]);
+        let [size, rest] = session.passive(spring).free[..] else {
+            panic!("two numbers are free");
+        };
+        let weight = session.weight_moment(1);
+        assert_eq!(
+            (size.mean, size.sd, size.step),
+            (0.0, weight, 0.01 * weight)
+        );
+        assert_eq!((rest.mean, rest.sd), (0.4, 1.0));
+    }
+
+    #[test]
+    fn friction_that_holds_a_joint_bears_all_of_the_arm() {
+        let session = resting(100.0);
+        let held = |kind, values: &[f64]| {
+            let mut law = session.passive(Effect::new(kind, 1).with(values));
+            session.hold(&mut law);
+            (law.likely, law.effect.parameters[0], law.free.len())
+        };
+        let weight = session.weight_moment(0);
+        assert_eq!(held(Kind::Coulomb, &[0.3, 0.0]), (true, weight, 0));
+        assert_eq!(held(Kind::Elastic, &[0.3, 0.1]), (false, 0.0, 0));
+    }
+}

@@ -67,3 +67,27 @@ fn reach(path: &[Vec<f64>]) -> f64 {
     };
     path.iter().map(from_start).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement_model::prediction::tests::resting;
+
+    #[test]
+    fn trials_whose_paths_lie_within_a_centimetre_repeat_one_movement() {
+        let count = |off: f64, rate: f64| {
+            let mut session = resting(100.0);
+            let mut other = session.trials[0].clone();
+            other.rate = rate;
+            for point in other.handle.as_mut().expect("a handle") {
+                point[0] += off;
+            }
+            session.trials.push(other);
+            let course = |i| Arc::new(session.course(i).expect("a course"));
+            groups(&session.trials, &[course(0), course(1)]).1.len()
+        };
+        assert_eq!([0.0099, 0.0101].map(|off| count(off, 100.0)), [1, 2]);
+        // Rates of rounded time stamps are one.
+        assert_eq!([100.05, 100.2].map(|rate| count(0.0, rate)), [1, 2]);
+    }
+}

@@ -271,3 +271,29 @@ impl<const N: usize> Session<N> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement_model::prediction::tests::resting;
+
+    #[test]
+    fn what_was_never_exact_is_free_within_four_standard_deviations() {
+        let mut session = resting(100.0);
+        session.effects = vec![Effect::new(Kind::Viscous, 0).with(&[0.5])];
+        let all = session.nuisances();
+        let of = |target| {
+            let found = all.iter().find(|c| c.target == target).expect("free");
+            (found.prior.expect("known").1, found.lower, found.upper)
+        };
+        let near = |(sd, lower, upper): (f64, f64, f64), expected: [f64; 3]| {
+            std::iter::zip([sd, lower, upper], expected).all(|(a, b)| (a - b).abs() < 1e-12)
+        };
+        // Segments are known to 2 % in this session, effects of the model and the stiffness of the contact to 5 %.
+        assert!(near(of(Target::Segment(0, 1)), [0.02, -0.08, 0.08]));
+        assert!(near(of(Target::Known(0, 0)), [0.025, 0.4, 0.6]));
+        assert!(near(of(Target::Contact(0, 0)), [0.05, -0.2, 0.2]));
+        // The damping of the contact to 30 %, and a contact that damps half as much again cannot be stepped through.
+        assert!(near(of(Target::Contact(1, 0)), [0.3, -0.9, 0.5]));
+    }
+}

@@ -216,6 +216,7 @@ fn around(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement_model::prediction::tests::resting;
 
     fn of(stretches: Vec<Vec<usize>>) -> ValidSegments {
         ValidSegments {
@@ -245,6 +246,40 @@ mod tests {
     fn a_trial_of_less_than_eight_samples_is_not_compared() {
         let until = |end| of(vec![(0..20).collect()]).until(end).len();
         assert_eq!((until(7), until(8), until(30)), (0, 8, 20));
+    }
+
+    #[test]
+    fn channels_are_compared_up_to_5_hz_or_a_fifth_of_the_rate() {
+        let band = |rate| resting(rate).course(0).expect("a course").band;
+        assert_eq!([100.0, 20.0].map(band), [5.0, 4.0]);
+        // One and a half periods of the cutoff lie next to an end or a gap.
+        assert_eq!((margin(100.0, 5.0), margin(1.0, 5.0)), (30, 1));
+    }
+
+    /// Of two seconds at 100 Hz those 0.3 s away from the ends, every eighth: 2.5 in each period of 5 Hz.
+    #[test]
+    fn samples_are_thinned_to_the_common_band_and_short_segments_are_left_out() {
+        let session = resting(100.0);
+        let course = session.course(0).expect("a course");
+        let without = |left_out: usize| {
+            let flags: Vec<bool> = (0..200).map(|i| i == left_out).collect();
+            let all = ValidSegments::of(&session.trials[0], &course, &flags, Arc::default());
+            all.samples().collect::<Vec<_>>()
+        };
+        let whole: Vec<usize> = (32..=168).step_by(8).collect();
+        assert_eq!(without(0), whole);
+        // Four samples before the one that is left out are compared, three are not.
+        assert_eq!(without(64), [&whole[..4], &whole[5..]].concat());
+        assert_eq!(without(56), whole[4..]);
+    }
+
+    /// 0.6 periods of 5 Hz at 100 Hz are 12 samples.
+    #[test]
+    fn what_is_near_rest_counts_as_rest() {
+        let course = resting(100.0).course(0).expect("a course");
+        let flags: Vec<bool> = (0..200).map(|i| i == 100).collect();
+        let near: Vec<bool> = (0..200).map(|i: usize| i.abs_diff(100) <= 12).collect();
+        assert_eq!(widened(&flags, &course), near);
     }
 
     #[test]

@@ -537,14 +537,14 @@ fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use arm_core::{Contact, models};
     use arm_ident::regression::trial::Tolerance;
 
     use super::*;
 
     /// A trial at rest of which a handle that shakes at 20 Hz is recorded.
-    fn resting(rate: f64) -> Session<2> {
+    pub(crate) fn resting(rate: f64) -> Session<2> {
         let at = |i: usize| i as f64 / rate;
         let handle = |i| [0.6, 1e-3 * libm::sin(core::f64::consts::TAU * 20.0 * at(i))];
         let trial = Trial {
