@@ -34,11 +34,29 @@ STATUSES = (0, 1, 2, 130, 143)
 SECONDS = 10.0
 """Of processor time."""
 WAIT = 120.0
-"""On the clock, after which a process is taken to wait for something that never comes."""
+"""On the clock, without any work, after which a process is taken to wait for something that never comes."""
+TOO_LONG = 60.0
+"""Of processor time, after which nobody waits for the end of a case."""
 MEMORY = 4 << 30
 """Address space beyond that of a process that has read nothing [bytes]."""
 AT_ONCE = 100
 """Cases in one process."""
+
+
+@dataclass
+class Most:
+    """What the costliest case took.
+
+    Attributes
+    ----------
+    seconds : float
+        Of processor time.
+    memory : float
+        Resident memory of the process that ran it [MiB].
+    """
+
+    seconds: float = 0.0
+    memory: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,8 +88,8 @@ def printing(path: Path) -> Iterator[None]:
         yield
 
 
-def run(case: Case, folder: Path, home: Path) -> list[str]:
-    """Run a case in this process; return what is wrong with it."""
+def run(case: Case, folder: Path, home: Path) -> tuple[float, list[str]]:
+    """Run a case in this process; return the seconds of processor time that it took, and what is wrong with it."""
     place = home / "work"
     shutil.copytree(folder, place)
     (place / case.seed.file).write_bytes(case.content)
@@ -103,7 +121,7 @@ def run(case: Case, folder: Path, home: Path) -> list[str]:
         wrong.append(f"left in the temporary folder {[p.name for p in scratch.iterdir()][:5]}")
     if took > SECONDS:
         wrong.append(f"{took:.1f} s of processor time")
-    return wrong
+    return took, wrong
 
 
 def child(pipe: int, numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, home: Path) -> None:
@@ -118,15 +136,16 @@ def child(pipe: int, numbers: range, start: int, seeds: tuple[Seed, ...], folder
         os.chdir("/")
         shutil.rmtree(home, ignore_errors=True)
         home.mkdir(parents=True)
-        wrong = "; ".join(run(case, folder, home)).replace("\n", " ")
-        os.write(pipe, f"{number} ends {wrong[:3000]}\n".encode())
+        took, found = run(case, folder, home)
+        wrong = "; ".join(found).replace("\n", " ")
+        os.write(pipe, f"{number} {took:.3f} {wrong[:3000]}\n".encode())
         if wrong:
             break  # what it printed is still to be kept
     os._exit(0)
 
 
-def batch(numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, home: Path) -> tuple[int, str | None]:
-    """Run cases in a process of their own; return how many ended, and what is wrong with the last one."""
+def batch(numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, home: Path, most: Most) -> tuple[int, str | None]:
+    """Run cases in a process of their own; return how many ended, and what is wrong with the last one; `most` is renewed."""
     reading, writing = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -137,19 +156,29 @@ def batch(numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, hom
             os._exit(70)
     os.close(writing)
     done, text, why = 0, b"", None
+    worked = begun = 0.0
     with os.fdopen(reading, "rb", buffering=0) as source:
         while True:
             ready, _, _ = select.select([source], [], [], WAIT)
-            piece = source.read(1 << 16) if ready else None
+            if not ready:
+                before, worked = worked, processor_time(pid)
+                if worked - before < 0.1:
+                    why = f"waits for more than {WAIT:g} s"
+                elif worked - begun > TOO_LONG:
+                    why = f"does not end within {TOO_LONG:g} s of processor time"
+                if why:
+                    break
+                continue
+            piece = source.read(1 << 16)
             if not piece:
-                why = None if ready else f"waits for more than {WAIT:g} s"
                 break
-            text += piece
+            begun, text = processor_time(pid), text + piece
             *lines, text = text.split(b"\n")
             for line in lines:
                 _, what, rest = (*line.decode().split(" ", 2), "")[:3]
-                if what == "ends":
+                if what != "begins":
                     done += 1
+                    most.seconds = max(most.seconds, float(what))
                     if rest:
                         why = rest
                         break
@@ -157,13 +186,23 @@ def batch(numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, hom
                 break
     if why:
         os.kill(pid, 9)
-    _, status = os.waitpid(pid, 0)
+    _, status, used = os.wait4(pid, 0)
+    most.memory = max(most.memory, used.ru_maxrss / 1024.0)
     if why is None and done < len(numbers):
         why = f"the process ended with {os.waitstatus_to_exitcode(status)}"
         return done + 1, why
-    if why and why.startswith("waits"):
+    if why and why.startswith(("waits", "does not end")):
         return done + 1, why
     return done, why
+
+
+def processor_time(pid: int) -> float:
+    """Return what a process has used [s]: on a busy machine it works for a long time without a word. Zero where nothing tells."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def keep(case: Case, why: str, home: Path, place: Path) -> None:
@@ -190,11 +229,11 @@ def main() -> int:
         folder, home = Path(name) / "seeds", Path(name) / "home"
         seeds = tuple(s for s in plant(folder) if asked.only in s.file)
         accepted_at_first(seeds, folder, Path(name) / "home")
-        begun, wrong = time.monotonic(), Counter[str]()
+        begun, wrong, most = time.monotonic(), Counter[str](), Most()
         next_case, end = asked.first, asked.first + asked.cases if asked.cases else sys.maxsize
         while next_case < end and (asked.cases or time.monotonic() - begun < 60.0 * asked.minutes):
             numbers = range(next_case, min(end, next_case + AT_ONCE))
-            done, why = batch(numbers, asked.seed, seeds, folder, home)
+            done, why = batch(numbers, asked.seed, seeds, folder, home, most)
             next_case += done
             if why:
                 case = case_of(next_case - 1, asked.seed, seeds, folder)
@@ -203,6 +242,7 @@ def main() -> int:
                 print(f"{next_case - 1}: armrs {' '.join(case.command)}, {case.seed.file}: {why[:300]}", flush=True)
         count = next_case - asked.first
         print(f"{count} changed files of {len(seeds)} formats in {time.monotonic() - begun:.0f} s: {sum(wrong.values())} wrong")
+        print(f"the costliest took {most.seconds:.1f} s of processor time and {most.memory:.0f} MiB")
         for line, number in wrong.most_common():
             print(f"  {number} x {line}")
     return 1 if wrong else 0
