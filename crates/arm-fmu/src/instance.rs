@@ -217,6 +217,7 @@ pub unsafe fn free(handle: Handle) {
 /// As [`guarded`]; what `place` holds is null or a state that was not freed.
 pub unsafe fn get_state(handle: Handle, what: &str, place: *mut *mut c_void) -> c_int {
     let body = |slave: &mut Slave| {
+        // SAFETY: null or a place for one state, as promised.
         let [held] = (unsafe { write(place, 1) })? else {
             return Err(error("no place for the state"));
         };
@@ -324,6 +325,7 @@ pub unsafe fn deserialize(
     let body = |_: &mut Slave| {
         // SAFETY: as promised.
         let state = SlaveState::from_bytes(unsafe { read(from, size)? })?;
+        // SAFETY: null or a place for one state, as promised.
         let [held] = (unsafe { write(place, 1) })? else {
             return Err(error("no place for the state"));
         };
