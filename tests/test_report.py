@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
 import shutil
 from html.parser import HTMLParser
@@ -186,6 +188,10 @@ def test_a_figure_outside_the_folder_of_the_result_is_refused(results: Path, tmp
         ("not json", "r.json: file: found Expecting value: line 1 column 1 (char 0), allowed JSON"),
         ("[]", "r.json: verb: found no key verb, allowed a result of armrs identify, simulate, passive, spasticity, cohort, demo"),
         ('{"verb": "gap2"}', "r.json: verb: found 'gap2', allowed a result of armrs"),
+        (
+            '{"verb": "identify", "data": {"name": "\\ud800"}}',
+            "r.json: file: found half a character, '\\ud800', allowed whole characters",
+        ),
         ('{"verb": ["identify"]}', "r.json: verb: found ['identify'], allowed a result of armrs"),
         ('{"verb": "identify"}', "r.json: content: found not what a result holds ('data'), allowed a whole result"),
         ('{"verb": "identify", "data": 3}', "r.json: content: found not what a result holds"),
@@ -203,6 +209,19 @@ def test_what_is_no_result_is_refused(
     assert err.count("\n") == 1
     assert message in err
     assert [p.name for p in tmp_path.iterdir()] == ["r.json"]
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no devices here")
+def test_a_device_is_no_figure(results: Path, tmp_path: Path) -> None:
+    """`/dev/zero` as a figure was read until memory ended."""
+    result = json.loads((results / "passive/passive.json").read_text(encoding="utf-8"))
+    os.mkfifo(tmp_path / "pipe.png")
+    for file, message in (("/dev/zero", "outside the folder of the result"), ("pipe.png", None)):
+        result["figures"] = [{"file": file, "title": "", "text": ""}]
+        (tmp_path / "passive.json").write_text(json.dumps(result), encoding="utf-8")
+        with pytest.raises(armrs.BadInput, match=message) if message else contextlib.nullcontext():
+            armrs.write_report([tmp_path / "passive.json"], tmp_path / "report.html")
+    assert "pipe.png" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_figure_that_is_no_picture_is_refused(results: Path, tmp_path: Path) -> None:

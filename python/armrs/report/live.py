@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInput, Text
-from ..io import files
+from ..io import files, jsonfile
 from . import animation, series
 
 FILE = "figures/live.json"
@@ -60,7 +60,7 @@ def read(name: object, folder: Path) -> Live:
             raise BadInput("live", Text(f"{name}, which is outside the folder of the result"), "a file below it", file=path)
         if not path.is_file():
             return NOTHING
-        data = json.loads(path.read_bytes())
+        data = jsonfile.read(path)
         return Live(data["animation"], data["series"])
     except (OSError, ValueError, RuntimeError, RecursionError, KeyError, TypeError) as error:
         raise BadInput("live", Text(f"no animation and series ({error})"), "a file that armrs wrote", file=path) from None

@@ -18,8 +18,7 @@ from markupsafe import Markup
 
 from .. import checks, views
 from ..errors import BadInput, Text
-from ..io import files
-from ..io.tomlfile import read_text
+from ..io import files, jsonfile
 from . import html, live, tables, words
 
 INPUT = "SHA-256 of dataset.toml, the model and the trials, one after the other in their order:"
@@ -75,11 +74,7 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     BadInput
         When it is not JSON, or not a result that a report is made of.
     """
-    content = read_text(path, "a JSON file")
-    try:
-        data = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise BadInput("file", Text(str(error)), "JSON", file=path) from None
+    data = jsonfile.read(path)
     verb = data.get("verb") if isinstance(data, dict) else None
     if not isinstance(verb, str) or verb not in KINDS:
         found = Text("no key verb") if verb is None else verb

@@ -17,7 +17,7 @@ from .. import checks
 from ..analysis import mixed_model, students_t
 from ..analysis.mixed_model import MixedModel
 from ..errors import ArmrsError, BadInput, Text
-from ..io import files
+from ..io import files, jsonfile
 from ..io.tomlfile import read_text
 from ..report.plain import passive_data
 from ..tabular import Tabular, Tidy
@@ -330,8 +330,8 @@ def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]]) -> tuple[lis
     warnings: list[str] = []
     for file in sorted(folder.rglob("*.json")):
         try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            data = jsonfile.read(file)
+        except BadInput:
             continue
         if isinstance(data, dict) and data.get("verb") in ("identify", "passive", "gap", "spasticity"):
             results.append(data)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
-from ..io import files
+from ..io import files, jsonfile
 from ..model import Effect, Model, load_model
 
 if TYPE_CHECKING:
@@ -146,14 +145,9 @@ def _deviations(model: Model, told: _Firmware, path: str | os.PathLike[str] | No
 
 
 def _result(path: Path) -> dict[str, Any]:
-    try:
-        result = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(result, dict) and {"combinations", "parameters"} <= result.keys():
-            return result
-    except OSError as error:
-        raise BadInput("--identified", Text(error.strerror or "unreadable"), "a result of armrs identify", file=path) from None
-    except ValueError:
-        pass
+    result = jsonfile.read(path)
+    if isinstance(result, dict) and {"combinations", "parameters"} <= result.keys():
+        return result
     raise BadInput("--identified", Text("no result"), "the JSON of armrs identify", file=path)
 
 
