@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ import armrs
 from armrs import cli
 from armrs.cosim.process import Confined, ProcessEnded
 from armrs.io import files, tomlfile
+from conftest import MODEL
 
 BOMBS: dict[str, Callable[[], str]] = {
     "depth 100 000": lambda: "a = " + "[" * 100_000 + "]" * 100_000,
@@ -72,6 +74,24 @@ def test_csv_with_200_000_columns_is_refused_at_once(tmp_path: Path) -> None:
     start = time.monotonic()
     assert "at most 4096 columns" in str(csv(b",".join(b"c%d" % k for k in range(100_000)) + b"\n", tmp_path))
     assert time.monotonic() - start < 2.0
+
+
+@pytest.mark.parametrize("store_schema", [True, False])
+def test_parquet_with_names_that_are_no_utf_8_is_refused(store_schema: bool, tmp_path: Path) -> None:
+    import pyarrow
+    from pyarrow import parquet
+
+    from armrs.io.samples import read_samples
+
+    path = tmp_path / "trial.parquet"
+    columns = pyarrow.table({"t_s": [0.0, 0.1], "q1_rad": [1.0, 2.0]})
+    parquet.write_table(columns, path, store_schema=store_schema)
+    whole = path.read_bytes()
+    assert b"q1_rad" in whole
+    path.write_bytes(whole.replace(b"q1_rad", b"q1_r\xff\xfe"))
+    with pytest.raises(armrs.BadInput) as refused:
+        read_samples(path)
+    assert "\n" not in str(refused.value) and "utf-8" in str(refused.value).lower()
 
 
 def written(folder: Path, content: str) -> None:
@@ -230,3 +250,66 @@ def test_a_child_that_outlives_foreign_code_is_not_waited_for(tmp_path: Path, mo
         child.receive(60.0)
     assert time.monotonic() - begin < 30.0
     child.close()
+
+
+FORGED = """
+import os
+os.write(1, b'{"step": "end"}\\n')
+os._exit(0)
+"""
+
+
+def test_what_foreign_code_prints_is_no_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A library that printed the line with which a probe ends was one with nothing wrong."""
+    (tmp_path / "forging.py").write_text(FORGED, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    child = Confined("forging", tmp_path)
+    with pytest.raises(ProcessEnded, match="writes into the pipe that is not its own"):
+        child.receive(60.0)
+    child.close()
+
+
+SMALL_ROOM = """
+import resource
+import numpy as np, armrs
+from pathlib import Path
+taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (taken + (1 << 30), taken + (1 << 30)))
+arm = armrs.Arm([0.3, 0.25], [2.0, 1.5], [0.14, 0.12], [0.02, 0.01])
+many = np.broadcast_to(np.zeros(2), (10**11, 2))
+row = np.zeros(2)
+whole = np.broadcast_to(np.zeros(2, dtype=int), (10**11, 2))
+calls = {
+    "gravity": lambda: arm.gravity(many),
+    "whole numbers": lambda: arm.gravity(whole),
+    "jacobian": lambda: arm.jacobian(many),
+    "inertia": lambda: arm.inertia(many),
+    "forward_kinematics": lambda: arm.forward_kinematics(many),
+    "coriolis": lambda: arm.coriolis(many, many),
+    "static_torque": lambda: arm.static_torque(row, many),
+    "inverse_dynamics": lambda: arm.inverse_dynamics(many, row, row),
+    "forward_dynamics": lambda: arm.forward_dynamics(row, row, many),
+    "regressor": lambda: arm.regressor(many, many, many),
+    "Arm": lambda: armrs.Arm(many[:, 0], [2.0], [0.1], [0.02]),
+    "Movement": lambda: armrs.Movement(many),
+    "Trial": lambda: armrs.Trial("a.csv", "slow", 1, "fit", many[:, 0], many),
+    "simulate": lambda: armrs.simulate("model.toml", None, start=row, start_speed=row, duration=1e5, rate=4000.0),
+}
+for name, call in calls.items():
+    try:
+        call()
+        print(name, "returned")
+    except MemoryError as error:
+        print(name, error)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/meminfo").exists(), reason="memory that is left is told on Linux")
+def test_more_memory_than_there_is_is_refused_with_the_number(tmp_path: Path) -> None:
+    """A process that asked for the gravity of 10¹¹ rows was aborted."""
+    (tmp_path / "model.toml").write_text(MODEL, encoding="utf-8")
+    done = subprocess.run([sys.executable, "-c", SMALL_ROOM], capture_output=True, text=True, cwd=tmp_path, timeout=120)
+    lines = done.stdout.splitlines()
+    assert len(lines) == 14, done.stderr
+    for line in lines:
+        assert re.search(r"needs [0-9.]+ [GTP]B of memory, ([0-9.]+ [MG]B are available|more than the system gives)$", line), line

@@ -137,6 +137,10 @@ def samples(place: str, value: object, unit: str = "", *, shape: Sequence[int | 
         raise _uneven(place, value) or BadInput(place, value, allowed) from None
     if raw.dtype.kind not in "iuf":
         raise BadInput(place, Text(_KINDS.get(raw.dtype.kind, str(raw.dtype))) if raw.ndim else value, allowed)
+    if 0 in raw.strides:  # numbers that are held once and seen many times; whoever works with them copies them
+        from ._armrs import require_room
+
+        require_room(8 * raw.size)
     result = np.asarray(raw, dtype=float)
     if shape is not None:
         fits = len(shape) == result.ndim and all(want in (None, have) for want, have in zip(shape, result.shape, strict=True))

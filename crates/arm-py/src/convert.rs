@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Chain, Lanes, Scalar};
+use arm_sim::reserve_room;
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{
     IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
@@ -12,7 +13,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use crate::errors::bad_input;
+use crate::errors::{bad_input, simulation};
 use crate::kernel::{Kernel, MOST};
 
 /// Anything NumPy can read as real numbers; what is none is refused where the name of the argument is known.
@@ -50,7 +51,8 @@ impl<'py> Numbers<'py> {
             let found = format!("an array of shape {:?}", array.shape());
             return Err(bad_input(name, found, "a list of numbers, one a segment"));
         }
-        let values: Vec<f64> = array.as_array().iter().copied().collect();
+        let mut values = room(array.len(), 1)?;
+        values.extend(array.as_array().iter());
         if let Some(at) = values.iter().position(|v| !v.is_finite()) {
             return Err(bad_input(
                 &format!("{name}[{at}]"),
@@ -114,7 +116,11 @@ impl<'a> Rows<'a> {
         };
         let values = match array.as_slice() {
             Ok(slice) => Cow::Borrowed(slice),
-            Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
+            Err(_) => {
+                let mut copy = room(array.len(), 1)?;
+                copy.extend(array.as_array().iter());
+                Cow::Owned(copy)
+            }
         };
         if let Some(at) = first_not_finite(&values) {
             let place = format!("{name}[{}, {}]", at / width, at % width);
@@ -136,6 +142,13 @@ impl<'a> Rows<'a> {
         };
         &self.values[start..start + self.width]
     }
+}
+
+/// Room for rows of `width` numbers, or `MemoryError` with what they need.
+fn room(rows: usize, width: usize) -> PyResult<Vec<f64>> {
+    let mut room = Vec::new();
+    reserve_room(&mut room, rows.saturating_mul(width)).map_err(simulation)?;
+    Ok(room)
 }
 
 /// The first of many values that is not finite: looked for only where a whole stretch of them is not.
@@ -176,7 +189,8 @@ pub fn over_rows<'py, F: Kernel<K>, const K: usize, const N: usize>(
     }
     let mut shape = F::shape(N);
     let (n, size) = (batch.unwrap_or(1), shape.iter().product::<usize>());
-    let mut out = vec![0.0; n * size];
+    let mut out = room(n, size)?;
+    out.resize(n * size, 0.0);
     let mut run = || {
         // Longer arms are rare, and code for their lanes long to compile.
         if const { F::IN_LANES && N <= 3 } && batch.is_some() {
@@ -272,7 +286,8 @@ pub fn in_order<'py, const K: usize>(
         let found = format!("{} rows", other.batch.unwrap_or(1));
         return Err(bad_input(other.name, found, &format!("{n} rows")));
     }
-    let mut out = vec![0.0; n * width];
+    let mut out = room(n, width)?;
+    out.resize(n * width, 0.0);
     for i in 0..n {
         let row = &mut out[i * width..(i + 1) * width];
         f(std::array::from_fn(|k| inputs[k].row(i)), row);
@@ -280,6 +295,12 @@ pub fn in_order<'py, const K: usize>(
     let array = ArrayD::from_shape_vec(IxDyn(&[n, width]), out)
         .expect("the buffer was made for this shape");
     Ok(array.into_pyarray(py))
+}
+
+/// Refuses with `MemoryError` what needs more bytes than this process can get, where the system tells.
+#[pyfunction]
+pub fn require_room(needed: u64) -> PyResult<()> {
+    arm_sim::require_room(needed).map_err(simulation)
 }
 
 /// A table of samples, `(n, M)`.

@@ -5,6 +5,7 @@ use arm_gap::GapError;
 use arm_ident::IdentError;
 use arm_numerics::NumericsError;
 use arm_sim::SimulationError;
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 /// `armrs.errors.BadInput` for an argument.
@@ -202,6 +203,7 @@ pub fn simulation(error: SimulationError) -> PyErr {
                 0.995 * largest
             ),
         ),
+        error @ SimulationError::Memory { .. } => PyMemoryError::new_err(error.to_string()),
         other => in_python("SimulationError", &other.to_string()),
     }
 }

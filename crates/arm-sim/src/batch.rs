@@ -184,7 +184,10 @@ impl<'a, const N: usize> Group<'a, N> {
             },
             memory: Memory::new(model.effects.len()),
             row: Row::new(),
-            recorders: prepared.iter().map(Recorder::new).collect(),
+            recorders: prepared
+                .iter()
+                .map(Recorder::new)
+                .collect::<Result<_, _>>()?,
             stopped: vec![None; prepared.len()],
             setup,
             model,

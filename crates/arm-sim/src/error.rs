@@ -110,6 +110,14 @@ pub enum SimulationError {
         /// What a newton metre of it adds to it \[N m\].
         gain: f64,
     },
+    /// More memory than there is.
+    #[error("the result needs {} of memory, {}", Bytes(*needed), room(*available))]
+    Memory {
+        /// What it needs \[bytes\].
+        needed: u64,
+        /// What this process can get, where that is known \[bytes\].
+        available: Option<u64>,
+    },
     /// Something that an engine cannot do.
     #[error("the {engine} engine cannot simulate {what}")]
     Unsupported {
@@ -118,6 +126,29 @@ pub enum SimulationError {
         /// What was asked of it.
         what: &'static str,
     },
+}
+
+/// A size in memory as text: three digits and a prefix.
+struct Bytes(u64);
+
+impl core::fmt::Display for Bytes {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        const UNITS: [&str; 7] = ["B", "kB", "MB", "GB", "TB", "PB", "EB"];
+        let mut value = self.0 as f64;
+        let mut unit = 0;
+        while value >= 999.5 && unit + 1 < UNITS.len() {
+            (value, unit) = (value / 1000.0, unit + 1);
+        }
+        let decimals = if value >= 99.95 || unit == 0 { 0 } else { 1 };
+        write!(f, "{value:.decimals$} {}", UNITS[unit])
+    }
+}
+
+/// How much there is, as text.
+fn room(available: Option<u64>) -> String {
+    available.map_or("more than the system gives".to_owned(), |bytes| {
+        format!("{} are available", Bytes(bytes))
+    })
 }
 
 /// Why an arm has no equilibrium near given angles.

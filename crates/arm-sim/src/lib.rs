@@ -23,6 +23,7 @@ mod prepare;
 mod rapier;
 mod record;
 mod recorder;
+mod room;
 mod schedule;
 mod sensor;
 mod series;
@@ -46,6 +47,7 @@ pub use path::{Handle, HandlePath};
 #[cfg(feature = "rapier")]
 pub use rapier::{RapierSettings, simulate_rapier};
 pub use record::{EnergyColumns, Partial, Piece, Recording, TorqueColumns, WorkColumns};
+pub use room::{require_room, reserve_room};
 pub use sensor::{Channel, Readings, Sensors};
 pub use series::{Interpolation, Jet, Series, cubic_weights};
 pub use simulate::{Engine, simulate, simulate_in_pieces, simulate_partial, simulate_with};

@@ -20,7 +20,7 @@ pub(crate) fn run<const N: usize>(
 ) -> Result<Partial<N>, SimulationError> {
     let prepared = Prepared::recorded(experiment, pieces.is_some())?;
     let schedule = prepared.schedule;
-    let mut recorder = Recorder::with(&prepared, pieces);
+    let mut recorder = Recorder::with(&prepared, pieces)?;
     let mut memory = Memory::new(prepared.model.effects.len());
     let mut state = State {
         q: prepared.start.0,

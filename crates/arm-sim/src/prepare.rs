@@ -10,6 +10,7 @@ use crate::discontinuities::Discontinuities;
 use crate::error::finite;
 use crate::model::{Link, Model};
 use crate::plain::Plain;
+use crate::room::require_room;
 use crate::schedule::Schedule;
 use crate::state::{BaseMotion, Input};
 use crate::{
@@ -56,6 +57,9 @@ impl<'a, const N: usize> Prepared<'a, N> {
             }
             Vec::new()
         } else {
+            if experiment.robot.is_some() {
+                require_room((size_of::<JointMotion<2>>() * schedule.samples()) as u64)?;
+            }
             motion.collect::<Result<_, _>>()?
         };
         let mut prepared = Self {

@@ -122,7 +122,7 @@ fn recorded<const N: usize>(
     check(&prepared, settings)?;
     let schedule = prepared.schedule;
     let mut arm = Arm::new(&prepared, settings)?;
-    let (mut recorder, mut row) = (Recorder::with(&prepared, pieces), Row::new());
+    let (mut recorder, mut row) = (Recorder::with(&prepared, pieces)?, Row::new());
     let (mut work, mut power) = ([0.0; 4], [0.0; 4]);
     let mut stopped = None;
     let mut input = prepared.input(0.0);

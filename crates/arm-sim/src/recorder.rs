@@ -5,13 +5,14 @@ use core::ops::ControlFlow;
 use arm_core::effect::{Motion, States};
 use arm_core::{Joints, Plane, Pose, Scalar, contributions};
 
-use crate::Recording;
 use crate::friction::{self, Friction};
 use crate::model::{Link, Model};
 use crate::prepare::Prepared;
 use crate::record::Piece;
 use crate::record::recorded_states;
+use crate::room::{require_room, reserve_room};
 use crate::state::{Input, Outcome, State, difference, sum};
+use crate::{Recording, SimulationError};
 use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Forces of a state, by whatever engine.
@@ -234,36 +235,42 @@ pub(crate) struct Recorder<'a, 't, const N: usize> {
 
 impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
     /// For the whole run.
-    pub fn new(prepared: &'a Prepared<'a, N>) -> Self {
+    pub fn new(prepared: &'a Prepared<'a, N>) -> Result<Self, SimulationError> {
         Self::with(prepared, None)
     }
 
     /// For the whole run, or for a piece after another.
-    pub fn with(prepared: &'a Prepared<'a, N>, pieces: Option<Pieces<'t, N>>) -> Self {
+    pub fn with(
+        prepared: &'a Prepared<'a, N>,
+        pieces: Option<Pieces<'t, N>>,
+    ) -> Result<Self, SimulationError> {
         let model = &prepared.model;
         let most = pieces.as_ref().map_or(usize::MAX, |p| p.samples);
         let room = prepared.schedule.samples().min(most);
-        let robot = if prepared.has_robot() { 2 * room } else { 0 };
-        let column = || Vec::with_capacity(robot);
         let mut recording = Recording {
-            robot_q: column(),
-            robot_qd: column(),
-            robot_qdd: column(),
             effects: model.effects.iter().map(|e| (e.kind, e.index)).collect(),
             ..Recording::default()
         };
         let handle = has_handle(model);
-        for (column, width) in columns(&mut recording, handle) {
-            column.reserve_exact(room * width);
+        let robot = if prepared.has_robot() { 2 } else { 0 };
+        let widths = columns(&mut recording, handle).map(|(_, width)| width);
+        let numbers = widths.iter().sum::<usize>() + 3 * robot;
+        require_room((size_of::<f64>() * numbers * room) as u64)?;
+        let r = &mut recording;
+        for column in [&mut r.robot_q, &mut r.robot_qd, &mut r.robot_qdd] {
+            reserve_room(column, robot * room)?;
         }
-        Self {
+        for (column, width) in columns(r, handle) {
+            reserve_room(column, width * room)?;
+        }
+        Ok(Self {
             prepared,
             recording,
             handle,
             pieces,
             from: 0,
             balance: 0.0,
-        }
+        })
     }
 
     /// Appends an instant, of which `of` reads the numbers of this run. Breaks where nobody wants more of it.

@@ -133,8 +133,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output has seen enough.
         _turn_away_output()
         return 0
-    except MemoryError:
-        print("armrs: not enough memory", file=sys.stderr)
+    except MemoryError as error:
+        print(f"armrs: not enough memory{': ' if str(error) else ''}{one_line(error)}", file=sys.stderr)
         return 1
     except OSError as error:
         _turn_away_output()
