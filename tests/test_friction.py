@@ -337,3 +337,37 @@ def test_a_law_may_simulate_but_not_itself(tmp_path: Path) -> None:
     asked[0] = path
     with pytest.raises(armrs.BadInput, match="simulates an arm with this effect"):
         swing(path)
+
+
+LABORATORY = """
+[subject]
+body_mass = 75.0
+height = 1.75
+sex = "male"
+
+[[joint]]
+coulomb = 0.05
+
+[[joint]]
+coulomb = {coulomb}
+
+[[movement]]
+waypoints_deg = [[-60, 60], [-50, 60], [-60, 60]]
+speed_rad_s = 0.4
+acceleration_rad_s2 = 2.0
+repeats = 1
+"""
+
+
+@pytest.mark.parametrize(("coulomb", "says"), [(3.0, True), (0.05, False)])
+def test_record_and_sweep_say_when_friction_is_set_valued(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], coulomb: float, says: bool
+) -> None:
+    """As `simulate` does: what is recorded has another law than the experiment states."""
+    (tmp_path / "experiment.toml").write_text(LABORATORY.format(coulomb=coulomb), encoding="utf-8")
+    (tmp_path / "sweep.toml").write_text('experiment = "experiment.toml"\ncases = 1\n', encoding="utf-8")
+    for line in (["record", "experiment.toml"], ["sweep", "sweep.toml", "--jobs", "1"]):
+        capsys.readouterr()
+        assert main([line[0], str(tmp_path / line[1]), *line[2:], "-o", str(tmp_path / line[0])]) in (0, 1)
+        said = capsys.readouterr().err
+        assert ("coulomb in joint 2: with the default smoothing too steep" in said) == says, said

@@ -241,3 +241,14 @@ def test_sensors_read_as_fast_as_1_khz(experiment: Path) -> None:
         assert trial.rate == pytest.approx(rate)
         angles.append(trial.robot_q)
     assert np.array_equal(angles[1][::2], angles[0])
+
+
+def test_a_movement_of_a_few_samples_is_refused(tmp_path: Path) -> None:
+    """It ended with a traceback: no supervisor had stopped it."""
+    path = tmp_path / "experiment.toml"
+    subject = '[subject]\nbody_mass = 75.0\nheight = 1.75\nsex = "male"\n'
+    movement = "waypoints_deg = [[-60, 60], [-59, 60]]\nspeed_rad_s = 1.0\nacceleration_rad_s2 = 4.0\nrepeats = 1\n"
+    path.write_text(f"{subject}[[movement]]\n{movement}", encoding="utf-8")
+    with pytest.raises(armrs.BadInput, match=r"\[\[movement\]\] 1: found a recording of less than [0-9]+ samples at [0-9.]+ Hz"):
+        armrs.record(load_experiment(path), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -226,6 +226,7 @@ def record(
     from ..report.results import write_recorded
     from ..workflows.experiment import load_experiment
     from ..workflows.record import record as run_record
+    from ..workflows.stiction import sticking_said
 
     writable(out, json)
     planned = load_experiment(experiment)
@@ -233,6 +234,7 @@ def record(
         result = run_record(planned, out, step=step)
     plain = result.to_dict() | {"made_by": origin(command_line(context))}
     report = write_recorded(result, plain, out)[-1]
+    console.warn(sticking_said(planned.truth))
     present(lambda: plain, json, lambda: words.recorded(plain, report))
     return 1 if result.stopped else 0
 
@@ -268,6 +270,7 @@ def sweep(
     """  # noqa: D301 (click reads this backspace as: leave the lines as they are)
     from ..montecarlo import load_sweep, words
     from ..montecarlo import sweep as run_sweep
+    from ..workflows.stiction import sticking_said
 
     writable(out, json)
     if cluster is not None and jobs is not None:
@@ -276,6 +279,8 @@ def sweep(
     count = os.cpu_count() or 1 if jobs is None else jobs
     with console.progress("cases", planned.cases) as step:
         result = run_sweep(planned, out, jobs=count, cluster=cluster, step=step, command=command_line(context))
+    if planned.dataset is None:
+        console.warn(sticking_said(planned.experiment(planned.seed_of(1), []).truth))
     present(
         lambda: result.data | {"run": result.run, "files": list(result.files)},
         json,

@@ -145,6 +145,10 @@ def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done
     kept = [(m.trial, m.markers, m.story) for m in seen if m.trial is not None and m.markers is not None]
     if not any(trial.role == "fit" for trial, _, _ in kept):
         stop = seen[0].story["stop"]
+        if stop is None:
+            rate = experiment.devices.rate_Hz
+            short = f"a recording of less than {FEWEST_SAMPLES} samples at {rate:g} Hz"
+            raise BadInput("[[movement]] 1", Text(short), "a longer movement or a higher rate")
         found = f"{stop['what']} {stop['reason']}, {stop['value']:.4g} where {stop['limit']:.4g} is allowed"
         raise ArmrsError(f"the supervisor stopped every trial to be fitted, the first after {stop['at_s']:.4g} s: {found}")
     lengths = np.mean([story["lengths_m"] for _, _, story in kept], axis=0)
