@@ -141,6 +141,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     *one = sized;
                 }
             }
+            let rows = self.rows_of_references();
+            let is_seen = |a: &TrialSpecific| a.trial.is_some() || a.is_beyond_noise(rows);
+            apart.trial_specific.retain(is_seen);
         }
         let rhythms = rhythms_of(&apart.trial_specific);
         Ok([

@@ -3,6 +3,8 @@
 
 use arm_core::effect::{Effect, Kind, MAX_PARAMETERS};
 
+use crate::candidates::candidate::price;
+
 /// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
 /// what a model lacks of them reach that far.
 pub(crate) const SLOW: f64 = 3.0;
@@ -32,6 +34,18 @@ impl TrialSpecific {
     /// Frequency \[Hz\] and phase \[rad\] of a rhythm.
     pub fn wave(&self) -> [f64; 2] {
         shapes_of(self.effect.kind).map(|p| self.effect.parameters[p])
+    }
+
+    /// Whether the size of a rhythm in simulated runs is beyond its standard deviation by as much as an effect must gain to be named.
+    ///
+    /// * `rows` - rows of data that decide it
+    pub fn is_beyond_noise(&self, rows: usize) -> bool {
+        let sizes = self.effect.kind.prior().parts.first();
+        let sizes = sizes.map_or(&[][..], |part| part.sizes);
+        let parameters = sizes.iter().map(|&p| self.effect.parameters[p]);
+        let square: f64 = parameters.map(|size| size * size).sum();
+        let sd = self.sd.first().copied().unwrap_or(0.0);
+        square > price(sizes.len(), 1, rows) * sd * sd
     }
 
     /// Whether another is the same rhythm.
@@ -121,6 +135,17 @@ mod tests {
             !first.swings_with(&rhythm(one, 5.0, Some(2))),
             "what happened once is no rhythm"
         );
+    }
+
+    #[test]
+    fn a_rhythm_is_larger_than_its_noise_by_the_price_of_an_effect() {
+        let mut one = rhythm(Kind::Tremor, 5.0, None);
+        one.sd = vec![0.01];
+        // 12 + ln 1000 = 18.9: 4.35 standard deviations.
+        for (size, seen) in [(0.0434, false), (0.0436, true), (-0.0436, true)] {
+            one.effect.parameters[0] = size;
+            assert_eq!(one.is_beyond_noise(1000), seen, "{size}");
+        }
     }
 
     #[test]
