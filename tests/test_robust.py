@@ -213,6 +213,7 @@ def test_help_lists_the_statuses(capsys: pytest.CaptureFixture[str]) -> None:
 SWALLOWED = """
 import os, signal, time
 from armrs.cli import interrupts
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts what runs in its background without it
 interrupts.obey()
 try:
     os.kill(os.getpid(), signal.SIGINT)
