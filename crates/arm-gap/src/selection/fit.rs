@@ -49,6 +49,13 @@ impl<const N: usize> Fitted<N> {
         ENOUGH + SHARE * (self.cost - self.rows as f64).max(0.0)
     }
 
+    /// Whether more is left than noise leaves.
+    pub(crate) fn leaves_much(&self) -> bool {
+        /// Misfit for each row from which on much is left: noise leaves 1.
+        const MUCH: f64 = 1.5;
+        self.cost >= MUCH * self.rows as f64
+    }
+
     /// Whether a named effect has come to a shape in which it is another, plainer law.
     pub(crate) fn has_plainer(&self) -> bool {
         let mut named = std::iter::zip(&self.asked, &self.hypothesis.named);

@@ -179,7 +179,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         current: &Fitted<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
         let before = self.dropped.clone();
-        if !before.contains(&true) || current.asked.is_empty() {
+        let is_settled = current.asked.is_empty() && !current.leaves_much();
+        if !before.contains(&true) || is_settled {
             return Ok(None);
         }
         for (dropped, law) in self.dropped.iter_mut().zip(&self.session.base) {
@@ -187,6 +188,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         let mut start = current.hypothesis.clone();
         let mut asked = current.asked.clone();
+        let first = self.session.effects.len();
+        for b in (0..before.len()).filter(|&b| before[b] && !self.dropped[b]) {
+            start.known[first + b] = self.session.base[b].effect;
+        }
         // What the rest angle of a spring that comes back stands for is not named beside it.
         for slot in (0..asked.len()).rev() {
             let named = &start.named[slot];

@@ -221,7 +221,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 _ => None,
             });
-        if !is_bent(fitted.cost / fitted.rows as f64, sensors) {
+        if !fitted.leaves_much() && !is_beyond_promise(sensors) {
             return (fitted, point);
         }
         let start = Hypothesis {
@@ -390,16 +390,13 @@ fn contenders(choices: &[Choice], library: &Library) -> Vec<Choice> {
     contenders
 }
 
-/// Whether what was found may have been bent by what it was found without: much is left, or a sensor is far from what was promised.
+/// Whether a sensor is far from what was promised.
 ///
-/// * `misfit` - for each row
 /// * `sensors` - how far each is off, in standard deviations of the promise
-fn is_bent(misfit: f64, mut sensors: impl Iterator<Item = f64>) -> bool {
-    /// Misfit for each row from which on much is left: noise leaves 1.
-    const MUCH: f64 = 1.5;
-    /// Standard deviations beyond which a sensor is far from what was promised: one in twenty by chance.
+fn is_beyond_promise(mut sensors: impl Iterator<Item = f64>) -> bool {
+    /// Standard deviations beyond which a sensor is far: one in twenty by chance.
     const FAR: f64 = 2.0;
-    misfit >= MUCH || sensors.any(|off| off.abs() > FAR)
+    sensors.any(|off| off.abs() > FAR)
 }
 
 #[cfg(test)]
@@ -407,10 +404,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_found_is_fitted_afresh_where_much_is_left_or_a_sensor_is_far_off() {
-        let bent = |misfit, sensor: f64| is_bent(misfit, [0.1, sensor].into_iter());
-        assert!(!bent(1.49, 1.99) && !bent(1.0, -1.99));
-        assert!(bent(1.5, 0.0) && bent(1.0, 2.01) && bent(1.0, -2.01));
-        assert!(!is_bent(1.0, std::iter::empty()));
+    fn what_was_found_is_fitted_afresh_where_a_sensor_is_far_off() {
+        let far = |sensor: f64| is_beyond_promise([0.1, sensor].into_iter());
+        assert!(!far(1.99) && !far(-1.99) && far(2.01) && far(-2.01));
+        assert!(!is_beyond_promise(std::iter::empty()));
     }
 }
