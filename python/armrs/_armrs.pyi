@@ -76,6 +76,7 @@ __all__ = [
     "control",
     "declare",
     "design",
+    "displacement_of_base",
     "distances",
     "effects",
     "find_gap",
@@ -1642,4 +1643,5 @@ def look(
     settings: SearchSettings,
     progress: Callable[[str, float], None] | None = None,
 ) -> Screening: ...
+def displacement_of_base(path: NDArray[np.float64], place: tuple[float, float], rate: float) -> NDArray[np.float64]: ...
 def low_pass_both_ways(values: NDArray[np.float64], rate: float, cutoff: float, order: int) -> NDArray[np.float64]: ...

@@ -1,6 +1,6 @@
 //! The common low-pass and the derivatives behind it, for time series.
 
-use arm_ident::regression::measured_motion::low_pass;
+use arm_ident::regression::measured_motion::{self, low_pass};
 use arm_numerics::signal::derivative;
 use arm_numerics::signal::filter::Butterworth;
 use numpy::ndarray::{Array1, Array2};
@@ -60,4 +60,21 @@ pub fn low_pass_both_ways<'py>(
         out.column_mut(c).assign(&Array1::from(passed));
     }
     Ok(out.into_pyarray(py))
+}
+
+/// How far a measured path of the first joint, `(n, 2)` [m], is from the place of the base [m]: `(n, 2)` [m].
+///
+/// Low-passed at 5 Hz, or a fifth of a low sampling rate; −3 dB of both ways together.
+#[pyfunction]
+pub fn displacement_of_base<'py>(
+    py: Python<'py>,
+    path: PyReadonlyArray2<'py, f64>,
+    place: [f64; 2],
+    rate: f64,
+) -> PyResult<Table<'py>> {
+    let path = path.as_array();
+    let points: Vec<[f64; 2]> = path.rows().into_iter().map(|r| [r[0], r[1]]).collect();
+    let moved =
+        measured_motion::displacement_of_base(&points, place, rate).map_err(identification)?;
+    Ok(Array2::from_shape_fn((moved.len(), 2), |(i, a)| moved[i][a]).into_pyarray(py))
 }

@@ -526,15 +526,6 @@ class CoreRun:
     qd: list[float] | None = None
 
 
-BASE_BAND = 5.0
-"""Band of a measured path of the first joint [Hz], as in `gap`: what is faster would be noise in its acceleration."""
-
-
-def _displacement(model: Model, path: np.ndarray, rate: float) -> np.ndarray:
-    """Return how far a measured path of the first joint is from the base of the model [m], low-passed."""
-    return _armrs.low_pass_both_ways(path - np.asarray(model.base), rate, min(BASE_BAND, 0.2 * rate), 4)
-
-
 def driven(model: Model, drive: Movement | Trial | None, coupling: str) -> CoreDrive:
     """Return a drive as the core takes it."""
     rigid = coupling == "rigid"
@@ -555,7 +546,7 @@ def driven(model: Model, drive: Movement | Trial | None, coupling: str) -> CoreD
                 what = f"{what} or path of the first joint"
             raise BadInput(what, Text(f"none at {lost:g} s"), "samples without a gap: they drive the arm", file=drive.file)
         times = np.array(drive.t[:upto] - drive.t[0])
-        base = None if drive.base is None else _displacement(model, drive.base[:upto], drive.rate)
+        base = None if drive.base is None else _armrs.displacement_of_base(drive.base[:upto], model.base, drive.rate)
         return CoreDrive(kind, rigid, np.array(values[:upto]), times, base=base)
     return CoreDrive("free", rigid)
 

@@ -145,6 +145,12 @@ impl<const N: usize> Hypothesis<N> {
         parts.into_iter().flatten().copied().collect()
     }
 
+    /// Whether dry friction acts in some joint.
+    pub fn rubs(&self) -> bool {
+        let mut acting = self.known.iter().chain(&self.named);
+        acting.any(|e| e.on && e.parameters[0] != 0.0 && e.kind.smoothed_by().is_some())
+    }
+
     /// Lets an effect stick or creep at rest as the friction that acts in its joint does.
     pub fn share_rest(&self, effect: &mut Effect<f64>) {
         let Some(smoothing) = effect.kind.smoothed_by() else {

@@ -60,13 +60,7 @@ impl<const N: usize> Session<N> {
             );
             columns.push(trial.response(&moved, c.step, reach)?);
         }
-        for rhythm in &rhythms {
-            for phase in [0.0, 0.5 * core::f64::consts::PI] {
-                let mut swinging = own.clone();
-                swinging.named.push(with_phase(rhythm, phase));
-                columns.push(trial.response(&swinging, 1.0, (false, false))?);
-            }
-        }
+        columns.extend(trial.swings(&own, &rhythms)?);
         let left = difference(&course.seen, &trial.shown);
         let sd: Vec<Option<f64>> = (0..columns.len())
             .map(|i| placed.get(i)?.prior.map(|(_, sd)| sd))
@@ -76,14 +70,46 @@ impl<const N: usize> Session<N> {
             let value = own.get(c.target) + size;
             own = own.with(c.target, value);
         }
-        for (rhythm, size) in std::iter::zip(rhythms, sizes[placed.len()..].chunks_exact(2)) {
-            own.named.push(match size {
-                // What the trial does not tell stays as it is.
-                [0.0, 0.0] => rhythm,
-                _ => with_phase(&rhythm, libm::atan2(size[1], size[0])),
-            });
+        in_phase(&mut rhythms, &sizes[placed.len()..]);
+        if !rhythms.is_empty() && own.rubs() {
+            rhythms = self.phased_by_runs((&own, rhythms), course)?;
         }
+        own.named.extend(rhythms);
         Ok(own)
+    }
+
+    /// Rhythms with the phases that runs with them tell: a joint that sticks without a rhythm slips with it, and answers otherwise.
+    fn phased_by_runs(
+        &self,
+        (own, mut rhythms): (&Hypothesis<N>, Vec<Effect<f64>>),
+        course: &Arc<Course<N>>,
+    ) -> Result<Vec<Effect<f64>>, SimulationError> {
+        for _ in 0..TURNS {
+            let mut swinging = own.clone();
+            swinging.named.extend_from_slice(&rhythms);
+            let Ok(trial) = ShownTrial::of(self, &swinging, course) else {
+                break;
+            };
+            let columns = trial.swings(&swinging, &rhythms)?;
+            let left = difference(&course.seen, &trial.shown);
+            let further = sizes(&left, &columns, &vec![None; columns.len()], course);
+            let now = rhythms.iter().flat_map(|rhythm| {
+                let phase = rhythm.parameters[shapes_of(rhythm.kind)[1]];
+                [libm::cos(phase), libm::sin(phase)]
+            });
+            let sizes: Vec<f64> = std::iter::zip(now, further).map(|(a, b)| a + b).collect();
+            in_phase(&mut rhythms, &sizes);
+        }
+        Ok(rhythms)
+    }
+}
+
+/// Gives rhythms the phases that their sizes at 0 and 90° say; what a trial does not tell stays as it is.
+fn in_phase(rhythms: &mut [Effect<f64>], sizes: &[f64]) {
+    for (rhythm, size) in std::iter::zip(rhythms, sizes.chunks_exact(2)) {
+        if size != [0.0, 0.0] {
+            *rhythm = with_phase(rhythm, libm::atan2(size[1], size[0]));
+        }
     }
 }
 
@@ -132,6 +158,23 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
             Some(line) => line.response(changed, size, reach),
             None => Ok(slope(&self.torques(changed)?, &self.shown, size)),
         }
+    }
+
+    /// What each rhythm would show more with a phase of 0 and of 90°.
+    fn swings(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        rhythms: &[Effect<f64>],
+    ) -> Result<Vec<Channels>, SimulationError> {
+        let mut columns = Vec::with_capacity(2 * rhythms.len());
+        for rhythm in rhythms {
+            for phase in [0.0, 0.5 * core::f64::consts::PI] {
+                let mut swinging = hypothesis.clone();
+                swinging.named.push(with_phase(rhythm, phase));
+                columns.push(self.response(&swinging, 1.0, (false, false))?);
+            }
+        }
+        Ok(columns)
     }
 
     fn torques(&self, hypothesis: &Hypothesis<N>) -> Result<Channels, SimulationError> {

@@ -55,6 +55,8 @@ pub struct Course<const N: usize> {
     handle: Vec<Plane<f64>>,
     /// How far the base is from its place \[m\], where its path was measured and drives a simulation.
     pub(crate) base: Option<Series<2>>,
+    /// Rhythms of muscles that are in the run of the trial, not in what is compared with it.
+    pub(crate) rhythms: Vec<Effect<f64>>,
     /// Angles and force on the arm that are measured at the start.
     pub(crate) start: Joints<f64, N>,
     pub(crate) start_force: Plane<f64>,
@@ -138,7 +140,7 @@ impl<const N: usize> Session<N> {
             _ => Vec::new(),
         };
         let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 / trial.rate).collect();
-        let base = self.base_path(number, band, &times)?;
+        let base = self.base_path(number, &times)?;
         let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
         let span = first..(first + START).min(trial.len());
         let count = span.len() as f64;
@@ -166,6 +168,7 @@ impl<const N: usize> Session<N> {
             times,
             handle,
             base,
+            rhythms: Vec::new(),
             start,
             start_force,
             motion,
@@ -236,6 +239,7 @@ impl<const N: usize> Session<N> {
         let duration = course.times[course.times.len() - 1];
         let mut experiment = Experiment::new(setup, drive, duration);
         experiment.effects = hypothesis.effects();
+        experiment.effects.extend_from_slice(&course.rhythms);
         experiment.base.clone_from(&course.base);
         experiment.output_interval = Some(interval);
         let near = course.start(hypothesis);

@@ -61,10 +61,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let found = &mut apart.trial_specific;
         let before = found.iter().position(|a| a.trial.is_none());
         let without = std::mem::replace(&mut self.courses, apart.measured.clone());
-        let again = self.rhythm(&state.point, Line::BetweenRepeats)?;
+        let point = self.linearize(&state.point.hypothesis)?;
+        let again = self.rhythm(&point, Line::BetweenRepeats)?;
         match (before, again) {
             (Some(before), Some(again)) if again.is_like(&found[before]) => {
-                self.take_out(&state.point, &again)?;
+                self.take_out(&point, &again)?;
                 found[before] = again;
                 self.renewed(state)
             }
@@ -75,7 +76,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             (before, again) => {
                 before.map(|before| found.remove(before));
                 if let Some(again) = again {
-                    self.take_out(&state.point, &again)?;
+                    self.take_out(&point, &again)?;
                     found.push(again);
                 }
                 let settled = self.calibrate_anew()?;

@@ -27,7 +27,7 @@ impl<const N: usize> Linear<'_, N> {
         changed: &Hypothesis<N>,
         course: &Course<N>,
     ) -> Result<Channels, SimulationError> {
-        let plant = Plant::new(self.session, changed)?;
+        let plant = Plant::new(self.session, changed, &course.rhythms)?;
         // A trial that was broken off needs no more than its own steps.
         let steps = self.steps_until(course.raw[0].len()).min(self.states.len());
         let hands = hands(course, changed, (steps, self.step))?;

@@ -96,7 +96,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         hypothesis: &Hypothesis<N>,
         course: &Arc<Course<N>>,
     ) -> Result<Self, SimulationError> {
-        let mut plant = Plant::new(session, hypothesis)?;
+        let mut plant = Plant::new(session, hypothesis, &course.rhythms)?;
         // Effects that are asked later may feel them.
         plant.feels_force = true;
         let grid = Grid::of(course.rate);
@@ -245,7 +245,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         size: f64,
         (sensing, moves_handle): (bool, bool),
     ) -> Result<Channels, SimulationError> {
-        let plant = Plant::new(self.session, changed)?;
+        let plant = Plant::new(self.session, changed, &self.course.rhythms)?;
         let nowhere = [Joints::<f64, N>::zeros(); 2];
         let start = match self.dry || plant.dry {
             true => self.start_of(&plant, changed)?,

@@ -28,11 +28,16 @@ pub(super) struct Plant<const N: usize> {
 }
 
 impl<const N: usize> Plant<N> {
-    pub fn new(session: &Session<N>, hypothesis: &Hypothesis<N>) -> Result<Self, SimulationError> {
+    /// * `rhythms` - of the trial; see [`Course::rhythms`]
+    pub fn new(
+        session: &Session<N>,
+        hypothesis: &Hypothesis<N>,
+        rhythms: &[Effect<f64>],
+    ) -> Result<Self, SimulationError> {
         let setup = session.rig(hypothesis)?;
-        let (resisting, sensing): (Vec<_>, Vec<_>) = hypothesis
-            .effects()
-            .into_iter()
+        let effects = hypothesis.effects().into_iter();
+        let (resisting, sensing): (Vec<_>, Vec<_>) = effects
+            .chain(rhythms.iter().copied())
             .filter(|e| e.on)
             .partition(|e| e.kind.info().place == Place::Joint);
         Ok(Self {

@@ -64,18 +64,19 @@ impl<const N: usize> PreparedSession<'_, N> {
             return Ok(None);
         }
         let told = match place {
-            Line::BetweenRepeats => self.differences(&residuals),
+            Line::BetweenRepeats => Some(self.differences(&residuals)),
             Line::OfTheRobot => {
                 let trial = self.fitted[0];
                 let rig = self.session.rig(&point.hypothesis);
                 let rig = rig.map_err(|source| GapError::Simulation { trial, source })?;
-                std::iter::zip(&residuals, &self.fitted)
-                    .map(|(residual, &trial)| self.closure(residual, trial, &rig.contact))
-                    .collect()
+                let each = std::iter::zip(&residuals, &self.fitted);
+                let closure =
+                    each.map(|(residual, &trial)| self.closure(residual, trial, &rig.contact));
+                Some(closure.collect::<Vec<_>>())
             }
-            Line::InPhase => residuals.clone(),
+            Line::InPhase => None,
         };
-        let all: Vec<&Channels> = told.iter().collect();
+        let all: Vec<&Channels> = told.as_ref().unwrap_or(&residuals).iter().collect();
         // A robot mostly starts its movements in the same phase of what shakes it.
         let (lowest, sums) = match place {
             Line::BetweenRepeats => (SLOWEST_RHYTHM, &[Sum::Powers][..]),
@@ -170,7 +171,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         out
     }
 
-    /// Takes a rhythm out of the measured channels, so that it does not disturb what is fitted to them.
+    /// Takes a rhythm out of what the measured channels and the runs differ by, so that it does not disturb what is fitted.
+    ///
+    /// It is taken out of the channels; where joints rub it is put into the runs instead. Dry friction resists in a joint that is shaken as
+    /// a viscous one does, and what a movement shows is not what it would show without the rhythm.
     ///
     /// # Errors
     /// [`GapError::Numerics`] for channels that the filter refuses.
@@ -179,7 +183,50 @@ impl<const N: usize> PreparedSession<'_, N> {
         point: &LinearizationPoint<N>,
         trial_specific: &TrialSpecific,
     ) -> Result<(), GapError> {
-        for (sizes, &trial) in trial_specific.sizes.iter().zip(&self.fitted.clone()) {
+        let is_of_muscles = trial_specific.effect.kind.prior().nature == Nature::Rhythm;
+        if is_of_muscles && point.hypothesis.rubs() {
+            let measured = self.courses.clone();
+            if let Ok(true) = self.put_into_runs(point, trial_specific) {
+                return Ok(());
+            }
+            self.courses = measured;
+        }
+        self.subtract(point, trial_specific, &trial_specific.sizes)
+    }
+
+    /// Has a rhythm in the run of every trial, with its size and phase there, and takes out of the channels what that does not show of it.
+    /// Whether that can be simulated and told.
+    fn put_into_runs(
+        &mut self,
+        point: &LinearizationPoint<N>,
+        trial_specific: &TrialSpecific,
+    ) -> Result<bool, GapError> {
+        let Some(sized) = self.sized(point, trial_specific) else {
+            return Ok(false);
+        };
+        let (frequency, columns) = (sized.wave()[0], &sized.columns);
+        for (sizes, &trial) in std::iter::zip(&sized.sizes, &self.fitted) {
+            let (own, _) = common_swing(columns, std::slice::from_ref(sizes), frequency);
+            Arc::make_mut(&mut self.courses[trial]).rhythms.push(own);
+        }
+        let there = self.linearize(&point.hypothesis)?;
+        let residuals = self.raw_residuals(&there)?;
+        let answers = self.answers(&there, frequency, columns);
+        let Some(left) = self.explain(&residuals, frequency, (columns, &answers)) else {
+            return Ok(false);
+        };
+        self.subtract(&there, trial_specific, &left.sizes)?;
+        Ok(true)
+    }
+
+    /// Takes swings of given sizes out of the measured channels.
+    fn subtract(
+        &mut self,
+        point: &LinearizationPoint<N>,
+        trial_specific: &TrialSpecific,
+        sizes: &[Vec<f64>],
+    ) -> Result<(), GapError> {
+        for (sizes, &trial) in std::iter::zip(sizes, &self.fitted.clone()) {
             let Some(line) = point.lines.get(self.group_of[trial]) else {
                 continue;
             };
@@ -276,6 +323,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         Some(TrialSpecific {
             effect,
             sd: vec![f64::max(explained.sd, scatter)],
+            sizes: explained.sizes,
             ..trial_specific.clone()
         })
     }
