@@ -7,6 +7,9 @@ STAMPS := $(VENV)/stamps
 RUST    := $(shell find crates bench -type f \( -name '*.rs' -o -name Cargo.toml \)) Cargo.toml Cargo.lock clippy.toml
 PACKAGE := $(RUST) $(shell find python -type f -name "*.pyi") pyproject.toml scripts/fmu_library.py
 
+# Declared by a macro, through which cargo fmt finds no files.
+EFFECTS := $(wildcard crates/arm-core/src/effect/*.rs)
+
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
 # Most of what comes with the packages is never imported; what is, compiles itself.
@@ -65,6 +68,7 @@ rust: $(STAMPS)/rust ## the Rust half of `test`
 
 $(STAMPS)/rust: $(RUST) scripts/check_no_std.sh scripts/capi_header.sh scripts/digests.txt | $(STAMPS)/venv
 	cargo fmt --all --check
+	rustfmt --edition 2024 --check $(EFFECTS)
 	scripts/check_no_std.sh
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	cargo test --quiet --no-fail-fast $(TESTED) --tests
@@ -82,6 +86,7 @@ python: $(STAMPS)/dev ## the Python half of `test`
 
 format: $(STAMPS)/dev ## format Rust and Python, mend what lints can mend
 	cargo fmt --all
+	rustfmt --edition 2024 $(EFFECTS)
 	$(BIN)/ruff format python tests scripts examples bench
 	$(BIN)/ruff check --fix python tests scripts examples bench
 

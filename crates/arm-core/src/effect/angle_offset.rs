@@ -15,7 +15,8 @@ impl Law for AngleOffset {
         parameters: &[Parameter::shape("offset", "rad", -3.2, 3.2, 0.0)],
         states: 0,
     };
-    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(2e-3)]).promised(Promise::AngleOffset);
+    const PRIOR: Prior =
+        Prior::lasting(&[Part::of(&[0]).small(2e-3)]).promised(Promise::AngleOffset);
 
     #[inline]
     fn distort<T: Scalar, const N: usize>(

@@ -31,12 +31,7 @@ impl Law for AngleViscosity {
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
         let s = share(p, at);
-        let inside = T::if_less(
-            T::ZERO,
-            s,
-            T::if_less(s, T::ONE, T::ONE, T::ZERO),
-            T::ZERO,
-        );
+        let inside = T::if_less(T::ZERO, s, T::if_less(s, T::ONE, T::ONE, T::ZERO), T::ZERO);
         // What the torque changes by with s, and s with both angles.
         let slope = inside * (p[1] - p[0]) * at.qd / p[3];
         leading([(T::ONE - s) * at.qd, s * at.qd, -slope, -(slope * s)])

@@ -32,7 +32,9 @@ impl Law for Biarticular {
         .shaped(&[(1, Values::Each(&[1.0, 0.5]))])
         .resting(2)
         .varying(&[1])
-        .expecting(&[(RATIO, EXPECTED_RATIO)])]).in_family(Family::TwoJoints).typically(1.0);
+        .expecting(&[(RATIO, EXPECTED_RATIO)])])
+    .in_family(Family::TwoJoints)
+    .typically(1.0);
     const CROSSES: bool = true;
 
     #[inline]

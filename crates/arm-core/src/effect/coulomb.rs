@@ -23,7 +23,11 @@ impl Law for Coulomb {
     };
     const SMOOTHED_BY: Option<usize> = Some(1);
     const RATE_INDEPENDENT: bool = true;
-    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])]).missing(0.03).in_family(Family::Dry).typically(0.1).passive();
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])])
+        .missing(0.03)
+        .in_family(Family::Dry)
+        .typically(0.1)
+        .passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -18,10 +18,10 @@ impl Law for CubicElastic {
         ],
         states: 0,
     };
-    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
-        .shaped(&[(1, Values::Middle)])
-        .varying(&[1])])
-    .missing(0.002).typically(2.0);
+    const PRIOR: Prior =
+        Prior::lasting(&[Part::of(&[0]).shaped(&[(1, Values::Middle)]).varying(&[1])])
+            .missing(0.002)
+            .typically(2.0);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -18,9 +18,10 @@ impl Law for Elastic {
         ],
         states: 0,
     };
-    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
-        .shaped(&[(1, Values::Middle)])
-        .resting(1)]).typically(1.0).passive();
+    const PRIOR: Prior =
+        Prior::lasting(&[Part::of(&[0]).shaped(&[(1, Values::Middle)]).resting(1)])
+            .typically(1.0)
+            .passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -21,8 +21,7 @@ impl Law for HandleSlip {
         ],
         states: 0,
     };
-    const PRIOR: Prior =
-        Prior::lasting(&[Part::of(&[0, 1]).small(1e-4)]).of_nature(Nature::Slip);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).small(1e-4)]).of_nature(Nature::Slip);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.displaced.slip[0] += p[0];

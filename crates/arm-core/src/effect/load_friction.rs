@@ -25,7 +25,9 @@ impl Law for LoadFriction {
     };
     const FEELS_FORCE: bool = true;
     const SMOOTHED_BY: Option<usize> = Some(1);
-    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])]).missing(0.03).in_family(Family::Dry);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])])
+        .missing(0.03)
+        .in_family(Family::Dry);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -23,7 +23,8 @@ impl Law for Relaxation {
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[0.3, 1.0, 3.0]))])
         .varying(&[1])])
-    .missing(0.002).typically(1.0);
+    .missing(0.002)
+    .typically(1.0);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

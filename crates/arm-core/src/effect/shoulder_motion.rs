@@ -22,9 +22,8 @@ impl Law for ShoulderMotion {
         states: 0,
     };
     const ACTS_ON: ActsOn = ActsOn::Rig;
-    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1])
-        .shaped(&[(2, Values::Middle)])
-        .small(1e-5)]);
+    const PRIOR: Prior =
+        Prior::lasting(&[Part::of(&[0, 1]).shaped(&[(2, Values::Middle)]).small(1e-5)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.base_motion[0] += p[0];

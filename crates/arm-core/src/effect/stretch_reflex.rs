@@ -40,7 +40,9 @@ impl Law for StretchReflex {
         ])
         .varying(&[1, LATENCY])
         .expecting(&[(LATENCY, EXPECTED_LATENCY)])])
-    .missing(0.1).in_family(Family::Muscle).typically(0.2);
+    .missing(0.1)
+    .in_family(Family::Muscle)
+    .typically(0.2);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
@@ -112,9 +114,7 @@ fn excess<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
 #[inline]
 fn excesses<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> [T; 2] {
     let (half, short) = (T::of(0.5), p[TONIC] - at.q);
-    let excess = |speed: T, short: T| {
-        (speed - p[1] - p[SLOPE] * short.max(T::ZERO)).max(T::ZERO)
-    };
+    let excess = |speed: T, short: T| (speed - p[1] - p[SLOPE] * short.max(T::ZERO)).max(T::ZERO);
     [
         T::if_less(p[2], -half, T::ZERO, excess(at.qd, short)),
         T::if_less(half, p[2], T::ZERO, excess(-at.qd, -short)),

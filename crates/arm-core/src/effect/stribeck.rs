@@ -28,7 +28,9 @@ impl Law for Stribeck {
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])
         .varying(&[1, 2])])
-    .missing(0.05).in_family(Family::Dry).typically(0.1);
+    .missing(0.05)
+    .in_family(Family::Dry)
+    .typically(0.1);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

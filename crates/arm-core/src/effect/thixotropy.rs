@@ -34,7 +34,9 @@ impl Law for Thixotropy {
             (4, Values::Each(&[1.0, 3.0, 10.0])),
         ])
         .varying(&[3, 4])])
-    .missing(0.05).in_family(Family::Dry).typically(0.1);
+    .missing(0.05)
+    .in_family(Family::Dry)
+    .typically(0.1);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

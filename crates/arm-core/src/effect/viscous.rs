@@ -15,7 +15,10 @@ impl Law for Viscous {
         parameters: &[Parameter::linear("viscosity", "N m s/rad", 0.0, 100.0, 0.0)],
         states: 0,
     };
-    const PRIOR: Prior = Prior::FIRST.in_family(Family::Rate).typically(0.2).passive();
+    const PRIOR: Prior = Prior::FIRST
+        .in_family(Family::Rate)
+        .typically(0.2)
+        .passive();
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -22,7 +22,9 @@ impl Law for Voluntary {
         ],
         states: 0,
     };
-    const PRIOR: Prior = Prior::FIRST.of_nature(Nature::Burst).in_family(Family::Muscle);
+    const PRIOR: Prior = Prior::FIRST
+        .of_nature(Nature::Burst)
+        .in_family(Family::Muscle);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

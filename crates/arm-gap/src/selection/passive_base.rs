@@ -172,15 +172,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.with_friction_at_rest(settled)
     }
 
-    /// Asks for the laws of the base once more that were dropped before anything was named: what was named since may have hidden
-    /// them. `None` where none comes back.
+    /// Asks for the laws of the base once more that were dropped before anything was named: what was named since may have hidden them. They
+    /// start as measured motion has them; where much is left all laws do, as a joint that sticks can lead a fit far astray. `None` where
+    /// none comes back and nothing is gained.
     pub(crate) fn with_base_revived(
         &mut self,
         current: &Fitted<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
         let before = self.dropped.clone();
-        let is_settled = current.asked.is_empty() && !current.leaves_much();
-        if !before.contains(&true) || is_settled {
+        let is_bent = current.leaves_much();
+        let is_settled = !is_bent && (current.asked.is_empty() || !before.contains(&true));
+        if before.is_empty() || is_settled {
             return Ok(None);
         }
         for (dropped, law) in self.dropped.iter_mut().zip(&self.session.base) {
@@ -189,7 +191,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut start = current.hypothesis.clone();
         let mut asked = current.asked.clone();
         let first = self.session.effects.len();
-        for b in (0..before.len()).filter(|&b| before[b] && !self.dropped[b]) {
+        for b in (0..before.len()).filter(|&b| (is_bent || before[b]) && !self.dropped[b]) {
             start.known[first + b] = self.session.base[b].effect;
         }
         // What the rest angle of a spring that comes back stands for is not named beside it.
@@ -208,7 +210,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let crossed = crossed_joints::<N>(&fitted.hypothesis.named);
             if !self.dropped_weak(&terms, |law| least_of(law, &crossed, STAYS)) {
                 let back = std::iter::zip(&before, &self.dropped).any(|(was, is)| *was && !is);
-                if back && fitted.cost < current.cost {
+                if (back || is_bent) && fitted.cost + fitted.enough() < current.cost {
                     return Ok(Some((fitted, point)));
                 }
                 break;
