@@ -13,6 +13,7 @@ from matplotlib.colors import rgb_to_hsv, to_hex, to_rgb
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
 import armrs
+from armrs.catalogue import catalogue
 from armrs.report import plotting
 from armrs.thesis import simulation
 from armrs.workflows import demo, identify
@@ -23,6 +24,11 @@ from test_docs import ROOT, blocks
 def gap_of(**channel: float | None) -> dict[str, Any]:
     whole = {"before": 1.0, "calibrated": 0.5, "after": 0.2, "floor": 0.2} | channel
     return {"gap": {"Fy_N": whole}, "effects": [{"trial": None}], "open": []}
+
+
+def test_the_readme_counts_the_effects_that_are_searched_for() -> None:
+    searched = sum(kind.searched for kind in catalogue().values())
+    assert f"armrs searches {searched} effects" in (ROOT / "README.md").read_text()
 
 
 @pytest.mark.parametrize(("after", "closed"), [(0.1, "100%"), (0.35, "50%"), (0.2, "100%")])
