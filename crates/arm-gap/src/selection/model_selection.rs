@@ -135,20 +135,34 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         ))
     }
 
+    /// A fitted hypothesis without each of its effects, which are told what they gain.
+    fn without_each(
+        &self,
+        fitted: &mut Fitted<N>,
+        point: &LinearizationPoint<N>,
+    ) -> Result<Vec<Fitted<N>>, GapError> {
+        let each = (0..fitted.asked.len()).map(|slot| self.without(fitted, slot, point));
+        let each = each.collect::<Result<Vec<_>, _>>()?;
+        for (candidate, less) in std::iter::zip(&mut fitted.asked, &each) {
+            candidate.gained = less.cost - fitted.cost;
+        }
+        Ok(each)
+    }
+
     /// What a named effect may explain without being there: the imperfect shape of another one that is named, or of a law of the base.
     ///
     /// * `slot`, `less` - the effect, and what was fitted without it
-    /// * `gains` - of all that are named
     /// * `base` - laws of the base, and what each gains
     fn mimicked_beside(
         &self,
         (fitted, slot, less): (&Fitted<N>, usize, &Fitted<N>),
-        (gains, base): (&[f64], &[(Effect<f64>, f64)]),
+        base: &[(Effect<f64>, f64)],
         point: &LinearizationPoint<N>,
     ) -> f64 {
         let candidate = &fitted.asked[slot];
-        let others = (0..gains.len()).filter(|&o| o != slot && gains[o].is_finite());
-        let others = others.map(|o| (fitted.asked[o].effect, gains[o]));
+        let others = fitted.asked.iter().enumerate();
+        let others = others.filter(|(o, other)| *o != slot && other.gained.is_finite());
+        let others = others.map(|(_, other)| (other.effect, other.gained));
         // A second dry law may be the imperfect shape of the first one, which explains less beside it than by itself.
         let is_dry = candidate.kind().smoothed_by().is_some() && less.cost.is_finite();
         let dry = is_dry
@@ -178,27 +192,22 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &point, &fitted).excess;
             let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
             let base = self.gains_of_base(&point, &fitted)?;
-            let without = (0..fitted.asked.len()).map(|slot| self.without(&fitted, slot, &point));
-            let without = without.collect::<Result<Vec<_>, _>>()?;
-            let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
-            for (candidate, &gain) in std::iter::zip(&mut fitted.asked, &gains) {
-                candidate.gained = gain;
-            }
+            let without = self.without_each(&mut fitted, &point)?;
             // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
             let foretold = match self.repeated {
                 true => None,
                 false => Some(self.foretold(&point, &fitted)?),
             };
             for (slot, less) in without.into_iter().enumerate() {
-                let mut gain = gains[slot];
                 let candidate = &fitted.asked[slot];
+                let mut gain = candidate.gained;
                 if let Some(with) = foretold
                     && gain.is_finite()
                 {
                     gain = gain.min(self.foretold(&point, &less)? - with);
                 }
                 // Less may be the imperfect shape of another one, or of a law of the base.
-                let beside = self.mimicked_beside((&fitted, slot, &less), (&gains, &base), &point);
+                let beside = self.mimicked_beside((&fitted, slot, &less), &base, &point);
                 let least = f64::max(floor, beside);
                 let worth = gain / scale - candidate.price * candidate.spread;
                 let worth = if gain < least {
@@ -246,15 +255,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 None => Vec::new(),
             };
-            let without = (0..twins.len()).map(|slot| self.without(&fitted, slot, &point));
-            let without = without.collect::<Result<Vec<_>, _>>()?;
-            let gains: Vec<f64> = without.iter().map(|l| l.cost - fitted.cost).collect();
+            let without = self.without_each(&mut fitted, &point)?;
             for (slot, (twin, less)) in std::iter::zip(&twins, &without).enumerate() {
                 progress(
                     "comparing alternatives",
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 )?;
-                let gain = gains[slot].min(f64::MAX);
+                let gain = fitted.asked[slot].gained.min(f64::MAX);
                 let rivals = match &library {
                     // Of what cannot be followed without it nothing can be said.
                     Some(library) if less.cost.is_finite() => {
@@ -265,7 +272,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     _ => Vec::new(),
                 };
                 // A shape that is refined may stand for what the law of another one misses.
-                let bent = self.mimicked_beside((&fitted, slot, less), (&gains, &[]), &point);
+                let bent = self.mimicked_beside((&fitted, slot, less), &[], &point);
                 let better = rivals.iter().find(|r| {
                     self.takes_over(
                         &r.alternative,
