@@ -20,6 +20,19 @@ pub struct LackOfFit {
     pub excess: f64,
 }
 
+impl LackOfFit {
+    /// What is left at least, as a sum of squares: the excess less two of its standard deviations, one time in forty more by chance.
+    pub fn certain(&self) -> f64 {
+        /// Standard deviations that chance takes.
+        const CHANCE: f64 = 2.0;
+        if self.z > CHANCE {
+            self.excess * (1.0 - CHANCE / self.z)
+        } else {
+            0.0
+        }
+    }
+}
+
 /// Lack of fit of a hypothesis over the groups of repeats.
 pub fn lack_of_fit<const N: usize>(
     prepared: &PreparedSession<N>,
@@ -116,5 +129,20 @@ pub fn project_off(rows: &mut [f64], basis: &[Vec<f64>]) {
         for (v, c) in rows.iter_mut().zip(column) {
             *v -= share * c;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_chance_may_leave_is_not_certain() {
+        let certain = |z: f64| {
+            let (ratio, excess) = (1.1, 100.0);
+            LackOfFit { ratio, z, excess }.certain()
+        };
+        assert_eq!([1.0, 2.0, f64::NAN].map(certain), [0.0; 3]);
+        assert_eq!(certain(4.0), 50.0);
     }
 }

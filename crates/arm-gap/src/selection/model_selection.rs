@@ -188,8 +188,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         };
         while !fitted.asked.is_empty() {
             let mut weakest: Option<(f64, Fitted<N>)> = None;
-            // Not a number without repeats, which `max` passes over.
-            let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &point, &fitted).excess;
+            let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &point, &fitted).certain();
             let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
             let base = self.gains_of_base(&point, &fitted)?;
             let without = self.without_each(&mut fitted, &point)?;
