@@ -26,7 +26,7 @@ pub struct Limit {
     pub price: f64,
 }
 
-/// The limits of all candidates that were ruled out, but for the effects that were named. Of several shapes of an effect that counts which
+/// The limits of all candidates that were ruled out, one for each size, but for the effects that were named. Of several shapes of an effect that counts which
 /// shows most clearly, and the most that any of them explains.
 pub(super) fn limits(
     ruled: &[Ruled],
@@ -36,36 +36,42 @@ pub(super) fn limits(
     for one in ruled {
         let effect = &one.candidate.effect;
         let place = placed(effect.kind, effect.index);
-        if !one.smallest.is_finite() || named.contains(&place) {
+        if named.contains(&place) {
             continue;
         }
-        let parameter = &effect.kind.info().parameters[one.candidate.free[0]];
-        let (kind, joint, channel) = place;
-        let same = |l: &&mut Limit| {
-            (&l.kind, l.joint, &l.channel) == (&kind, joint, &channel)
-                && l.parameter == parameter.name
-        };
-        if let Some(known) = all.iter_mut().find(same) {
-            if known.gain - known.price <= one.gain - one.price {
-                (known.gain, known.price) = (one.gain, one.price);
-            }
-            if one.smallest < known.at_least {
-                known.at_least = one.smallest;
-            }
-            continue;
+        let sizes = std::iter::zip(&one.candidate.free, &one.smallest);
+        for (&free, &smallest) in sizes.filter(|(_, smallest)| smallest.is_finite()) {
+            add(&mut all, one, (free, smallest));
         }
-        all.push(Limit {
-            kind,
-            joint,
-            channel,
-            parameter: parameter.name.to_owned(),
-            at_least: one.smallest,
-            unit: parameter.unit.to_owned(),
-            gain: one.gain,
-            price: one.price,
-        });
     }
     all
+}
+
+/// Adds the smallest value of a free parameter that would have been named.
+fn add(all: &mut Vec<Limit>, one: &Ruled, (free, smallest): (usize, f64)) {
+    let effect = &one.candidate.effect;
+    let parameter = &effect.kind.info().parameters[free];
+    let (kind, joint, channel) = placed(effect.kind, effect.index);
+    let same = |l: &&mut Limit| {
+        (&l.kind, l.joint, &l.channel) == (&kind, joint, &channel) && l.parameter == parameter.name
+    };
+    if let Some(known) = all.iter_mut().find(same) {
+        if known.gain - known.price <= one.gain - one.price {
+            (known.gain, known.price) = (one.gain, one.price);
+        }
+        known.at_least = known.at_least.min(smallest);
+        return;
+    }
+    all.push(Limit {
+        kind,
+        joint,
+        channel,
+        parameter: parameter.name.to_owned(),
+        at_least: smallest,
+        unit: parameter.unit.to_owned(),
+        gain: one.gain,
+        price: one.price,
+    });
 }
 
 /// An effect alone, to first order.
@@ -168,8 +174,24 @@ mod tests {
             candidate,
             gain,
             price,
-            smallest,
+            smallest: vec![smallest],
         }
+    }
+
+    /// Play that the force shows along y, and hardly along z, where it never turns over.
+    #[test]
+    fn each_size_has_its_own_limit() {
+        let mut play = ruled("backlash", 0, (3.0, 20.0, 2e-5));
+        play.candidate.free = vec![0, 1];
+        play.smallest = vec![2e-5, 3e-3];
+        let mut along_y = ruled("backlash", 0, (4.0, 20.0, 1e-5));
+        along_y.smallest = vec![1e-5];
+        let limits = limits(&[play, along_y], &[]);
+        let told: Vec<_> = limits
+            .iter()
+            .map(|l| (l.parameter.as_str(), l.at_least))
+            .collect();
+        assert_eq!(told, [("y", 1e-5), ("z", 3e-3)]);
     }
 
     #[test]

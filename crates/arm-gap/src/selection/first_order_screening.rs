@@ -66,7 +66,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                     effect: candidate.found(&choice.coefficients[0]),
                     gain: choice.gain / score_test.scale,
                     price: score_test.price[c] * score_test.spread[c],
-                    smallest: score_test.smallest_seen(c),
+                    smallest: score_test.smallest_seen(c, candidate.free.len())[0],
                     candidate,
                 })
             })

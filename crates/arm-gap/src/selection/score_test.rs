@@ -238,18 +238,22 @@ impl ScoreTest {
         all
     }
 
-    /// Smallest size of a candidate that would have been named, in the unit of its first parameter.
-    pub fn smallest_seen(&self, candidate: usize) -> f64 {
-        let information = self.columns[candidate]
-            .clone()
-            .map(|c| self.gram[(c, c)])
-            .fold(0.0, f64::max);
+    /// Smallest sizes of a candidate that would have been named, each alone, in the units of its free parameters.
+    ///
+    /// A rest angle that is free with a size makes it easier to see, but is no size of its own.
+    pub fn smallest_seen(&self, candidate: usize, sizes: usize) -> Vec<f64> {
         let price = self.scale * self.spread[candidate] * self.price[candidate];
-        if information > 0.0 {
-            libm::sqrt(price / information)
-        } else {
-            f64::INFINITY
+        let mut columns = self.columns[candidate].clone();
+        let own = columns.by_ref().take(sizes).map(|c| self.gram[(c, c)]);
+        let mut information: Vec<f64> = own.collect();
+        for column in columns {
+            information[0] = information[0].max(self.gram[(column, column)]);
         }
+        let least = information.into_iter().map(|i| match i > 0.0 {
+            true => libm::sqrt(price / i),
+            false => f64::INFINITY,
+        });
+        least.collect()
     }
 
     /// Squared cosine between what two candidates would show, after everything else was refitted.

@@ -355,7 +355,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 gain: score_test.evaluate(&[c]).map_or(0.0, |choice| choice.gain)
                     / score_test.scale,
                 price: score_test.price[c] * score_test.spread[c],
-                smallest: score_test.smallest_seen(c),
+                smallest: score_test.smallest_seen(c, library.candidates[c].free.len()),
             })
             .collect()
     }

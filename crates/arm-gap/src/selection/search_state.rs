@@ -26,8 +26,8 @@ pub struct Ruled {
     pub gain: f64,
     /// What it would have to gain.
     pub price: f64,
-    /// Smallest size of its first free parameter that would have been named.
-    pub smallest: f64,
+    /// Smallest size of each of its free parameters that would have been named.
+    pub smallest: Vec<f64>,
 }
 
 /// What a search tells while it works: what it does, and how far it is (0 to 1). [`GapError::Stopped`] in answer ends the search.
