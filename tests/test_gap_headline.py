@@ -44,6 +44,23 @@ def test_a_named_effect_is_told_with_its_size_and_what_it_is_worth() -> None:
     )
 
 
+def test_of_two_amplitudes_the_larger_one_is_told() -> None:
+    """A heave of 3 mm upward and 1 mm forward was told with the latter, where the table of effects begins with y."""
+    heave = effect("shoulder_heave", None)
+    heave["parameters"] = {
+        name: {"value": value, "std": std, "unit": held_in, "interval": [value - 2e-4, value + 2e-4]}
+        for name, value, std, held_in in (
+            ("y", 1e-3, 1e-4, "m"),
+            ("z", -3e-3, 1e-4, "m"),
+            ("frequency", 0.31, 0.01, "Hz"),
+            ("phase", 0.7, None, "rad"),
+        )
+    }
+    assert headline(result("explained", heave)).startswith("The model lacks shoulder heave, z -0.00300 ± 0.00010 m: with it, ")
+    heave |= {"summary": "first joint that heaves", "formula": "f", "p_value": 1e-20}
+    assert "z -0.00300 m (95 %: -0.00320 to -0.00280)" in named(result("explained", heave))[0]
+
+
 def test_an_open_gap_contradicts_no_sentence() -> None:
     """As where a reflex was absorbed: the wrist off by 0.0153 rad where repeats differ by 0.0019."""
     channels = {"q3_rad": channel(0.02, 0.0155, 0.0153, 0.0019), "Fz_N": channel(0.7, 0.65, 0.65, 0.14)}
@@ -113,6 +130,8 @@ def test_nothing_is_claimed_that_was_not_tested() -> None:
         ("gravity_moment", 1, [("segment", 0)]),
         ("angle_offset", 2, [("joint", 1)]),
         ("gravity_tilt", None, [("frame", 0)]),
+        ("shoulder_heave", None, [("base", 0)]),
+        ("shoulder_motion", None, [("base", 0)]),
         ("backlash", None, [("hand", 0)]),
         ("force_bias", None, [("hand", 0)]),
     ],

@@ -105,7 +105,7 @@ impl ArmSpec {
         effects: &[Effect<f64>],
     ) -> Self {
         let ours = |e: &&Effect<f64>| match e.kind.info().place {
-            Place::Joint | Place::Segment | Place::Frame | Place::Hand => e.on,
+            Place::Joint | Place::Segment | Place::Frame | Place::Base | Place::Hand => e.on,
             Place::Contact => e.on && port == Port::Motion,
             Place::AngleSensor | Place::ForceSensor | Place::Sensors => false,
         };

@@ -30,7 +30,7 @@ def sketch(model: Model, trials: Sequence[Trial], marked: Collection[tuple[str, 
     trials : sequence of Trial
     marked : collection of (str, int)
         What is drawn in blue: a `segment` or `joint` by its index from 0, `across` both joints of the segment that ends in a joint, the
-        `hand` or the `frame` with 0.
+        `hand`, the `frame` or the `base` with 0.
     lines : sequence of (str, str)
         What is written, and its colour.
     ax : Axes
@@ -52,6 +52,8 @@ def sketch(model: Model, trials: Sequence[Trial], marked: Collection[tuple[str, 
     hand = ("hand", 0) in marked
     ax.plot(*points[-1], marker="s", ms=11, mfc=plotting.BLUE if hand else "white", mec=plotting.INK, mew=1.8, zorder=4)
     _down(points, reach, ("frame", 0) in marked, ax)
+    if ("base", 0) in marked:
+        _shaken(points[0], reach, ax)
     for first, last in ((k - 1, k) for place, k in marked if place == "across"):
         _bow(points, first, last, reach, ax)
     ax.set_aspect("equal", adjustable="datalim")
@@ -91,6 +93,14 @@ def _down(points: np.ndarray, reach: float, marked: bool, ax: Axes) -> None:
     ax.plot([at[0], at[0]], [at[1], at[1] - 0.2 * reach], color=colour, lw=2.2 if marked else 1.4)
     ax.plot(at[0], at[1] - 0.2 * reach, marker="v", ms=8, color=colour)
     ax.text(at[0], at[1] - 0.26 * reach, "g", color=colour, ha="center", va="top", fontsize=10)
+
+
+def _shaken(base: np.ndarray, reach: float, ax: Axes) -> None:
+    """Draw that the first joint does not stay in place."""
+    style = {"arrowstyle": "-|>", "color": plotting.BLUE, "lw": 2.2, "shrinkA": 0.0, "shrinkB": 0.0}
+    for y, z in ((0.16, 0.0), (-0.16, 0.0), (0.0, 0.16), (0.0, -0.16)):
+        end = (base[0] + y * reach, base[1] + z * reach)
+        ax.annotate("", end, xytext=(base[0], base[1]), arrowprops=style, zorder=3)
 
 
 def _bow(points: np.ndarray, first: int, last: int, reach: float, ax: Axes) -> None:

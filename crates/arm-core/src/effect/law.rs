@@ -159,7 +159,7 @@ impl ActsOn {
         match place {
             Place::Joint => Self::Joints,
             Place::Segment | Place::Hand | Place::Frame => Self::Arm,
-            Place::Contact => Self::Rig,
+            Place::Base | Place::Contact => Self::Rig,
             Place::AngleSensor | Place::ForceSensor | Place::Sensors => Self::Sensors,
         }
     }

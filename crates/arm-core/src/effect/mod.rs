@@ -346,7 +346,9 @@ impl<T: Scalar> Effect<T> {
         let places = match info.place {
             Place::Joint | Place::Segment | Place::AngleSensor => joints,
             Place::ForceSensor => 3,
-            Place::Frame | Place::Contact | Place::Hand | Place::Sensors => usize::MAX,
+            Place::Frame | Place::Base | Place::Contact | Place::Hand | Place::Sensors => {
+                usize::MAX
+            }
         };
         // What also acts in the joint before needs one.
         let shared = info.place == Place::Joint && !self.proximal_share().within(0.0, 0.0);

@@ -9,6 +9,8 @@ pub enum Place {
     Segment,
     /// On the whole arm.
     Frame,
+    /// On the base, the place of the first joint.
+    Base,
     /// Between hand and robot.
     Contact,
     /// In a sensor of joint angles.
@@ -28,6 +30,7 @@ impl Place {
             Self::Joint => "joint",
             Self::Segment => "segment",
             Self::Frame => "frame",
+            Self::Base => "base",
             Self::Contact => "contact",
             Self::AngleSensor => "angle sensor",
             Self::ForceSensor => "force sensor",
@@ -41,7 +44,7 @@ impl Place {
         match self {
             Self::Joint | Self::Segment | Self::AngleSensor => Some("joint"),
             Self::ForceSensor => Some("channel"),
-            Self::Frame | Self::Contact | Self::Hand | Self::Sensors => None,
+            Self::Frame | Self::Base | Self::Contact | Self::Hand | Self::Sensors => None,
         }
     }
 }

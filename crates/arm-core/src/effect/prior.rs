@@ -66,7 +66,7 @@ impl Family {
         match place {
             Place::Joint => Self::Elastic,
             Place::Segment | Place::Hand => Self::Segment,
-            Place::Frame => Self::Frame,
+            Place::Frame | Place::Base => Self::Frame,
             Place::Contact => Self::Contact,
             Place::AngleSensor | Place::ForceSensor | Place::Sensors => Self::Sensor,
         }

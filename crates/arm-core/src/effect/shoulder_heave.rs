@@ -1,4 +1,4 @@
-use super::law::{ActsOn, Info, Law, Parameters, Place, WAVE, add_wave};
+use super::law::{Info, Law, Parameters, Place, WAVE, add_wave};
 use super::prior::{Nature, Part, Prior};
 use crate::{Scalar, Setup};
 
@@ -10,14 +10,13 @@ pub struct ShoulderHeave;
 impl Law for ShoulderHeave {
     const INFO: Info = Info {
         kind: "shoulder_heave",
-        place: Place::Frame,
+        place: Place::Base,
         summary: "first joint that heaves periodically",
         formula: "base += (y, z) · sin(2π frequency t + phase)",
         reference: "motion of the chest wall in quiet breathing: De Groote, Wantier, Cheron, Estenne, Paiva 1997",
         parameters: &WAVE,
         states: 0,
     };
-    const ACTS_ON: ActsOn = ActsOn::Rig;
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).varying(&[2, 3]).small(1e-4)])
         .of_nature(Nature::Periodic);
 

@@ -1,4 +1,4 @@
-use super::law::{ActsOn, Info, Law, Parameter, Parameters, Place};
+use super::law::{Info, Law, Parameter, Parameters, Place};
 use super::prior::{Part, Prior, Values};
 use crate::{Scalar, Setup};
 
@@ -10,7 +10,7 @@ pub struct ShoulderMotion;
 impl Law for ShoulderMotion {
     const INFO: Info = Info {
         kind: "shoulder_motion",
-        place: Place::Frame,
+        place: Place::Base,
         summary: "first joint that moves with its angle",
         formula: "base += (y, z) · (q_1 − rest)",
         reference: "shoulder rhythm: Inman, Saunders, Abbott 1944; linear form",
@@ -21,7 +21,6 @@ impl Law for ShoulderMotion {
         ],
         states: 0,
     };
-    const ACTS_ON: ActsOn = ActsOn::Rig;
     const PRIOR: Prior =
         Prior::lasting(&[Part::of(&[0, 1]).shaped(&[(2, Values::Middle)]).small(1e-5)]);
 

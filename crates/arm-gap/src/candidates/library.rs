@@ -169,11 +169,11 @@ fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<u
     // weight or an inertia could as well be.
     let swings_freely = session.swings_freely();
     match kind.info().place {
-        Place::Segment | Place::Hand | Place::Frame if swings_freely => 0..0,
+        Place::Segment | Place::Hand | Place::Frame | Place::Base if swings_freely => 0..0,
         Place::Joint if swings_freely && holds_at_rest(kind) => 0..0,
         Place::Joint => usize::from(kind.crosses())..N,
         Place::Segment | Place::AngleSensor => 0..N,
-        Place::Frame | Place::Hand => 0..1,
+        Place::Frame | Place::Base | Place::Hand => 0..1,
         Place::ForceSensor if led => 0..2,
         Place::Contact | Place::Sensors if led => 0..1,
         Place::ForceSensor | Place::Contact | Place::Sensors => 0..0,

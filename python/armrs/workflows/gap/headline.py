@@ -147,11 +147,18 @@ def _name(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
 
 def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
     name = _name(effect, joints)
-    fitted = [(n, p) for n, p in effect["parameters"].items() if p["std"] is not None]
-    if not _decided(effect) or not fitted:
+    parameter = largest(effect["parameters"])
+    if not _decided(effect) or parameter is None:
         return name
-    parameter, value = fitted[0]
+    value = effect["parameters"][parameter]
     return f"{name}, {parameter} {number(value['value'], value['std'])} ± {spread(value['std'])} {unit(value['unit'])}".rstrip()
+
+
+def largest(parameters: Mapping[str, Mapping[str, Any]]) -> str | None:
+    """Return the name of the value that tells the size of an effect: of those fitted that have the unit of the first, the largest."""
+    fitted = {name: p for name, p in parameters.items() if p["std"] is not None}
+    alike = [name for name, p in fitted.items() if p["unit"] == next(iter(fitted.values()))["unit"]]
+    return max(alike, key=lambda name: abs(fitted[name]["value"]), default=None)
 
 
 def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:

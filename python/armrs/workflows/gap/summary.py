@@ -14,7 +14,7 @@ from ...report.figures import Drawn
 from ...report.sketch import sketch
 from ...report.tables import number, spread, unit
 from .found import GapFound
-from .headline import still_open
+from .headline import largest, still_open
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +27,8 @@ STEPS = {
 """The steps of a gap: colour and name."""
 _LINES = 11
 """Effects that find room beside the sketch."""
+_SIGNS = {"frame": "g", "base": "↔"}
+"""How the sketch marks places that are neither a joint nor a segment; all others it marks at the hand."""
 
 
 def summary(result: GapFound) -> Drawn:
@@ -62,7 +64,7 @@ def drawn_arm(result: GapFound, ax: Axes) -> None:
     lines = []
     for effect in sorted(result.effects, key=lambda e: e.joint or np.inf):
         named = f"{joints[effect.joint - 1]}: " if effect.joint else f"{effect.channel}: " if effect.channel else ""
-        here = f"{effect.joint}  {named}" if effect.joint else f"■  {named}" if catalogue()[effect.kind].where != "frame" else "g  "
+        here = f"{effect.joint}  {named}" if effect.joint else f"{_SIGNS.get(catalogue()[effect.kind].where, '■')}  {named}"
         lines.append((here + _words(effect), plotting.INK if getattr(effect, "decided", True) is not False else plotting.RED))
     sketch(dataset.model, dataset.trials, marked, lines, ax)
 
@@ -73,7 +75,7 @@ def marks(effect: Missing, kind: Kind) -> list[tuple[str, int]]:
         return [("joint", effect.joint - 2), ("joint", effect.joint - 1), ("across", effect.joint - 1)]
     if effect.joint is not None:
         return [("segment" if kind.where == "segment" else "joint", effect.joint - 1)]
-    return [("frame" if kind.where == "frame" else "hand", 0)]
+    return [(kind.where if kind.where in _SIGNS else "hand", 0)]
 
 
 def _words(effect: Missing) -> str:
@@ -82,8 +84,9 @@ def _words(effect: Missing) -> str:
     if getattr(effect, "decided", True) is False:
         rivals = dict.fromkeys(a.kind.replace("_", " ") for a in effect.alternatives)
         return f"{text} (or {', '.join(rivals)})"
-    name, value = next(((n, v) for n, v in effect.parameters.items() if v.std is not None), (None, None))
-    if name is not None and value is not None:
+    name = largest({n: {"value": v.value, "std": v.std, "unit": v.unit} for n, v in effect.parameters.items()})
+    value = None if name is None else effect.parameters[name]
+    if value is not None and value.std is not None:
         text += f" {number(value.value, value.std)} ± {spread(value.std)} {unit(value.unit)}".rstrip()
     return text + (" (one trial)" if effect.trial else "")
 

@@ -23,7 +23,8 @@ _BETTER = 10.0
 
 def size(effect: Mapping[str, Any]) -> str:
     """Return the size of an effect with its interval."""
-    name, value = next(((n, v) for n, v in effect["parameters"].items() if v["std"] is not None), next(iter(effect["parameters"].items())))
+    name = headline.largest(effect["parameters"]) or next(iter(effect["parameters"]))
+    value = effect["parameters"][name]
     text = f"{name} {number(value['value'], value['std'])} {unit(value['unit'])}".rstrip()
     if value["std"] is None:
         return text
