@@ -19,7 +19,7 @@ from armrs.catalogue import catalogue
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.report import plotting
-from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, figures, separate, separating
+from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, figures, moving, separate, separating
 from armrs.workflows.gap.results import gap_data, write_gap
 from gap_sessions import model, session
 
@@ -183,6 +183,12 @@ def test_what_swings_with_the_same_phase_in_every_trial_is_seen(
     assert np.cos(turned(found) - turned(parameters)) > 0.99
     for name, value in parameters.items():
         assert name == "phase" or found[name] == pytest.approx(value, rel=0.1), name
+    # The page switches it off, whether it acts in a joint or at the base.
+    series = moving.moving(result).series
+    assert series is not None
+    for panel in series["panels"]:
+        line = {line["name"].partition(" in joint")[0]: np.array(line["values"], dtype=float) for line in panel["lines"]}
+        assert np.nanstd(line[f"without {kind.replace('_', ' ')}"] - line["with the named effects"]) > 0.0
 
 
 def test_a_rhythm_that_a_strong_effect_hides_is_seen_once_that_is_named() -> None:

@@ -207,6 +207,15 @@ def test_every_value_is_seen_on_a_phone(pages: Path, verb: str) -> None:
         assert seen.page.evaluate(outside) == []
 
 
+def test_names_of_joints_are_whole_on_a_phone(pages: Path) -> None:
+    """The clinician's page had `shou / lder` and `elbo / w` in its first column."""
+    broken = """[...document.querySelectorAll('.brief tr > :first-child')].filter(e => {
+      const range = document.createRange(); range.selectNodeContents(e); return range.getClientRects().length > 1 }).map(e => e.innerText)"""
+    with opened(pages / "summary" / "report.html", width=390) as seen:
+        assert seen.page.locator(".brief tbody td:first-child").count() > 0
+        assert seen.page.evaluate(broken) == []
+
+
 @pytest.mark.parametrize("verb", SYMBOLS)
 def test_symbols_are_explained_where_they_stand(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html") as seen:

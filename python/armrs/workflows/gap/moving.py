@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...catalogue import catalogue
 from ...errors import BadInput, SimulationError
 from ...io.trial import Trial
 from ...report import plotting
@@ -48,8 +49,11 @@ def moving(result: GapFound) -> Live:
 
 
 def _without(result: GapFound, trial: Trial, amended: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the channels of a trial without each named effect: what its absence changes in a simulation, from the amended course."""
-    named = [e for e in result.effects if e.trial is None and e.joint is not None]
+    """Return the channels of a trial without each named effect: what its absence changes in a simulation, from the amended course.
+
+    Effects of sensors change no simulated movement.
+    """
+    named = [e for e in result.effects if e.trial is None and "sensor" not in catalogue()[e.kind].where]
     joints = [joint.name for joint in result.dataset.model.joints]
     model = result.model
     found: dict[str, np.ndarray] = {}
@@ -59,7 +63,7 @@ def _without(result: GapFound, trial: Trial, amended: np.ndarray) -> dict[str, n
             left = tuple(e for e in model.effects if (e.kind, e.joint) != (effect.kind, effect.joint))
             if len(left) < len(model.effects):
                 changed = _channels(simulate(model.replace(effects=left), trial), trial) - with_all
-                found[place_of(effect.kind, effect.joint, None, joints)] = amended + changed
+                found[place_of(effect.kind, effect.joint, effect.channel, joints)] = amended + changed
     except (BadInput, SimulationError):
         # An arm that cannot be followed without an effect has no course to show.
         return found
