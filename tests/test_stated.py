@@ -112,6 +112,16 @@ def test_what_the_readme_shows_is_installed_and_short() -> None:
     assert len(python) >= 3 and not any(re.search(r"\blist\(|\.copy\(|\[\*", content) for content in python)
 
 
+@pytest.mark.parametrize("file", ["README.md", "docs/architecture.md"])
+def test_the_thesis_is_cited_where_it_is_spoken_of(file: str) -> None:
+    """Pages said "the thesis" and nothing said whose."""
+    text = (ROOT / file).read_text(encoding="utf-8")
+    cited = (
+        r"Timotej Kodek, \*Estimation of Upper Extremity Biomechanical Parameters Using a Robot Manipulator\*, Ph\. ?D\. thesis,[^.]*2004"
+    )
+    assert "thesis" in text and re.search(cited, " ".join(text.split()))
+
+
 def test_the_documented_thresholds_are_those_of_the_code() -> None:
     """A null misfit of 4.3 stood in one place and of 4.8 in another."""
     guide = (ROOT / "docs" / "developer.md").read_text(encoding="utf-8")
