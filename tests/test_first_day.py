@@ -24,7 +24,7 @@ from armrs.io.raw import RawTable, read_raw
 from armrs.io.raw.table import Remark, column, remarks_of
 from armrs.report import console, html, moving, plotting
 from armrs.workflows import demo, setup
-from armrs.workflows.importing import clock, handle
+from armrs.workflows.importing import clock, handle, matching
 from armrs.workflows.importing.columns import symbol_of
 from armrs.workflows.importing.recipe import load_recipe
 from armrs.workflows.importing.remarks import timed
@@ -149,8 +149,8 @@ def test_forces_on_their_own_clock_share_the_laws_of_the_arm(world: Path, apart:
     recordings = []
     for trial, offset in zip(data.trials, offsets, strict=True):
         assert trial.force_on_arm is not None
-        found = clock.align(trial.t, trial.q, trial.t + offset, trial.force_on_arm)
-        near = min((shift.seconds for shift in found), key=lambda seconds: abs(seconds + offset))
+        found = matching.together([matching.Match.of(trial.t, trial.q, trial.t + offset, trial.force_on_arm)])[0]
+        near = min(found, key=lambda seconds, at=offset: abs(seconds + at))
         recordings.append(clock.Recording(trial.t, trial.q, trial.t + offset, trial.force_on_arm, near))
     shifts = np.array(clock.refine(data.model, recordings))
     assert np.abs(shifts + offsets).max() < within

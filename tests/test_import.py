@@ -302,6 +302,14 @@ HOPELESS: dict[str, tuple[Writer, tuple[str, ...]]] = {
     "no workbook": (lambda r, folder: _written(folder / "slow_1.xlsx", b"PK\x03\x04 broken"), ("no readable workbook",)),
     "damaged HDF5": (lambda r, folder: _damaged(matlab_7_3(r, folder)), ("no readable MATLAB file",)),
     "no MATLAB file": (lambda r, folder: _written(folder / "slow_1.mat", b"MATLAB 5.0 " + b"x" * 600), ("MATLAB",)),
+    "units that nobody knows": (
+        text(names=["t [fortnight]", "q1 [gon]", "q2 [rad]", "Fy [N]", "Fz [bar]"]),
+        (
+            "column 't [fortnight]': found 'fortnight', allowed a unit of time: s, min, ms, µs, ns",
+            "column 'q1 [gon]': found 'gon', allowed a unit of angle: rad, deg, mrad",
+            "column 'Fz [bar]': found 'bar', allowed a unit of force: N, kN, mN, daN, kgf, lbf",
+        ),
+    ),
     "forces of noise": (
         lambda r, folder: write_text(folder / "slow_1.csv", SI, np.column_stack([r.t, r.q, NOISE.standard_normal((len(r.t), 2))])),
         ("unexplained",),

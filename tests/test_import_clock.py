@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +11,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import armrs
 from armrs import Arm, Model
 from armrs.io.raw import RawTable, read_raw
 from armrs.io.raw.table import column
 from armrs.workflows import demo
 from armrs.workflows.importing import clock, columns
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+import check_clock
 
 PERIOD = 2.0
 """Of the movement that repeats itself [s]."""
@@ -47,6 +53,52 @@ def test_a_movement_that_repeats_itself_is_not_taken_a_period_off(model: Model) 
 def test_clocks_that_differ_are_not_made_one(model: Model) -> None:
     recordings = [recorded(model, 0.4, 0.02, repeats=False), recorded(model, 1.1, 0.02, repeats=False)]
     assert clock.refine(model, recordings) == pytest.approx([-0.4, -1.1], abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(20112, id="fast movements, which were refused"),
+        pytest.param(20115, id="clocks of their own, which were up to 6 s off"),
+        pytest.param(20102, id="circles without beginning, one clock, which were a period off"),
+        pytest.param(20120, id="one slow movement"),
+    ],
+)
+def test_clocks_of_a_session_are_found_together(seed: int, tmp_path: Path) -> None:
+    for case, error, _ in check_clock.found(seed, tmp_path):
+        assert abs(error) <= max(case.step, 0.02)
+
+
+def test_a_period_that_nothing_tells_is_in_doubt(tmp_path: Path) -> None:
+    """Circles without beginning, each on a clock of its own: every period explains the forces as well."""
+    results = check_clock.found(20142, tmp_path)
+    assert max(abs(error) for _, error, _ in results) > check_clock.PERIOD_OFF
+    assert all(doubted for _, error, doubted in results if abs(error) > check_clock.PERIOD_OFF)
+    with pytest.warns(armrs.errors.ArmrsWarning, match=r"forces shifted by [-+]\d+\.\d{3} s, but .* explain them about as well"):
+        again = armrs.import_recordings([tmp_path / "raw"], tmp_path / "again", model=tmp_path / "session" / "model.toml")
+    page = again.report(tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("explain them about as well") >= len(again.warnings) - 1 > 0
+
+
+def test_one_offset_in_doubt_is_that_of_all(model: Model) -> None:
+    """One movement that repeats itself says nothing of the period; a second one on the same clock does."""
+    periodic, other = (recorded(model, 0.4, 0.0, repeats=r) for r in (True, False))
+    others = {"others": (-0.4 - PERIOD, -0.4, -0.4 + PERIOD)}
+    (alone,) = clock.certain(model, [dataclasses.replace(periodic, **others)], [-0.4])
+    assert any(abs(s + 0.4 - PERIOD) < 0.05 or abs(s + 0.4 + PERIOD) < 0.05 for s in alone.others)
+    both = clock.certain(model, [dataclasses.replace(r, **others) for r in (periodic, other)], [-0.4, -0.4])
+    assert [f.others for f in both] == [(), ()]
+    assert all(f.seconds == pytest.approx(-0.4, abs=1e-9) and f.std < 1e-3 for f in both)
+
+
+def test_of_a_short_recording_the_lateness_is_found_as_well(model: Model) -> None:
+    """1.7 s, as fast movements are; its ends were all that was compared, and then nothing."""
+    whole = recorded(model, 0.0, 0.0, repeats=False)
+    for late in (0.0, 0.1):
+        force = np.roll(whole.force_on_arm, round(100 * late), axis=0)[100:270]
+        found, _ = clock.lateness(model, whole.t[100:270], whole.q[100:270], force)
+        assert found == pytest.approx(late, abs=0.01)
+    assert clock.lateness(model, whole.t[:60], whole.q[:60], whole.force_on_arm[:60]) == (0.0, 1.0)
 
 
 def test_files_that_begin_and_end_together_are_on_one_clock(model: Model) -> None:

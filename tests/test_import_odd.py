@@ -241,8 +241,11 @@ def test_files_that_all_state_a_wrong_unit_are_alike(recording: Recording, tmp_p
     files = [write_text(tmp_path / f"slow_{k}.csv", names, repeated(values, k)) for k in (1, 2)]
     imported = armrs.import_recordings(files, tmp_path / "set", model=KNOWN)
     assert len(imported.recipe.trials) == 2
-    other = write_text(tmp_path / "slow_3.csv", [names[0], "q1_deg", *names[2:]], repeated(values, 3))
-    with pytest.raises(armrs.BadInput, match=r"slow_3\.csv"):
+    # Where one header states what the others only hold, it is the same column.
+    third = write_text(tmp_path / "slow_3.csv", [names[0], "q1_deg", *names[2:]], repeated(values, 3))
+    assert len(armrs.import_recordings([*files, third], tmp_path / "three", model=KNOWN).recipe.trials) == 3
+    other = write_text(tmp_path / "slow_4.csv", [names[0], "q1_mrad", *names[2:]], repeated(values, 4))
+    with pytest.raises(armrs.BadInput, match=r"slow_4\.csv: column 'q1_mrad': found 'mrad', allowed deg, as in the first file"):
         armrs.import_recordings([*files, other], tmp_path / "other", model=KNOWN)
 
 

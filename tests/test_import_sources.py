@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 
 import armrs
@@ -48,6 +49,32 @@ def test_a_folder_without_recordings_says_what_it_holds(tmp_path: Path) -> None:
     (tmp_path / "raw" / "day 1" / "slow_1.csv").write_text("t\n", encoding="utf-8")
     with pytest.raises(BadInput, match=r"a folder without recordings, .* \(name its folders: day 1\)"):
         armrs.import_recordings([tmp_path / "raw"], tmp_path / "set", model=KNOWN)
+
+
+def test_one_folder_may_write_one_column_in_two_ways(recording: Recording, tmp_path: Path) -> None:
+    """A workbook with a row of units, and text with the units in the names: eight lines for each file said that columns are missing."""
+    book = openpyxl.Workbook()
+    for number in (1, 2):
+        sheet = book.active if number == 1 else book.create_sheet()
+        assert sheet is not None
+        sheet.title = f"slow {number}"
+        sheet.append(["Zeit", "Schulter", "Ellbogen", "Kraft y", "Kraft z"])
+        sheet.append(["s", "rad", "rad", "N", "N"])
+        for row in np.column_stack([recording.t, recording.q - 0.01 * number, recording.force_on_robot]):
+            sheet.append([float(x) for x in row])
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    book.save(folder / "Proband 07.xlsx")
+    names = "Zeit [s],Schulter [rad],Ellbogen [rad],Kraft y [N],Kraft z [N]"
+    for number in (1, 2):
+        values = np.column_stack([recording.t, recording.q + 0.01 * number, recording.force_on_robot])
+        np.savetxt(folder / f"fast {number}.csv", values, delimiter=",", header=names, comments="", fmt="%.9g")
+    done = armrs.import_recordings([folder], tmp_path / "session", model=KNOWN)
+    assert {(t.configuration, t.repeat) for t in done.recipe.trials} == {("slow", 1), ("slow", 2), ("fast", 1), ("fast", 2)}
+    assert not any("not used" in note for note in done.notes)
+    again = armrs.import_recordings([done.folder / "import.toml"], tmp_path / "again")
+    first, second = (armrs.load_dataset(d.folder).trials for d in (done, again))
+    assert all(np.array_equal(a.q, b.q) for a, b in zip(first, second, strict=True))
 
 
 def test_a_workbook_beside_its_own_text_is_imported_once(recording: Recording, tmp_path: Path) -> None:

@@ -240,6 +240,8 @@ def import_(
     def human() -> None:
         for note in done.notes:
             print(f"  {note}")
+        for line in done.warnings:
+            print(f"  in doubt: {line}")
         print("  (t: time; q1 …: joint angles, from the base on; Fy, Fz: force forward and upward)")
         count = len(done.recipe.trials)
         print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}.")

@@ -93,6 +93,13 @@ class RawTable:
         """Number of samples."""
         return len(self.columns[0].values) if self.columns else 0
 
+    def find(self, name: str) -> RawColumn | None:
+        """Return the column of this name, or else the only one that differs from it in how its unit is written: `Zeit`, `Zeit [ms]`."""
+        named = next((c for c in self.columns if c.name == name), None)
+        labels = {name, column(name, np.empty(0)).label}
+        alike = [c for c in self.columns if labels & {c.label, column(c.name, np.empty(0)).label}]
+        return alike[0] if named is None and len(alike) == 1 else named
+
 
 def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
     """Return a column; without `unit`, the unit is split off its name where one is recognised.

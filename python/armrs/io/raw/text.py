@@ -77,7 +77,7 @@ def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
     lines = [line for index, line in enumerate(lines) if not (index and _is_comment(line))]
     layout = _layout(lines[:_PROBED])
     if layout is None:
-        raise NoTable("file", Text("no block of rows with at least two numbers each"), "a table with one row a sample")
+        raise NoTable("file", Text(f"no block of rows with at least two numbers each, {_FEWEST} or more"), "a table with one row a sample")
     names, units = _header(lines, layout)
     notes = [f"text in {encoding}, cells between {_SEPARATORS[layout.separator]}, decimal {'comma' if layout.decimal == ',' else 'point'}"]
     columns, remarks = _columns(lines[layout.first :], names, units, layout, notes)

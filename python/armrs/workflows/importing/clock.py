@@ -8,96 +8,40 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import _armrs
-from ...errors import BadInput, Text
 from ...model import Model
+from . import matching
+from .matching import EDGE, FINE, averaged, smoothed
 
 _RATE = 50.0
 """Rate at which signals are compared [Hz]."""
 _COARSE = 0.04
-"""Steps of the shift over all shifts [s]."""
+"""First steps of the lateness [s]."""
 NEAR = 0.35
 """The posture alone tells the shift to this [s]; within it the equation of motion is asked."""
 _STEP, _LONGEST, _SETTLED, _ROUNDS = 0.01, 0.05, 1e-5, 40
 """Steps of the shift [s]: over which slopes are taken, the longest in one round, and the one that ends the rounds."""
-_TOGETHER = 1.1
+_TOGETHER = 1.5
 """One shift holds for all recordings where it leaves at most so many times what a shift for each does."""
+_FEWEST = 100
+"""Samples of a recording from which on its ends are left out."""
 _ENDS = 2.0
 """Recordings that begin and end within so many steps of each other seem to be on one clock."""
+_DOUBTFUL = 1.5
+"""Another shift may be right where it leaves at most so many times what the one taken does."""
 _COMPARED = 0.25
 """Least part of the angles on which two shifts are compared."""
-_SMOOTH = 0.06
-"""Angles are averaged over this before they are differentiated [s]."""
 _CREEP = 0.02
 """Speed at which friction has most of its size [rad/s]."""
-_OVERLAP = 0.6
-"""Least part of the angles that forces must cover."""
-_ALIKE = 3.0
-"""Shifts that leave at most this many times as much unexplained as the best are compared by the balance of the arm."""
-_MOST = 6
-"""As many are compared at most."""
 _LATEST = 0.6
 """Lateness up to which forces are looked for [s]."""
 _AS_GOOD = 1.2
 """The clock of the file is kept where it leaves at most so many times what the best shift does."""
-_EXPLAINED = 0.6
-"""Least share of the force's variance that the posture must explain: less is no match."""
-
-
-@dataclass(frozen=True)
-class Shift:
-    """What to add to the time of the forces [s], and the share of their variance that the arm's posture then explains."""
-
-    seconds: float
-    explained: float
 
 
 def together(t: np.ndarray, force_t: np.ndarray) -> bool:
     """Whether angles and forces begin and end at the same times [s]: then their clocks are at most `NEAR` apart."""
     step = max(float(np.median(np.diff(stamps))) for stamps in (t, force_t))
     return bool(max(abs(t[0] - force_t[0]), abs(t[-1] - force_t[-1])) <= _ENDS * step)
-
-
-def align(t: np.ndarray, q: np.ndarray, force_t: np.ndarray, force: np.ndarray) -> list[Shift]:
-    """Return the shifts of the force's clock at which posture and motion explain the forces about equally well, the best first.
-
-    A movement that repeats itself explains them at several; which is the right one, the balance of the arm tells.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Time of the angles [s].
-    q : ndarray, shape (n, n_joints)
-        Angles in any convention [rad].
-    force_t : ndarray, shape (m,)
-        Time of the forces [s].
-    force : ndarray, shape (m, 2)
-        [N]
-
-    Raises
-    ------
-    BadInput
-        When no shift makes the forces belong to the movement.
-
-    Notes
-    -----
-    The forces are regressed on sines and cosines of the sums of neighbouring angles, and on speeds: whatever the convention of the angles,
-    gravity of a moving arm lies in the span of these.
-    """
-    good, seen = np.isfinite(q).all(axis=1), np.isfinite(force).all(axis=1)
-    grid = np.arange(t[good][0], t[good][-1], 1.0 / _RATE)
-    features = _features(np.column_stack([np.interp(grid, t[good], column) for column in q[good].T]))
-    clock, values = force_t[seen], force[seen]
-    covered = _OVERLAP * (grid[-1] - grid[0])
-    shifts = np.arange(grid[0] - clock[-1] + covered, grid[-1] - clock[0] - covered, _COARSE)
-    found = [Shift(float(s), _explained(float(s), grid, features, clock, values)) for s in shifts]
-    best = max(found, key=lambda shift: shift.explained, default=Shift(0.0, 0.0))
-    if best.explained < _EXPLAINED:
-        said = Text(f"{100 * best.explained:.0f} % of the forces explained by the movement at the best offset")
-        raise BadInput("clock of the forces", said, f"at least {100 * _EXPLAINED:.0f} %", hint="do the forces belong to this trial?")
-    share = np.array([shift.explained for shift in found])
-    around = np.pad(share, 1, constant_values=-np.inf)
-    peaks = np.flatnonzero((share >= around[:-2]) & (share > around[2:]) & (1.0 - share <= _ALIKE * (1.0 - best.explained)))
-    return sorted((found[k] for k in peaks), key=lambda shift: -shift.explained)[:_MOST]
 
 
 def lateness(model: Model, t: np.ndarray, q: np.ndarray, force_on_arm: np.ndarray) -> tuple[float, float]:
@@ -110,9 +54,13 @@ def lateness(model: Model, t: np.ndarray, q: np.ndarray, force_on_arm: np.ndarra
         As in `Recording`, on one clock.
     """
     good = np.isfinite(q).all(axis=1) & np.isfinite(force_on_arm).all(axis=1)
-    fit = _Fit.of(model, Recording(t[good], q[good], t[good], force_on_arm[good]), [0.0], _LATEST + _COARSE)
+    # Of a short recording, half must be left to compare.
+    latest = min(_LATEST, 0.25 * float(np.ptp(t[good])) - _COARSE - EDGE)
+    if latest < _COARSE:
+        return 0.0, 1.0
+    fit = _Fit.of(model, Recording(t[good], q[good], t[good], force_on_arm[good]), [0.0], latest + _COARSE)
     best = 0.0
-    for width, step in ((_LATEST, _COARSE), (_COARSE, 0.25 * _COARSE)):
+    for width, step in ((latest, _COARSE), (_COARSE, 0.25 * _COARSE)):
         tried = [float(shift) for shift in best + np.arange(-width, width + 0.5 * step, step)]
         best = min(tried, key=lambda shift: _left([fit], [shift]))
     return -best, _left([fit], [0.0]) / max(_left([fit], [best]), 1e-300)
@@ -125,13 +73,15 @@ class Recording:
     Attributes
     ----------
     t, q
-        As in `align`, the angles in the convention of armrs.
+        Time of the angles [s], shape (n,), and the angles in the convention of armrs [rad], shape (n, n_joints).
     force_t, force_on_arm
-        As in `align`.
+        Time of the forces by their own clock [s], shape (m,), and the forces [N], shape (m, 2).
     near : float
-        What `align` found [s].
+        What `matching` found: what to add to the time of the forces [s].
     one_file : bool
         Whether both stand in one file.
+    others : tuple of float
+        What `matching` found as well [s].
     """
 
     t: np.ndarray
@@ -140,6 +90,7 @@ class Recording:
     force_on_arm: np.ndarray
     near: float = 0.0
     one_file: bool = False
+    others: tuple[float, ...] = ()
 
     @property
     def one_clock(self) -> bool:
@@ -148,7 +99,7 @@ class Recording:
 
 
 def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
-    """Return for each recording the shift near what `align` found at which the equation of motion explains the contact torques best [s].
+    """Return for each recording the shift near what `matching` found at which the equation of motion explains the contact torques best [s].
 
     Parameters
     ----------
@@ -173,7 +124,7 @@ def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
     best, held = _TOGETHER, each
     if len(recordings) == 1:
         return each.tolist()
-    for shift in _distinct([float(np.median(each)), *near.tolist()]):
+    for shift in _distinct([float(np.median(each)), *near.tolist(), *_of_all(recordings)]):
         start = np.full(len(near), shift)
         fits = _fits(model, recordings, each, start)
         if not fits:
@@ -183,6 +134,133 @@ def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
         if times <= best:
             best, held = times, common
     return held.tolist()
+
+
+@dataclass(frozen=True)
+class Found:
+    """The shift of one recording.
+
+    Attributes
+    ----------
+    seconds : float
+        Added to the time of the forces [s].
+    std : float
+        Its standard deviation [s], of residuals that are independent from second to second; infinite where a delay and the laws of the
+        joints look alike.
+    others : tuple of float
+        Other shifts that explain the torques about as well [s].
+    """
+
+    seconds: float
+    std: float
+    others: tuple[float, ...]
+
+
+def certain(model: Model, recordings: Sequence[Recording], shifts: Sequence[float]) -> list[Found]:
+    """Return the shifts that `refine` found, or better ones of `others`, with what is not known of them.
+
+    Parameters
+    ----------
+    model, recordings
+        As in `refine`.
+    shifts : sequence of float
+        [s]
+    """
+    held = np.array(shifts)
+    common = len(recordings) > 1 and float(np.ptp(held)) == 0.0
+    if all(recording.one_clock for recording in recordings) and not held.any():
+        doubted: list[list[float]] = [[] for _ in recordings]
+    elif common:
+        held, doubted = _other_common(model, recordings, held)
+    else:
+        held, doubted = _other_single(model, recordings, held)
+    stds = _deviations(_fits(model, recordings, held), held, together=common)
+    return [Found(float(s), std, tuple(sorted(o))) for s, std, o in zip(held, stds, doubted, strict=True)]
+
+
+def _other_common(model: Model, recordings: Sequence[Recording], held: np.ndarray) -> tuple[np.ndarray, list[list[float]]]:
+    """Return the shift of all recordings that is best, and others that are about as good."""
+    doubted: list[float] = []
+    for other in _distinct([float(held[0]), *(shift for recording in recordings for shift in recording.others)])[1:]:
+        start = np.full(len(held), other)
+        if not (fits := _fits(model, recordings, held, start)):
+            continue
+        found = _descended(fits, start, start, together=True)
+        times = _left(fits, found) / max(_left(fits, held), 1e-300)
+        if times < 1.0:
+            held, found = found, held
+        if max(times, 1.0 / max(times, 1e-300)) <= _DOUBTFUL:
+            doubted.append(float(found[0]))
+    return held, [doubted] * len(recordings)
+
+
+def _other_single(model: Model, recordings: Sequence[Recording], held: np.ndarray) -> tuple[np.ndarray, list[list[float]]]:
+    """Return for each recording the best of its shifts while the others keep theirs, and those that are about as good."""
+    triangles = [_triangle(fit, float(s)) for fit, s in zip(_fits(model, recordings, held), held, strict=True)]
+    doubted: list[list[float]] = []
+    for k, recording in enumerate(recordings):
+        doubted.append([])
+        rest = np.concatenate([np.zeros((0, triangles[0].shape[1])), *triangles[:k], *triangles[k + 1 :]])
+        without = _last(rest)
+        for other in _distinct([float(held[k]), *recording.others])[1:]:
+            fit = _Fit.of(model, recording, [float(held[k]), other], NEAR + _STEP)
+            if len(fit.grid) < _COMPARED * (recording.t[-1] - recording.t[0]) * _RATE:
+                doubted[k].append(other)
+                continue
+
+            def left(shift: float, fit: _Fit = fit, rest: np.ndarray = rest, without: float = without) -> float:
+                return max(_last(np.concatenate([rest, _triangle(fit, shift)])) - without, 1e-300)
+
+            best = other
+            for width, step in ((NEAR, 0.05), (0.0375, 0.0125)):
+                best = min((float(s) for s in best + np.arange(-width, width + 0.5 * step, step)), key=left)
+            times = left(best) / left(float(held[k]))
+            if times < 1.0:
+                best, held[k] = float(held[k]), best
+                triangles[k] = _triangle(_Fit.of(model, recording, [float(held[k])], NEAR + _STEP), float(held[k]))
+            if max(times, 1.0 / times) <= _DOUBTFUL:
+                doubted[k].append(best)
+    return held, doubted
+
+
+def _triangle(fit: _Fit, shift: float) -> np.ndarray:
+    """Return the triangle of the regressors and the torques at a shift [s]."""
+    rows = fit.design.reshape(-1, fit.design.shape[2])
+    return np.asarray(np.linalg.qr(np.column_stack([rows, fit.torque(shift)]), mode="r"))
+
+
+def _last(rows: np.ndarray) -> float:
+    """Return the sum of squares that the regressors leave of the torques in the last column."""
+    return float(np.linalg.qr(rows, mode="r")[-1, -1] ** 2) if len(rows) >= rows.shape[1] else 0.0  # type: ignore[call-overload]
+
+
+def _deviations(fits: Sequence[_Fit], shifts: np.ndarray, *, together: bool) -> list[float]:
+    """Return the standard deviations of shifts, by a sandwich over seconds of the recordings [s]."""
+    slopes = [(fit.torque(float(s) + _STEP) - fit.torque(float(s) - _STEP)) / (2.0 * _STEP) for fit, s in zip(fits, shifts, strict=True)]
+    ends = np.cumsum([0, *(len(slope) for slope in slopes)])
+    columns = np.zeros((ends[-1], 1 if together else len(fits)))
+    for k, slope in enumerate(slopes):
+        columns[ends[k] : ends[k + 1], 0 if together else k] = -slope
+    design = np.concatenate([fit.design.reshape(-1, fit.design.shape[2]) for fit in fits])
+    design = design[:, np.abs(design).max(axis=0) > 0.0]
+    design = design / np.abs(design).max(axis=0)
+    torque = np.concatenate([fit.torque(float(s)) for fit, s in zip(fits, shifts, strict=True)])
+    # What the laws of the joints do not take up tells the shift.
+    own = columns - design @ np.linalg.lstsq(design, columns, rcond=1e-10)[0]
+    left = torque - design @ np.linalg.lstsq(design, torque, rcond=1e-10)[0]
+    information = own.T @ own
+    blocks = np.add.reduceat(own * left[:, None], np.arange(0, len(left), round(_RATE) * fits[0].design.shape[1]), axis=0)
+    if np.linalg.cond(information) > 1e12:
+        return [float("inf")] * len(fits)
+    inverse = np.linalg.inv(information)
+    stds = np.sqrt(np.diag(inverse @ (blocks.T @ blocks) @ inverse))
+    return [float(stds[0 if together else k]) for k in range(len(fits))]
+
+
+def _of_all(recordings: Sequence[Recording]) -> list[float]:
+    """Return the shifts that may be those of every recording."""
+    rest = recordings[1:]
+    return [s for s in recordings[0].others if all(any(abs(s - other) < NEAR for other in r.others) for r in rest)]
 
 
 def _distinct(shifts: Sequence[float]) -> list[float]:
@@ -200,33 +278,64 @@ class _Fit:
 
     grid: np.ndarray
     design: np.ndarray
+    fine: np.ndarray
     jacobian: np.ndarray
+    inside: np.ndarray
     clock: np.ndarray
-    values: np.ndarray
+    force: np.ndarray
 
     @classmethod
     def of(cls, model: Model, recording: Recording, shifts: Sequence[float], widest: float) -> _Fit:
         """Return that of the samples that have forces at every shift up to `widest` [s] from each of these."""
-        good, seen = np.isfinite(recording.q).all(axis=1), np.isfinite(recording.force_on_arm).all(axis=1)
-        t, clock = recording.t[good], recording.force_t[seen]
-        grid = np.arange(t[0], t[-1], 1.0 / _RATE)
-        angles = _smoothed(np.column_stack([np.interp(grid, t, column) for column in recording.q[good].T]))
-        speeds = np.gradient(angles, grid, axis=0)
-        accelerations = np.gradient(speeds, grid, axis=0)
-        kernels = _armrs.Arm.from_model(model)
-        rows = kernels.regressor(angles, speeds, accelerations)
-        n, joints = angles.shape
-        own = np.zeros((n, joints, 4 * joints))
-        for j in range(joints):
-            own[:, j, 4 * j : 4 * j + 4] = np.column_stack([angles[:, j], speeds[:, j], np.tanh(speeds[:, j] / _CREEP), np.ones(n)])
-        inside = (grid - max(shifts) - widest >= clock[0]) & (grid - min(shifts) + widest <= clock[-1])
-        design = np.concatenate([rows, own], axis=2)[inside]
-        return cls(grid[inside], design, kernels.jacobian(angles)[inside], clock, recording.force_on_arm[seen])
+        fine, clock, force, jacobian, rows = _equation(model, recording)
+        grid, beyond = fine[::FINE], widest + EDGE
+        inside = np.zeros(len(grid), dtype=bool)
+        while inside.sum() < _COMPARED * len(grid) and beyond > _STEP:  # a short recording has not much of an edge to leave out
+            inside = (grid - max(shifts) - beyond >= clock[0]) & (grid - min(shifts) + beyond <= clock[-1])
+            beyond *= 0.5
+        return cls(grid[inside], smoothed(rows, FINE * _RATE)[inside], fine, jacobian, inside, clock, force)
 
     def torque(self, shift: float) -> np.ndarray:
         """Return the torque of the contact force, joint by joint in one column, with the clock of the forces shifted [s]."""
-        force = np.column_stack([np.interp(self.grid - shift, self.clock, column) for column in self.values.T])
-        return np.einsum("nij,ni->nj", self.jacobian, force).ravel()
+        force = np.column_stack([np.interp(self.fine - shift, self.clock, column) for column in self.force.T])
+        return smoothed(np.einsum("nij,ni->nj", self.jacobian, force), FINE * _RATE)[self.inside].ravel()
+
+
+def _equation(model: Model, recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return times of angles and of forces, forces, Jacobian, and regressors of the equation of motion."""
+    good, seen = np.isfinite(recording.q).all(axis=1), np.isfinite(recording.force_on_arm).all(axis=1)
+    rate = FINE * _RATE
+    fine, angles = averaged(recording.t[good], recording.q[good], rate)
+    clock, force = averaged(recording.force_t[seen], recording.force_on_arm[seen], rate)
+    speeds = np.gradient(angles, fine, axis=0)
+    kernels = _armrs.Arm.from_model(model)
+    rows = kernels.regressor(angles, speeds, np.gradient(speeds, fine, axis=0))
+    # At its ends a mean is one to the side, and its slope none of the angle's.
+    ends = slice(round(matching.AVERAGED * rate), -round(matching.AVERAGED * rate)) if len(fine) > _FEWEST else slice(None)
+    fine, angles, speeds, rows = fine[ends], angles[ends], speeds[ends], rows[ends]
+    n, joints = angles.shape
+    own = np.zeros((n, joints, 4 * joints))
+    for j in range(joints):
+        own[:, j, 4 * j : 4 * j + 4] = np.column_stack([angles[:, j], speeds[:, j], np.tanh(speeds[:, j] / _CREEP), np.ones(n)])
+    return fine, clock, force, kernels.jacobian(angles), np.concatenate([rows, own], axis=2)
+
+
+def matched(model: Model, recordings: Sequence[Recording]) -> list[list[float]]:
+    """Return for each recording the shifts at which one equation of motion explains the torques about equally well, the best first [s].
+
+    Parameters
+    ----------
+    model, recordings
+        As in `refine`.
+    """
+    matches = []
+    for recording in recordings:
+        fine, clock, force, jacobian, rows = _equation(model, recording)
+        within = NEAR if together(recording.t, recording.force_t) else np.inf
+        inner = slice(round(EDGE * _RATE), -round(EDGE * _RATE)) if len(fine) > _FEWEST else slice(None)
+        grid, design, jacobian = fine[::FINE][inner], smoothed(rows, FINE * _RATE)[inner], jacobian[::FINE][inner]
+        matches.append(matching.Match.of_motion(grid, design, jacobian, clock[::FINE], smoothed(force, FINE * _RATE), within))
+    return matching.together(matches)
 
 
 def _fits(model: Model, recordings: Sequence[Recording], *hypotheses: np.ndarray) -> list[_Fit]:
@@ -260,28 +369,3 @@ def _descended(fits: Sequence[_Fit], shifts: np.ndarray, near: np.ndarray, *, to
             return moved
         shifts = moved
     return shifts
-
-
-def _smoothed(angles: np.ndarray) -> np.ndarray:
-    half = max(1, round(0.5 * _SMOOTH * _RATE))
-    padded = np.pad(angles, ((half, half), (0, 0)), mode="edge")
-    kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
-    return np.column_stack([np.convolve(column, kernel, "valid") for column in padded.T])
-
-
-def _features(q: np.ndarray) -> np.ndarray:
-    sums = [q[:, a : b + 1].sum(axis=1) for a in range(q.shape[1]) for b in range(a, q.shape[1])]
-    speeds = np.gradient(q, axis=0)
-    columns = [np.ones(len(q)), *(f(s) for s in sums for f in (np.sin, np.cos)), *speeds.T, *np.tanh(speeds * _RATE / _CREEP).T]
-    return np.column_stack(columns)
-
-
-def _explained(shift: float, grid: np.ndarray, features: np.ndarray, clock: np.ndarray, values: np.ndarray) -> float:
-    inside = (grid - shift >= clock[0]) & (grid - shift <= clock[-1])
-    if inside.mean() < _OVERLAP:
-        return 0.0
-    target = np.column_stack([np.interp(grid[inside] - shift, clock, column) for column in values.T])
-    target -= target.mean(axis=0)
-    left = target - features[inside] @ np.linalg.lstsq(features[inside], target, rcond=None)[0]
-    total = float(np.sum(target**2))
-    return 1.0 - float(np.sum(left**2)) / total if total > 0.0 else 0.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import BadInput, Text, unknown_name
 from ...io.raw import RawColumn, RawTable
-from ...io.raw.units import unit
+from ...io.raw.units import UNITS, unit
 from .recipe import Channel
 
 _TIME = {
@@ -233,6 +233,11 @@ def guess(tables: Sequence[RawTable], given: Mapping[str, tuple[str, int]], prob
     ]
 
 
+def _is_unit(column: RawColumn) -> bool:
+    """Whether a column states a unit, known or not: in square brackets, or in a row of units; in round ones it may be a remark."""
+    return f"[{column.unit}]" in column.name or column.unit not in column.name
+
+
 def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequence[RawTable], problems: list[BadInput]) -> Channel | None:
     dimension = dimension_of(symbol)
     if not dimension:
@@ -242,7 +247,11 @@ def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequen
         place = f"column {column.name!r}"
         problems.append(BadInput(place, column.unit, f"a unit of {dimension} for {symbol}", file=tables[0].path))
         return None
-    values = [c.values for table in tables for c in table.columns if c.name == column.name]
+    if stated is None and column.unit and _is_unit(column):
+        known = ", ".join(dict.fromkeys(u.text for u in UNITS.values() if u.dimension == dimension))
+        problems.append(BadInput(f"column {column.name!r}", column.unit, f"a unit of {dimension}: {known}", file=tables[0].path))
+        return None
+    values = [c.values for table in tables if (c := table.find(column.name)) is not None]
     if symbol == "t":
         return _time(column, stated.text if stated else "", values[0], why, tables[0], problems)
     most = max((float(np.nanmax(np.abs(v))) for v in values if np.isfinite(v).any()), default=0.0)
@@ -292,7 +301,7 @@ def _sideways(three: Sequence[Channel], tables: Sequence[RawTable]) -> str | Non
 
 
 def _root_mean_square(channel: Channel, tables: Sequence[RawTable]) -> float:
-    values = np.concatenate([c.values for table in tables for c in table.columns if c.name == channel.column] or [np.zeros(0)])
+    values = np.concatenate([c.values for table in tables if (c := table.find(channel.column)) is not None] or [np.zeros(0)])
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
 

@@ -79,10 +79,10 @@ def balance(model: Model, motion: Motion | None, convention: Convention) -> Bala
     return Balance(convention, left)
 
 
-def best(model: Model, recording: tuple[np.ndarray, np.ndarray, np.ndarray], given: Mapping[str, object]) -> Balance:
-    """Return the convention in which one recording balances best; arguments as in `decide`."""
-    motion = motion_of([(*recording, None)])
-    return min((balance(model, motion, c) for c in candidates(model.n_joints, given, has_force=True)), key=lambda b: b.unexplained)
+def ranked(model: Model, recordings: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], given: Mapping[str, object]) -> list[Balance]:
+    """Return the conventions that agree with what is given, the one in which recordings balance best first; arguments as in `decide`."""
+    motion = motion_of([(*recording, None) for recording in recordings])
+    return sorted((balance(model, motion, c) for c in candidates(model.n_joints, given, has_force=True)), key=lambda b: b.unexplained)
 
 
 def decide(

@@ -20,9 +20,11 @@ from ...io.raw.units import unit
 from ...io.samples import write_samples
 from ...model import Description, Model, Robot, Subject, Tolerance, TrialEntry, load_model
 from ...tabular import Tabular, Tidy
-from . import clock, columns, conventions, handle, remarks, trials
+from ...telling import telling
+from . import aligning, columns, conventions, handle, remarks, trials
 from . import sources as raw
 from .columns import symbol_of
+from .reads import Read, arrays, by, on_clock, values
 from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
 from .samples import cleaned
 
@@ -43,11 +45,14 @@ class Imported(Tabular):
         What was decided; `import.toml` holds it.
     notes : tuple of str
         Decisions and their reasons, a line each.
+    warnings : tuple of str
+        What was decided and may be wrong, a line each.
     """
 
     folder: Path
     recipe: Recipe
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"Imported({str(self.folder)!r}, {len(self.recipe.trials)} trials, {self.recipe.convention.words()})"
@@ -66,18 +71,11 @@ class Imported(Tabular):
             "channels": [dict(vars(c)) for c in self.recipe.channels],
             "trials": [dict(vars(t)) for t in self.recipe.trials],
             "notes": list(self.notes),
+            "warnings": list(self.warnings),
         }
 
 
-@dataclass(frozen=True)
-class _Read:
-    """A trial with its raw tables."""
-
-    trial: RawTrial
-    table: RawTable
-    forces: RawTable | None
-
-
+@telling
 def import_recordings(
     sources: Sequence[str | os.PathLike[str]],
     out: str | os.PathLike[str],
@@ -146,15 +144,15 @@ def import_recordings(
     if _is_recipe(paths):
         recipe = load_recipe(paths[0])
         reads = _reread(recipe, paths[0].parent)
-        notes = [f"as {paths[0]} says"]
+        notes, doubts = [f"as {paths[0]} says"], list[str]()
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
-        recipe, reads, notes = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
+        recipe, reads, notes, doubts = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
     reads = [changed(read, trial=changed(read.trial, remarks=_remarks(read, recipe.channels))) for read in reads]
     recipe = changed(recipe, trials=tuple(changed(t, remarks=r.trial.remarks) for t, r in zip(recipe.trials, reads, strict=True)))
     loaded, said = _led(loaded, recipe, reads)
     folder = _write(files.output_folder(out), former, loaded, recipe, reads, about)
-    return Imported(folder, recipe, (*notes, *said))
+    return Imported(folder, recipe, (*notes, *said), tuple(doubts))
 
 
 def _is_recipe(paths: Sequence[Path]) -> bool:
@@ -179,17 +177,17 @@ def _about(model: Path) -> tuple[Subject, Tolerance]:
     return (found.subject, found.tolerance) if mine else (Subject(), Tolerance())
 
 
-def _led(model: Model, recipe: Recipe, reads: Sequence[_Read]) -> tuple[Model, list[str]]:
+def _led(model: Model, recipe: Recipe, reads: Sequence[Read]) -> tuple[Model, list[str]]:
     """Return a model with the robot that the recorded angles show, where it has none, and what is to be said of that."""
     channels = recipe.channels
     if model.robot is not None or not {"qr1", "qr2"} <= {c.symbol for c in channels}:
         return model, []
     pairs = []
     for read in reads:
-        _, raw_angles, force = _arrays(read, channels, model.n_joints)
+        _, raw_angles, force = arrays(read, channels, model.n_joints)
         q = conventions.to_model_angles(raw_angles, recipe.convention)
         on_arm = force if force is None or recipe.convention.force_on == "arm" else -force
-        pairs.append((q, np.column_stack([_values(read.table, _by(channels, f"qr{j}")) for j in (1, 2)]), on_arm))
+        pairs.append((q, np.column_stack([values(read.table, by(channels, f"qr{j}")) for j in (1, 2)]), on_arm))
     robot, apart = handle.robot_of(model, pairs)
     off = f"{1e3 * apart:.1f} mm (root mean square)"
     if robot is None:
@@ -222,7 +220,7 @@ def _decided(
     given: Mapping[str, object],
     points: tuple[str, ...],
     rate: float | None,
-) -> tuple[Recipe, list[_Read], list[str]]:
+) -> tuple[Recipe, list[Read], list[str], list[str]]:
     """Return what all files say together; every problem is collected before any is raised."""
     problems: list[BadInput] = []
     sources = raw.read_all(paths, points, problems)
@@ -263,53 +261,50 @@ def _decided(
     _alike(force_tables, [c for c in channels if c.symbol[0] in "FM"], problems)
     if len(problems) > of_files:
         raise BadInputs.of(problems)
-    reads = [_aligned(n, channels, model, given, problems) for n in named]
-    recorded = [_arrays(read, channels, model.n_joints) for read in reads]
-    if recorded[0][2] is not None:
-        together = [(t, q, f) for t, q, f in recorded if f is not None]
-        convention = conventions.decide(model, together, given, problems)
+    reads = aligning.aligned(named, channels, model, given, problems)
+    clocks, doubts = list[str](), list[str]()
+    if any(c.symbol == "Fy" for c in channels):
+        reads, convention, clocks, doubts = aligning.settled(reads, channels, model, given, problems)
     else:
         signs = given.get("signs", (1,) * model.n_joints)
         why = "no contact force, so the balance cannot be used: the angles are taken in the convention of armrs"
         convention = Convention(str(given.get("reference", "relative")), str(given.get("zero", "horizontal")), signs, None, why)  # type: ignore[arg-type]
     if problems:
         raise BadInputs.of(problems)
-    reads = _refined(reads, channels, convention, model)
     origin = _origin(reads, channels, convention, model, axes)
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
     notes = [*sources.notes, *remarks.said(tables), *axes]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
-    shifted = [f"{r.trial.force_file}: forces shifted by {r.trial.force_shift:+.3f} s" for r in reads if r.trial.force_file]
-    return recipe, reads, [*notes, *shifted]
+    return recipe, reads, [*notes, *clocks], doubts
 
 
 def _alike(tables: Sequence[RawTable], channels: Sequence[Channel], problems: list[BadInput]) -> None:
     """Refuse tables that lack a column of the first, or have it in another unit: the one that it is in, or that its header states."""
     stated_first = {c.name: stated.text for table in tables[:1] for c in table.columns if (stated := unit(c.unit)) is not None}
     for table in tables[1:]:
-        there = {c.name: c for c in table.columns}
         for channel in channels:
             if channel.symbol == "t of forces":
                 continue
-            if channel.column not in there:
+            there = table.find(channel.column)
+            if there is None:
                 found = Text(f"no column {channel.column!r}")
                 problems.append(BadInput("columns", found, f"the columns of the first file: this one is {channel.symbol}", file=table.path))
                 continue
-            stated = unit(there[channel.column].unit)
+            stated = unit(there.unit)
             if stated is not None and stated.text not in (channel.unit, stated_first.get(channel.column)):
-                place, allowed = f"column {channel.column!r}", f"{channel.unit}, as in the first file"
-                problems.append(BadInput(place, there[channel.column].unit, allowed, file=table.path, hint="import it by itself"))
-            elif channel.symbol == "t" and (back := np.flatnonzero(np.diff(there[channel.column].values) <= 0.0)).size:
-                problems.append(columns.went_back(channel.column, there[channel.column].values, int(back[0]), table))
-            elif channel.symbol == "t" and not columns.is_clock(there[channel.column].values, channel.unit):
-                place, allowed = f"column {channel.column!r}", f"time in {channel.unit}, as in the first file"
+                place, allowed = f"column {there.name!r}", f"{channel.unit}, as in the first file"
+                problems.append(BadInput(place, there.unit, allowed, file=table.path, hint="import it by itself"))
+            elif channel.symbol == "t" and (back := np.flatnonzero(np.diff(there.values) <= 0.0)).size:
+                problems.append(columns.went_back(channel.column, there.values, int(back[0]), table))
+            elif channel.symbol == "t" and not columns.is_clock(there.values, channel.unit):
+                place, allowed = f"column {there.name!r}", f"time in {channel.unit}, as in the first file"
                 problems.append(BadInput(place, Text("time stamps that are not"), allowed, file=table.path, hint="import it by itself"))
 
 
 def _origin(
-    reads: Sequence[_Read], channels: Sequence[Channel], convention: Convention, model: Model, notes: list[str]
+    reads: Sequence[Read], channels: Sequence[Channel], convention: Convention, model: Model, notes: list[str]
 ) -> tuple[float, float] | None:
     """Return the origin of the handle's positions, None where there are none or the model has no robot."""
     if not {"Py", "Pz"} <= {c.symbol for c in channels} or any(c.symbol == "qr1" for c in channels):
@@ -319,7 +314,7 @@ def _origin(
         notes.append(f"positions of the handle: not used, since the model has no [robot] whose angles they would tell; {adds}")
         return None
     pairs = [
-        (conventions.to_model_angles(_arrays(read, channels, model.n_joints)[1], convention), _positions(read, channels)) for read in reads
+        (conventions.to_model_angles(arrays(read, channels, model.n_joints)[1], convention), _positions(read, channels)) for read in reads
     ]
     y, z = handle.origin(model, pairs)
     place = f"their origin lies at ({y:.3f}, {z:.3f}) m from that of the model, as the angles of the arm say" if y or z else "as recorded"
@@ -327,14 +322,14 @@ def _origin(
     return y, z
 
 
-def _positions(read: _Read, channels: Sequence[Channel]) -> np.ndarray:
-    return np.column_stack([_values(read.table, _by(channels, symbol)) for symbol in ("Py", "Pz")])
+def _positions(read: Read, channels: Sequence[Channel]) -> np.ndarray:
+    return np.column_stack([values(read.table, by(channels, symbol)) for symbol in ("Py", "Pz")])
 
 
 def _unused(tables: Sequence[RawTable], channels: Sequence[Channel]) -> list[str]:
     """Return a line that names the columns of which nothing is read; none where there are none."""
-    used = {channel.column for channel in channels}
-    names = list(dict.fromkeys(c.name for table in tables for c in table.columns if c.name not in used))
+    used = [table.find(channel.column) for table in tables for channel in channels]
+    names = list(dict.fromkeys(c.name for table in tables for c in table.columns if not any(c is one for one in used)))
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return [f"not used: {', '.join(repr(name) for name in names[:_NAMED])}{more}"] if names else []
 
@@ -386,94 +381,15 @@ def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, probl
             problems.append(BadInput("columns", found, allowed, file=table.path))
 
 
-def _aligned(
-    named: trials.Named, channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
-) -> _Read:
-    """Return a trial with its forces on the clock of its angles: of the shifts that posture allows, that in which the arm balances."""
-    trial = RawTrial(os.fspath(named.table.path), named.table.title, named.configuration, named.repeat, named.role)
-    if named.forces is None:
-        return _Read(trial, named.table, None)
-    q = np.column_stack([_values(named.table, c) for c in channels if c.symbol.startswith("q") and c.symbol[1:].isdigit()])
-    force = np.column_stack([_values(named.forces, _by(channels, s)) for s in ("Fy", "Fz")])
-    trial = changed(trial, force_file=os.fspath(named.forces.path), force_table=named.forces.title, force_shift=0.0)
-    try:
-        shifts = clock.align(_values(named.table, _by(channels, "t")), q, _values(named.forces, _by(channels, "t of forces")), force)
-    except BadInput as error:
-        problems.append(error.within(file=named.forces.path))
-        return _Read(trial, named.table, named.forces)
-    seconds = [shift.seconds for shift in shifts]
-    if clock.together(_values(named.table, _by(channels, "t")), _values(named.forces, _by(channels, "t of forces"))):
-        seconds = [shift for shift in seconds if abs(shift) <= clock.NEAR] or [0.0]
-    reads = [_Read(changed(trial, force_shift=shift), named.table, named.forces) for shift in seconds]
-    return reads[0] if len(reads) == 1 else min(reads, key=lambda read: _unexplained(read, channels, model, given))
-
-
-def _unexplained(read: _Read, channels: Sequence[Channel], model: Model, given: Mapping[str, object]) -> float:
-    """Return what a trial leaves unexplained in the convention that suits its clock best, after that was refined in it."""
-    t, q, force = _arrays(read, channels, model.n_joints)
-    if force is None:
-        return 1.0
-    found = conventions.best(model, (t, q, force), given)
-    t, q, force = _arrays(_refined([read], channels, found.convention, model)[0], channels, model.n_joints)
-    return min(found.unexplained, conventions.best(model, (t, q, force), given).unexplained) if force is not None else 1.0
-
-
-def _refined(reads: Sequence[_Read], channels: Sequence[Channel], convention: Convention, model: Model) -> list[_Read]:
-    """Return trials whose forces are on the clock of the angles as exactly as the equation of motion tells."""
-    apart = [k for k, read in enumerate(reads) if read.forces is not None]
-    recordings = []
-    for read in (reads[k] for k in apart):
-        t, raw, _ = _arrays(read, channels, model.n_joints)
-        clock_of_forces, y, z = (_values(read.forces, _by(channels, s)) for s in ("t of forces", "Fy", "Fz"))  # type: ignore[arg-type]
-        on_arm = np.column_stack([y, z]) * (1.0 if convention.force_on == "arm" else -1.0)
-        q, same = conventions.to_model_angles(raw, convention), read.trial.force_file == read.trial.file
-        recordings.append(clock.Recording(t, q, clock_of_forces, on_arm, read.trial.force_shift, same))
-    found = dict(zip(apart, clock.refine(model, recordings), strict=True)) if apart else {}
-    return [changed(read, trial=changed(read.trial, force_shift=found.get(k, read.trial.force_shift))) for k, read in enumerate(reads)]
-
-
-def _remarks(read: _Read, channels: Sequence[Channel]) -> tuple[str, ...]:
+def _remarks(read: Read, channels: Sequence[Channel]) -> tuple[str, ...]:
     """Return the remarks beside the samples of a trial, on the clock of its angles."""
-    own = remarks.timed(read.table, _values(read.table, _by(channels, "t")))
+    own = remarks.timed(read.table, values(read.table, by(channels, "t")))
     if read.forces is None:
         return own
-    return (*own, *remarks.timed(read.forces, _values(read.forces, _by(channels, "t of forces")) + read.trial.force_shift))
+    return (*own, *remarks.timed(read.forces, values(read.forces, by(channels, "t of forces")) + read.trial.force_shift))
 
 
-def _by(channels: Sequence[Channel], symbol: str) -> Channel:
-    return next(c for c in channels if c.symbol == symbol)
-
-
-def _values(table: RawTable, channel: Channel) -> np.ndarray:
-    """Return a channel in SI units with its sign."""
-    found = next((c for c in table.columns if c.name == channel.column), None)
-    if found is None:
-        raise BadInput("columns", Text(f"no column {channel.column!r}"), f"the column of {channel.symbol}", file=table.path)
-    known = unit(channel.unit) if channel.unit else None
-    factor = channel.sign * (known.factor if known and not channel.symbol.startswith("emg_") else 1.0)
-    return found.values if factor == 1.0 else found.values * factor
-
-
-def _arrays(read: _Read, channels: Sequence[Channel], n_joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Return time, raw angles and raw force of a trial."""
-    t = _values(read.table, _by(channels, "t"))
-    q = np.column_stack([_values(read.table, _by(channels, f"q{j}")) for j in range(1, n_joints + 1)])
-    if not any(c.symbol == "Fy" for c in channels):
-        return t, q, None
-    return t, q, np.column_stack([_on_clock(read, t, channels, s) for s in ("Fy", "Fz")])
-
-
-def _on_clock(read: _Read, t: np.ndarray, channels: Sequence[Channel], symbol: str) -> np.ndarray:
-    channel = _by(channels, symbol)
-    if read.forces is None or symbol[0] not in "FM":
-        return _values(read.table, channel)
-    clock_of_forces = _values(read.forces, _by(channels, "t of forces")) + read.trial.force_shift
-    values = _values(read.forces, channel)
-    good = np.isfinite(values)
-    return np.interp(t, clock_of_forces[good], values[good], left=np.nan, right=np.nan)
-
-
-def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
+def _reread(recipe: Recipe, folder: Path) -> list[Read]:
     """Return the trials of a recipe with their tables."""
     problems: list[BadInput] = []
     reads = []
@@ -491,7 +407,7 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
         trial = changed(kept, file=os.fspath(folder / kept.file), force_file=forces)
         try:
             table = table_of(trial.file, trial.table, recipe.points)
-            reads.append(_Read(trial, table, table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None))
+            reads.append(Read(trial, table, table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None))
         except BadInput as error:
             problems.append(error)
     if problems:
@@ -499,7 +415,7 @@ def _reread(recipe: Recipe, folder: Path) -> list[_Read]:
     return reads
 
 
-def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[_Read], about: tuple[Subject, Tolerance]) -> Path:
+def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[Read], about: tuple[Subject, Tolerance]) -> Path:
     """Write the data set whole or not at all, with `import.toml` in it, and remove the other trials of a former import."""
     kept = changed(recipe, trials=tuple(_seen_from(folder, read.trial) for read in reads))
 
@@ -555,15 +471,15 @@ def _seen_from(folder: Path, trial: RawTrial) -> RawTrial:
     return changed(trial, file=os.path.relpath(Path(trial.file).resolve(), here), force_file=force_file)
 
 
-def _si_columns(read: _Read, recipe: Recipe, n_joints: int, robot: Robot | None) -> dict[str, np.ndarray]:
+def _si_columns(read: Read, recipe: Recipe, n_joints: int, robot: Robot | None) -> dict[str, np.ndarray]:
     """Return the columns of a trial file: SI units, the angles of armrs, the sign of `force_on`."""
-    t, q, force = _arrays(read, recipe.channels, n_joints)
+    t, q, force = arrays(read, recipe.channels, n_joints)
     angles = conventions.to_model_angles(q, recipe.convention)
     table = {"t_s": t} | {f"q{j}_rad": np.ascontiguousarray(angles[:, j - 1]) for j in range(1, n_joints + 1)}
     if force is not None:
         table |= {"Fy_N": np.ascontiguousarray(force[:, 0]), "Fz_N": np.ascontiguousarray(force[:, 1])}
     if any(c.symbol == "dq1" for c in recipe.channels):
-        raw = np.column_stack([_values(read.table, _by(recipe.channels, f"dq{j}")) for j in range(1, n_joints + 1)])
+        raw = np.column_stack([values(read.table, by(recipe.channels, f"dq{j}")) for j in range(1, n_joints + 1)])
         speeds = conventions.to_model_speeds(raw, recipe.convention)
         table |= {f"dq{j}_rad_s": np.ascontiguousarray(speeds[:, j - 1]) for j in range(1, n_joints + 1)}
     if recipe.origin is not None and robot is not None:
@@ -573,10 +489,10 @@ def _si_columns(read: _Read, recipe: Recipe, n_joints: int, robot: Robot | None)
         symbol = channel.symbol
         if symbol in ("t", "t of forces", "Fy", "Fz", "Py", "Pz") or (symbol[0] == "q" and symbol[1:].isdigit()):
             continue
-        values = _on_clock(read, t, recipe.channels, symbol)
+        own = on_clock(read, t, recipe.channels, symbol)
         if symbol.startswith("dq"):
             continue
         if symbol.startswith("tau"):
-            values = values * recipe.convention.signs[int(symbol[-1]) - 1]
-        table[symbol if symbol.startswith("emg_") else f"{symbol}_{_SI[columns.dimension_of(symbol)]}"] = values
+            own = own * recipe.convention.signs[int(symbol[-1]) - 1]
+        table[symbol if symbol.startswith("emg_") else f"{symbol}_{_SI[columns.dimension_of(symbol)]}"] = own
     return table

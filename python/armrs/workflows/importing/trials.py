@@ -78,10 +78,10 @@ def _has(table: RawTable, start: str) -> bool:
 
 
 def _titles(tables: Sequence[RawTable]) -> list[str]:
-    """Return the titles, those of one workbook's sheets without the name of the workbook."""
-    if len({t.path for t in tables}) == 1 and len(tables) > 1:
-        return [t.title.removeprefix(t.path.stem).strip() or t.title for t in tables]
-    return [t.title for t in tables]
+    """Return the titles, those of the sheets of a workbook without its name where they are told apart without it."""
+    files = [t.path for t in tables]
+    bare = [t.title.removeprefix(t.path.stem).strip() or t.title if files.count(t.path) > 1 else t.title for t in tables]
+    return bare if len(set(bare)) == len(bare) else [t.title for t in tables]
 
 
 def _names(titles: Sequence[str]) -> list[str]:
