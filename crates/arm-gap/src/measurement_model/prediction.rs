@@ -15,6 +15,7 @@ use arm_sim::{
 use crate::GapError;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::measurement_model::start::measured_at_start;
 
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
 pub type Channels = Vec<Vec<f64>>;
@@ -32,10 +33,6 @@ pub(crate) const STEPS: [f64; 4] = [2e-3, 1e-3, 5e-4, 2.5e-4];
 /// Least rate at which a run is recorded that sensors read \[Hz\]: what a delayed sensor reads lies between samples, where few of them
 /// would take a fifth of an arm's ringing on its contact.
 const RECORDED: f64 = 250.0;
-/// Samples at the start whose mean tells where the arm was at rest.
-const START: usize = 5;
-/// Time at the start over which forces are averaged \[s\].
-const START_TIME: f64 = 0.2;
 
 /// A trial made ready: what was measured in the common band, and what drives the simulation.
 #[derive(Clone, Debug)]
@@ -141,16 +138,7 @@ impl<const N: usize> Session<N> {
         };
         let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 / trial.rate).collect();
         let base = self.base_path(number, &times)?;
-        let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
-        let span = first..(first + START).min(trial.len());
-        let count = span.len() as f64;
-        let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
-        let resting =
-            first..(first + START.max((START_TIME * trial.rate) as usize)).min(trial.len());
-        let start_force = trial.force_on_arm.as_ref().map_or([0.0; 2], |force| {
-            let count = resting.len() as f64;
-            [0, 1].map(|a| force[resting.clone()].iter().map(|f| f[a]).sum::<f64>() / count)
-        });
+        let (start, start_force) = measured_at_start(trial);
         let motion = match self.comparison {
             ComparisonMode::Led => None,
             ComparisonMode::Torque => Some(motion(trial, band)?),
@@ -238,8 +226,7 @@ impl<const N: usize> Session<N> {
         let interval = 1.0 / course.rate / parts as f64;
         let duration = course.times[course.times.len() - 1];
         let mut experiment = Experiment::new(setup, drive, duration);
-        experiment.effects = hypothesis.effects();
-        experiment.effects.extend_from_slice(&course.rhythms);
+        experiment.effects = [hypothesis.effects(), course.rhythms.clone()].concat();
         experiment.base.clone_from(&course.base);
         experiment.output_interval = Some(interval);
         let near = course.start(hypothesis);

@@ -1,12 +1,34 @@
 //! Where a led arm starts: at rest, with the dry friction that the measured force tells.
 
 use arm_core::effect::{Effect, Kind, Motion, dry_friction, resisting_besides_dry};
-use arm_core::{Joints, Placement, Pose, Reading, inverse_dynamics, joint_force, static_torque};
+use arm_core::{
+    Joints, Placement, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque,
+};
+use arm_ident::regression::trial::Trial;
 use arm_sim::{Experiment, SimulationError, Start, simulate};
 
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::Course;
+
+/// Samples at the start whose mean tells where the arm was at rest.
+const START: usize = 5;
+/// Time at the start over which forces are averaged \[s\].
+const START_TIME: f64 = 0.2;
+
+/// Angles \[rad\] and force on the arm \[N\] that are measured at the start of a trial.
+pub(super) fn measured_at_start<const N: usize>(trial: &Trial<N>) -> (Joints<f64, N>, Plane<f64>) {
+    let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
+    let span = first..(first + START).min(trial.len());
+    let count = span.len() as f64;
+    let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
+    let resting = first..(first + START.max((START_TIME * trial.rate) as usize)).min(trial.len());
+    let start_force = trial.force_on_arm.as_ref().map_or([0.0; 2], |force| {
+        let count = resting.len() as f64;
+        [0, 1].map(|a| force[resting.clone()].iter().map(|f| f[a]).sum::<f64>() / count)
+    });
+    (start, start_force)
+}
 
 impl<const N: usize> Session<N> {
     /// What dry friction resists with at the start, where the handle places a joint \[N m\].

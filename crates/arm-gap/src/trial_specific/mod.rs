@@ -5,5 +5,6 @@ pub(crate) mod contact_identification;
 pub mod disturbance;
 mod disturbance_shape;
 pub mod in_phase;
+mod setting_apart;
 mod spectral_line;
 pub mod tremor_detection;

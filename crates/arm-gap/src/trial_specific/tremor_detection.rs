@@ -1,7 +1,5 @@
 //! Rhythms of muscles and the robot's ripple: what swings, too fast for the common band or with another phase in every trial.
 
-use std::sync::Arc;
-
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
 use arm_core::{Contact, Joints, Pose, jacobian};
 use arm_numerics::Cholesky;
@@ -10,7 +8,7 @@ use crate::GapError;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::repeats::same_rate;
-use crate::measurement_model::prediction::{Channels, Course, smooth};
+use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::trial_specific::component::{TrialSpecific, shapes_of};
@@ -171,89 +169,6 @@ impl<const N: usize> PreparedSession<'_, N> {
         out
     }
 
-    /// Takes a rhythm out of what the measured channels and the runs differ by, so that it does not disturb what is fitted.
-    ///
-    /// It is taken out of the channels; where joints rub it is put into the runs instead. Dry friction resists in a joint that is shaken as
-    /// a viscous one does, and what a movement shows is not what it would show without the rhythm.
-    ///
-    /// # Errors
-    /// [`GapError::Numerics`] for channels that the filter refuses.
-    pub fn take_out(
-        &mut self,
-        point: &LinearizationPoint<N>,
-        trial_specific: &TrialSpecific,
-    ) -> Result<(), GapError> {
-        let is_of_muscles = trial_specific.effect.kind.prior().nature == Nature::Rhythm;
-        if is_of_muscles && point.hypothesis.rubs() {
-            let measured = self.courses.clone();
-            if let Ok(true) = self.put_into_runs(point, trial_specific) {
-                return Ok(());
-            }
-            self.courses = measured;
-        }
-        self.subtract(point, trial_specific, &trial_specific.sizes)
-    }
-
-    /// Has a rhythm in the run of every trial, with its size and phase there, and takes out of the channels what that does not show of it.
-    /// Whether that can be simulated and told.
-    fn put_into_runs(
-        &mut self,
-        point: &LinearizationPoint<N>,
-        trial_specific: &TrialSpecific,
-    ) -> Result<bool, GapError> {
-        let Some(sized) = self.sized(point, trial_specific) else {
-            return Ok(false);
-        };
-        let (frequency, columns) = (sized.wave()[0], &sized.columns);
-        for (sizes, &trial) in std::iter::zip(&sized.sizes, &self.fitted) {
-            let (own, _) = common_swing(columns, std::slice::from_ref(sizes), frequency);
-            Arc::make_mut(&mut self.courses[trial]).rhythms.push(own);
-        }
-        let there = self.linearize(&point.hypothesis)?;
-        let residuals = self.raw_residuals(&there)?;
-        let answers = self.answers(&there, frequency, columns);
-        let Some(left) = self.explain(&residuals, frequency, (columns, &answers)) else {
-            return Ok(false);
-        };
-        self.subtract(&there, trial_specific, &left.sizes)?;
-        Ok(true)
-    }
-
-    /// Takes swings of given sizes out of the measured channels.
-    fn subtract(
-        &mut self,
-        point: &LinearizationPoint<N>,
-        trial_specific: &TrialSpecific,
-        sizes: &[Vec<f64>],
-    ) -> Result<(), GapError> {
-        for (sizes, &trial) in std::iter::zip(sizes, &self.fitted.clone()) {
-            let Some(line) = point.lines.get(self.group_of[trial]) else {
-                continue;
-            };
-            let mut course = Course::clone(&self.courses[trial]);
-            for (k, column) in trial_specific.columns.iter().enumerate() {
-                for quarter in [false, true] {
-                    let size = sizes[2 * k + usize::from(quarter)];
-                    let mut changed = point.hypothesis.clone();
-                    changed
-                        .named
-                        .push(small(column, trial_specific.wave()[0], quarter));
-                    let Ok(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
-                        continue;
-                    };
-                    for (channel, swing) in course.raw.iter_mut().zip(&swing) {
-                        for (value, swing) in channel.iter_mut().zip(swing) {
-                            *value -= size * swing;
-                        }
-                    }
-                }
-            }
-            course.seen = smooth(&course.raw, course.band, course.rate)?;
-            self.courses[trial] = Arc::new(course);
-        }
-        Ok(())
-    }
-
     /// What can swing at a frequency: for each explanation the effects whose swings it adds up.
     fn swings(&self, frequency: f64) -> Vec<Vec<Effect<f64>>> {
         let mut list = Vec::new();
@@ -329,7 +244,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     }
 
     /// What small swings show on each movement, to first order.
-    fn answers(
+    pub(super) fn answers(
         &self,
         point: &LinearizationPoint<N>,
         frequency: f64,
@@ -349,7 +264,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// How much of the line some swings explain, with a size and phase of their own in every trial.
     ///
     /// * `answers` - what one unit of each column shows on each movement
-    fn explain(
+    pub(super) fn explain(
         &self,
         residuals: &[Channels],
         frequency: f64,
@@ -388,7 +303,7 @@ impl<const N: usize> PreparedSession<'_, N> {
 /// The swing of all trials in one effect, and whether it is locked to their starts.
 ///
 /// * `sizes` - of each trial, two for each column: turned by 0 and by 90°
-fn common_swing(
+pub(super) fn common_swing(
     columns: &[Effect<f64>],
     sizes: &[Vec<f64>],
     frequency: f64,
@@ -446,14 +361,14 @@ fn stretch(force: &[f64], (stiffness, damping): (f64, f64), rate: f64) -> Vec<f6
 }
 
 /// What one unit of each of some swings shows on a movement; `None` where one cannot be followed.
-type Answer = Option<Vec<Channels>>;
+pub(super) type Answer = Option<Vec<Channels>>;
 
-struct Explained {
+pub(super) struct Explained {
     effect: Effect<f64>,
     sd: f64,
     gain: f64,
     locked: bool,
-    sizes: Vec<Vec<f64>>,
+    pub sizes: Vec<Vec<f64>>,
     columns: Vec<Effect<f64>>,
     /// Largest share of the variance of a channel's residual.
     share: f64,
@@ -482,7 +397,7 @@ impl Explained {
 }
 
 /// The size with which swings are tried.
-const UNIT: f64 = 1e-3;
+pub(super) const UNIT: f64 = 1e-3;
 
 /// Position of the size that is one in a swing.
 fn size_of(swing: &Effect<f64>) -> usize {
@@ -492,7 +407,7 @@ fn size_of(swing: &Effect<f64>) -> usize {
 }
 
 /// A swing of a small size, a quarter of a period earlier on demand.
-fn small(swing: &Effect<f64>, frequency: f64, earlier: bool) -> Effect<f64> {
+pub(super) fn small(swing: &Effect<f64>, frequency: f64, earlier: bool) -> Effect<f64> {
     let mut effect = sized_at(swing, frequency, UNIT);
     if earlier {
         effect.parameters[shapes_of(swing.kind)[1]] += 0.5 * core::f64::consts::PI;
