@@ -15,7 +15,6 @@ use arm_sim::{
 use crate::GapError;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
-use crate::measurement_model::start::measured_at_start;
 
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
 pub type Channels = Vec<Vec<f64>>;
@@ -138,7 +137,7 @@ impl<const N: usize> Session<N> {
         };
         let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 / trial.rate).collect();
         let base = self.base_path(number, &times)?;
-        let (start, start_force) = measured_at_start(trial);
+        let (start, start_force) = Self::measured_at_start(trial);
         let motion = match self.comparison {
             ComparisonMode::Led => None,
             ComparisonMode::Torque => Some(motion(trial, band)?),

@@ -16,21 +16,22 @@ const START: usize = 5;
 /// Time at the start over which forces are averaged \[s\].
 const START_TIME: f64 = 0.2;
 
-/// Angles \[rad\] and force on the arm \[N\] that are measured at the start of a trial.
-pub(super) fn measured_at_start<const N: usize>(trial: &Trial<N>) -> (Joints<f64, N>, Plane<f64>) {
-    let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
-    let span = first..(first + START).min(trial.len());
-    let count = span.len() as f64;
-    let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
-    let resting = first..(first + START.max((START_TIME * trial.rate) as usize)).min(trial.len());
-    let start_force = trial.force_on_arm.as_ref().map_or([0.0; 2], |force| {
-        let count = resting.len() as f64;
-        [0, 1].map(|a| force[resting.clone()].iter().map(|f| f[a]).sum::<f64>() / count)
-    });
-    (start, start_force)
-}
-
 impl<const N: usize> Session<N> {
+    /// Angles \[rad\] and force on the arm \[N\] that are measured at the start of a trial.
+    pub(super) fn measured_at_start(trial: &Trial<N>) -> (Joints<f64, N>, Plane<f64>) {
+        let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
+        let span = first..(first + START).min(trial.len());
+        let count = span.len() as f64;
+        let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
+        let resting =
+            first..(first + START.max((START_TIME * trial.rate) as usize)).min(trial.len());
+        let start_force = trial.force_on_arm.as_ref().map_or([0.0; 2], |force| {
+            let count = resting.len() as f64;
+            [0, 1].map(|a| force[resting.clone()].iter().map(|f| f[a]).sum::<f64>() / count)
+        });
+        (start, start_force)
+    }
+
     /// What dry friction resists with at the start, where the handle places a joint \[N m\].
     ///
     /// A joint at rest is held by any torque up to what it resists with in motion, and the force on a resting arm shows which. What the
