@@ -58,8 +58,14 @@ impl<const N: usize> Fitted<N> {
 
     /// Whether a named effect has come to a shape in which it is another, plainer law.
     pub(crate) fn has_plainer(&self) -> bool {
-        let mut named = std::iter::zip(&self.asked, &self.hypothesis.named);
-        named.any(|(asked, effect)| asked.is_plainer(effect))
+        self.plainer().next().is_some()
+    }
+
+    /// The questions whose effects have come to such a shape.
+    pub(crate) fn plainer(&self) -> impl Iterator<Item = Candidate> {
+        let named = std::iter::zip(&self.asked, &self.hypothesis.named);
+        let plainer = named.filter(|(asked, effect)| asked.is_plainer(effect));
+        plainer.map(|(asked, _)| asked.clone())
     }
 
     /// The numbers of the named effects that a fit may change.

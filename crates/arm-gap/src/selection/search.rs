@@ -251,6 +251,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price and possible.
+    ///
+    /// Where a law comes to a shape in which it is a plainer one, the scan is asked again without it.
     fn round(
         &self,
         (calibrated, current): (&Fitted<N>, &Fitted<N>),
@@ -258,62 +260,84 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (library, score_test): (&Library, &ScoreTest),
         room: usize,
     ) -> Option<(Settled<'a, N>, SearchStep)> {
-        let fresh = |members: &[usize], c: usize| {
-            let candidate = &library.candidates[c];
-            !current.asked.iter().any(|a| a.is_same_question(candidate))
-                && !members
-                    .iter()
-                    .any(|&m| library.candidates[m].is_same_question(candidate))
-        };
-        let choices = score_test.search(&[], AHEAD.min(room), WIDTH, &fresh);
         // Less than every effect must explain need not be converged.
         let explained = calibrated.cost - current.cost;
         let least = |member: &usize| {
             let effect = &library.candidates[*member].effect;
             mimicked_by_any(effect, &current.asked, explained)
         };
-        let choices: Vec<Choice> = choices
-            .into_iter()
-            .filter(|c| c.gain > c.members.iter().map(least).sum())
-            .collect();
-        let contenders = contenders(&choices, library);
-        let mut worthy: Vec<(f64, Fitted<N>)> = Vec::new();
-        let mut tried = Vec::new();
-        for choice in &contenders {
-            let asked: Vec<Candidate> = choice
-                .members
-                .iter()
-                .map(|&m| {
-                    let mut candidate = library.candidates[m].clone();
-                    (candidate.price, candidate.spread) =
-                        (score_test.price[m], score_test.spread[m]);
-                    candidate
-                })
-                .collect();
-            let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), point) else {
-                continue;
+        let mut converged = Converged::default();
+        for _ in 0..TURNS {
+            let fresh = |members: &[usize], c: usize| {
+                let candidate = &library.candidates[c];
+                let same = |other: &Candidate| other.is_same_question(candidate);
+                let is_plainer = |other: &Candidate| other.is_same_effect(&candidate.effect);
+                !current.asked.iter().any(same)
+                    && !members.iter().any(|&m| same(&library.candidates[m]))
+                    && !converged.plainer.iter().any(is_plainer)
             };
-            let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
-            let gain = current.cost - fitted.cost;
-            let worth = gain / score_test.scale - price;
-            let simple = worth - self.price_of_shapes(&asked);
-            tried.push((asked, gain));
-            if worth > 0.0 && !fitted.has_plainer() {
-                worthy.push((simple, fitted));
+            let choices = score_test.search(&[], AHEAD.min(room), WIDTH, &fresh);
+            let choices: Vec<Choice> = choices
+                .into_iter()
+                .filter(|c| c.gain > c.members.iter().map(least).sum())
+                .collect();
+            let before = converged.plainer.len();
+            for choice in &contenders(&choices, library) {
+                self.converge(
+                    choice,
+                    current,
+                    point,
+                    (library, score_test),
+                    &mut converged,
+                );
+            }
+            if converged.plainer.len() == before {
+                break;
             }
         }
+        let Converged { worthy, tried, .. } = &mut converged;
         tried.sort_by(|a, b| b.1.total_cmp(&a.1));
         worthy.sort_by(|a, b| b.0.total_cmp(&a.0));
         // What can be followed but not simulated is no answer.
-        worthy.into_iter().find_map(|(_, better)| {
+        converged.worthy.into_iter().find_map(|(_, better)| {
             let step = SearchStep {
-                tried: tried.clone(),
+                tried: converged.tried.clone(),
                 before: current.cost,
                 after: better.cost,
             };
             let settled = self.settle(better.hypothesis, better.asked).ok()?;
             Some((settled, step))
         })
+    }
+
+    /// Converges a choice by simulation.
+    fn converge(
+        &self,
+        choice: &Choice,
+        current: &Fitted<N>,
+        point: &LinearizationPoint<N>,
+        (library, score_test): (&Library, &ScoreTest),
+        converged: &mut Converged<N>,
+    ) {
+        let question = |&m: &usize| {
+            let mut candidate = library.candidates[m].clone();
+            (candidate.price, candidate.spread) = (score_test.price[m], score_test.spread[m]);
+            candidate
+        };
+        let asked: Vec<Candidate> = choice.members.iter().map(question).collect();
+        let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), point) else {
+            return;
+        };
+        let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
+        let gain = current.cost - fitted.cost;
+        let worth = gain / score_test.scale - price;
+        let simple = worth - self.price_of_shapes(&asked);
+        converged.tried.push((asked, gain));
+        if fitted.has_plainer() {
+            converged.plainer.extend(fitted.plainer());
+        } else if worth > 0.0 {
+            converged.worthy.push((simple, fitted));
+        }
     }
 
     /// A hypothesis with further effects, fitted; `None` where it cannot be followed.
@@ -358,6 +382,26 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 smallest: score_test.smallest_seen(c, library.candidates[c].free.len()),
             })
             .collect()
+    }
+}
+
+/// What came of the choices that were converged by simulation.
+struct Converged<const N: usize> {
+    /// Those worth their price: their worth less the price of their shapes, and how they fit.
+    worthy: Vec<(f64, Fitted<N>)>,
+    /// All with what they gained.
+    tried: Vec<(Vec<Candidate>, f64)>,
+    /// Questions that came to a plainer law.
+    plainer: Vec<Candidate>,
+}
+
+impl<const N: usize> Default for Converged<N> {
+    fn default() -> Self {
+        Self {
+            worthy: Vec::new(),
+            tried: Vec::new(),
+            plainer: Vec::new(),
+        }
     }
 }
 
