@@ -236,6 +236,18 @@ def test_refuses_a_history_that_is_damaged(tmp_path: Path, at: int) -> None:
         sessions.check(file, 2, "a")
 
 
+def test_refuses_a_history_whose_damage_is_no_text(tmp_path: Path) -> None:
+    """SQLite names what it cannot read, in bytes that are no UTF-8."""
+    file = tmp_path / "s.sqlite"
+    _written(file)
+    content = file.read_bytes()
+    assert content.count(b"CREATE TABLE subject ") == 1
+    file.write_bytes(content.replace(b"CREATE TABLE subject ", b"CREATE TABLE\xff\xffsubject"))
+    for ask in (lambda: sessions.check(file, 2, "a"), lambda: sessions.read(file)):
+        with pytest.raises(BadInput, match=r"s\.sqlite: history: found "):
+            ask()
+
+
 @pytest.mark.parametrize("given", ["20260101", "2026-W01-1", "2026-1-1", " 2026-01-01", "", 3, b"2026-01-01"])
 def test_a_date_has_one_form(given: object) -> None:
     with pytest.raises(BadInput, match="date: found "):

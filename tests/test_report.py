@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import armrs
-from armrs import _armrs, cli
+from armrs import BadInput, _armrs, cli
 from browser import opened
 from markup import PNG, Markup, unescaped
 
@@ -139,6 +139,15 @@ def test_text_from_files_is_escaped(results: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("verb", "name"), [("identify", "identified"), ("passive", "passive"), ("simulate", "simulated")])
 def test_no_string_of_a_result_becomes_markup(results: Path, tmp_path: Path, verb: str, name: str) -> None:
     assert unescaped(results / verb / f"{name}.json", tmp_path) == []
+
+
+def test_a_whole_number_that_no_float_holds_is_refused(results: Path, tmp_path: Path) -> None:
+    result = json.loads((results / "identify/identified.json").read_text(encoding="utf-8"))
+    result["figures"], result["parameters"][0]["std"] = [], 10**400
+    (tmp_path / "identified.json").write_text(json.dumps(result), encoding="utf-8")
+    with pytest.raises(BadInput, match="found not what a result holds"):
+        armrs.write_report([tmp_path / "identified.json"], tmp_path / "report.html")
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_what_decided_a_value_is_no_class_unless_it_is_one_of_ours(results: Path, tmp_path: Path) -> None:

@@ -214,7 +214,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
         }
     except BadInput:
         raise
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, IndexError, ArithmeticError) as error:
         raise BadInput("content", Text(f"not what a result holds ({error})"), "whole results", file=sources[0]) from None
     engine = html.environment()
     html.write_page(engine, target, [html.render(engine, "summary.html.j2", page)], title="armrs summary", maker="report")

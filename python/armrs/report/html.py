@@ -7,6 +7,7 @@ import hashlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +60,9 @@ class Picture:
         return " ".join(name for name, true in (("broad", width > _PHONE), ("tall", height > width)) if true)
 
 
+@cache
 def environment(*folders: Path) -> Environment:
-    """Return an environment of the templates of reports and of those in `folders`: escaping always, a missing value is an error."""
+    """Return the environment of the templates of reports and of those in `folders`: escaping always, a missing value is an error."""
     engine = Environment(
         loader=FileSystemLoader([TEMPLATES, *folders]),
         autoescape=True,

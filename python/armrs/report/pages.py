@@ -134,7 +134,7 @@ def _part(engine: html.Environment, source: Path, number: int) -> Markup:
         return _result(engine, data, figures, live.read(data.get("live"), source.parent), number)
     except BadInput:
         raise
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError, html.TemplateError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, IndexError, ArithmeticError, html.TemplateError) as error:
         raise BadInput("content", Text(f"not what a result holds ({error})"), "a whole result", file=source) from None
 
 

@@ -60,6 +60,8 @@ _IMPOSSIBLE_SUBJECT = {
 }
 _OUTPUTS = (".json", ".toml", ".html", ".png", ".csv", ".parquet")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+_UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
+"""What SQLite raises for a damaged file: the second where its message names what is no text."""
 _AROUND = " _-.,;:/|()[]"
 """What may stand between a subject and a date in the name of a data set."""
 
@@ -320,7 +322,7 @@ def _reading(file: Path) -> Iterator[sqlite3.Connection]:
     try:
         with closing(_open(file)) as connection:
             yield connection
-    except sqlite3.Error as error:
+    except _UNREADABLE as error:
         raise _no_history(file, str(error)) from None
 
 
@@ -375,11 +377,11 @@ def _open(file: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(file, timeout=LONGEST_WAIT)
     except OSError as error:
         raise _no_history(file, error.strerror or "a file that cannot be read") from None
-    except sqlite3.Error as error:
+    except _UNREADABLE as error:
         raise _no_history(file, str(error)) from None
     try:
         wrong = _wrong(connection)
-    except sqlite3.Error as error:
+    except _UNREADABLE as error:
         wrong = str(error)
     if wrong:
         connection.close()
