@@ -21,8 +21,12 @@ from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(1, str(Path(__file__).parents[1]))
 
+import numpy as np
 from seeds import plant
+
+import patients
 
 PATIENCE = 120.0
 """For the call after a kill [s]."""
@@ -52,9 +56,37 @@ VERBS = (
     Verb(("import", "raw/slow_1.csv", "--model", "model.toml", "-o", "OUT")),
     Verb(("record", "experiment.toml", "-o", "OUT")),
     Verb(("report", "result.json", "-o", "OUT")),
-    Verb(("plan", "model.toml", "-o", "OUT")),
+    Verb(("plan", "model.toml", "--angles-deg=-80:-20,40:110", "-o", "OUT")),
     Verb(("init", "OUT", "--body-mass-kg", "78", "--height-m", "1.8", "--sex", "male")),
+    Verb(("gap", "session", "-o", "OUT")),
+    Verb(("spasticity", "stretches", "-o", "OUT")),
+    Verb(("cohort", "cohort.csv", "-o", "OUT")),
+    Verb(("sweep", "sweep.toml", "--jobs", "1", "-o", "OUT")),
+    Verb(("fmu", "export", "model.toml", "-o", "OUT/arm.fmu")),
+    Verb(("fmu", "run", "system.toml", "--no-estimate", "-o", "OUT")),
+    Verb(("export-c", "model.toml", "-o", "OUT")),
 )
+"""Every verb that writes but `demo` and `reproduce`, which run the others and take minutes."""
+
+SWEEP = """\
+cases = 3
+seed = 5
+experiment = "experiment.toml"
+
+[[vary]]
+key = "subject.body_mass"
+normal = [75.0, 10.0]
+within = [50, 100]
+"""
+
+
+def plant_more(folder: Path) -> None:
+    """Write what only these verbs read below a folder: a sweep, a table of subjects, the stretches of a patient."""
+    (folder / "sweep.toml").write_text(SWEEP)
+    draw = np.random.default_rng(1)
+    rows = [f"s{k},{'ab'[k % 2]},half width,{value:.6f}\n" for k, value in enumerate(draw.normal(1.0, 0.2, 24))]
+    (folder / "cohort.csv").write_text("subject,group,quantity,value\n" + "".join(rows))
+    patients.written(patients.session(patients.Patient(), 1), folder / "stretches")
 
 
 def start(verb: Verb, place: Path, temporary: Path) -> subprocess.Popen[str]:
@@ -156,6 +188,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="kills-") as name:
         folder, place = Path(name) / "seeds", Path(name) / "home" / "work"
         plant(folder)
+        plant_more(folder)
         verbs = [verb for verb in VERBS if asked.only in " ".join(verb.arguments)]
         random.shuffle(verbs)
         expected: dict[Verb, Usual] = {}

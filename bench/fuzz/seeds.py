@@ -60,11 +60,14 @@ class Seed:
     ----------
     file : str
     commands : tuple of tuple of str
-        Arguments of armrs.
+        Arguments of armrs; of one that stands here more often, more cases are made.
+    costly : bool
+        Whether a command takes ten times as long as those of other formats, because it computes, draws or starts a process.
     """
 
     file: str
     commands: tuple[tuple[str, ...], ...]
+    costly: bool = False
 
 
 SIMULATE = ("simulate", "model.toml", "--movement", "movement.toml", "--duration-s", "0.1", "-o", "OUT")
@@ -76,29 +79,29 @@ def _imported(name: str, *more: str) -> tuple[str, ...]:
 
 
 SEEDS = (
-    Seed("model.toml", (SIMULATE, ("convert", "model.toml", "--to", "urdf", "-o", "OUT"))),
-    Seed("movement.toml", (SIMULATE,)),
-    Seed("session/dataset.toml", (CHECK, ("convert", "session", "--to", "parquet", "-o", "OUT"))),
-    Seed("session/trials/slow_1.csv", (CHECK, ("convert", "session/trials/slow_1.csv", "--to", "parquet", "-o", "OUT"))),
-    Seed("session/trials/slow_2.parquet", (CHECK, ("convert", "session/trials/slow_2.parquet", "--to", "csv", "-o", "OUT"))),
-    Seed("raw/slow_1.csv", (_imported("slow_1.csv"),)),
-    Seed("raw/slow_1.xlsx", (_imported("slow_1.xlsx"),)),
-    Seed("raw/slow_1.mat", (_imported("slow_1.mat"),)),
-    Seed("raw/slow_7.mat", (_imported("slow_7.mat"),)),
+    Seed("model.toml", (SIMULATE, ("convert", "model.toml", "--to", "urdf", "-o", "OUT")), costly=True),
+    Seed("movement.toml", (SIMULATE,), costly=True),
+    Seed("session/dataset.toml", (CHECK, *(("convert", "session", "--to", "parquet", "-o", "OUT"),) * 3)),
+    Seed("session/trials/slow_1.csv", (CHECK, ("convert", "session/trials/slow_1.csv", "--to", "parquet", "-o", "OUT")), costly=True),
+    Seed("session/trials/slow_2.parquet", (CHECK, ("convert", "session/trials/slow_2.parquet", "--to", "csv", "-o", "OUT")), costly=True),
+    Seed("raw/slow_1.csv", (_imported("slow_1.csv"),), costly=True),
+    Seed("raw/slow_1.xlsx", (_imported("slow_1.xlsx"),), costly=True),
+    Seed("raw/slow_1.mat", (_imported("slow_1.mat"),), costly=True),
+    Seed("raw/slow_7.mat", (_imported("slow_7.mat"),), costly=True),
     Seed(
         "raw/slow_1.sto",
-        (_imported("slow_1.sto"), ("convert", "raw/slow_1.sto", "--to", "csv", "--coordinates", "shoulder,elbow", "-o", "OUT")),
+        (_imported("slow_1.sto"), *(("convert", "raw/slow_1.sto", "--to", "csv", "--coordinates", "shoulder,elbow", "-o", "OUT"),) * 3),
     ),
     Seed("raw/slow_1.trc", (("convert", "raw/slow_1.trc", "--points", ",".join(MARKERS), "--to", "csv", "-o", "OUT"),)),
-    Seed("raw/good.c3d", (("convert", "raw/good.c3d", "--points", ",".join(MARKERS), "--to", "csv", "-o", "OUT"),)),
+    Seed("raw/good.c3d", (("convert", "raw/good.c3d", "--points", ",".join(MARKERS), "--to", "csv", "-o", "OUT"),), costly=True),
     Seed("other/model.urdf", (("convert", "other/model.urdf", "--to", "toml", "-o", "OUT"),)),
     Seed("other/model.xml", (("convert", "other/model.xml", "--to", "toml", "-o", "OUT"),)),
     Seed("result.json", (("report", "result.json", "-o", "OUT"),)),
     Seed("passive.json", (("report", "passive.json", "-o", "OUT"), ("report", "result.json", "passive.json", "-o", "OUT"))),
-    Seed("history.sqlite", (("identify", "session", "--motion", "measured", "--history", "history.sqlite"),)),
+    Seed("history.sqlite", (("identify", "session", "--motion", "measured", "--history", "history.sqlite"),), costly=True),
     Seed("arm.fmu", (("fmu", "info", "arm.fmu"), ("fmu", "check", "--no-library", "arm.fmu"))),
-    Seed("system.toml", (("fmu", "run", "system.toml", "--no-estimate", "-o", "OUT"),)),
-    Seed("experiment.toml", (("record", "experiment.toml", "-o", "OUT"),)),
+    Seed("system.toml", (("fmu", "run", "system.toml", "--no-estimate", "-o", "OUT"),), costly=True),
+    Seed("experiment.toml", (("record", "experiment.toml", "-o", "OUT"),), costly=True),
 )
 """`OUT` is a folder that does not exist before."""
 
@@ -122,7 +125,7 @@ def plant(folder: Path) -> tuple[Seed, ...]:
     (folder / "movement.toml").write_text(MOVEMENT)
     (folder / "system.toml").write_text(SYSTEM)
     there_and_back = np.radians([[-60, 60], [-25, 60], [-60, 95], [-30, 70], [-60, 60]])
-    run = armrs.simulate(folder / "model.toml", armrs.Movement(there_and_back, speed=0.4, acceleration=2.0), rate=50.0)
+    run = armrs.simulate(folder / "model.toml", armrs.Movement(there_and_back, speed=0.4, acceleration=2.0), rate=20.0)
     force = run.force_on_arm
     names = ["t_s", "q1_rad", "q2_rad", "Fy_N", "Fz_N", "qr1_rad", "qr2_rad"]
     columns = [run.t, *run.q.T, *-force.T, *np.asarray(run.columns["robot_q"]).T] if run.columns.get("robot_q") is not None else None
@@ -130,8 +133,11 @@ def plant(folder: Path) -> tuple[Seed, ...]:
         names, columns = names[:5], [run.t, *run.q.T, *-force.T]
     values = np.column_stack(columns)
     trials = folder / "session" / "trials"
+    noise = np.random.default_rng(2)
     for k in (1, 2):
-        (trials / f"slow_{k}.csv").write_text(_table(names, values))
+        # A repeat is a measurement of its own.
+        measured = np.column_stack([values[:, :3], values[:, 3:5] + noise.normal(0.0, 0.05, (len(values), 2)), values[:, 5:]])
+        (trials / f"slow_{k}.csv").write_text(_table(names, measured))
     rate = 1.0 / (run.t[1] - run.t[0])
     head = f'name = "S1"\nmodel = "model.toml"\nforce_on = "robot"\nsample_rate = {rate:.9g}\n\n[tolerance]\nforce_bias_N = 0.4\n'
     entry = '\n[[trial]]\nfile = "trials/slow_{}.{}"\nconfiguration = "slow"\nrepeat = {}\nrole = "{}"\n'
