@@ -301,6 +301,7 @@ HOPELESS: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "no workbook": (lambda r, folder: _written(folder / "slow_1.xlsx", b"PK\x03\x04 broken"), ("no readable workbook",)),
     "damaged HDF5": (lambda r, folder: _damaged(matlab_7_3(r, folder)), ("no readable MATLAB file",)),
+    "MATLAB 5 with data of a kind that is none": (lambda r, folder: _of_kind_11(matlab_5(r, folder)), ("a MATLAB file of version 5",)),
     "no MATLAB file": (lambda r, folder: _written(folder / "slow_1.mat", b"MATLAB 5.0 " + b"x" * 600), ("MATLAB",)),
     "units that nobody knows": (
         text(names=["t [fortnight]", "q1 [gon]", "q2 [rad]", "Fy [N]", "Fz [bar]"]),
@@ -323,6 +324,14 @@ def _three_wrong(r: Recording, folder: Path) -> Path:
     _written(folder / "b.csv", b"hello\nworld\n")
     text(names=["t_s", "q1_rad", "elbow flex? [N]", "Fy_N", "Fz_N"])(r, folder)
     return folder
+
+
+def _of_kind_11(path: Path) -> Path:
+    """Change the kind of the first numbers, which crashes SciPy 1.17 and ended armrs with a segmentation fault."""
+    content = path.read_bytes()
+    at = content.index(b"\x09\x00\x00\x00", 176)
+    path.write_bytes(content[:at] + b"\x0b" + content[at + 1 :])
+    return path
 
 
 def _damaged(path: Path) -> Path:

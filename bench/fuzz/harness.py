@@ -52,8 +52,6 @@ MEMORY = 4 << 30
 """Address space beyond that of a process that has read nothing [bytes]."""
 AT_ONCE = 1000
 """Cases in one process."""
-COSTLY = 3
-"""One in so many turns of a format whose commands cost much is its own."""
 DRAWN = 20
 """One in so many cases draws its figures: that takes ten times as long as all else."""
 IMAGE = bytes.fromhex(
@@ -148,12 +146,12 @@ class Place:
 
 
 def case_of(number: int, start: int, seeds: tuple[Seed, ...], folder: Path) -> Case:
-    """Return the case of a number: formats take turns, those whose commands cost most with every third turn."""
+    """Return the case of a number: formats take turns, those whose commands cost most with some of their turns."""
     random = Random(f"{start} {number}")
     turn, place = divmod(number, len(seeds))
     seed = seeds[place]
-    cheap = [other for other in seeds if not other.costly]
-    if seed.costly and cheap and turn % COSTLY:
+    cheap = [other for other in seeds if other.every == 1]
+    if cheap and turn % seed.every:
         seed = random.choice(cheap)
     content = mutate(random, Path(seed.file).suffix, (folder / seed.file).read_bytes())
     return Case(number, seed, random.choice(seed.commands), content, turn % DRAWN == 0)
@@ -299,6 +297,7 @@ def main() -> int:
     parser.add_argument("--only", default="", help="formats whose file holds this text")
     parser.add_argument("--keep", type=Path, default=Path("out/fuzz/mutations"))
     asked = parser.parse_args()
+    place = asked.keep.resolve()
     memory = Path("/dev/shm")
     with tempfile.TemporaryDirectory(prefix="fuzz-", dir=memory if os.access(memory, os.W_OK) else None) as name:
         folder, home = Path(name) / "seeds", Path(name) / "home"
@@ -312,7 +311,7 @@ def main() -> int:
             next_case += done
             if why:
                 case = case_of(next_case - 1, asked.seed, seeds, folder)
-                keep(case, why, home, asked.keep)
+                keep(case, why, home, place)
                 wrong[f"{case.seed.file}: {why[:100]}"] += 1
                 print(f"{next_case - 1}: armrs {' '.join(case.command)}, {case.seed.file}: {why[:300]}", flush=True)
         count = next_case - asked.first

@@ -61,13 +61,14 @@ class Seed:
     file : str
     commands : tuple of tuple of str
         Arguments of armrs; of one that stands here more often, more cases are made.
-    costly : bool
-        Whether a command takes ten times as long as those of other formats, because it computes, draws or starts a process.
+    every : int
+        One in so many turns of the format is its own: 3 where a command computes or draws, 12 where it starts a process; the others
+        are those of formats that take a tenth of the time.
     """
 
     file: str
     commands: tuple[tuple[str, ...], ...]
-    costly: bool = False
+    every: int = 1
 
 
 SIMULATE = ("simulate", "model.toml", "--movement", "movement.toml", "--duration-s", "0.1", "-o", "OUT")
@@ -79,29 +80,29 @@ def _imported(name: str, *more: str) -> tuple[str, ...]:
 
 
 SEEDS = (
-    Seed("model.toml", (SIMULATE, ("convert", "model.toml", "--to", "urdf", "-o", "OUT")), costly=True),
-    Seed("movement.toml", (SIMULATE,), costly=True),
+    Seed("model.toml", (SIMULATE, ("convert", "model.toml", "--to", "urdf", "-o", "OUT")), every=3),
+    Seed("movement.toml", (SIMULATE,), every=3),
     Seed("session/dataset.toml", (CHECK, *(("convert", "session", "--to", "parquet", "-o", "OUT"),) * 3)),
-    Seed("session/trials/slow_1.csv", (CHECK, ("convert", "session/trials/slow_1.csv", "--to", "parquet", "-o", "OUT")), costly=True),
-    Seed("session/trials/slow_2.parquet", (CHECK, ("convert", "session/trials/slow_2.parquet", "--to", "csv", "-o", "OUT")), costly=True),
-    Seed("raw/slow_1.csv", (_imported("slow_1.csv"),), costly=True),
-    Seed("raw/slow_1.xlsx", (_imported("slow_1.xlsx"),), costly=True),
-    Seed("raw/slow_1.mat", (_imported("slow_1.mat"),), costly=True),
-    Seed("raw/slow_7.mat", (_imported("slow_7.mat"),), costly=True),
+    Seed("session/trials/slow_1.csv", (CHECK, ("convert", "session/trials/slow_1.csv", "--to", "parquet", "-o", "OUT")), every=3),
+    Seed("session/trials/slow_2.parquet", (CHECK, ("convert", "session/trials/slow_2.parquet", "--to", "csv", "-o", "OUT")), every=3),
+    Seed("raw/slow_1.csv", (_imported("slow_1.csv"),), every=3),
+    Seed("raw/slow_1.xlsx", (_imported("slow_1.xlsx"),), every=3),
+    Seed("raw/slow_1.mat", (_imported("slow_1.mat"),), every=12),
+    Seed("raw/slow_7.mat", (_imported("slow_7.mat"),), every=12),
     Seed(
         "raw/slow_1.sto",
         (_imported("slow_1.sto"), *(("convert", "raw/slow_1.sto", "--to", "csv", "--coordinates", "shoulder,elbow", "-o", "OUT"),) * 3),
     ),
     Seed("raw/slow_1.trc", (("convert", "raw/slow_1.trc", "--points", ",".join(MARKERS), "--to", "csv", "-o", "OUT"),)),
-    Seed("raw/good.c3d", (("convert", "raw/good.c3d", "--points", ",".join(MARKERS), "--to", "csv", "-o", "OUT"),), costly=True),
+    Seed("raw/good.c3d", (("convert", "raw/good.c3d", "--points", ",".join(MARKERS), "--to", "csv", "-o", "OUT"),), every=12),
     Seed("other/model.urdf", (("convert", "other/model.urdf", "--to", "toml", "-o", "OUT"),)),
     Seed("other/model.xml", (("convert", "other/model.xml", "--to", "toml", "-o", "OUT"),)),
     Seed("result.json", (("report", "result.json", "-o", "OUT"),)),
     Seed("passive.json", (("report", "passive.json", "-o", "OUT"), ("report", "result.json", "passive.json", "-o", "OUT"))),
-    Seed("history.sqlite", (("identify", "session", "--motion", "measured", "--history", "history.sqlite"),), costly=True),
+    Seed("history.sqlite", (("identify", "session", "--motion", "measured", "--history", "history.sqlite"),), every=3),
     Seed("arm.fmu", (("fmu", "info", "arm.fmu"), ("fmu", "check", "--no-library", "arm.fmu"))),
-    Seed("system.toml", (("fmu", "run", "system.toml", "--no-estimate", "-o", "OUT"),), costly=True),
-    Seed("experiment.toml", (("record", "experiment.toml", "-o", "OUT"),), costly=True),
+    Seed("system.toml", (("fmu", "run", "system.toml", "--no-estimate", "-o", "OUT"),), every=3),
+    Seed("experiment.toml", (("record", "experiment.toml", "-o", "OUT"),), every=3),
 )
 """`OUT` is a folder that does not exist before."""
 

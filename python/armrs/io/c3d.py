@@ -6,10 +6,6 @@ Run as a module (`python -m armrs.io.c3d FILE OUT.npz`) it is that process.
 from __future__ import annotations
 
 import struct
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,14 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArmrsError, BadInput, Text
-from . import files
+from . import apart
 
-LONGEST = 60.0
-"""Time that reading a file may take [s]; 100 MB take about 2 s."""
-_MEMORY_PER_BYTE = 60
-"""Memory the reader may take for each byte of the file; whole files took up to 20."""
-_MEMORY = 2 << 30
-"""Memory it may take whatever the file is [bytes]: address space, of which the libraries reserve most."""
 _BLOCK = 512
 
 
@@ -73,29 +63,8 @@ def read(path: Path) -> C3D:
     if find_spec("ezc3d") is None:
         raise ArmrsError('C3D files need ezc3d: pip install "armrs[files]"')
     _check_header(path)
-    with tempfile.TemporaryDirectory(prefix=files.scratch_prefix("c3d")) as folder:
-        out = Path(folder) / "content.npz"
-        command = [sys.executable, "-m", "armrs.io.c3d", str(path.resolve()), str(out)]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False, preexec_fn=_limits(path))
-        except subprocess.TimeoutExpired:
-            raise BadInput("file", Text(f"a content that keeps the reader busy for more than {LONGEST:g} s"), "a whole C3D file") from None
-        if done.returncode != 0 or not out.is_file():
-            said = done.stderr.strip().splitlines()
-            found = said[-1] if done.returncode == 1 and said else "a content that the reader does not survive"
-            raise BadInput("file", Text(found), "a whole C3D file")
-        with np.load(out, allow_pickle=False) as content:
-            return _checked(content)
-
-
-def _limits(path: Path) -> Callable[[], None] | None:
-    """Return what limits the memory of the reader, where the system can."""
-    if sys.platform != "linux":
-        return None
-    import resource
-
-    most = _MEMORY + _MEMORY_PER_BYTE * path.stat().st_size
-    return lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    with apart.content("armrs.io.c3d", path, "a whole C3D file") as arrays:
+        return _checked(arrays)
 
 
 def _checked(content: Any) -> C3D:
@@ -154,30 +123,26 @@ def _first(group: Any, name: str, default: float) -> float:
     return float(value[0]) if len(value) else default
 
 
-def _read_and_save(source: str, target: str) -> None:
+def _arrays(path: Path) -> dict[str, Any]:
     import ezc3d
 
-    content = ezc3d.c3d(source)
+    content = ezc3d.c3d(str(path))
     parameters = content["parameters"]
     point, analog = parameters["POINT"], parameters.get("ANALOG", {})
     points = np.asarray(content["data"]["points"], dtype=float)
     samples = np.asarray(content["data"]["analogs"], dtype=float)
     units = _texts(point, "UNITS")
-    np.savez(
-        target,
-        labels=np.array(_texts(point, "LABELS"), dtype=str),
-        points=np.transpose(points[:3], (2, 1, 0)),
-        unit=units[0] if units else "",
-        rate=_first(point, "RATE", 0.0),
-        analog_labels=np.array(_texts(analog, "LABELS"), dtype=str),
-        analog_units=np.array(_texts(analog, "UNITS"), dtype=str),
-        analog=samples.reshape(samples.shape[-2], -1).T if samples.size else np.empty((0, 0)),
-        analog_rate=_first(analog, "RATE", 0.0),
-    )
+    return {
+        "labels": np.array(_texts(point, "LABELS"), dtype=str),
+        "points": np.transpose(points[:3], (2, 1, 0)),
+        "unit": units[0] if units else "",
+        "rate": _first(point, "RATE", 0.0),
+        "analog_labels": np.array(_texts(analog, "LABELS"), dtype=str),
+        "analog_units": np.array(_texts(analog, "UNITS"), dtype=str),
+        "analog": samples.reshape(samples.shape[-2], -1).T if samples.size else np.empty((0, 0)),
+        "analog_rate": _first(analog, "RATE", 0.0),
+    }
 
 
 if __name__ == "__main__":
-    try:
-        _read_and_save(*sys.argv[1:3])
-    except Exception as error:  # whatever the library raises is one line for the parent
-        sys.exit(" ".join(str(error).split()) or type(error).__name__)
+    apart.serve(_arrays)

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import re
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ...errors import ArmrsError, BadInput, Text
+from ...errors import ArmrsError, Text
+from .. import apart
+from .matlab_arrays import HDF5
 from .table import NoTable, RawTable, column
 
 SUFFIXES = (".mat",)
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 _FEWEST = 3
 _FORCE = re.compile(r"force|kraft|fuerza|forza|^f$", flags=re.IGNORECASE)
 _AXES = {2: "yz", 3: "xyz"}
 """Columns of a matrix of forces -> their axes."""
-_DEEPEST = 4
-"""Structs within structs that are looked into."""
-_MOST = 100_000_000
-"""Values of one array of a version 7.3 file, whose size is stated by the file whatever it holds."""
 
 
 def read_matlab(path: Path) -> list[RawTable]:
@@ -36,9 +34,11 @@ def read_matlab(path: Path) -> list[RawTable]:
         When a version 7.3 file needs h5py, of the extra `files`.
     """
     head = path.read_bytes()[:520]
-    if head[:8] == _HDF5 or head[512:520] == _HDF5:
-        return [table_of(path, path.stem, _version_7_3(path))]
-    return [table_of(path, title, arrays) for title, arrays in _version_5(path)]
+    if HDF5 in (head[:8], head[512:520]) and find_spec("h5py") is None:
+        raise ArmrsError('MATLAB files of version 7.3 need h5py: pip install "armrs[files]"')
+    with apart.content("armrs.io.raw.matlab_arrays", path, "a MATLAB file of version 5 or 7.3") as arrays:
+        names = json.loads(str(arrays["names"]))
+        return [table_of(path, title, {name: arrays[place] for name, place in of.items()}) for title, of in names]
 
 
 def table_of(path: Path, title: str, arrays: dict[str, np.ndarray]) -> RawTable:
@@ -63,81 +63,3 @@ def table_of(path: Path, title: str, arrays: dict[str, np.ndarray]) -> RawTable:
     left = [name for name in tall if name not in chosen and tall[name].size > 1]
     notes = [f"left out, since they have another length than {long}: {', '.join(left)}"] if left else []
     return RawTable(path, title, tuple(columns), tuple(notes))
-
-
-def _version_5(path: Path) -> list[tuple[str, dict[str, np.ndarray]]]:
-    from scipy.io import loadmat
-
-    try:
-        content = loadmat(path, squeeze_me=False, struct_as_record=False)
-    except Exception as error:  # the reader raises what its parts raise
-        raise BadInput("file", Text(f"no readable MATLAB file ({error})"), "a MATLAB file of version 5 or 7.3") from None
-    own = {name: value for name, value in content.items() if not name.startswith("__")}
-    structs = next((list(v.flat) for v in own.values() if isinstance(v, np.ndarray) and v.dtype == object and v.size > 1), [])
-    structs = [_struct(part) for part in structs]
-    if structs and all(part is not None for part in structs):
-        titled = []
-        for k, part in enumerate(structs, start=1):
-            arrays: dict[str, np.ndarray] = {}
-            _collect("", part, arrays, 0)
-            titled.append((f"{path.stem} {k}", arrays))
-        return titled
-    found: dict[str, np.ndarray] = {}
-    for name, value in own.items():
-        _collect(name, value, found, 0)
-    return [(path.stem, found)]
-
-
-def _struct(value: Any) -> Any:
-    """Return the struct that a cell holds, None where it holds something else."""
-    while isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
-        value = value.flat[0]
-    return value if hasattr(value, "_fieldnames") else None
-
-
-def _collect(name: str, value: Any, found: dict[str, np.ndarray], depth: int) -> None:
-    if depth > _DEEPEST:
-        return
-    if hasattr(value, "_fieldnames"):
-        for part in value._fieldnames:
-            _collect(part, getattr(value, part), found, depth + 1)
-    elif isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
-        _collect(name, value.flat[0], found, depth)
-    else:
-        _keep(name, np.asarray(value), found)
-
-
-def _keep(name: str, value: np.ndarray, found: dict[str, np.ndarray]) -> None:
-    if value.ndim == 1:
-        value = value[:, None]
-    if value.ndim == 2 and value.size > 1 and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
-        found.setdefault(name, value.astype(np.float64))
-
-
-def _version_7_3(path: Path) -> dict[str, np.ndarray]:
-    try:
-        import h5py
-    except ImportError:
-        raise ArmrsError('MATLAB files of version 7.3 need h5py: pip install "armrs[files]"') from None
-    found: dict[str, np.ndarray] = {}
-
-    def visit(name: str, item: Any) -> None:
-        # MATLAB keeps contents of cells and strings in groups of its own; it stores matrices column by column.
-        if (
-            isinstance(item, h5py.Dataset)
-            and not name.startswith("#")
-            and item.attrs.get("MATLAB_class", b"") != b"char"
-            and item.ndim <= 2
-        ):
-            if item.size > _MOST:
-                raise ValueError(f"{name} has {item.size} values, at most {_MOST} are read")
-            value = np.asarray(item[()])
-            if np.issubdtype(value.dtype, np.number):
-                _keep(name.rsplit("/", 1)[-1], value.T, found)
-
-    try:
-        with h5py.File(path, "r") as file:
-            file.visititems(visit)
-    except Exception as error:  # h5py raises OSError, RuntimeError, KeyError and others for damaged files
-        raise BadInput("file", Text(f"no readable MATLAB file ({error})"), "a MATLAB file of version 5 or 7.3") from None
-    return found

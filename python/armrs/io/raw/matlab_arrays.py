@@ -1,0 +1,113 @@
+"""The numeric arrays of a MATLAB file, version 5 (SciPy) and 7.3 (HDF5): `python -m armrs.io.raw.matlab_arrays FILE OUT.npz`.
+
+Damaged files crash both libraries, so that a process of its own reads them (`apart`).
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import apart
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+_DEEPEST = 4
+"""Structs within structs that are looked into."""
+_MOST = 100_000_000
+"""Values of one array of a version 7.3 file, whose size is stated by the file whatever it holds."""
+
+
+def arrays_of(path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of all tables of a file under numbers, and under `names` in JSON their titles and names."""
+    head = path.read_bytes()[:520]
+    tables = [(path.stem, _version_7_3(path))] if HDF5 in (head[:8], head[512:520]) else _version_5(path)
+    found: dict[str, np.ndarray] = {}
+    names: list[tuple[str, dict[str, str]]] = []
+    for title, arrays in tables:
+        places = {name: str(len(found) + k) for k, name in enumerate(arrays)}
+        found |= {places[name]: value for name, value in arrays.items()}
+        names.append((title, places))
+    return {"names": np.array(json.dumps(names)), **found}
+
+
+def _version_5(path: Path) -> list[tuple[str, dict[str, np.ndarray]]]:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, squeeze_me=False, struct_as_record=False)
+    except Exception as error:  # the reader raises what its parts raise
+        raise ValueError(f"no readable MATLAB file ({error})") from None
+    own = {name: value for name, value in content.items() if not name.startswith("__")}
+    structs = next((list(v.flat) for v in own.values() if isinstance(v, np.ndarray) and v.dtype == object and v.size > 1), [])
+    structs = [_struct(part) for part in structs]
+    if structs and all(part is not None for part in structs):
+        titled = []
+        for k, part in enumerate(structs, start=1):
+            arrays: dict[str, np.ndarray] = {}
+            _collect("", part, arrays, 0)
+            titled.append((f"{path.stem} {k}", arrays))
+        return titled
+    found: dict[str, np.ndarray] = {}
+    for name, value in own.items():
+        _collect(name, value, found, 0)
+    return [(path.stem, found)]
+
+
+def _struct(value: Any) -> Any:
+    """Return the struct that a cell holds, None where it holds something else."""
+    while isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
+        value = value.flat[0]
+    return value if hasattr(value, "_fieldnames") else None
+
+
+def _collect(name: str, value: Any, found: dict[str, np.ndarray], depth: int) -> None:
+    if depth > _DEEPEST:
+        return
+    if hasattr(value, "_fieldnames"):
+        for part in value._fieldnames:
+            _collect(part, getattr(value, part), found, depth + 1)
+    elif isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
+        _collect(name, value.flat[0], found, depth)
+    else:
+        _keep(name, np.asarray(value), found)
+
+
+def _keep(name: str, value: np.ndarray, found: dict[str, np.ndarray]) -> None:
+    if value.ndim == 1:
+        value = value[:, None]
+    if value.ndim == 2 and value.size > 1 and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
+        found.setdefault(name, value.astype(np.float64))
+
+
+def _version_7_3(path: Path) -> dict[str, np.ndarray]:
+    import h5py
+
+    found: dict[str, np.ndarray] = {}
+
+    def visit(name: str, item: Any) -> None:
+        # MATLAB keeps contents of cells and strings in groups of its own; it stores matrices column by column.
+        if (
+            isinstance(item, h5py.Dataset)
+            and not name.startswith("#")
+            and item.attrs.get("MATLAB_class", b"") != b"char"
+            and item.ndim <= 2
+        ):
+            if item.size > _MOST:
+                raise ValueError(f"{name} has {item.size} values, at most {_MOST} are read")
+            value = np.asarray(item[()])
+            if np.issubdtype(value.dtype, np.number):
+                _keep(name.rsplit("/", 1)[-1], value.T, found)
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(visit)
+    except Exception as error:  # h5py raises OSError, RuntimeError, KeyError and others for damaged files
+        raise ValueError(f"no readable MATLAB file ({error})") from None
+    return found
+
+
+if __name__ == "__main__":
+    apart.serve(arrays_of)
