@@ -338,6 +338,21 @@ def test_run_writes_samples_figures_and_report(folder: Path, capsys: pytest.Capt
     assert Path("parquet/coupled.parquet").exists()
 
 
+def test_friction_too_steep_for_the_inner_step_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    brake = '\n[[effect]]\nkind = "coulomb"\njoint = 2\ntorque = 2.0\nsmoothing = {}\n'
+    arm = Path("arm.toml").read_text(encoding="utf-8")
+    told = "coulomb in joint 2: the default smoothing is too steep for inner steps of 0.00025 s -> smoothing = 0"
+    for smoothing, said in ((0.01, True), (0.0, False)):
+        Path("arm.toml").write_text(arm + brake.format(smoothing), encoding="utf-8")
+        cli.main(["fmu", "run", "wall.toml", "--no-estimate"])
+        assert (f"arm: {told}" in capsys.readouterr().err) == said
+        cli.main(["fmu", "export", "arm.toml"])
+        assert (told in capsys.readouterr().err) == said
+    Path("arm.toml").write_text(arm + brake.format(0.01), encoding="utf-8")
+    cli.main(["fmu", "export", "arm.toml", "--dt", "1e-6"])
+    assert told not in capsys.readouterr().err
+
+
 def test_a_run_that_is_no_result_writes_its_diagnosis_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = Path("wall.toml").read_text(encoding="utf-8").replace('"iterated"', '"jacobi"').replace("0.002", "0.01")
     Path("explicit.toml").write_text(text, encoding="utf-8")

@@ -61,6 +61,7 @@ def fmu_export(
     from ..cosim.slave import Slave
     from ..fmu.export import export_fmu
     from ..fmu.libraries import collected
+    from ..workflows.stiction import too_steep_said
 
     writable(None, json)
     target = out if out is not None else Path(model.with_suffix(".fmu").name)
@@ -76,6 +77,7 @@ def fmu_export(
         console.warn([f"left out: {', '.join(without)}, because FMI 2.0 has no folder for them; export with --fmi 3"])
     if slave.left_out:
         console.warn([f"left out, because they act in sensors or contact, outside this port: {', '.join(slave.left_out)}"])
+    console.warn(too_steep_said(slave.model, slave.internal_step))
     data = {
         "verb": "fmu export",
         "file": written,
@@ -155,12 +157,16 @@ def fmu_run(
     from ..cosim.coupled import RESULTS
     from ..cosim.master import run_system
     from ..cosim.outcome import coupled_data, write_coupled
+    from ..cosim.slave import Slave
     from ..errors import CoupledError
     from ..report import words
+    from ..workflows.stiction import too_steep_said
 
     suffix = samples_suffix(to, out)
     folder = writable(out, json)
     loaded = _loaded(system, step, duration)
+    arms = {name: slave for name, slave in loaded.slaves.items() if isinstance(slave, Slave)}
+    console.warn([f"{name}: {said}" for name, arm in arms.items() for said in too_steep_said(arm.model, arm.internal_step)])
     try:
         with console.progress("coupling", total=loaded.count * (3 if estimate else 1)) as advance:
             run = run_checked(loaded, progress=advance) if estimate else run_system(loaded, progress=advance)

@@ -55,6 +55,7 @@ class Slave(Partner):
     """
 
     can_rollback = True
+    internal_step: float
 
     def __init__(
         self,

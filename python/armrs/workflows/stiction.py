@@ -50,8 +50,18 @@ def sticking_said(model: Model) -> tuple[str, ...]:
     return (f"{', '.join(laws)}: {why}, so solved as set-valued friction, which sticks.",)
 
 
-def _too_steep(model: Model) -> Iterator[tuple[Effect, str]]:
-    """Give the dry laws with the default smoothing whose slope at rest the usual step cannot follow, and the name of that parameter."""
+def too_steep_said(model: Model, dt: float) -> tuple[str, ...]:
+    """Return what `sticking` would change in a model that is simulated as it is, with steps of `dt` [s], in a line."""
+    laws = [f"{law.kind} in joint {law.joint}" for law, _ in _too_steep(model, dt)]
+    if not laws:
+        return ()
+    return (
+        f"{', '.join(laws)}: the default smoothing is too steep for inner steps of {dt:g} s -> smoothing = 0, with which a joint sticks",
+    )
+
+
+def _too_steep(model: Model, dt: float = DEFAULT_DT) -> Iterator[tuple[Effect, str]]:
+    """Give the dry laws with the default smoothing whose slope at rest a step cannot follow, and the name of that parameter."""
     agility = np.diag(np.linalg.inv(_armrs.Arm.from_model(model).inertia(np.zeros(model.n_joints))))
     for law in model.all_effects:
         size = catalogue()[law.kind].parameters[0]
@@ -60,7 +70,7 @@ def _too_steep(model: Model) -> Iterator[tuple[Effect, str]]:
             continue
         for smoothing in _smoothings(law):
             rate = law.parameters[size.name] / smoothing.default * agility[law.joint - 1]
-            if law.parameters[smoothing.name] == smoothing.default and rate * DEFAULT_DT > FOLLOWED:
+            if law.parameters[smoothing.name] == smoothing.default and rate * dt > FOLLOWED:
                 yield law, smoothing.name
 
 
