@@ -20,7 +20,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: help demo test bench bench-kernels hidden fuzz crosscheck fmu-libraries wheel sdist docs guide mutants lint-workflows clean build format rust python
+.PHONY: help demo test bench bench-kernels hidden fuzz crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -154,6 +154,10 @@ fuzz: $(STAMPS)/dev ## changed files, fuzzed readers and kills, a minute each (F
 sdist: $(STAMPS)/venv ## the source archive, in out/wheels, and a wheel built from it
 	$(BIN)/maturin sdist --out out/wheels
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir out/from-sdist out/wheels/armrs-*.tar.gz
+
+lock: $(STAMPS)/venv ## renew requirements.lock: the newest versions that pyproject.toml allows, with hashes, for every Python and system
+	$(BIN)/python -m pip install uv
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.10 --extra files --generate-hashes --no-header --no-annotate pyproject.toml -o requirements.lock
 
 # The site is made of the pages of docs/. What it is made with goes into an environment of its own.
 $(STAMPS)/docs: docs/requirements.txt | $(STAMPS)/venv
