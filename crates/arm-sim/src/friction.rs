@@ -11,18 +11,23 @@
 //! switches more than [`MOST_SWITCHES`] times.
 
 mod gain;
+mod growth;
 mod instant;
+mod locate;
 
 pub(crate) use instant::{Friction, at};
 
+use core::cell::OnceCell;
+
 use arm_core::Joints;
 use instant::{Mode, Modes, Solved, modes};
+use locate::{LOCATED, first_beyond};
 
 use crate::model::{Link, Model};
 use crate::state::{BaseMotion, Input, State};
 use crate::step::{self, Inputs, Jam, Memory, PROJECTIONS, remember, rk4};
 use crate::{Handle, Integrator};
-use arm_core::effect::States;
+use arm_core::effect::{Motion, States};
 
 /// Switches that are located in one step.
 const MOST_SWITCHES: usize = 12;
@@ -30,10 +35,6 @@ const MOST_SWITCHES: usize = 12;
 const RESOLVED: f64 = 0.3;
 /// Shortest part of a step that is made for that, as a fraction of the step.
 const SHORTEST: f64 = 1.0 / 128.0;
-/// Trials in which a switch is located.
-const TRIALS: usize = 60;
-/// How near a switch is located, as a fraction of the step.
-const LOCATED: f64 = 1e-12;
 /// Speed against the friction that is rounding \[rad/s\].
 const STILL: f64 = 1e-13;
 
@@ -137,12 +138,17 @@ impl<const N: usize> Part<'_, N> {
             return 1.0;
         }
         let at = (&self.before.q, &self.before.qd);
-        let length = |speed: &Joints<f64, N>| {
-            let rate = instant::growth(self.model, input, (at.0, speed), memory, &self.modes);
+        // Friction of the instant, unless a joint force was in it.
+        let known = (!self.model.feels_joint_force).then_some(self.first.most);
+        let yielding = OnceCell::new();
+        let yields = || *yielding.get_or_init(|| growth::yielding(self.model, input, at));
+        let length = |speed: &Joints<f64, N>, most| {
+            let motion = Motion::new(input.time, *at.0, *speed);
+            let rate = growth::growth(self.model, &motion, memory, &self.modes, (most, yields));
             let length = (RESOLVED / (rate * self.h)).max(SHORTEST);
             if length < rest { length } else { rest }
         };
-        let first = length(at.1);
+        let first = length(at.1, known);
         // Slower joints slow down into steeper friction.
         let slower = Joints::<f64, N>::from_fn(|j, _| {
             let (speed, change) = (at.1[j], 1.5 * first * self.h * self.first.outcome.qdd[j]);
@@ -154,7 +160,11 @@ impl<const N: usize> Part<'_, N> {
                 0.0
             }
         });
-        let length = first.min(length(&slower));
+        let length = if slower == *at.1 {
+            first
+        } else {
+            first.min(length(&slower, None))
+        };
         if length < rest {
             self.from + length
         } else {
@@ -222,8 +232,6 @@ impl<const N: usize> Part<'_, N> {
 
     /// Makes the step up to the first switch, and tells where that is.
     ///
-    /// Regula falsi in its Illinois form, with every third trial in the middle.
-    ///
     /// * `after` - where it was tried to end it, and the margin there
     fn locate(
         &self,
@@ -231,34 +239,15 @@ impl<const N: usize> Part<'_, N> {
         (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
     ) -> f64 {
         let before = self.margin(&self.before, &self.first).max(1e-9);
-        let (mut low, mut high) = ((self.from, before), after);
         let mut tried = after.0;
-        for trial in 1..=TRIALS {
-            if high.0 - low.0 < LOCATED {
-                break;
-            }
-            let share = if trial % 3 == 0 {
-                0.5
-            } else {
-                low.1 / (low.1 - high.1)
-            };
-            tried = low.0 + share * (high.0 - low.0);
-            let margin = self.attempt(tried, (state, memory));
-            if margin < 0.0 {
-                high = (tried, margin);
-                low.1 *= 0.5;
-                if margin > -LOCATED {
-                    break;
-                }
-            } else {
-                low = (tried, margin);
-                high.1 *= 0.5;
-            }
+        let found = first_beyond([(self.from, before), after], |to| {
+            tried = to;
+            self.attempt(to, (state, memory))
+        });
+        if tried != found {
+            self.attempt(found, (state, memory));
         }
-        if tried != high.0 {
-            self.attempt(high.0, (state, memory));
-        }
-        high.0
+        found
     }
 
     /// Speeds that reached zero are exactly that.

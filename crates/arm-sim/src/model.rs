@@ -41,6 +41,8 @@ pub(crate) struct Model<T, const N: usize> {
     affine: [[T; 3]; N],
     /// All again with those switched off; empty where none is left.
     others: Vec<Effect<T>>,
+    /// Whether one of those resists with more than set-valued dry friction.
+    resists_otherwise: bool,
     /// Whether an effect depends on the force through its joint.
     pub(crate) feels_joint_force: bool,
     /// Whether one besides dry friction does.
@@ -89,8 +91,11 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         }
         let chain = setup.chain()?;
         let feels_besides_dry = |e: &Effect<T>| !e.is_dry() && feels_joint_force(e);
+        let has_dry = dry.contains(&true);
+        let resists = |e: &Effect<T>| e.on && (!has_dry || resists_besides_dry(e));
         Ok(Self {
             affine,
+            resists_otherwise: others.iter().any(resists),
             others,
             products: Products::of(&chain),
             chain,
@@ -102,7 +107,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             feels_joint_force: effects.iter().any(feels_joint_force),
             has_memory: any_state(&effects),
             feels_besides_dry: effects.iter().any(feels_besides_dry),
-            has_dry: dry.contains(&true),
+            has_dry,
             dry_falls: effects.iter().any(falls),
             dry,
             effects,
@@ -222,7 +227,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     #[inline(always)]
     pub fn resisting(&self, motion: &Motion<T, N>, memory: &[States<T>]) -> Joints<T, N> {
         let mut total = affine(&self.affine, &motion.q, &motion.qd);
-        if !self.others.is_empty() {
+        if self.resists_otherwise {
             self.resist_otherwise(motion, memory, &mut total);
         }
         total
@@ -496,6 +501,16 @@ fn dry_at<T: Scalar>(effect: &Effect<T>, speed: f64) -> T {
 /// Tries whether there is any dry friction in an effect.
 fn rubs<T: Scalar>(effect: &Effect<T>) -> bool {
     effect.is_dry() && !dry_at(effect, 0.0).every(|most| most == 0.0)
+}
+
+/// Tries whether an effect resists with more than set-valued dry friction.
+fn resists_besides_dry<T: Scalar>(effect: &Effect<T>) -> bool {
+    let nothing = |q: f64| {
+        let mut at = Local::moving(T::of(q), T::ONE);
+        at.joint_force = T::ONE;
+        effect.besides_dry(&at).every(|torque| torque == 0.0)
+    };
+    !(effect.is_dry() && nothing(0.1) && nothing(-0.7))
 }
 
 /// Tries whether dry friction is less at a speed than at rest.

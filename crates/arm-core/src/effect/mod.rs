@@ -530,3 +530,18 @@ pub fn dry_friction<T: Scalar, const N: usize>(
     }
     most
 }
+
+/// Largest torque of the set-valued dry friction of one joint \[N m\], see [`dry_friction`].
+#[inline]
+pub fn dry_friction_of<T: Scalar, const N: usize>(
+    joint: usize,
+    effects: &[Effect<T>],
+    motion: &Motion<T, N>,
+    memory: &[States<T>],
+) -> T {
+    in_joints::<T, N>(effects, memory)
+        .filter(|(effect, _)| effect.index == joint && effect.is_dry())
+        .fold(T::ZERO, |most, (effect, state)| {
+            most + effect.dry(&motion.local(joint, state))
+        })
+}

@@ -1,6 +1,6 @@
 //! Dry friction at one instant: which joints stick, and what their friction is.
 
-use arm_core::effect::{Motion, States, dry_friction};
+use arm_core::effect::{Motion, States, dry_friction, dry_friction_of};
 use arm_core::{Joints, Plane, Pose, Resistance, Scalar};
 
 use super::gain::{newton, strongest};
@@ -176,8 +176,9 @@ fn ambiguous<const N: usize>(
     };
     let through = model.through_joints(&pose, (qd, &answer.qdd), (answer.force, input));
     let motion = Motion::new(input.time, *q, *qd).with_joint_force(&through);
+    let most = dry_friction(&model.effects, &motion, memory);
     let gain = |j: usize| {
-        let slope = slope(model, &motion, memory, j);
+        let slope = slope(model, &motion, memory, (j, most[j]));
         if slope == 0.0 {
             return 0.0;
         }
@@ -193,45 +194,18 @@ fn ambiguous<const N: usize>(
 }
 
 /// What a newton of force through a joint adds to its friction \[m\].
+///
+/// * `now` - its friction \[N m\]
 fn slope<const N: usize>(
     model: &Model<f64, N>,
     motion: &Motion<f64, N>,
     memory: &[States<f64>],
-    joint: usize,
+    (joint, now): (usize, f64),
 ) -> f64 {
     let change = 1e-3 * (1.0 + motion.joint_force[joint]);
-    let force = |by: f64| {
-        let mut beside = *motion;
-        beside.joint_force[joint] += by;
-        dry_friction(&model.effects, &beside, memory)[joint]
-    };
-    (force(change) - force(0.0)) / change
-}
-
-/// Fastest rate with which the speed of a joint that slips grows by itself because its friction falls with it \[1/s\].
-pub(crate) fn growth<const N: usize>(
-    model: &Model<f64, N>,
-    input: &Input<f64, N>,
-    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[States<f64>],
-    modes: &Modes<N>,
-) -> f64 {
-    /// A change of speed in which friction hardly bends \[rad/s\].
-    const CHANGE: f64 = 1e-6;
-    let motion = Motion::new(input.time, *q, *qd);
-    let mut faster = motion;
-    for j in 0..N {
-        if let Mode::Slips(way) = modes[j] {
-            faster.qd[j] += CHANGE * way;
-        }
-    }
-    let [slow, fast] = [motion, faster].map(|m| dry_friction(&model.effects, &m, memory));
-    let pose = Pose::new(q);
-    let arm = Arm::at((model, input), (&pose, qd), [0.0; 2]);
-    (0..N)
-        .filter(|&j| fast[j] < slow[j])
-        .map(|j| (slow[j] - fast[j]) / CHANGE * arm.column(j).0.qdd[j])
-        .fold(0.0, f64::max)
+    let mut beside = *motion;
+    beside.joint_force[joint] += change;
+    (dry_friction_of(joint, &model.effects, &beside, memory) - now) / change
 }
 
 /// What follows from state, input and modes.
@@ -248,7 +222,7 @@ pub(crate) fn solve<const N: usize>(
     let (force, lost) = model.contact(input, q, qd, &pose);
     let arm = Arm::at((model, input), (&pose, qd), force);
     let mut motion = Motion::new(input.time, *q, *qd);
-    let mut rubbing = Rubbing {
+    let rubbing = Rubbing {
         modes,
         wanted: ahead.map_or_else(Joints::zeros, |h| qd / h),
         memory,
@@ -283,8 +257,8 @@ pub(crate) fn solve<const N: usize>(
 
 /// Accelerations, and the force on the arm that belongs to them.
 #[derive(Clone, Copy, Debug)]
-struct Answer<const N: usize> {
-    qdd: Joints<f64, N>,
+pub(super) struct Answer<const N: usize> {
+    pub(super) qdd: Joints<f64, N>,
     force: Plane<f64>,
 }
 
@@ -301,7 +275,7 @@ impl<const N: usize> Answer<N> {
 }
 
 /// An arm in one state, which answers any torques.
-struct Arm<'a, const N: usize> {
+pub(super) struct Arm<'a, const N: usize> {
     model: &'a Model<f64, N>,
     input: &'a Input<f64, N>,
     pose: &'a Pose<f64, N>,
@@ -317,7 +291,7 @@ enum Form<const N: usize> {
 }
 
 impl<const N: usize> Form<N> {
-    #[inline]
+    #[inline(always)]
     fn at(model: &Model<f64, N>, pose: &Pose<f64, N>, qd: &Joints<f64, N>) -> Self {
         if model.in_link_form() {
             return Self::Links(Resistance::at(&model.products, pose, qd));
@@ -329,8 +303,8 @@ impl<const N: usize> Form<N> {
 }
 
 impl<'a, const N: usize> Arm<'a, N> {
-    #[inline]
-    fn at(
+    #[inline(always)]
+    pub(super) fn at(
         (model, input): (&'a Model<f64, N>, &'a Input<f64, N>),
         (pose, qd): (&'a Pose<f64, N>, &'a Joints<f64, N>),
         force: Plane<f64>,
@@ -345,7 +319,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn under(&self, torque: &Joints<f64, N>) -> Answer<N> {
         let (qdd, force) = match &self.form {
             Form::Links(resistance) => {
@@ -361,7 +335,7 @@ impl<'a, const N: usize> Arm<'a, N> {
     }
 
     /// What one newton metre in a joint adds, and what it would give way by if nothing held the tip.
-    fn column(&self, joint: usize) -> (Answer<N>, f64) {
+    pub(super) fn column(&self, joint: usize) -> (Answer<N>, f64) {
         let (free, constraint) = match &self.form {
             Form::Links(resistance) => (resistance.column(joint), None),
             Form::Joints(terms, constraint) => {
@@ -466,23 +440,58 @@ struct Found<const N: usize> {
 
 impl<const N: usize> Rubbing<'_, N> {
     /// What follows under given torques besides friction; the joint forces are put into the motion where an effect feels them.
+    #[inline(always)]
     fn under(
-        &mut self,
+        &self,
         arm: &Arm<'_, N>,
         motion: &mut Motion<f64, N>,
         net: &Joints<f64, N>,
+    ) -> Found<N> {
+        let most = dry_friction(&arm.model.effects, motion, self.memory);
+        if arm.model.feels_joint_force {
+            return self.with_joint_forces(arm, motion, net, most);
+        }
+        let slips = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j]);
+        let mut answer = arm.under(&difference(net, &slips));
+        let sticks = self.modes.map(|mode| mode == Mode::Sticks);
+        let (mut dry, mut held) = (Joints::zeros(), [false; N]);
+        if sticks.contains(&true) {
+            (dry, held) = arm.hold(&mut answer, &sticks, &self.wanted.map(|w| -w));
+        }
+        Found {
+            answer,
+            dry: sum(&dry, &slips),
+            most,
+            held,
+            jam: None,
+        }
+    }
+
+    /// Direction in which a joint slips; zero for one that does not.
+    fn way(&self, joint: usize) -> f64 {
+        match self.modes[joint] {
+            Mode::Slips(way) => way,
+            Mode::None | Mode::Sticks => 0.0,
+        }
+    }
+
+    /// What follows where friction grows with the force through its joint, which grows with friction: by Newton's method.
+    ///
+    /// * `most` - dry friction without those forces
+    #[inline(never)]
+    fn with_joint_forces(
+        &self,
+        arm: &Arm<'_, N>,
+        motion: &mut Motion<f64, N>,
+        net: &Joints<f64, N>,
+        mut most: [f64; N],
     ) -> Found<N> {
         let (model, modes) = (arm.model, self.modes);
         let sticks = modes.map(|mode| mode == Mode::Sticks);
         let any = sticks.contains(&true);
         let stop = self.wanted.map(|w| -w);
-        let way = |j: usize| match modes[j] {
-            Mode::Slips(way) => way,
-            Mode::None | Mode::Sticks => 0.0,
-        };
-        let mut most = dry_friction(&model.effects, motion, self.memory);
-        let mut slips = Joints::<f64, N>::from_fn(|j, _| way(j) * most[j]);
-        let (mut jam, mut settled) = (None, !model.feels_joint_force);
+        let mut slips = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j]);
+        let (mut jam, mut settled) = (None, false);
         for _ in 0..PASSES {
             let mut answer = arm.under(&difference(net, &slips));
             let (mut dry, mut held) = (Joints::zeros(), [false; N]);
@@ -503,14 +512,14 @@ impl<const N: usize> Rubbing<'_, N> {
             let through = model.through_joints(arm.pose, moving, (answer.force, arm.input));
             *motion = motion.with_joint_force(&through);
             most = dry_friction(&model.effects, motion, self.memory);
-            let missing = Joints::<f64, N>::from_fn(|j, _| way(j) * most[j] - slips[j]);
+            let missing = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j] - slips[j]);
             let size = 1.0 + slips.amax();
             // What is not finite is not for this to say.
             let lost = !missing.iter().all(|m| m.is_finite());
             if jam.is_some() || lost || missing.amax() <= 1e-12 * size {
                 return found(most, jam);
             }
-            let gains = self.gains(arm, motion, (&answer, &through), &sticks);
+            let gains = self.gains(arm, motion, (&answer, &through, &most), &sticks);
             let (change, determinant) = newton(&gains, &missing);
             if determinant <= SINGLE {
                 jam = Some(strongest(&gains));
@@ -535,7 +544,7 @@ impl<const N: usize> Rubbing<'_, N> {
         &self,
         arm: &Arm<'_, N>,
         motion: &Motion<f64, N>,
-        (answer, through): (&Answer<N>, &[Plane<f64>; N]),
+        (answer, through, most): (&Answer<N>, &[Plane<f64>; N], &[f64; N]),
         sticks: &[bool; N],
     ) -> [[f64; N]; N] {
         let model = arm.model;
@@ -544,7 +553,7 @@ impl<const N: usize> Rubbing<'_, N> {
             let Mode::Slips(way) = self.modes[j] else {
                 continue;
             };
-            *gain = way * slope(model, motion, self.memory, j);
+            *gain = way * slope(model, motion, self.memory, (j, most[j]));
         }
         let mut gains = [[0.0; N]; N];
         for k in 0..N {
