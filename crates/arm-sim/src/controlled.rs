@@ -8,6 +8,7 @@ use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Stop, Times};
 use arm_core::{Joints, Plane, Robot};
 
 use crate::noise::Normal;
+use crate::room::require_room;
 use crate::{Drive, Experiment, JointMotion, Outside, Port, SimulationError, Start, Stepper};
 
 /// The robot's joints and their controller; values are those of both joints.
@@ -142,9 +143,13 @@ pub fn control<const N: usize>(
     let robot = experiment.robot.ok_or(missing("an arm without a robot"))?;
     check(controller, safety)?;
     let periods = (experiment.duration / controller.period).floor() as usize;
-    let required = (0..=periods)
-        .map(|k| path.robot_motion(&robot, k as f64 * controller.period))
-        .collect::<Result<Vec<_>, _>>()?;
+    // What is required of the robot, and what it does: before either is begun.
+    let bytes = size_of::<JointMotion<2>>() + 3 * size_of::<f64>();
+    require_room((periods as u64).saturating_mul(bytes as u64))?;
+    let mut required = Vec::with_capacity(periods + 1);
+    for k in 0..=periods {
+        required.push(path.robot_motion(&robot, k as f64 * controller.period)?);
+    }
     let mut loop_ = Loop::new(experiment, &robot, controller, &required)?;
     let mut supervisor = Supervisor::new(controller, safety, &required, seed)?;
     let injected = fault.map(|(time, fault)| ((time / controller.period).ceil() as usize, fault));

@@ -2,7 +2,9 @@
 
 use arm_core::Shape;
 use arm_core::monitor::Reason;
-use arm_sim::{Controlled, Controller, Experiment, Fault, Safety, control, models};
+use arm_sim::{
+    Controlled, Controller, Experiment, Fault, Safety, SimulationError, control, models,
+};
 
 /// Control periods within which a fault must be seen.
 const SOON: u64 = 2;
@@ -32,6 +34,19 @@ fn follows_the_required_angles() {
         "tracking error {} rad",
         done.tracking_error
     );
+}
+
+/// A movement with an acceleration of 1e-9 rad/s² ended the process with an allocation of 6.4 GB, after many others.
+#[test]
+#[cfg(target_os = "linux")]
+fn what_needs_more_memory_than_there_is_is_refused_at_once() {
+    let settings = (&Controller::default(), &Safety::default());
+    let refused = control(&experiment(1e9), settings, None, 1).expect_err("too much");
+    let SimulationError::Memory { needed, .. } = refused else {
+        panic!("{refused}");
+    };
+    // 4e12 periods with angles, speeds, accelerations, a time and two angles read.
+    assert_eq!(needed, 4_000_000_000_000 * 72);
 }
 
 #[test]
