@@ -112,6 +112,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             asked: 1.0,
             scale: 1.0,
             been: Vec::new(),
+            barred: Vec::new(),
         };
         self.search_on(start, periodic, progress)
     }
@@ -140,21 +141,24 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             state.scale = score_test.scale;
             state.ruled = self.ruled(&library, &score_test);
             let room = MOST - state.current.asked.len();
-            let from = (&state.calibrated, &state.current);
-            let Some((settled, step)) =
-                self.round(from, &state.point, (&library, &score_test), room)
-            else {
+            let asking = (&library, &score_test, room);
+            let Some((settled, step)) = self.round(&state, asking) else {
                 break;
             };
             state.search_trace.push(step);
             let settled = self.afresh(settled);
             let settled = self.with_friction_at_rest(settled)?;
+            let asked = settled.0.asked.clone();
             (state.current, state.point) = self.pruned(settled, &state.calibrated, state.scale)?;
             if self.leave_out_rest(&state.point) {
                 state = self.renewed(state)?;
             }
             if state.is_back(self.dry) {
                 state.search_trace.pop();
+                // What stands in their place may be behind it.
+                if self.repeated && state.bar_lost(asked) {
+                    continue;
+                }
                 break;
             }
             // Without repeats a second look has only its own residual to tell noise from what the model lacks.
@@ -255,18 +259,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Where a law comes to a shape in which it is a plainer one, the scan is asked again without it.
     fn round(
         &self,
-        (calibrated, current): (&Fitted<N>, &Fitted<N>),
-        point: &LinearizationPoint<N>,
-        (library, score_test): (&Library, &ScoreTest),
-        room: usize,
+        state: &SearchState<'a, N>,
+        (library, score_test, room): (&Library, &ScoreTest, usize),
     ) -> Option<(Settled<'a, N>, SearchStep)> {
+        let current = &state.current;
         // Less than every effect must explain need not be converged.
-        let explained = calibrated.cost - current.cost;
+        let explained = state.calibrated.cost - current.cost;
         let least = |member: &usize| {
             let effect = &library.candidates[*member].effect;
             mimicked_by_any(effect, &current.asked, explained)
         };
-        let mut converged = Converged::default();
+        let mut converged = Converged {
+            worthy: Vec::new(),
+            tried: Vec::new(),
+            plainer: state.barred.clone(),
+        };
         for _ in 0..TURNS {
             let fresh = |members: &[usize], c: usize| {
                 let candidate = &library.candidates[c];
@@ -283,13 +290,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .collect();
             let before = converged.plainer.len();
             for choice in &contenders(&choices, library) {
-                self.converge(
-                    choice,
-                    current,
-                    point,
-                    (library, score_test),
-                    &mut converged,
-                );
+                self.converge(choice, state, (library, score_test), &mut converged);
             }
             if converged.plainer.len() == before {
                 break;
@@ -314,8 +315,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn converge(
         &self,
         choice: &Choice,
-        current: &Fitted<N>,
-        point: &LinearizationPoint<N>,
+        state: &SearchState<'a, N>,
         (library, score_test): (&Library, &ScoreTest),
         converged: &mut Converged<N>,
     ) {
@@ -325,6 +325,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             candidate
         };
         let asked: Vec<Candidate> = choice.members.iter().map(question).collect();
+        let SearchState { current, point, .. } = state;
         let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), point) else {
             return;
         };
@@ -391,18 +392,8 @@ struct Converged<const N: usize> {
     worthy: Vec<(f64, Fitted<N>)>,
     /// All with what they gained.
     tried: Vec<(Vec<Candidate>, f64)>,
-    /// Questions that came to a plainer law.
+    /// Questions that came to a plainer law, now or in a round before.
     plainer: Vec<Candidate>,
-}
-
-impl<const N: usize> Default for Converged<N> {
-    fn default() -> Self {
-        Self {
-            worthy: Vec::new(),
-            tried: Vec::new(),
-            plainer: Vec::new(),
-        }
-    }
 }
 
 /// The choices that are converged by simulation: the best, each with other effects, and the best of a single effect.

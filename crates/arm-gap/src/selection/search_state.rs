@@ -50,9 +50,23 @@ pub(crate) struct SearchState<'a, const N: usize> {
     pub scale: f64,
     /// Where it has been: what was named, the joints that are dry then, and the cost.
     pub been: Vec<(Vec<Candidate>, [bool; N], f64)>,
+    /// What led back to where it has been: laws of many shapes that were named and are lost again, as plainer ones do as well.
+    pub barred: Vec<Candidate>,
 }
 
 impl<const N: usize> SearchState<'_, N> {
+    /// Bars what was asked, has shapes and is named no more; whether there is something that was not barred before.
+    pub fn bar_lost(&mut self, asked: Vec<Candidate>) -> bool {
+        let known = self.barred.len();
+        for one in asked.into_iter().filter(|one| one.shapes() > 0.0) {
+            let same = |other: &Candidate| other.is_same_effect(&one.effect);
+            if !self.current.asked.iter().any(same) && !self.barred.iter().any(same) {
+                self.barred.push(one);
+            }
+        }
+        self.barred.len() > known
+    }
+
     /// Whether it has been here before and was no worse off: from here it would go round in a circle.
     pub fn is_back(&mut self, dry: [bool; N]) -> bool {
         let Fitted { asked, cost, .. } = &self.current;
