@@ -93,13 +93,13 @@ class BadInputs(BadInput):
         return BadInputs.of([problem.within(file=file, place=place) for problem in self.problems])
 
     @classmethod
-    def of(cls, problems: Iterable[BadInput]) -> BadInput:
-        """Return one refusal for all problems, which is the problem itself where there is but one."""
+    def of(cls, problems: Iterable[BadInput], told_by: str = "armrs check lists") -> BadInput:
+        """Return one refusal for all problems, or the problem itself where there is but one; `told_by` says where the others stand."""
         listed = tuple(problems)
         if len(listed) == 1:
             return listed[0]
         first, others = listed[0], len(listed) - 1
-        more = f"and {others} more problem{'s' * (others > 1)}, which armrs check lists"
+        more = f"and {others} more problem{'s' * (others > 1)}, which {told_by}"
         hint = f"{first.hint}; {more}" if first.hint else more
         made = cls(first.place, first.found, first.allowed, file=first.file, hint=hint)
         made.problems = listed

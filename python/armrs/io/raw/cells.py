@@ -10,9 +10,11 @@ import numpy as np
 from ...errors import BadInput
 
 _CLOCK = re.compile(
-    r"(?:(?P<date>\d+[-./]\d+[-./]\d+)[ T])?(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,:]\d+)?)(?:Z|[+-]\d\d:?\d\d)?"
+    r"(?:(?P<date>\d+[-./]\d+[-./]\d+|\d+ days?)[ T])?(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,:]\d+)?)(?:Z|[+-]\d\d:?\d\d)?"
 )
-"""A time of day, with a date before it or none: 10:15:02.020, 2026-03-14 10:15:02,020, 15:02.5; without hours only with a fraction."""
+"""A time of day, with a date or days before it or none: 10:15:02.020, 2026-03-14 10:15:02,020, 0 days 00:00:01, 15:02.5.
+
+Without hours only with a fraction."""
 _UNREADABLE = 0.1
 _EMPTY = {"", "nan", "null", "none", "-", "--", "n/a"}
 

@@ -20,6 +20,9 @@ TRC_SUFFIXES = (".trc",)
 _NO_ANGLE = re.compile(r"force|moment|torque|emg|_[vp][xyz]$|_t[xyz]$|_f[xyz]$", flags=re.IGNORECASE)
 """Names of columns that the header's unit of angles does not concern."""
 
+_SPEED = re.compile(r"/speed$|_u$")
+"""Names of speeds in a file of states."""
+
 
 def read_parquet(path: Path) -> RawTable:
     """Read the numeric columns of a Parquet file, and time stamps as the time since the first [s]."""
@@ -52,7 +55,10 @@ def read_motion_table(path: Path) -> RawTable:
     unit = {True: "deg", False: "rad", None: ""}[motion.in_degrees]
     notes = (f"angles in {unit}, as the header says",) if unit else ()
     columns = [column("time", motion.t, "s")]
-    columns += [column(name, motion.values[:, k], "" if _NO_ANGLE.search(name) else unit) for k, name in enumerate(motion.names)]
+    per_second = f"{unit}/s" if unit else ""
+    for k, name in enumerate(motion.names):
+        own = "" if _NO_ANGLE.search(name) else per_second if _SPEED.search(name) else unit
+        columns.append(column(name, motion.values[:, k], own))
     return RawTable(path, path.stem, tuple(columns), notes)
 
 

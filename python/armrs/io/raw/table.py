@@ -120,6 +120,26 @@ def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
     return RawColumn(name, text, "", values)
 
 
+def headed(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
+    """Return groups and names of columns from the rows above the samples, each as wide as they.
+
+    A cell over both rows, merged in a workbook, stands in the upper one. Where pandas writes columns of several levels, the name of
+    the index stands in a row below them.
+
+    >>> headed([["", "Force", "Force"], ["", "y", "z"], ["t [s]", "", ""]], 3)
+    (['', 'Force', 'Force'], ['t [s]', 'y', 'z'])
+    >>> headed([["t [s]", "Force", ""], ["", "y", "z"]], 3)[1]
+    ['t [s]', 'y', 'z']
+    """
+    kept = [list(row) for row in rows]
+    if len(kept) > 1 and any(kept[-1]) and not any(a and b for a, b in zip(kept[-1], kept[-2], strict=False)):
+        below = kept.pop()
+        kept[-1] = [a or b for a, b in zip(below, kept[-1], strict=False)]
+    if len(kept) > 1:
+        return kept[-2], [name or above for name, above in zip(kept[-1], kept[-2], strict=False)]
+    return [], kept[0] if kept else [""] * width
+
+
 def grouped(groups: Sequence[str], names: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return names and units of columns that stand in groups: a word above several of them, as `Force [N]` above `y` and `z`.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import BadInput, Text
 from .cells import number, seconds
-from .table import NoTable, RawColumn, RawTable, Remark, column, grouped, remarks_of
+from .table import NoTable, RawColumn, RawTable, Remark, column, grouped, headed, remarks_of
 from .units import unit
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".xls")
@@ -25,16 +25,20 @@ _COMMENT = ("#", "%", "//", '"#')
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", " ": "blanks"}
 _PROBED = 400
 """Lines in which header, separator and decimal mark are looked for."""
+_NAMING = 3
+"""Comment lines above the samples that may hold groups, names and units of the columns."""
 _FEWEST = 3
 """Rows of numbers that make a table."""
 _TWO_PARTS = ("ZeitInSec", "ZeitInNanoSec")
 """Columns that hold the time of KUKA's DataRecorder."""
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "#NV", "-", "--", "null", "None", "inf", "-inf"]
 _NUMBER = {
-    ".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+|[1-9]\d{0,2}(,\d{3})+\.\d*)([eE][-+]?\d+)?"),
-    ",": re.compile(r"[-+]?(\d+,?\d*|,\d+|[1-9]\d{0,2}(\.\d{3})+,\d*)([eE][-+]?\d+)?"),
+    ".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+|[1-9]\d{0,2}((,\d{3})+\.\d*|(,\d{3}){2,}))([eE][-+]?\d+)?"),
+    ",": re.compile(r"[-+]?(\d+,?\d*|,\d+|[1-9]\d{0,2}((\.\d{3})+,\d*|(\.\d{3}){2,}))([eE][-+]?\d+)?"),
 }
-"""Numbers by their decimal mark; thousands are recognised as such where a decimal mark follows."""
+"""Numbers by their decimal mark; thousands are recognised as such where a decimal mark follows, or where the mark stands twice."""
+_THOUSANDS = re.compile("(?<=\\d)[\u00a0\u202f\u2009'\u2019](?=\\d{3}(?!\\d))")
+"""Marks for thousands that are no decimal mark: narrow and other blanks, and the Swiss apostrophe."""
 _BAD_CELLS = 0.1
 """A column with more cells than this that are no numbers holds something else."""
 
@@ -74,7 +78,9 @@ def read_text_table(path: Path) -> RawTable:
 
 def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
     """Return the table in a text, from what `decoded_lines` returned; errors as in `read_text_table`."""
-    lines = [line for index, line in enumerate(lines) if not (index and _is_comment(line))]
+    leading = next((index for index, line in enumerate(lines) if not _is_comment(line)), len(lines))
+    lines = [_THOUSANDS.sub("", line) for line in lines]
+    lines = [line for index, line in enumerate(lines) if index == 0 or not _is_comment(line) or _may_name(index, leading, line)]
     layout = _layout(lines[:_PROBED])
     if layout is None:
         raise NoTable("file", Text(f"no block of rows with at least two numbers each, {_FEWEST} or more"), "a table with one row a sample")
@@ -119,6 +125,11 @@ def _decoded(raw: bytes) -> tuple[str, str]:
 
 def _is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENT)
+
+
+def _may_name(index: int, leading: int, line: str) -> bool:
+    """Whether a comment may hold names or units: it is one of the last above the first line that is none, and has no number."""
+    return leading - _NAMING <= index < leading and not any(number(cell) is not None for cell in re.split(r"[;,|\s]+", line) if cell)
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -176,8 +187,8 @@ def _header(lines: list[str], layout: _Layout) -> tuple[list[str], list[str]]:
         units = [cell.strip("[]() ") for cell in rows.pop()]
     elif len(rows) > 1 and rows[-1] == rows[-2]:
         rows.pop()
-    names = rows[-1] if rows else [""] * layout.cells
-    names, units = grouped(rows[-2] if len(rows) > 1 else [], names, units)
+    groups, names = headed(rows, layout.cells)
+    names, units = grouped(groups, names, units)
     return [name or f"column {k}" for k, name in enumerate(names, start=1)], units
 
 
@@ -196,7 +207,7 @@ def _columns(
     separator = layout.separator
     if separator == " ":
         lines, separator = ["\t".join(line.split()) for line in lines], "\t"
-    places = [f"c{k}" for k in range(len(names))]
+    places = [f"c{k}" for k in range(1, len(names) + 1)]
     skipped: list[int] = []
 
     def odd(row: csv.InvalidRow) -> str:
@@ -219,6 +230,7 @@ def _columns(
         if values is not None and (odd_cells := _odd_cells(data.column(place), values)):
             notes.append(f"{name}: cells without a number, which count as missing: {odd_cells}")
         if values is not None:
+            name = "time" if unit_of_clock and name == f"column {place[1:]}" else name
             columns.append(column(name, values, stated or unit_of_clock))
         elif any(said := ["" if cell.strip() in _MISSING else cell.strip() for cell in data.column(place).to_pylist()]):
             remarks += remarks_of(name, said)
@@ -233,6 +245,10 @@ def _numbers(cells: Any, decimal: str) -> tuple[np.ndarray | None, str]:
     plain = pc.utf8_trim_whitespace(cells)
     known = pc.if_else(pc.is_in(plain, pa.array(_MISSING)), None, plain)
     dotted = pc.replace_substring(known, ",", ".") if decimal == "," else known
+    if decimal == "," and any(pointed := pc.match_substring(known, ".").to_pylist()):
+        marked = pc.match_substring_regex(known, r"^[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?$").to_pylist()
+        if marked == pointed:  # points that are all marks for thousands: 12.345 is no fraction
+            dotted = pc.replace_substring(pc.replace_substring(known, ".", ""), ",", ".")
     try:
         values = pc.cast(dotted, pa.float64()).to_numpy()
     except pa.ArrowInvalid:

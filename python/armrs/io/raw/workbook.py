@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ArmrsError, BadInput, Text
-from .table import NoTable, RawTable, Remark, column, grouped, remarks_of
+from .table import NoTable, RawTable, Remark, column, grouped, headed, remarks_of
 from .units import unit
 
 SUFFIXES = (".xlsx", ".xlsm")
@@ -60,8 +60,8 @@ def _table(path: Path, rows: list[list[Any]]) -> RawTable | None:
     units = [""] * width
     if len(above) > 1 and _is_units(above[-1]):
         units = _words(above.pop(), width)
-    names = _words(above[-1], width) if above else [""] * width
-    names, units = grouped(_words(above[-2], width) if len(above) > 1 else [], names, units)
+    groups, names = headed([_words(row, width) for row in above], width)
+    names, units = grouped(groups, names, units)
     columns = []
     remarks: list[Remark] = []
     for k, name in enumerate(names):
@@ -112,9 +112,10 @@ def _number(cell: Any) -> float:
     if isinstance(cell, datetime.time):
         return 3600.0 * cell.hour + 60.0 * cell.minute + cell.second + 1e-6 * cell.microsecond
     if isinstance(cell, str):
-        # A workbook of one language opened in another leaves numbers as text.
+        # A workbook of one language opened in another leaves numbers as text; of two marks, the last is the decimal one.
+        decimal, other = (",", ".") if cell.rfind(",") > cell.rfind(".") else (".", ",")
         try:
-            return float(cell.strip().replace(",", "."))
+            return float(cell.strip().replace(other, "" if decimal in cell else other).replace(decimal, "."))
         except ValueError:
             return np.nan
     return np.nan

@@ -33,7 +33,7 @@ _TIME = {
     "laufzeit",
 }
 _JOINTS = (
-    {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral", "oberarm", "upperarm", "humerus"},
+    {"shoulder", "schulter", "epaule", "hombro", "spalla", "rame", "glenohumeral", "oberarm", "upperarm", "humerus", "armflex"},
     {
         "elbow", "ellbogen", "ellenbogen", "coude", "codo", "gomito", "komolec", "unterarm", "forearm", "avantbras", "antebrazo",
         "avambraccio",
@@ -164,7 +164,7 @@ def _joint(tokens: Sequence[str], dimension: str | None) -> str | None:
     if number is None and _mentions(tokens, _ANGLE | _SPEED | _TORQUE | _ROBOT):
         number = next((int(token) for token in tokens if token.isdigit()), None)
     if number is None and (dimension in ("angle", "speed", "moment") or _mentions(tokens, _ANGLE | _SPEED | _TORQUE)):
-        number = next((_LIMBS[token] for token in tokens if token in _LIMBS), None)
+        number = next((_LIMBS[token] for token in tokens if token in _LIMBS and tokens[-1] not in "xyz"), None)
     if number is None:
         return None
     if _mentions(tokens, _ROBOT):

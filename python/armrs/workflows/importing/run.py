@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ... import checks
-from ...errors import BadInput, BadInputs, Text
+from ...errors import BadInput, BadInputs, Text, unknown_name
 from ...io import files
 from ...io.dataset import load_dataset
 from ...io.raw import RawTable
@@ -29,6 +29,7 @@ from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
 from .samples import cleaned
 
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
+_TOLD_BY = "BadInputs.problems holds"
 _NAMED = 8
 """Columns that a line names at most."""
 
@@ -239,7 +240,7 @@ def _decided(
         for table in mapped_tables[:1]:
             _complete(columns.guess([table], _present(mapped, table), problems), model.n_joints, table, problems)
     if not named:
-        raise BadInputs.of(problems)
+        raise BadInputs.of(problems, _TOLD_BY)
     for table in left:
         if table.path in sources.in_folders:
             sources.notes.append(f"left out, since it holds neither joint angles nor forces: {table.path}")
@@ -255,12 +256,14 @@ def _decided(
             *(c for c in own if c.symbol[0] in "FM"),
             *(changed(c, symbol="t of forces") for c in own if c.symbol == "t"),
         ]
+    _every_name_known(mapped, tables, problems)
+    channels, partial = _whole(channels, model.n_joints)
     channels, axes = columns.plane(channels, force_tables or [n.table for n in named])
     _complete(channels, model.n_joints, named[0].table, problems)
     _alike([n.table for n in named], [c for c in channels if not force_tables or c.symbol[0] not in "FM"], problems)
     _alike(force_tables, [c for c in channels if c.symbol[0] in "FM"], problems)
     if len(problems) > of_files:
-        raise BadInputs.of(problems)
+        raise BadInputs.of(problems, _TOLD_BY)
     reads = aligning.aligned(named, channels, model, given, problems)
     clocks, doubts = list[str](), list[str]()
     if any(c.symbol == "Fy" for c in channels):
@@ -270,10 +273,10 @@ def _decided(
         why = "no contact force, so the balance cannot be used: the angles are taken in the convention of armrs"
         convention = Convention(str(given.get("reference", "relative")), str(given.get("zero", "horizontal")), signs, None, why)  # type: ignore[arg-type]
     if problems:
-        raise BadInputs.of(problems)
+        raise BadInputs.of(problems, _TOLD_BY)
     origin = _origin(reads, channels, convention, model, axes)
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
-    notes = [*sources.notes, *remarks.said(tables), *axes]
+    notes = [*sources.notes, *remarks.said(tables), *axes, *partial]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
@@ -353,6 +356,25 @@ def _present(mapped: Mapping[str, tuple[str, int]], table: RawTable) -> dict[str
     return found
 
 
+def _every_name_known(mapped: Mapping[str, tuple[str, int]], tables: Sequence[RawTable], problems: list[BadInput]) -> None:
+    """Refuse a name of `--map` that no table has; beside a column that is recognised by itself it would be passed over."""
+    known = {name for table in tables for c in table.columns for name in (c.name, c.label)}
+    for name, _ in mapped.values():
+        if name not in known:
+            problems.append(unknown_name("--map", name, {c.name for table in tables for c in table.columns}, what="column"))
+
+
+def _whole(channels: Sequence[Channel], n_joints: int) -> tuple[list[Channel], list[str]]:
+    """Return channels without speeds and torques that are there for some joints only, and a line for those."""
+    kept, notes = list(channels), []
+    for kind, said in (("dq", "speeds"), ("tau", "torques")):
+        own = [c for c in channels if c.symbol.removeprefix(kind).isdigit()]
+        if own and {c.symbol for c in own} != {f"{kind}{j}" for j in range(1, n_joints + 1)}:
+            kept = [c for c in kept if c not in own]
+            notes.append(f"{said} of some joints only, so not used: {', '.join(repr(c.column) for c in own)}")
+    return kept, notes
+
+
 def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, problems: list[BadInput]) -> None:
     symbols = {c.symbol for c in channels}
     # A column that was refused for its unit or its values is not missing.
@@ -411,7 +433,7 @@ def _reread(recipe: Recipe, folder: Path) -> list[Read]:
         except BadInput as error:
             problems.append(error)
     if problems:
-        raise BadInputs.of(problems)
+        raise BadInputs.of(problems, _TOLD_BY)
     return reads
 
 

@@ -11,10 +11,12 @@ import numpy as np
 from ...io.raw import RawColumn, RawTable
 from .columns import symbol_of
 
-_CODES = (9999.0, 99999.0, 999999.0, 9999.99, 32768.0)
+_CODES = (999.0, 9999.0, 99999.0, 999999.0, 9999.99, 32768.0, 1e10)
 """Magnitudes by which recorders mark a missing value."""
-_FAR = 10.0
+_FAR = 3.0
 """Such a value is so many times as large as every other of its column."""
+_JUMP = 10.0
+"""An angle that was lost jumps to zero by so many times the largest of its other steps."""
 
 
 def cleaned(table: RawTable, rate: float | None, notes: list[str]) -> Iterator[RawTable]:
@@ -87,14 +89,30 @@ def _with_times(table: RawTable, notes: list[str]) -> RawTable:
 
 
 def _without_codes(table: RawTable, notes: list[str]) -> RawTable:
-    """Return a table in which codes for missing values, such as -9999, are empty."""
+    """Return a table in which codes for missing values, such as -9999, are empty, and so are angles that were lost at zero."""
     columns = []
     for c in table.columns:
-        coded = np.isin(np.abs(c.values), _CODES)
-        others = np.abs(c.values[np.isfinite(c.values) & ~coded])
-        if coded.any() and others.size and _FAR * float(others.max()) < float(np.abs(c.values[coded]).min()) and symbol_of(c) != "t":
-            notes.append(f"{c.name}: {c.values[coded][0]:g} counts as missing, {int(coded.sum())} times: {table.path}")
-            columns.append(replace(c, values=np.where(coded, np.nan, c.values)))
-        else:
-            columns.append(c)
+        symbol, cells = symbol_of(c) or "", c.values
+        coded = np.isin(np.abs(cells), _CODES)
+        others = np.abs(cells[np.isfinite(cells) & ~coded])
+        if not (others.size and coded.any() and _FAR * float(others.max()) < float(np.abs(cells[coded]).min())):
+            coded = _lost(cells) if symbol.startswith("q") else np.zeros(len(cells), dtype=bool)
+        if coded.any() and symbol != "t":
+            notes.append(f"{c.name}: {cells[coded][0]:g} counts as missing, {int(coded.sum())} times: {table.path}")
+            cells = np.where(coded, np.nan, cells)
+        columns.append(replace(c, values=cells))
     return replace(table, columns=tuple(columns))
+
+
+def _lost(cells: np.ndarray) -> np.ndarray:
+    """Return where values are exactly zero between jumps, as of a sensor or a marker that was lost.
+
+    >>> _lost(np.array([1.0, 1.01, 0.0, 0.0, 1.02, 1.03])).tolist()
+    [False, False, True, True, False, False]
+    """
+    zero = cells == 0.0
+    steps = np.abs(np.diff(cells))
+    border = np.diff(zero.astype(int)) != 0
+    usual = float(np.nanmax(steps[~border], initial=0.0))
+    jumps = border & (steps > _JUMP * usual)
+    return zero if usual > 0.0 and border.any() and bool((jumps == border).all()) else np.zeros(len(cells), dtype=bool)
