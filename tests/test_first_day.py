@@ -368,3 +368,12 @@ def test_a_picture_knows_its_shape(size: tuple[float, float], shape: str) -> Non
     plotting.write_png(plotting.figure(*size), image)
     assert html.Picture("x.png", "x", "x", html.data_uri(image.getvalue())).shape == shape
     assert html.Picture("x.png", "x", "x", None).shape == ""
+
+
+def test_a_data_set_is_a_table_of_its_trials(imported: Path) -> None:
+    """`pd.DataFrame(dataset)` ended with a TypeError, where it works for every result."""
+    pandas = pytest.importorskip("pandas")
+    dataset = armrs.load_dataset(imported)
+    frame = pandas.DataFrame(dataset)
+    pandas.testing.assert_frame_equal(frame, dataset.to_dataframe())
+    assert list(frame["file"]) == [trial.file for trial in dataset.trials]

@@ -61,6 +61,12 @@ class Framed:
         """Return the result as a tidy table."""
         raise NotImplementedError
 
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Give the rows of the table, so that `pandas.DataFrame(result)` works."""
+        columns = self.tidy().columns
+        for row in zip(*columns.values(), strict=True):
+            yield dict(zip(columns, row, strict=True))
+
     def to_dataframe(self) -> pandas.DataFrame:
         """Return a tidy pandas DataFrame; `attrs["units"]` has the units of its columns.
 
@@ -98,12 +104,6 @@ class Framed:
 
 class Tabular(Framed):
     """The result of a verb: a table, a picture, a page and JSON. Subclasses have `to_dict`; `views` names what draws them."""
-
-    def __iter__(self) -> Iterator[dict[str, Any]]:
-        """Give the rows of the table, so that `pandas.DataFrame(result)` works."""
-        columns = self.tidy().columns
-        for row in zip(*columns.values(), strict=True):
-            yield dict(zip(columns, row, strict=True))
 
     def plot(self, name: str | None = None) -> np.ndarray:
         """Draw a figure of the report where notebooks and windows show it.
