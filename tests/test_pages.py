@@ -216,6 +216,19 @@ def test_names_of_joints_are_whole_on_a_phone(pages: Path) -> None:
         assert seen.page.evaluate(broken) == []
 
 
+def test_keys_break_between_their_parts_on_a_phone(pages: Path) -> None:
+    """The table of what a sweep drew had `appli / ed`, `segment[2].c / om` and `joint[2].coulo / mb`."""
+    ends = """[...document.querySelectorAll('.wide:not(.many) th, .wide:not(.many) td:first-child')].flatMap(cell => {
+      const letters = [], walker = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+      while (walker.nextNode()) for (let k = 0; k < walker.currentNode.length; k++) {
+        const range = document.createRange(); range.setStart(walker.currentNode, k); range.setEnd(walker.currentNode, k + 1);
+        letters.push([walker.currentNode.data[k], range.getBoundingClientRect().top]) }
+      return letters.filter((one, k) => k + 1 < letters.length && letters[k + 1][1] > one[1] + 2).map(one => one[0]) })"""
+    with opened(pages / "sweep" / "report.html", width=390) as seen:
+        assert seen.page.locator(".wide:not(.many) td:first-child").count() > 0
+        assert set(seen.page.evaluate(ends)) <= set(" ._/")
+
+
 @pytest.mark.parametrize("verb", SYMBOLS)
 def test_symbols_are_explained_where_they_stand(pages: Path, verb: str) -> None:
     with opened(pages / verb / "report.html") as seen:

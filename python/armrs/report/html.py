@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from ..errors import BadInput, Text
 from ..io import files
@@ -23,6 +23,7 @@ CONTENTS = Markup("<!-- contents -->")
 """Where a part of a page has its table of contents."""
 _PHONE = 640
 """Widest image that a phone shows whole [pixels]."""
+_BETWEEN_PARTS = re.compile(r"(?<=[\w\]])([._/])(?=[A-Za-z])")
 _HEADING = re.compile(r"<h2>(.*?)</h2>", flags=re.S)
 
 __all__ = [
@@ -71,7 +72,13 @@ def environment(*folders: Path) -> Environment:
         keep_trailing_newline=True,
     )
     engine.filters["typeset"] = tables.typeset
+    engine.filters["breakable"] = _breakable
     return engine
+
+
+def _breakable(cell: object) -> Markup:
+    """Return a cell in which a line may end between the parts of a key or of a file's name."""
+    return Markup(_BETWEEN_PARTS.sub(r"\1<wbr>", str(escape(cell))))
 
 
 def render(engine: Environment, template: str, values: Mapping[str, Any]) -> Markup:
