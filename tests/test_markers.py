@@ -246,9 +246,9 @@ def test_refuses_broken_motions(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["segfault.c3d", "endless.c3d"])
 def test_a_damaged_c3d_neither_crashes_nor_hangs(data: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("ezc3d")
-    from armrs.io import c3d
+    from armrs.io import apart
 
-    monkeypatch.setattr(c3d, "LONGEST", 5.0)
+    monkeypatch.setattr(apart, "LONGEST", 5.0)
     with pytest.raises(armrs.BadInput, match="a whole C3D file"):
         armrs.read_markers(data / "hostile" / name)
 

@@ -17,7 +17,7 @@ from armrs import BadInput, _armrs, cli
 from browser import opened
 from markup import PNG, Markup, unescaped
 
-VOID = {"meta", "img", "br", "input"}
+VOID = {"meta", "img", "br", "input", "wbr"}
 
 
 class Page(HTMLParser):
