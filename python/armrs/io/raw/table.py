@@ -96,9 +96,11 @@ class RawTable:
     def find(self, name: str) -> RawColumn | None:
         """Return the column of this name, or else the only one that differs from it in how its unit is written: `Zeit`, `Zeit [ms]`."""
         named = next((c for c in self.columns if c.name == name), None)
+        if named is not None:
+            return named
         labels = {name, column(name, np.empty(0)).label}
         alike = [c for c in self.columns if labels & {c.label, column(c.name, np.empty(0)).label}]
-        return alike[0] if named is None and len(alike) == 1 else named
+        return alike[0] if len(alike) == 1 else None
 
 
 def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
