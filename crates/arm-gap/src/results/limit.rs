@@ -34,12 +34,12 @@ pub(super) fn limits(
 ) -> Vec<Limit> {
     let mut all: Vec<Limit> = Vec::new();
     for one in ruled {
-        let effect = &one.candidate.effect;
+        let effect = &one.effect;
         let place = placed(effect.kind, effect.index);
         if named.contains(&place) {
             continue;
         }
-        let sizes = std::iter::zip(&one.candidate.free, &one.smallest);
+        let sizes = std::iter::zip(&one.free, &one.smallest);
         for (&free, &smallest) in sizes.filter(|(_, smallest)| smallest.is_finite()) {
             add(&mut all, one, (free, smallest));
         }
@@ -49,7 +49,7 @@ pub(super) fn limits(
 
 /// Adds the smallest value of a free parameter that would have been named.
 fn add(all: &mut Vec<Limit>, one: &Ruled, (free, smallest): (usize, f64)) {
-    let effect = &one.candidate.effect;
+    let effect = &one.effect;
     let parameter = &effect.kind.info().parameters[free];
     let (kind, joint, channel) = placed(effect.kind, effect.index);
     let same = |l: &&mut Limit| {
@@ -157,21 +157,9 @@ mod tests {
 
     fn ruled(kind: &str, index: usize, (gain, price, smallest): (f64, f64, f64)) -> Ruled {
         let kind = Kind::named(kind).expect("a kind");
-        let candidate = Candidate {
-            effect: Effect::new(kind, index),
-            question: 0,
-            free: vec![0],
-            rest: None,
-            refined: Vec::new(),
-            tried: 1,
-            step: 1.0,
-            price: 0.0,
-            spread: 1.0,
-            gained: f64::INFINITY,
-            expected: Vec::new(),
-        };
         Ruled {
-            candidate,
+            effect: Effect::new(kind, index),
+            free: vec![0],
             gain,
             price,
             smallest: vec![smallest],
@@ -182,7 +170,7 @@ mod tests {
     #[test]
     fn each_size_has_its_own_limit() {
         let mut play = ruled("backlash", 0, (3.0, 20.0, 2e-5));
-        play.candidate.free = vec![0, 1];
+        play.free = vec![0, 1];
         play.smallest = vec![2e-5, 3e-3];
         let mut along_y = ruled("backlash", 0, (4.0, 20.0, 1e-5));
         along_y.smallest = vec![1e-5];

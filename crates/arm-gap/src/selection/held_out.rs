@@ -48,8 +48,8 @@ const TOLERATED: f64 = 0.1;
 const LEVEL: f64 = 3.09;
 /// Times its floor above which a gap is plain to see,
 const PLAIN: f64 = 1.5;
-/// and standard deviations of the floor that it must exceed it by then.
-const UNCERTAIN: f64 = 2.0;
+/// and standard deviations of the floor that it must exceed it by then: a reader of the table sees no more.
+const UNCERTAIN: f64 = 1.0;
 
 /// A piece of a trial: its mean square, and when it starts and ends \[s\].
 #[derive(Clone, Copy)]
@@ -65,7 +65,7 @@ struct Piece {
 /// movements where no test trial has a repeat). Both are means over pieces of a second; the scatter of the pieces tells how many degrees of
 /// freedom each has (Satterthwaite 1946). A gap is open where their ratio, less what is tolerated, exceeds the 0.999 quantile of Fisher's
 /// distribution (cube-root approximation of Wilson and Hilferty 1931, Paulson 1942). Few pieces decide little at that level: what anybody
-/// sees in the table, a gap half as large again as its floor and more than twice its standard deviation above it, is open as well.
+/// sees in the table, a gap half as large again as its floor and more than its standard deviation above it, is open as well.
 pub fn held_out(trials: &[Left]) -> Vec<Gap> {
     let channels = trials
         .iter()

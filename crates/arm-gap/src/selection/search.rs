@@ -272,6 +272,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut converged = Converged {
             worthy: Vec::new(),
             tried: Vec::new(),
+            met: Vec::new(),
             plainer: state.barred.clone(),
         };
         for _ in 0..TURNS {
@@ -289,8 +290,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .filter(|c| c.gain > c.members.iter().map(least).sum())
                 .collect();
             let before = converged.plainer.len();
-            for choice in &contenders(&choices, library) {
-                self.converge(choice, state, (library, score_test), &mut converged);
+            for choice in contenders(&choices, library) {
+                if !converged.met.contains(&choice.members) {
+                    self.converge(&choice, state, (library, score_test), &mut converged);
+                    converged.met.push(choice.members);
+                }
             }
             if converged.plainer.len() == before {
                 break;
@@ -376,7 +380,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn ruled(&self, library: &Library, score_test: &ScoreTest) -> Vec<Ruled> {
         (0..score_test.len())
             .map(|c| Ruled {
-                candidate: library.candidates[c].clone(),
+                effect: library.candidates[c].effect,
+                free: library.candidates[c].free.clone(),
                 gain: score_test.evaluate(&[c]).map_or(0.0, |choice| choice.gain)
                     / score_test.scale,
                 price: score_test.price[c] * score_test.spread[c],
@@ -392,6 +397,8 @@ struct Converged<const N: usize> {
     worthy: Vec<(f64, Fitted<N>)>,
     /// All with what they gained.
     tried: Vec<(Vec<Candidate>, f64)>,
+    /// Their members, also of those that cannot be followed: none is converged twice.
+    met: Vec<Vec<usize>>,
     /// Questions that came to a plainer law, now or in a round before.
     plainer: Vec<Candidate>,
 }

@@ -1,5 +1,7 @@
 //! How far a search is, and what it tells.
 
+use arm_core::effect::Effect;
+
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::selection::fit::Fitted;
@@ -17,16 +19,18 @@ pub struct SearchStep {
     pub after: f64,
 }
 
-/// A candidate of the last scan: what it would still explain, and the smallest size that would have been named.
+/// What was asked for and not named: what it would still explain, and the smallest size that would have been named.
 #[derive(Clone, Debug)]
 pub struct Ruled {
-    /// The candidate.
-    pub candidate: Candidate,
+    /// The effect.
+    pub effect: Effect<f64>,
+    /// Its free parameters.
+    pub free: Vec<usize>,
     /// What it would gain.
     pub gain: f64,
     /// What it would have to gain.
     pub price: f64,
-    /// Smallest size of each of its free parameters that would have been named.
+    /// Smallest size of each of these that would have been named.
     pub smallest: Vec<f64>,
 }
 

@@ -26,6 +26,12 @@ pub(crate) struct SetApart<const N: usize> {
 }
 
 impl<const N: usize> SetApart<N> {
+    /// Whether what acts or slips once in some place was found there.
+    pub fn holds(&self, effect: &Effect<f64>) -> bool {
+        let mut once = self.trial_specific.iter().filter(|a| a.trial.is_some());
+        once.any(|a| (a.effect.kind, a.effect.index) == (effect.kind, effect.index))
+    }
+
     /// Drops bursts that dry friction of the final model may hold.
     pub fn without_held(&mut self, effects: &[Effect<f64>]) {
         self.trial_specific.retain(|one| !is_held(one, effects));
@@ -61,11 +67,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let found = &mut apart.trial_specific;
         let before = found.iter().position(|a| a.trial.is_none());
         let without = std::mem::replace(&mut self.courses, apart.measured.clone());
-        let point = self.linearize(&state.point.hypothesis)?;
-        let again = self.rhythm(&point, Line::BetweenRepeats)?;
+        let was_in_runs = without.iter().any(|course| !course.rhythms.is_empty());
+        let anew = was_in_runs.then(|| self.linearize(&state.point.hypothesis));
+        let anew = anew.transpose()?;
+        let point = anew.as_ref().unwrap_or(&state.point);
+        let again = self.rhythm(point, Line::BetweenRepeats)?;
         match (before, again) {
             (Some(before), Some(again)) if again.is_like(&found[before]) => {
-                self.take_out(&point, &again)?;
+                self.take_out(point, &again)?;
                 found[before] = again;
                 self.renewed(state)
             }
@@ -76,7 +85,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             (before, again) => {
                 before.map(|before| found.remove(before));
                 if let Some(again) = again {
-                    self.take_out(&point, &again)?;
+                    self.take_out(point, &again)?;
                     found.push(again);
                 }
                 let settled = self.calibrate_anew()?;
