@@ -90,6 +90,12 @@ impl Candidate {
         (parameter.min, parameter.max)
     }
 
+    /// The least that its two columns with a rest angle may be together: a spring of less than no stiffness is none. `None` without one.
+    pub fn least_of_sum(&self) -> Option<f64> {
+        let parameters = self.effect.kind.info().parameters;
+        self.rest.map(|_| parameters[self.free[0]].min)
+    }
+
     /// The effect whose response each column is: one unit of it.
     pub(super) fn unit(&self, column: usize, size: f64) -> Effect<f64> {
         let mut effect = self.effect;

@@ -4,7 +4,7 @@ use arm_numerics::linalg::matrix::add_scaled;
 use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
-use crate::candidates::candidate::price;
+use crate::candidates::candidate::{Candidate, price};
 use crate::candidates::library::{Library, Twin};
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, priors};
@@ -35,6 +35,8 @@ pub struct ScoreTest {
     square: f64,
     freedom: f64,
     bounds: Vec<(f64, f64)>,
+    /// Least size of each candidate whose two columns are one effect at two rest angles: their sum, which no bound of a column holds.
+    least: Vec<Option<f64>>,
 }
 
 /// Some candidates together.
@@ -106,6 +108,11 @@ impl ScoreTest {
             square: normal.square,
             freedom: normal.rows.saturating_sub(base.len() + 10).max(1) as f64,
             bounds,
+            least: library
+                .candidates
+                .iter()
+                .map(Candidate::least_of_sum)
+                .collect(),
         };
         for index in 0..score_test.columns.len() {
             let Some(choice) = score_test.evaluate(&[index]) else {
@@ -144,7 +151,7 @@ impl ScoreTest {
         self.columns.is_empty()
     }
 
-    /// What some candidates explain together; `None` where they cannot be told apart.
+    /// What some candidates explain together; `None` where they cannot be told apart, or one would be what it cannot be.
     pub fn evaluate(&self, members: &[usize]) -> Option<Choice> {
         self.answer(members, &self.score)
     }
@@ -173,7 +180,7 @@ impl ScoreTest {
         let bounds = |i: usize| self.bounds[columns[i]];
         let (steps, gain) = solve(&self.gram, score, &columns, &bounds)?;
         let mut rest = steps.as_slice();
-        let coefficients = members
+        let coefficients: Vec<Vec<f64>> = members
             .iter()
             .map(|&m| {
                 let (own, others) = rest.split_at(self.columns[m].len());
@@ -181,6 +188,12 @@ impl ScoreTest {
                 own.to_vec()
             })
             .collect();
+        let is_possible = |(&m, own): (&usize, &Vec<f64>)| {
+            self.least[m].is_none_or(|least| own.iter().sum::<f64>() >= least)
+        };
+        if !std::iter::zip(members, &coefficients).all(is_possible) {
+            return None;
+        }
         let price: f64 = members
             .iter()
             .map(|&m| self.spread[m] * self.price[m])

@@ -19,6 +19,8 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 const MOST: usize = 6;
 /// Choices that are converged by simulation in each round.
 const CONTENDERS: usize = 4;
+/// Choices that are converged one after the other where none of these can be followed.
+const RESERVES: usize = 8;
 /// Effects that a choice may add in one round: what is invisible alone may be plain together.
 const AHEAD: usize = 3;
 /// Times that what was found is judged, when others have taken the places of what was named.
@@ -290,7 +292,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .filter(|c| c.gain > c.members.iter().map(least).sum())
                 .collect();
             let before = converged.plainer.len();
-            for choice in contenders(&choices, library) {
+            for (place, choice) in contenders(&choices, library).into_iter().enumerate() {
+                if place > CONTENDERS && !converged.tried.is_empty() {
+                    break;
+                }
                 if !converged.met.contains(&choice.members) {
                     self.converge(&choice, state, (library, score_test), &mut converged);
                     converged.met.push(choice.members);
@@ -403,12 +408,13 @@ struct Converged<const N: usize> {
     plainer: Vec<Candidate>,
 }
 
-/// The choices that are converged by simulation: the best, each with other effects, and the best of a single effect.
+/// The choices that are converged by simulation: the best, each with other effects, and the best of a single effect. Those behind them are
+/// for where none of these can be followed.
 fn contenders(choices: &[Choice], library: &Library) -> Vec<Choice> {
-    let mut contenders: Vec<Choice> = Vec::new();
+    let mut distinct: Vec<Choice> = Vec::new();
     let most = choices.first().map_or(0.0, |c| c.worth);
     for choice in choices.iter().filter(|c| c.worth > 0.5 * most) {
-        if contenders.len() >= CONTENDERS {
+        if distinct.len() >= CONTENDERS + RESERVES {
             break;
         }
         // Another shape of the same effects is refined by the fit, it need not be converged by itself.
@@ -418,18 +424,20 @@ fn contenders(choices: &[Choice], library: &Library) -> Vec<Choice> {
                     library.candidates[a].is_same_effect(&library.candidates[b].effect)
                 })
         };
-        if !contenders.iter().any(same) {
-            contenders.push(choice.clone());
+        if !distinct.iter().any(same) {
+            distinct.push(choice.clone());
         }
     }
-    if let Some(single) = choices
+    let single = choices
         .iter()
-        .find(|c| c.members.len() == 1 && c.worth > 0.0)
-        && !contenders.iter().any(|c| c.members == single.members)
-    {
-        contenders.push(single.clone());
+        .find(|c| c.members.len() == 1 && c.worth > 0.0);
+    if let Some(single) = single {
+        let of = distinct.iter().position(|c| c.members == single.members);
+        if of.is_none_or(|place| place > CONTENDERS) {
+            distinct.insert(CONTENDERS.min(distinct.len()), single.clone());
+        }
     }
-    contenders
+    distinct
 }
 
 /// Whether a sensor is far from what was promised.
