@@ -207,6 +207,17 @@ def test_the_line_says_which_argument(call: Callable[[], object], message: str) 
         call()
 
 
+@pytest.mark.parametrize(
+    "name", ["forward_kinematics", "jacobian", "inertia", "gravity", "coriolis", "inverse_dynamics", "forward_dynamics"]
+)
+def test_arrays_stored_by_columns_are_read_by_rows(name: str) -> None:
+    """As those of pandas are; of two rows or more, since one is stored the same either way."""
+    kernel = getattr(ARM, name)
+    count = {"coriolis": 2, "inverse_dynamics": 3, "forward_dynamics": 3}.get(name, 1)
+    given = np.random.default_rng(1).normal(size=(count, 5, 2))
+    np.testing.assert_array_equal(kernel(*map(np.asfortranarray, given)), kernel(*given))
+
+
 def test_numbers_of_other_kinds_are_numbers() -> None:
     exact = ARM.gravity([[0.5, 0.25]])
     for same in ([[Fraction(1, 2), Fraction(1, 4)]], np.array([[0.5, 0.25]], np.float32), np.asfortranarray([[0.5, 0.25]])):

@@ -6,10 +6,10 @@ use std::marker::PhantomData;
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Chain, Lanes, Scalar};
 use arm_sim::reserve_room;
-use numpy::ndarray::{ArrayD, IxDyn};
+use numpy::ndarray::{ArrayD, Dimension, IxDyn};
 use numpy::{
-    IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
-    PyUntypedArrayMethods,
+    Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
+    PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -114,9 +114,9 @@ impl<'a> Rows<'a> {
                 ));
             }
         };
-        let values = match array.as_slice() {
-            Ok(slice) => Cow::Borrowed(slice),
-            Err(_) => {
+        let values = match array.as_array().to_slice() {
+            Some(slice) => Cow::Borrowed(slice),
+            None => {
                 let mut copy = room(array.len(), 1)?;
                 copy.extend(array.as_array().iter());
                 Cow::Owned(copy)
@@ -142,6 +142,17 @@ impl<'a> Rows<'a> {
         };
         &self.values[start..start + self.width]
     }
+}
+
+/// The numbers of an array row by row.
+///
+/// NumPy's own notion of a slice takes an array that is stored column by column, as those of pandas are, for one that is stored by rows.
+pub fn by_rows<'a, T: Element + Copy, D: Dimension>(
+    array: &'a PyReadonlyArray<'_, T, D>,
+) -> Cow<'a, [T]> {
+    let view = array.as_array();
+    view.to_slice()
+        .map_or_else(|| Cow::Owned(view.iter().copied().collect()), Cow::Borrowed)
 }
 
 /// Room for rows of `width` numbers, or `MemoryError` with what they need.

@@ -6,6 +6,7 @@ use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
+use crate::convert::by_rows;
 use crate::errors::{bad_input, identification};
 use crate::results::RunFit;
 use crate::rig::Rig;
@@ -52,8 +53,8 @@ pub fn fit_by_simulation<'py>(
         }
         let experiment = experiment(chain, rig, drive, settings)?;
         let values = Recorded {
-            q: recorded.q.as_slice()?,
-            force_on_arm: recorded.force_on_arm.as_slice()?,
+            q: &by_rows(&recorded.q),
+            force_on_arm: &by_rows(&recorded.force_on_arm),
             angle_noise: [recorded.angle_noise; N],
             force_noise: [recorded.force_noise; 2],
         };

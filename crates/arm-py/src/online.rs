@@ -14,6 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arm::AnyChain;
+use crate::convert::by_rows;
 use crate::errors::{bad_input, invalid};
 use crate::firmware::{DeviceEquation, EFFECTS, UNKNOWNS, device, too_long};
 use crate::kernel::joints;
@@ -268,8 +269,8 @@ impl OnlineEstimator {
     ) -> PyResult<Bound<'py, PyDict>> {
         let (time, q, torque, hand, missing) = &log;
         let (time, missing) = (time.as_slice()?, missing.as_slice()?);
-        let (q, torque, hand) = (q.as_slice()?, torque.as_slice()?, hand.as_slice()?);
-        let lead = lead.as_ref().map(|lead| lead.as_slice()).transpose()?;
+        let (q, torque, hand) = (by_rows(q), by_rows(torque), by_rows(hand));
+        let lead = lead.as_ref().map(by_rows);
         let mut status = Vec::with_capacity(time.len());
         let mut recorded = Recorded::default();
         py.detach(|| {
@@ -279,7 +280,7 @@ impl OnlineEstimator {
                 let span = k * n..(k + 1) * n;
                 let row = (!missing[k]).then(|| Read {
                     q: &q[span.clone()],
-                    lead: lead.map(|lead| &lead[span.clone()]),
+                    lead: lead.as_ref().map(|lead| &lead[span.clone()]),
                     torque: &torque[span.clone()],
                     hand: &hand[3 * k..3 * (k + 1)],
                 });
@@ -307,7 +308,7 @@ impl OnlineEstimator {
         along(
             py,
             &**estimator,
-            [time.as_slice()?, q.as_slice()?, qd.as_slice()?],
+            [time.as_slice()?, &by_rows(&q), &by_rows(&qd)],
         )
     }
 
@@ -482,7 +483,7 @@ impl OnlineCompensation {
         along(
             py,
             &*self.inner,
-            [time.as_slice()?, q.as_slice()?, qd.as_slice()?],
+            [time.as_slice()?, &by_rows(&q), &by_rows(&qd)],
         )
     }
 }
@@ -560,7 +561,7 @@ impl OnlineMonitor {
         moving: PyReadonlyArray2<'_, bool>,
     ) -> PyResult<Option<Stopped>> {
         let (now, stamp) = (times.0.as_slice()?, times.1.as_slice()?);
-        let (values, moving) = (values.as_slice()?, moving.as_slice()?);
+        let (values, moving) = (by_rows(&values), by_rows(&moving));
         let mut monitor = locked(&self.inner);
         for row in 0..now.len() {
             let span = row * self.channels..(row + 1) * self.channels;

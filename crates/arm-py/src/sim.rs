@@ -11,7 +11,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
-use crate::convert::rows;
+use crate::convert::{by_rows, rows};
 use crate::errors::{bad_input, simulation};
 use crate::results::{Readings, Recording as Recorded};
 use crate::rig::Rig;
@@ -356,9 +356,8 @@ impl Digest {
     }
 
     /// Adds values of the column that was begun last.
-    fn values(&mut self, values: PyReadonlyArrayDyn<'_, f64>) -> PyResult<()> {
-        self.0.values(values.as_slice()?);
-        Ok(())
+    fn values(&mut self, values: PyReadonlyArrayDyn<'_, f64>) {
+        self.0.values(&by_rows(&values));
     }
 
     /// The digest of all that was added.
