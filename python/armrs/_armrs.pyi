@@ -87,7 +87,6 @@ __all__ = [
     "literature",
     "load_model",
     "look",
-    "low_pass_both_ways",
     "online_settings",
     "play",
     "reach",
@@ -1644,4 +1643,3 @@ def look(
     progress: Callable[[str, float], None] | None = None,
 ) -> Screening: ...
 def displacement_of_base(path: NDArray[np.float64], place: tuple[float, float], rate: float) -> NDArray[np.float64]: ...
-def low_pass_both_ways(values: NDArray[np.float64], rate: float, cutoff: float, order: int) -> NDArray[np.float64]: ...

@@ -49,7 +49,6 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(plan::design_py, m)?)?;
     m.add_function(wrap_pyfunction!(lab::literature, m)?)?;
     m.add_function(wrap_pyfunction!(signal::smooth, m)?)?;
-    m.add_function(wrap_pyfunction!(signal::low_pass_both_ways, m)?)?;
     m.add_function(wrap_pyfunction!(signal::displacement_of_base, m)?)?;
     m.add_function(wrap_pyfunction!(convert::require_room, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;

@@ -2,7 +2,6 @@
 
 use arm_ident::regression::measured_motion::{self, low_pass};
 use arm_numerics::signal::derivative;
-use arm_numerics::signal::filter::Butterworth;
 use numpy::ndarray::{Array1, Array2};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -39,27 +38,6 @@ pub fn smooth<'py>(
     }
     let [passed, first, second] = out.map(|table| table.into_pyarray(py));
     Ok((passed, first, second))
-}
-
-/// Zero-phase Butterworth low-pass of uniform time series, `(n, k)`.
-///
-/// `cutoff` is −3 dB of a single pass [Hz], so −6 dB of both; the ends are continued as `scipy.signal.sosfiltfilt` does.
-#[pyfunction]
-pub fn low_pass_both_ways<'py>(
-    py: Python<'py>,
-    values: PyReadonlyArray2<'py, f64>,
-    rate: f64,
-    cutoff: f64,
-    order: usize,
-) -> PyResult<Table<'py>> {
-    let filter = Butterworth::low_pass(order, cutoff, rate).map_err(identification)?;
-    let mut out = Array2::zeros((values.shape()[0], values.shape()[1]));
-    for c in 0..values.shape()[1] {
-        let column = values.as_array().column(c).to_vec();
-        let passed = filter.both_ways(&column).map_err(identification)?;
-        out.column_mut(c).assign(&Array1::from(passed));
-    }
-    Ok(out.into_pyarray(py))
 }
 
 /// How far a measured path of the first joint, `(n, 2)` [m], is from the place of the base [m]: `(n, 2)` [m].
