@@ -5,13 +5,12 @@ use arm_core::effect::{
 };
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
-    Setup, forward_dynamics, gravity, joint_force, kinetic_energy, potential_energy, tip,
-    tip_velocity,
+    Setup, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
 };
 
 use crate::plain::{Plain, affine, apart, load, pull};
 use crate::state::{Input, Outcome, State, difference, powers, sum};
-use crate::terms::{MovingBase, Terms, add_inertia, unit_weight};
+use crate::terms::{MovingBase, Terms, add_inertia, first_moment_rows};
 
 /// How the tip is held.
 #[derive(Clone, Copy, Debug)]
@@ -27,11 +26,9 @@ pub(crate) enum Link<T> {
 #[derive(Clone, Debug)]
 pub(crate) struct Model<T, const N: usize> {
     pub chain: Chain<T, N>,
-    pub base: Option<MovingBase<T, N>>,
+    pub base: Option<MovingBase<T>>,
     /// Whether the base also moves by itself, as a function of time.
     pub heaves: bool,
-    /// The arm under unit gravity against y and z: its gravity torques are those of an accelerated base.
-    unit_weight: [Chain<T, N>; 2],
     /// Where the handle is, unless at the tip.
     pub placement: Option<Placement<T>>,
     pub link: Link<T>,
@@ -82,7 +79,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         if others.iter().all(|effect| !effect.on) {
             others.clear();
         }
-        let is_dry = |e: &&Effect<T>| rubs(e);
+        let is_dry = |e: &&Effect<T>| has_dry_friction(e);
         let mut dry = [false; N];
         for effect in effects.iter().filter(is_dry) {
             if let Some(dry) = dry.get_mut(effect.index) {
@@ -99,9 +96,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             others,
             products: Products::of(&chain),
             chain,
-            base: MovingBase::of(setup)?,
+            base: MovingBase::of(setup),
             heaves: !setup.heave.is_still(),
-            unit_weight: unit_weight(setup)?,
             placement: Placement::of(setup),
             link,
             feels_joint_force: effects.iter().any(feels_joint_force),
@@ -211,7 +207,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     /// Apart, so that the usual case stays small.
     #[inline(never)]
     fn heaving(&self, input: &Input<T, N>, pose: &Pose<T, N>) -> Joints<T, N> {
-        let rows = [0, 1].map(|axis| gravity(&self.unit_weight[axis], pose));
+        let rows = first_moment_rows(&self.chain, pose);
         let [y, z] = input.base.acceleration;
         let mut torque = input.torque;
         for j in 0..N {
@@ -499,7 +495,7 @@ fn dry_at<T: Scalar>(effect: &Effect<T>, speed: f64) -> T {
 }
 
 /// Tries whether there is any dry friction in an effect.
-fn rubs<T: Scalar>(effect: &Effect<T>) -> bool {
+fn has_dry_friction<T: Scalar>(effect: &Effect<T>) -> bool {
     effect.is_dry() && !dry_at(effect, 0.0).every(|most| most == 0.0)
 }
 
@@ -515,7 +511,8 @@ fn resists_besides_dry<T: Scalar>(effect: &Effect<T>) -> bool {
 
 /// Tries whether dry friction is less at a speed than at rest.
 fn falls<T: Scalar>(effect: &Effect<T>) -> bool {
-    rubs(effect) && !(dry_at(effect, 0.1) - dry_at(effect, 0.0)).every(|change| change == 0.0)
+    has_dry_friction(effect)
+        && !(dry_at(effect, 0.1) - dry_at(effect, 0.0)).every(|change| change == 0.0)
 }
 
 /// Tries whether the force through the joint changes an effect's torque; no kind is named here.

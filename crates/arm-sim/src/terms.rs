@@ -4,7 +4,7 @@
 use core::array::from_fn;
 
 use arm_core::{
-    Chain, Invalid, JointMatrix, Joints, Placement, Plane, Pose, Scalar, Setup, gravity, inertia,
+    Chain, JointMatrix, Joints, Placement, Plane, Pose, Scalar, Setup, gravity, inertia,
     inverse_dynamics, jacobian, jacobian_rate, joint_force,
 };
 
@@ -20,39 +20,36 @@ use arm_core::{
 ///
 /// so that inertia, weight and contact force all act on it and energy is conserved.
 #[derive(Clone, Debug)]
-pub(crate) struct MovingBase<T, const N: usize> {
+pub(crate) struct MovingBase<T> {
     per_angle: Plane<T>,
     rest: T,
     mass: T,
-    /// The arm under unit gravity against y and z: its gravity torques are the rows of P.
-    unit_weight: [Chain<T, N>; 2],
 }
 
-impl<T: Scalar, const N: usize> MovingBase<T, N> {
+impl<T: Scalar> MovingBase<T> {
     /// The moving base of a rig, or nothing where it rests.
-    pub fn of(setup: &Setup<T, N>) -> Result<Option<Self>, Invalid> {
+    pub fn of<const N: usize>(setup: &Setup<T, N>) -> Option<Self> {
         let u = setup.base_motion;
         if u.iter().all(|u| u.every(|u| u == 0.0)) {
-            return Ok(None);
+            return None;
         }
-        Ok(Some(Self {
+        Some(Self {
             per_angle: u,
             rest: setup.base_rest,
             mass: setup.segments.iter().fold(T::ZERO, |m, s| m + s.mass),
-            unit_weight: unit_weight(setup)?,
-        }))
+        })
     }
 
     /// How far the base stands from its place at rest \[m\].
     #[inline]
-    pub fn displacement(&self, q: &Joints<T, N>) -> Plane<T> {
+    pub fn displacement<const N: usize>(&self, q: &Joints<T, N>) -> Plane<T> {
         let angle = q[0] - self.rest;
         self.per_angle.map(|u| u * angle)
     }
 
     /// Its velocity \[m/s\], and with accelerations its acceleration \[m/s²\].
     #[inline]
-    pub fn velocity(&self, qd: &Joints<T, N>) -> Plane<T> {
+    pub fn velocity<const N: usize>(&self, qd: &Joints<T, N>) -> Plane<T> {
         self.per_angle.map(|u| u * qd[0])
     }
 
@@ -63,13 +60,8 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
         self.mass * (uy * y + uz * z)
     }
 
-    /// Derivative of the first moment to the joint angles, rows y and z \[kg m/rad\].
-    fn first_moment_rows(&self, pose: &Pose<T, N>) -> [Joints<T, N>; 2] {
-        [0, 1].map(|axis| gravity(&self.unit_weight[axis], pose))
-    }
-
     /// Joint torques on the left-hand side because the base moves; the contact's share is subtracted \[N m\].
-    pub fn torque(
+    pub fn torque<const N: usize>(
         &self,
         chain: &Chain<T, N>,
         pose: &Pose<T, N>,
@@ -78,7 +70,7 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
     ) -> Joints<T, N> {
         // Newton for the whole arm as if its base stood still, less the contact force.
         let [fy, fz] = joint_force(chain, pose, (qd, qdd), force_on_arm)[0];
-        let rows = self.first_moment_rows(pose);
+        let rows = first_moment_rows(chain, pose);
         let [uy, uz] = self.per_angle;
         let mut torque = Joints::<T, N>::repeat(T::ZERO);
         for k in 0..N {
@@ -89,7 +81,7 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
     }
 
     /// Kinetic and potential energy beyond those of the arm on a base at rest \[J\].
-    pub fn energy(
+    pub fn energy<const N: usize>(
         &self,
         chain: &Chain<T, N>,
         pose: &Pose<T, N>,
@@ -97,7 +89,7 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
         qd: &Joints<T, N>,
     ) -> [T; 2] {
         let v = self.velocity(qd);
-        let rows = self.first_moment_rows(pose);
+        let rows = first_moment_rows(chain, pose);
         let mut kinetic = T::of(0.5) * self.mass * (v[0].squared() + v[1].squared());
         for k in 0..N {
             kinetic += (v[0] * rows[0][k] + v[1] * rows[1][k]) * qd[k];
@@ -108,12 +100,13 @@ impl<T: Scalar, const N: usize> MovingBase<T, N> {
     }
 }
 
-/// An arm under unit gravity against y and against z.
-pub(crate) fn unit_weight<T: Scalar, const N: usize>(
-    setup: &Setup<T, N>,
-) -> Result<[Chain<T, N>; 2], Invalid> {
-    let against = |y, z| Chain::new(setup.segments, setup.base, [T::of(y), T::of(z)]);
-    Ok([against(-1.0, 0.0)?, against(0.0, -1.0)?])
+/// Derivative of the arm's first moment to the joint angles, rows y and z \[kg m/rad\]: its gravity torques under unit gravity against y and z.
+pub(crate) fn first_moment_rows<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+) -> [Joints<T, N>; 2] {
+    let against = |y, z| gravity(&chain.with_gravity([T::of(y), T::of(z)]), pose);
+    [against(-1.0, 0.0), against(0.0, -1.0)]
 }
 
 /// Adds to the forces through the joints what accelerates everything beyond them with the base \[N\].
@@ -147,7 +140,7 @@ pub(crate) struct Terms<T, const N: usize> {
 impl<T: Scalar, const N: usize> Terms<T, N> {
     pub fn new(
         chain: &Chain<T, N>,
-        base: Option<&MovingBase<T, N>>,
+        base: Option<&MovingBase<T>>,
         placement: Option<&Placement<T>>,
         (pose, qd): (&Pose<T, N>, &Joints<T, N>),
     ) -> Self {
@@ -167,7 +160,7 @@ impl<T: Scalar, const N: usize> Terms<T, N> {
         };
         if let Some(base) = base {
             let [uy, uz] = base.per_angle;
-            let rows = base.first_moment_rows(pose);
+            let rows = first_moment_rows(chain, pose);
             for k in 0..N {
                 let coupling = uy * rows[0][k] + uz * rows[1][k];
                 terms.inertia[(0, k)] += coupling;
