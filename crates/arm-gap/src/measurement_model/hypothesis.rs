@@ -145,8 +145,8 @@ impl<const N: usize> Hypothesis<N> {
         parts.into_iter().flatten().copied().collect()
     }
 
-    /// Whether dry friction acts in some joint.
-    pub fn rubs(&self) -> bool {
+    /// Whether dry friction acts in some joint, set-valued or smoothed.
+    pub fn has_dry_friction(&self) -> bool {
         let mut acting = self.known.iter().chain(&self.named);
         acting.any(|e| e.on && e.parameters[0] != 0.0 && e.kind.smoothed_by().is_some())
     }

@@ -71,7 +71,7 @@ impl<const N: usize> Session<N> {
             own = own.with(c.target, value);
         }
         in_phase(&mut rhythms, &sizes[placed.len()..]);
-        if !rhythms.is_empty() && own.rubs() {
+        if !rhythms.is_empty() && own.has_dry_friction() {
             rhythms = self.phased_by_runs((&own, rhythms), course)?;
         }
         own.named.extend(rhythms);

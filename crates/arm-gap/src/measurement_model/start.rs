@@ -46,7 +46,7 @@ impl<const N: usize> Session<N> {
     ) -> Result<Joints<f64, N>, SimulationError> {
         let effects = hypothesis.effects();
         let zero = Joints::zeros();
-        if !effects.iter().any(is_rubbing) {
+        if !effects.iter().any(is_set_valued_friction) {
             return Ok(zero);
         }
         let setup = self.rig(hypothesis)?;
@@ -97,7 +97,11 @@ impl<const N: usize> Session<N> {
         resting.start = Start::Equilibrium { near };
         resting.duration = resting.dt;
         resting.output_interval = None;
-        for effect in resting.effects.iter_mut().filter(|e| is_rubbing(e)) {
+        for effect in resting
+            .effects
+            .iter_mut()
+            .filter(|e| is_set_valued_friction(e))
+        {
             if friction[effect.index] != 0.0 {
                 effect.parameters[0] = 0.0;
             }
@@ -112,8 +116,8 @@ impl<const N: usize> Session<N> {
     }
 }
 
-/// Whether an effect is dry friction that is set-valued.
-pub(crate) fn is_rubbing(effect: &Effect<f64>) -> bool {
+/// Whether an effect is set-valued dry friction that acts.
+pub(crate) fn is_set_valued_friction(effect: &Effect<f64>) -> bool {
     effect.on && effect.is_dry() && effect.parameters[0] > 0.0
 }
 

@@ -10,7 +10,7 @@ use arm_sim::SimulationError;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::Course;
-use crate::measurement_model::start::is_rubbing;
+use crate::measurement_model::start::is_set_valued_friction;
 
 /// What moves a led arm, besides its own state.
 pub(super) struct Plant<const N: usize> {
@@ -43,7 +43,7 @@ impl<const N: usize> Plant<N> {
         Ok(Self {
             chain: setup.chain()?,
             contact: setup.contact,
-            dry: resisting.iter().any(is_rubbing),
+            dry: resisting.iter().any(is_set_valued_friction),
             feels_force: setup.base_motion != [0.0; 2]
                 || resisting.iter().any(|e| e.kind.feels_force()),
             setup,

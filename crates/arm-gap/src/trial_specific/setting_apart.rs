@@ -25,7 +25,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         trial_specific: &TrialSpecific,
     ) -> Result<(), GapError> {
         let is_of_muscles = trial_specific.effect.kind.prior().nature == Nature::Rhythm;
-        if is_of_muscles && point.hypothesis.rubs() {
+        if is_of_muscles && point.hypothesis.has_dry_friction() {
             let measured = self.courses.clone();
             if let Ok(true) = self.put_into_runs(point, trial_specific) {
                 return Ok(());
