@@ -116,6 +116,19 @@ def matlab_7_3(r: Recording, folder: Path) -> Path:
     return folder / "slow_1.mat"
 
 
+def matlab_7_3_with_units(r: Recording, folder: Path) -> Path:
+    """HDF5 as MATLAB reads and h5py writes it: milliseconds, degrees and kilonewtons, said by attributes alone."""
+    h5py = pytest.importorskip("h5py")
+    _, values = table(r, names=SI, t=1e3, angle=DEGREE, force=1e-3)
+    with h5py.File(folder / "slow_1.mat", "w") as file:
+        group = file.create_group("trial")
+        parts = (("t", values[:, 0], b"ms"), ("q", values[:, 1:3], "deg"), ("Fy", values[:, 3], np.array(["kN"], dtype=object)))
+        for name, part, unit in (*parts, ("Fz", values[:, 4], np.bytes_("kN"))):
+            group[name] = part
+            group[name].attrs["units" if name != "q" else "Unit"] = unit
+    return folder / "slow_1.mat"
+
+
 def c3d_with_analogs(r: Recording, folder: Path) -> Path:
     """Markers at 100 Hz and the force on analog channels at 200 Hz, as ezc3d writes them."""
     ezc3d = pytest.importorskip("ezc3d")
@@ -211,6 +224,7 @@ CASES: dict[str, tuple[Writer, dict[str, object], float]] = {
     "OpenSim storage that a spreadsheet saved": (saved_again, {}, 0.0),
     "MATLAB 5": (matlab_5, {}, 0.0),
     "MATLAB 7.3": (matlab_7_3, {}, 0.0),
+    "MATLAB 7.3 with attributes for units": (matlab_7_3_with_units, {}, 1e-12),
     "C3D with analogs": (c3d_with_analogs, {"points": ("SHO", "ELB", "HAND")}, 3e-6),
     "OpenSim storage": (motion_file, {}, 0.0),
     "Parquet": (parquet, {}, 0.0),

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import armrs
-from armrs import Arm, Model
+from armrs import Arm, Model, cli
 from armrs.io.raw import RawTable, read_raw
 from armrs.io.raw.table import column
 from armrs.workflows import demo
@@ -69,13 +69,19 @@ def test_clocks_of_a_session_are_found_together(seed: int, tmp_path: Path) -> No
         assert abs(error) <= max(case.step, 0.02)
 
 
-def test_a_period_that_nothing_tells_is_in_doubt(tmp_path: Path) -> None:
+def test_a_period_that_nothing_tells_is_in_doubt(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Circles without beginning, each on a clock of its own: every period explains the forces as well."""
     results = check_clock.found(20142, tmp_path)
     assert max(abs(error) for _, error, _ in results) > check_clock.PERIOD_OFF
     assert all(doubted for _, error, doubted in results if abs(error) > check_clock.PERIOD_OFF)
     with pytest.warns(armrs.errors.ArmrsWarning, match=r"forces shifted by [-+]\d+\.\d{3} s, but .* explain them about as well"):
         again = armrs.import_recordings([tmp_path / "raw"], tmp_path / "again", model=tmp_path / "session" / "model.toml")
+    repeated = ["import", str(again.folder / "import.toml"), "-o", str(tmp_path / "decided")]
+    assert cli.main(repeated) == 0, "import.toml decides the clocks"
+    monkeypatch.setattr("armrs.workflows.importing.import_recordings", lambda *_, **__: again)
+    assert cli.main(repeated) == 1 and "  in doubt: " in capsys.readouterr().out
     page = again.report(tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count("explain them about as well") >= len(again.warnings) - 1 > 0
 

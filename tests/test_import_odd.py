@@ -372,3 +372,39 @@ def test_states_of_opensim_are_angles_and_speeds(recording: Recording, tmp_path:
     assert [units[symbol] for symbol in ("q1", "q2", "dq1", "dq2")] == ["rad", "rad", "rad/s", "rad/s"]
     assert not any(c.symbol.startswith("tau") for c in done.recipe.channels)
     assert np.abs(armrs.load_dataset(done.folder).trials[0].q - recording.q).max() < 1e-8
+
+
+def _one_turn(r: Recording, folder: Path, wrap: Callable[[np.ndarray], np.ndarray]) -> list[Path]:
+    """Two repeats in degrees, which begin at 0 s and 1 s of the recording, as a recorder writes angles that it wraps."""
+    made = []
+    for repeat in (1, 2):
+        samples = repeated(np.column_stack([r.t, r.q * DEGREE, r.force_on_robot]), repeat)[100 * (repeat - 1) :]
+        samples[:, 1:3] = wrap(samples[:, 1:3])
+        made.append(write_text(folder / f"slow_{repeat}.csv", ["t_s", "q1_deg", "q2_deg", "Fy_N", "Fz_N"], samples))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("wrap", "wrapped"),
+    [
+        (lambda q: np.mod(q, 360.0), "0 to 360°"),
+        (lambda q: np.mod(q + (offset := np.array([45.0, -60.0])), 360.0) - offset, "wrapped within the movement"),
+        (lambda q: q + 360.0 * (q[0] < [-50.0, 50.0]), "whole turns off in some trials"),
+    ],
+)
+def test_angles_are_counted_in_one_turn_in_all_trials(
+    wrap: Callable[[np.ndarray], np.ndarray], wrapped: str, recording: Recording, tmp_path: Path
+) -> None:
+    """Each trial was unwrapped from its own first sample, and the same movement stood a turn apart in two trials."""
+    done = armrs.import_recordings(_one_turn(recording, tmp_path, wrap), tmp_path / "set", model=KNOWN)
+    again = armrs.import_recordings([done.folder / "import.toml"], tmp_path / "again", model=KNOWN)
+    assert again.recipe.channels == done.recipe.channels
+    assert any(c.lowest is not None and "turn from" in c.why for c in done.recipe.channels), wrapped
+    for made in (done, again):
+        for k, trial in enumerate(armrs.load_dataset(made.folder).trials):
+            assert np.abs(trial.q - recording.q[100 * k :]).max() < 1e-5  # the noise of `repeated` is 1e-4 degrees
+
+
+def test_angles_within_a_turn_are_left_as_they_are(recording: Recording, tmp_path: Path) -> None:
+    done = armrs.import_recordings(_one_turn(recording, tmp_path, lambda q: q), tmp_path / "set", model=KNOWN)
+    assert [c.lowest for c in done.recipe.channels] == [None] * 5 and "lowest" not in (done.folder / "import.toml").read_text()

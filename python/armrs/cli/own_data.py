@@ -200,12 +200,13 @@ def import_(
     ask: Annotated[bool, typer.Option("--ask", help="Ask for each column on the terminal, with a guess and its reason.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the data set of a former import, with what was edited in it.")] = False,
     json: JsonFile = None,
-) -> None:
+) -> int:
     """Convert recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO, exports of Vicon, Qualisys, OptiTrack) into a data set.
 
     Separators, decimal commas, encodings, units and columns are recognised. The angle convention and the body on which the force acts
     are inferred from the balance of the arm, unless options state them. Every decision is printed and saved in import.toml, which
-    repeats the import.
+    repeats the import. Exit status 1 if the clock of a force recording is in doubt: the data set is written, and a line names the
+    offsets that explain the forces about as well.
     """
     from ..io.dataset import load_dataset
     from ..report.recording import write_recording
@@ -248,6 +249,7 @@ def import_(
         print(f"Look at {picture}: does the arm stand as in the laboratory, and does the force support it?")
 
     present(done.to_dict, json, human, f"armrs check {shlex.quote(str(done.folder))}")
+    return 1 if done.warnings else 0
 
 
 def _about_columns(error: BadInput) -> bool:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -37,11 +39,11 @@ def read_matlab(path: Path) -> list[RawTable]:
     if HDF5 in (head[:8], head[512:520]) and find_spec("h5py") is None:
         raise ArmrsError('MATLAB files of version 7.3 need h5py: pip install "armrs[files]"')
     with apart.content("armrs.io.raw.matlab_arrays", path, "a MATLAB file of version 5 or 7.3") as arrays:
-        names = json.loads(str(arrays["names"]))
-        return [table_of(path, title, {name: arrays[place] for name, place in of.items()}) for title, of in names]
+        names, units = (json.loads(str(arrays[key])) for key in ("names", "units"))
+        return [table_of(path, title, {name: arrays[place] for name, place in of.items()}, units) for title, of in names]
 
 
-def table_of(path: Path, title: str, arrays: dict[str, np.ndarray]) -> RawTable:
+def table_of(path: Path, title: str, arrays: dict[str, np.ndarray], units: Mapping[str, str] = MappingProxyType({})) -> RawTable:
     """Return the vectors among arrays, and the columns of matrices, that are as long as the longest.
 
     Raises
@@ -59,7 +61,7 @@ def table_of(path: Path, title: str, arrays: dict[str, np.ndarray]) -> RawTable:
     for name, a in chosen.items():
         axes = _AXES.get(a.shape[1], "") if _FORCE.search(name) else ""
         names = [name] if a.shape[1] == 1 else [f"{name} {axis}" for axis in axes] or [f"{name}{k}" for k in range(1, a.shape[1] + 1)]
-        columns += [column(own, np.ascontiguousarray(values)) for own, values in zip(names, a.T, strict=True)]
+        columns += [column(own, np.ascontiguousarray(values), units.get(name, "")) for own, values in zip(names, a.T, strict=True)]
     left = [name for name in tall if name not in chosen and tall[name].size > 1]
     notes = [f"left out, since they have another length than {long}: {', '.join(left)}"] if left else []
     return RawTable(path, title, tuple(columns), tuple(notes))

@@ -21,16 +21,17 @@ _MOST = 100_000_000
 
 
 def arrays_of(path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of all tables of a file under numbers, and under `names` in JSON their titles and names."""
+    """Return the arrays of all tables of a file under numbers; in JSON, under `names` their titles and names, under `units` their units."""
     head = path.read_bytes()[:520]
-    tables = [(path.stem, _version_7_3(path))] if HDF5 in (head[:8], head[512:520]) else _version_5(path)
+    units: dict[str, str] = {}
+    tables = [(path.stem, _version_7_3(path, units))] if HDF5 in (head[:8], head[512:520]) else _version_5(path)
     found: dict[str, np.ndarray] = {}
     names: list[tuple[str, dict[str, str]]] = []
     for title, arrays in tables:
         places = {name: str(len(found) + k) for k, name in enumerate(arrays)}
         found |= {places[name]: value for name, value in arrays.items()}
         names.append((title, places))
-    return {"names": np.array(json.dumps(names)), **found}
+    return {"names": np.array(json.dumps(names)), "units": np.array(json.dumps(units)), **found}
 
 
 def _version_5(path: Path) -> list[tuple[str, dict[str, np.ndarray]]]:
@@ -82,7 +83,14 @@ def _keep(name: str, value: np.ndarray, found: dict[str, np.ndarray]) -> None:
         found.setdefault(name, value.astype(np.float64))
 
 
-def _version_7_3(path: Path) -> dict[str, np.ndarray]:
+def _unit_of(item: Any) -> str:
+    """Return what the attribute `units` of an HDF5 dataset says, as h5py, PyTables, netCDF-4 and NWB write it; empty without one."""
+    stated = next((item.attrs[key] for key in item.attrs if key.lower() in ("unit", "units")), "")
+    stated = stated.flat[0] if isinstance(stated, np.ndarray) and stated.size else stated
+    return stated.decode("utf-8", "replace") if isinstance(stated, bytes) else stated if isinstance(stated, str) else ""
+
+
+def _version_7_3(path: Path, units: dict[str, str]) -> dict[str, np.ndarray]:
     import h5py
 
     found: dict[str, np.ndarray] = {}
@@ -98,8 +106,11 @@ def _version_7_3(path: Path) -> dict[str, np.ndarray]:
             if item.size > _MOST:
                 raise ValueError(f"{name} has {item.size} values, at most {_MOST} are read")
             value = np.asarray(item[()])
+            last = name.rsplit("/", 1)[-1]
             if np.issubdtype(value.dtype, np.number):
-                _keep(name.rsplit("/", 1)[-1], value.T, found)
+                if last not in found:
+                    units[last] = _unit_of(item)
+                _keep(last, value.T, found)
 
     try:
         with h5py.File(path, "r") as file:

@@ -14,6 +14,7 @@ from ...errors import BadInput, Text, unknown_name
 from ...io.raw import RawColumn, RawTable
 from ...io.raw.units import UNITS, unit
 from .recipe import Channel
+from .turns import TURN, lowest
 
 _TIME = {
     "t",
@@ -228,9 +229,8 @@ def guess(tables: Sequence[RawTable], given: Mapping[str, tuple[str, int]], prob
             )
         turned = symbol[0] in "FP" and bool((_BACK | _DOWN) & set(words(columns[0].label)))
         chosen[symbol] = (columns[0], -1 if turned else 1, f"by its name {columns[0].name!r}")
-    return [
-        channel for symbol, (c, sign, why) in chosen.items() if (channel := _channel(symbol, c, sign, why, tables, problems)) is not None
-    ]
+    channels = [_channel(symbol, c, sign, why, tables, problems) for symbol, (c, sign, why) in chosen.items()]
+    return [_in_one_turn(channel, tables) for channel in channels if channel is not None]
 
 
 def _is_unit(column: RawColumn) -> bool:
@@ -269,6 +269,17 @@ def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequen
         text = "mm" if most > _MILLIMETRES_FROM else "m"
         return Channel(symbol, column.name, text, sign, f"{why}; no unit stated; values up to {most:.3g}, so in {text}")
     return Channel(symbol, column.name, _DEFAULT_UNIT[dimension], sign, f"{why}; no unit stated, so {_DEFAULT_UNIT[dimension]}")
+
+
+def _in_one_turn(channel: Channel, tables: Sequence[RawTable]) -> Channel:
+    """Return a channel of angles with the turn in which all trials count it, where they are wrapped or whole turns off."""
+    known = unit(channel.unit)
+    if known is None or known.dimension != "angle":
+        return channel
+    low = lowest([c.values for table in tables if (c := table.find(channel.column)) is not None], TURN / known.factor)
+    if low is None:
+        return channel
+    return changed(channel, lowest=low, why=f"{channel.why}; in the turn from {low:g} {channel.unit} on, without jumps over all trials")
 
 
 def plane(channels: Sequence[Channel], tables: Sequence[RawTable]) -> tuple[list[Channel], list[str]]:

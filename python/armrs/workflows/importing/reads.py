@@ -11,6 +11,7 @@ from ...errors import BadInput, Text
 from ...io.raw import RawTable
 from ...io.raw.units import unit
 from .recipe import Channel, RawTrial
+from .turns import TURN, counted_from
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,11 @@ def values(table: RawTable, channel: Channel) -> np.ndarray:
     if found is None:
         raise BadInput("columns", Text(f"no column {channel.column!r}"), f"the column of {channel.symbol}", file=table.path)
     known = unit(channel.unit) if channel.unit else None
+    raw = found.values
+    if channel.lowest is not None and known is not None:
+        raw = counted_from(raw, channel.lowest, TURN / known.factor)
     factor = channel.sign * (known.factor if known and not channel.symbol.startswith("emg_") else 1.0)
-    return found.values if factor == 1.0 else found.values * factor
+    return raw if factor == 1.0 else raw * factor
 
 
 def arrays(read: Read, channels: Sequence[Channel], n_joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:

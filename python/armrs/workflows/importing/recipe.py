@@ -31,6 +31,8 @@ class Channel:
     sign : {1, -1}
     why : str
         The reason for this choice.
+    lowest : float or None
+        Raw angles are brought into the turn from here on, in `unit`; None where they are not wrapped.
     """
 
     symbol: str
@@ -38,6 +40,7 @@ class Channel:
     unit: str
     sign: int = 1
     why: str = field(default="", compare=False)
+    lowest: float | None = None
 
 
 @dataclass(frozen=True)
@@ -139,7 +142,13 @@ class Recipe:
         }
         blocks.append("\n".join([*_reason(c.why), "[convention]", *tomlfile.lines(angles)]))
         for channel in self.channels:
-            table = {"symbol": channel.symbol, "column": channel.column, "unit": channel.unit, "sign": channel.sign}
+            table = {
+                "symbol": channel.symbol,
+                "column": channel.column,
+                "unit": channel.unit,
+                "sign": channel.sign,
+                "lowest": channel.lowest,
+            }
             blocks.append("\n".join([*_reason(channel.why), "[[channel]]", *tomlfile.lines(table)]))
         for trial in self.trials:
             shift = trial.force_shift if trial.force_file else None
@@ -199,11 +208,12 @@ def _sign(place: str, value: object) -> int:
 
 
 def _channel(place: str, table: Mapping[str, Any]) -> Channel:
-    checks.keys(place, table, required=["symbol", "column", "unit"], optional=["sign"])
+    checks.keys(place, table, required=["symbol", "column", "unit"], optional=["sign", "lowest"])
     text = {key: table[key] for key in ("symbol", "column", "unit")}
     for key, value in text.items():
         checks.instance(f"{place}, {key}", value, str)
-    return Channel(**text, sign=_sign(f"{place}, sign", table.get("sign", 1)))
+    lowest = None if "lowest" not in table else checks.number(f"{place}, lowest", table["lowest"], unit=text["unit"])
+    return Channel(**text, sign=_sign(f"{place}, sign", table.get("sign", 1)), lowest=lowest)
 
 
 def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
