@@ -227,7 +227,7 @@ def test_refuses_broken_motions(tmp_path: Path) -> None:
         ("0.1\t2.0\n", "", r"found 1 rows, allowed 2 rows, as its header says \(the file is cut off\)"),
         ("inDegrees=yes", "inDegrees=maybe", "header, inDegrees: found 'maybe', allowed yes or no"),
         ("2.0", "two", "line 9, column q: found 'two', allowed a number"),
-        ("0.1\t", "0.0\t", "line 9, time: found 0.0 s after 0.0 s"),
+        ("0.1\t", "0.0\t", "line 9, time: found 0 s twice"),
         ("nColumns=2", "nColumns=3", "file: found 2 columns, allowed 3 columns, as its header says"),
         ("nRows=2", "nRows=3", "file: found 2 rows, allowed 3 rows, as its header says"),
         ("version=1", "datacolumns 12", "file: found 2 columns, allowed 12 columns, as its header says"),

@@ -67,7 +67,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "NaN in a cell": (IDENTIFY, lambda f: f.cell(9, 2, "nan"), "line 9, column q2_rad: found 'nan'"),
     "infinity in a cell": (IDENTIFY, lambda f: f.cell(9, 3, "inf"), "line 9, column Fy_N: found"),
     "time twice": (IDENTIFY, lambda f: f.cell(5, 0, "0.04"), "time: found 0.04 s twice"),
-    "time that decreases": (IDENTIFY, lambda f: f.cell(9, 0, "0.0"), "line 9, time: found 0.0 s after"),
+    "time that decreases": (IDENTIFY, lambda f: f.cell(9, 0, "0.0"), "line 9, time: found 0 s after"),
     "no time stamp": (IDENTIFY, lambda f: f.cell(9, 0, ""), "line 9, time: found an empty cell"),
     "a column is missing": (PASSIVE, lambda f: f.edit("trials/slow_1.csv", "q2_rad", "emg_x"), "header: found no column for q2"),
     "a file cut in a line": (IDENTIFY, lambda f: f.lines(lambda lines: [*lines[:50], lines[50][:4]]), "line 51: found 1 cells"),

@@ -161,6 +161,23 @@ def not_utf8(place: str, raw: bytes, error: UnicodeDecodeError, *, file: str | o
     return BadInput(place, Text(f"byte 0x{raw[error.start]:02x}"), "UTF-8 text", file=file, hint=f"{guess} text? Save it as UTF-8")
 
 
+def not_later(place: str, before: float, after: float, *, file: str | os.PathLike[str] | None = None) -> BadInput:
+    """Return the refusal of a time stamp [s] that is not after the one before it.
+
+    >>> print(not_later("line 8, time", 0.1, 0.05).found, not_later("", 1.7e9 + 1e-3, 1.7e9).found, sep="; ")
+    0.05 s after 0.1 s; 1.7e+09 s, 0.001 s less than the one before
+    """
+    early, late = f"{before:.9g} s", f"{after:.9g} s"
+    found = (
+        f"{late} twice"
+        if after == before
+        else f"{late} after {early}"
+        if early != late
+        else f"{late}, {before - after:.2g} s less than the one before"
+    )
+    return BadInput(place, Text(found), "time stamps that increase strictly", file=file)
+
+
 def show(value: object) -> str:
     """Write a value on one line of bounded length, as it would stand in a file."""
     text = str(value).lower() if isinstance(value, bool) else repr(value)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BadInput, Text
+from ..errors import BadInput, Text, not_later
 from . import files, tomlfile
 from .markers import METRES, Markers
 from .trial import SAME_RATE
@@ -217,6 +217,4 @@ def _increasing(t: np.ndarray, lines: Sequence[int]) -> None:
     back = np.flatnonzero(np.diff(t) <= 0.0)
     if back.size:
         k = int(back[0]) + 1
-        raise BadInput(
-            f"line {lines[k]}, time", Text(f"{float(t[k])!r} s after {float(t[k - 1])!r} s"), "time stamps that increase strictly"
-        )
+        raise not_later(f"line {lines[k]}, time", t[k - 1], t[k])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import checks, views
-from ..errors import BadInput, BadInputs, Text
+from ..errors import BadInput, BadInputs, Text, not_later
 from . import columns, resample
 from .samples import Samples, read_samples
 
@@ -360,9 +360,7 @@ def _check_time(t: np.ndarray, samples: Samples) -> None:
     back = np.flatnonzero(np.diff(t) <= 0.0)
     if back.size:
         row = int(back[0])
-        word = "again" if t[row + 1] == t[row] else "after"
-        found = Text(f"{float(t[row + 1])!r} s {word} {float(t[row])!r} s" if word == "after" else f"{float(t[row])!r} s twice")
-        raise BadInput(f"{samples.place_of(row + 1)}, time", found, "time stamps that increase strictly")
+        raise not_later(f"{samples.place_of(row + 1)}, time", t[row], t[row + 1])
     step = resample.usual_step(t)
     if step >= SLOWEST:
         raise BadInput("time", Text(f"{step:g} s between samples"), f"less than {SLOWEST:g} s", hint=columns.TIME.hint)
@@ -371,7 +369,7 @@ def _check_time(t: np.ndarray, samples: Samples) -> None:
         raise BadInput("time", found, allowed, hint="seconds labelled as milliseconds?")
     if t[-1] - t[0] > 10.0 * step * len(t):
         row = int(np.argmax(np.diff(t)))
-        found = Text(f"{float(t[row + 1])!r} s after {float(t[row])!r} s")
+        found = Text(f"{t[row + 1]:.9g} s after {t[row]:.9g} s")
         raise BadInput(f"{samples.place_of(row + 1)}, time", found, "a recording of which at least a tenth is there")
 
 

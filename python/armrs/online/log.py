@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import checks
-from ..errors import BadInput, Text
+from ..errors import BadInput, Text, not_later
 from ..io import columns
 from ..io.resample import usual_step
 from ..io.samples import read_samples
@@ -62,7 +62,7 @@ class Log:
         back = np.flatnonzero(np.diff(t) <= 0.0)
         if back.size:
             k = int(back[0]) + 1
-            raise BadInput(f"t[{k}]", Text(f"{float(t[k])!r} s after {float(t[k - 1])!r} s"), "time stamps that increase strictly")
+            raise not_later(f"t[{k}]", t[k - 1], t[k])
         joints = checks.samples("q", self.q, "rad", shape=(n, None)).shape[1]
         if self.force_on_arm is None and self.tau is None:
             raise BadInput("force_on_arm", Text("neither forces nor torques"), "force_on_arm, or tau, or both")
@@ -164,8 +164,7 @@ def _read(source: Path, n_joints: int, force_on: str | None) -> Log:
     back = np.flatnonzero(np.diff(found["t"]) <= 0.0)
     if back.size:
         before, after = (float(found["t"][back[0] + k]) for k in (0, 1))
-        place = f"{samples.place_of(int(back[0]) + 1)}, time"
-        raise BadInput(place, Text(f"{after!r} s after {before!r} s"), "time stamps that increase strictly")
+        raise not_later(f"{samples.place_of(int(back[0]) + 1)}, time", before, after)
     joints = range(1, n_joints + 1)
     return Log(
         t=found["t"],
