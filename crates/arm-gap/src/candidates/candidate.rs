@@ -246,6 +246,26 @@ impl Candidate {
     }
 }
 
+#[cfg(test)]
+impl Candidate {
+    /// A question about the first parameter of an effect, as a scan has not judged it yet.
+    pub(crate) fn about(effect: Effect<f64>) -> Self {
+        Self {
+            effect,
+            question: 0,
+            free: vec![0],
+            rest: None,
+            refined: Vec::new(),
+            tried: 1,
+            step: 1.0,
+            price: 0.0,
+            spread: 1.0,
+            gained: f64::INFINITY,
+            expected: Vec::new(),
+        }
+    }
+}
+
 /// What an effect must gain to be named: the threshold, Schwarz' price of its numbers, and that of the shapes that were tried.
 ///
 /// * `rows` - rows of data that decide it

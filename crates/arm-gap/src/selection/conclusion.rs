@@ -51,7 +51,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             current,
             point,
             search_trace,
-            mut ruled,
+            ruled,
             asked,
             scale,
             ..
@@ -96,8 +96,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             (amended.hypothesis, precision) = (hypothesis, known);
         }
         apart.without_held(&amended.hypothesis.effects());
-        let smallest = self.smallest_disturbances(&point, 1.0).into_iter();
-        ruled.extend(smallest.filter(|one| !apart.holds(&one.effect)));
         self.courses = std::mem::take(&mut apart.measured);
         let in_trials = self.in_every_trial((&mut calibrated, &mut amended), &mut apart)?;
         for law in base {

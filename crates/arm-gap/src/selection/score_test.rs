@@ -312,3 +312,33 @@ fn projected_off<const N: usize>(
         .filter(free)
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns that are one spring at two rest angles, and one of another effect.
+    fn scored(score: [f64; 3]) -> ScoreTest {
+        ScoreTest {
+            gram: Matrix::diagonal(&[1.0; 3]),
+            score: score.to_vec(),
+            columns: vec![0..2, 2..3],
+            spread: vec![1.0; 2],
+            unlike: vec![0.0; 2],
+            price: vec![1.0; 2],
+            scale: 1.0,
+            square: 100.0,
+            freedom: 50.0,
+            bounds: vec![(f64::NEG_INFINITY, f64::INFINITY); 3],
+            least: vec![Some(0.0), None],
+        }
+    }
+
+    #[test]
+    fn a_spring_of_less_than_no_stiffness_is_no_choice() {
+        assert!(scored([3.0, -2.0, 5.0]).evaluate(&[0]).is_some());
+        let softer = scored([2.0, -3.0, 5.0]);
+        assert!(softer.evaluate(&[0]).is_none() && softer.evaluate(&[0, 1]).is_none());
+        assert!(softer.evaluate(&[1]).is_some());
+    }
+}

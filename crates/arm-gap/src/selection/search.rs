@@ -451,7 +451,35 @@ fn is_beyond_promise(mut sensors: impl Iterator<Item = f64>) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use arm_core::effect::Effect;
+
     use super::*;
+
+    /// Pairs, all distinct, and behind them the best of a single effect.
+    #[test]
+    fn the_best_of_a_single_effect_stands_behind_the_best_four_and_before_the_reserves() {
+        let kinds = arm_core::effect::KINDS.iter().take(16);
+        let library = Library {
+            candidates: kinds
+                .map(|&kind| Candidate::about(Effect::new(kind, 0)))
+                .collect(),
+            responses: Vec::new(),
+        };
+        let choice = |members: Vec<usize>, worth| Choice {
+            coefficients: vec![vec![1.0]; members.len()],
+            gain: worth,
+            worth,
+            members,
+        };
+        let pairs = (1..16).map(|k| choice(vec![0, k], 100.0 - k as f64));
+        let all: Vec<Choice> = pairs.chain([choice(vec![3], 51.0)]).collect();
+        let found = contenders(&all, &library);
+        let members: Vec<_> = found.iter().map(|c| c.members.clone()).collect();
+        assert_eq!(members[..CONTENDERS], [[0, 1], [0, 2], [0, 3], [0, 4]]);
+        assert_eq!(members[CONTENDERS], [3]);
+        assert_eq!(members[CONTENDERS + 1], [0, 5]);
+        assert_eq!(members.len(), CONTENDERS + 1 + RESERVES);
+    }
 
     #[test]
     fn what_was_found_is_fitted_afresh_where_a_sensor_is_far_off() {

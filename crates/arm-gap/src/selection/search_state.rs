@@ -62,12 +62,7 @@ impl<const N: usize> SearchState<'_, N> {
     /// Bars what was asked, has shapes and is named no more; whether there is something that was not barred before.
     pub fn bar_lost(&mut self, asked: Vec<Candidate>) -> bool {
         let known = self.barred.len();
-        for one in asked.into_iter().filter(|one| one.shapes() > 0.0) {
-            let same = |other: &Candidate| other.is_same_effect(&one.effect);
-            if !self.current.asked.iter().any(same) && !self.barred.iter().any(same) {
-                self.barred.push(one);
-            }
-        }
+        add_lost(&mut self.barred, asked, &self.current.asked);
         self.barred.len() > known
     }
 
@@ -87,5 +82,43 @@ impl<const N: usize> SearchState<'_, N> {
             .any(|(named, then, before)| *then == dry && same(named) && before - cost < enough);
         self.been.push((asked.clone(), dry, *cost));
         back
+    }
+}
+
+/// Adds those with shapes that were asked and are named no more.
+fn add_lost(barred: &mut Vec<Candidate>, asked: Vec<Candidate>, named: &[Candidate]) {
+    for one in asked.into_iter().filter(|one| one.shapes() > 0.0) {
+        let same = |other: &Candidate| other.is_same_effect(&one.effect);
+        if !named.iter().any(same) && !barred.iter().any(same) {
+            barred.push(one);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    #[test]
+    fn what_has_shapes_and_is_named_no_more_is_barred_once() {
+        let shaped = |kind, index| {
+            let mut one = Candidate::about(Effect::new(kind, index));
+            one.refined = vec![(1, (0.1, 1.0))];
+            one
+        };
+        let asked = || {
+            vec![
+                shaped(Kind::Thixotropy, 0),
+                shaped(Kind::Stribeck, 1),
+                Candidate::about(Effect::new(Kind::Viscous, 0)),
+            ]
+        };
+        let mut barred = Vec::new();
+        add_lost(&mut barred, asked(), &[shaped(Kind::Stribeck, 1)]);
+        add_lost(&mut barred, asked(), &[shaped(Kind::Stribeck, 1)]);
+        assert_eq!(barred.len(), 1);
+        assert!(barred[0].is_same_effect(&Effect::new(Kind::Thixotropy, 0)));
     }
 }

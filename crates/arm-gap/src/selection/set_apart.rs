@@ -26,12 +26,6 @@ pub(crate) struct SetApart<const N: usize> {
 }
 
 impl<const N: usize> SetApart<N> {
-    /// Whether what acts or slips once in some place was found there.
-    pub fn holds(&self, effect: &Effect<f64>) -> bool {
-        let mut once = self.trial_specific.iter().filter(|a| a.trial.is_some());
-        once.any(|a| (a.effect.kind, a.effect.index) == (effect.kind, effect.index))
-    }
-
     /// Drops bursts that dry friction of the final model may hold.
     pub fn without_held(&mut self, effects: &[Effect<f64>]) {
         self.trial_specific.retain(|one| !is_held(one, effects));

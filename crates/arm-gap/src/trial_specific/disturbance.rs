@@ -8,7 +8,6 @@ use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
 use crate::selection::lack_of_fit::{orthogonal, project_off};
 use crate::selection::model_selection::TIE;
-use crate::selection::search_state::Ruled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{TrialSpecific, timing_of};
 use crate::trial_specific::disturbance_shape::{Asked, Explained, Shape, scatter_elsewhere, timed};
@@ -59,50 +58,8 @@ impl<const N: usize> PreparedSession<'_, N> {
     ///
     /// * `scale` - misfit for each degree of freedom
     fn worth(&self, one: &Explained, scale: f64) -> f64 {
-        one.gain / scale - self.price_of(one.asked.sizes.len())
-    }
-
-    /// What a disturbance must gain.
-    ///
-    /// * `sizes` - number of parameters that are its size
-    fn price_of(&self, sizes: usize) -> f64 {
         let tried = self.fitted.len() * 4 * N * 100;
-        price(sizes, tried, self.rows_of_references())
-    }
-
-    /// The smallest bursts and slips that would have been named, in every place where there can be one. Half of those as large would have
-    /// been, at any time of the movements.
-    ///
-    /// * `scale` - misfit for each degree of freedom
-    pub fn smallest_disturbances(&self, point: &LinearizationPoint<N>, scale: f64) -> Vec<Ruled> {
-        let held = held_either_way(&point.hypothesis.effects());
-        let mut seen = Vec::new();
-        let mut is_first_of_its_movement = |one: &Compared| {
-            let movement = self.group_of[self.fitted[one.place]];
-            let is_new = !seen.contains(&movement);
-            seen.push(movement);
-            is_new
-        };
-        let compared = (0..self.fitted.len()).filter_map(|m| self.compared(point, m));
-        let mut told: Vec<Ruled> = Vec::new();
-        for suspect in compared.filter(|one| is_first_of_its_movement(one)) {
-            let (asked, deviations) = (self.asked_in(point, &suspect), suspect.deviations());
-            for one in usual_of_each_place(&asked) {
-                let scale = scale * scatter_elsewhere(one, &asked, &deviations);
-                let price = self.price_of(one.sizes.len());
-                let least = scale * f64::max(price, excess_of(self.session.channels()));
-                let size = |v: &f64| libm::sqrt(least * v) / shrunk(suspect.others.len());
-                let smallest = one.variances.iter().map(size);
-                told.push(Ruled {
-                    effect: one.effect,
-                    free: one.sizes.clone(),
-                    gain: one.gain(&suspect.deviation) / scale,
-                    price,
-                    smallest: smallest.map(|s| s.max(self.promised(one, held))).collect(),
-                });
-            }
-        }
-        middle_of_each(told, |r| (r.effect.kind, r.effect.index), |r| r.smallest[0])
+        one.gain / scale - price(one.asked.sizes.len(), tried, self.rows_of_references())
     }
 
     /// What each kind in each place explains of how a trial differs from its repeats, where and as long as it explains most, the best first;
@@ -116,7 +73,23 @@ impl<const N: usize> PreparedSession<'_, N> {
         /// Share of what explains most on the grid of times below which a time of its own helps no more.
         const NEAR: f64 = 0.5;
         let trial = self.fitted[suspect.place];
-        let asked = self.asked_in(point, suspect);
+        let see = |shape: Shape| {
+            if self.is_left_out(
+                trial,
+                shape.effect.parameters[timing_of(shape.effect.kind).0],
+            ) {
+                return None;
+            }
+            let row = |(p, channels): &(usize, _)| {
+                let mut row = self.noise.whiten(channels, &suspect.samples);
+                project_off(&mut row, &suspect.usual);
+                (*p, row)
+            };
+            let rows = shape.columns.iter().map(row).collect();
+            Asked::along(shape.effect, rows, &suspect.deviation)
+        };
+        let shapes = self.shapes_in(point, trial);
+        let asked: Vec<Asked> = shapes.into_iter().filter_map(see).collect();
         let mut clearest: Vec<(f64, &Asked)> = Vec::new();
         let held = held_either_way(&point.hypothesis.effects());
         let possible = asked
@@ -133,7 +106,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
         let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
         clearest.retain(|(gain, _)| *gain > NEAR * most);
-        let answer = |effect| self.asked_of(self.shape_of(point, trial, effect)?, suspect);
+        let answer = |effect| see(self.shape_of(point, trial, effect)?);
         let at_its_time = |(_, one): &(f64, &Asked)| {
             let asked = timed((*one).clone(), &suspect.deviation, answer);
             Explained::of(asked, &suspect.deviation)
@@ -150,44 +123,6 @@ impl<const N: usize> PreparedSession<'_, N> {
         (explained, scale * scatter.unwrap_or(1.0))
     }
 
-    /// Every disturbance that is asked for in a trial.
-    fn asked_in(&self, point: &LinearizationPoint<N>, suspect: &Compared) -> Vec<Asked> {
-        let shapes = self
-            .shapes_in(point, self.fitted[suspect.place])
-            .into_iter();
-        shapes
-            .filter_map(|shape| self.asked_of(shape, suspect))
-            .collect()
-    }
-
-    /// A disturbance of a trial as it is compared with its repeats; `None` where it would show nothing or is left out already.
-    fn asked_of(&self, shape: Shape, suspect: &Compared) -> Option<Asked> {
-        let start = shape.effect.parameters[timing_of(shape.effect.kind).0];
-        if self.is_left_out(self.fitted[suspect.place], start) {
-            return None;
-        }
-        let row = |(p, channels): &(usize, _)| {
-            let mut row = self.noise.whiten(channels, &suspect.samples);
-            project_off(&mut row, &suspect.usual);
-            (*p, row)
-        };
-        let rows = shape.columns.iter().map(row).collect();
-        Asked::along(shape.effect, rows, &suspect.deviation)
-    }
-
-    /// Size that a disturbance must exceed, as the calibration promises no less, or as friction may hold it.
-    ///
-    /// * `held` - see [`held_either_way`]
-    fn promised(&self, one: &Asked, held: f64) -> f64 {
-        let prior = one.effect.kind.prior();
-        match (prior.nature, prior.promise) {
-            (Nature::Slip, _) => self.session.tolerance.handle_placement,
-            (Nature::Burst, _) => held,
-            (_, Some(_)) => self.session.tolerance.angle_offset(),
-            (_, None) => 0.0,
-        }
-    }
-
     /// Whether what is asked is a finding in a trial, whatever its size: of two repeats both deviate alike, and the disturbed one is further
     /// from the model; what moves within what the calibration promises of it is none.
     ///
@@ -195,7 +130,13 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn is_finding(&self, one: &Asked, suspect: &Compared, held: f64) -> bool {
         let own = dot(&one.row, &suspect.own).abs();
         let further = |other: &Vec<f64>| own > dot(&one.row, other).abs();
-        let promised = self.promised(one, held);
+        let prior = one.effect.kind.prior();
+        let promised = match (prior.nature, prior.promise) {
+            (Nature::Slip, _) => self.session.tolerance.handle_placement,
+            (Nature::Burst, _) => held,
+            (_, Some(_)) => self.session.tolerance.angle_offset(),
+            (_, None) => 0.0,
+        };
         let size = one.size(&suspect.deviation).abs();
         // What hardly shows in the samples that are left would have to be larger than anything.
         let largest = one.effect.kind.info().parameters[one.sizes[0]].max;
@@ -336,47 +277,12 @@ fn shrunk(repeats: usize) -> f64 {
     }
 }
 
-/// Of each place in turn the burst or slip that shows as clearly as half of them there do.
-fn usual_of_each_place(asked: &[Asked]) -> Vec<&Asked> {
-    let is_once = |one: &&Asked| {
-        let nature = one.effect.kind.prior().nature;
-        matches!(nature, Nature::Burst | Nature::Slip)
-    };
-    let once = asked.iter().filter(is_once).collect();
-    middle_of_each(once, |one| one.place(), |one| one.variances[0])
-}
-
-/// Of each group the one in the middle by a value.
-fn middle_of_each<T, G: PartialEq>(
-    all: Vec<T>,
-    group: impl Fn(&T) -> G,
-    value: impl Fn(&T) -> f64,
-) -> Vec<T> {
-    let mut groups: Vec<Vec<T>> = Vec::new();
-    for one in all {
-        match groups.iter_mut().find(|g| group(&g[0]) == group(&one)) {
-            Some(own) => own.push(one),
-            None => groups.push(vec![one]),
-        }
-    }
-    let middle = |mut own: Vec<T>| {
-        own.sort_by(|a, b| value(a).total_cmp(&value(b)));
-        own.swap_remove(own.len() / 2)
-    };
-    groups.into_iter().map(middle).collect()
-}
-
-/// Rows of one window of a deviation.
-const WINDOW: usize = 12;
-
-/// What a window must hold beyond noise to stand out, as a sum of squares: four and a half standard deviations.
-fn excess_of(channels: usize) -> f64 {
-    const EXCESS: f64 = 4.5;
-    EXCESS * libm::sqrt(2.0 * (WINDOW * channels) as f64)
-}
-
 /// Whether some second of a whitened deviation holds far more than noise.
 fn stands_out(deviation: &[f64], channels: usize, scale: f64) -> bool {
+    /// Rows of one window.
+    const WINDOW: usize = 12;
+    /// Excess in standard deviations.
+    const EXCESS: f64 = 4.5;
     let samples = deviation.len() / channels.max(1);
     let at = |s: usize| {
         (0..channels).fold(0.0, |sum, c| {
@@ -388,7 +294,7 @@ fn stands_out(deviation: &[f64], channels: usize, scale: f64) -> bool {
     let dof = (WINDOW * channels) as f64;
     squares.windows(WINDOW).any(|w| {
         let sum: f64 = w.iter().sum();
-        sum > dof + excess_of(channels)
+        sum > dof + EXCESS * libm::sqrt(2.0 * dof)
     })
 }
 
@@ -447,12 +353,6 @@ mod tests {
         // Where the model is wrong otherwise, more is usual.
         assert!(!stands_out(&of(1.9 * limit), 2, 2.0) && stands_out(&of(2.1 * limit), 2, 2.0));
         assert!(!stands_out(&[9.0; 22], 2, 1.0), "shorter than a window");
-    }
-
-    #[test]
-    fn of_each_group_the_one_in_the_middle_counts() {
-        let all = vec![(0, 3.0), (1, 7.0), (0, 1.0), (0, 2.0), (1, 9.0)];
-        assert_eq!(middle_of_each(all, |a| a.0, |a| a.1), [(0, 2.0), (1, 9.0)]);
     }
 
     #[test]
