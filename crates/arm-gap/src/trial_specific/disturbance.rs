@@ -138,8 +138,12 @@ impl<const N: usize> PreparedSession<'_, N> {
             (_, None) => 0.0,
         };
         let size = one.size(&suspect.deviation).abs();
-        // What hardly shows in the samples that are left would have to be larger than anything.
+        // What hardly shows in the samples that are left, or in a joint that sticks, would have to be larger than anything.
         let largest = one.effect.kind.info().parameters[one.sizes[0]].max;
+        let largest = match prior.nature {
+            Nature::Burst => strongest(self.session.weight_moment(one.effect.index)).min(largest),
+            _ => largest,
+        };
         size > promised && size < largest && suspect.others.iter().all(further)
     }
 
@@ -260,6 +264,20 @@ pub(crate) fn is_held(one: &TrialSpecific, effects: &[Effect<f64>]) -> bool {
     is_burst && one.effect.parameters[0].abs() <= held_either_way(effects)
 }
 
+/// What muscles can do in a joint at most \[N m\]; anything where nothing weighs.
+///
+/// * `weight` - largest moment of the weight there \[N m\]
+fn strongest(weight: f64) -> f64 {
+    /// Times the weight. At the wrist, where it is most, up to 19 N m (Delp, Grierson, Buchanan 1996, J. Biomech. 29) over the 0.4 N m of
+    /// a hand.
+    const STRONGEST: f64 = 50.0;
+    if weight > 0.0 {
+        STRONGEST * weight
+    } else {
+        f64::INFINITY
+    }
+}
+
 /// A whitened residual less the mean of its repeats, scaled to the noise of one trial.
 fn deviation(own: &[f64], others: &[Vec<f64>]) -> Vec<f64> {
     let n = others.len() as f64;
@@ -315,6 +333,12 @@ mod tests {
         ];
         assert_eq!(held_either_way(&effects), 0.4);
         assert_eq!(held_either_way(&effects[..1]), 0.0);
+    }
+
+    #[test]
+    fn muscles_are_as_strong_as_fifty_times_the_weight() {
+        assert_eq!(strongest(0.4), 20.0);
+        assert_eq!(strongest(0.0), f64::INFINITY, "an arm that nothing pulls");
     }
 
     #[test]
