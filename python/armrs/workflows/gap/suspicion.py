@@ -19,7 +19,7 @@ from .core_input import core_settings, core_trials
 
 _BY_TORQUES = (
     "so all trials are compared by joint torques in measured motion, and errors of the contact, the robot and the force sensor, "
-    "misalignment, delay, tremor and bursts are not asked"
+    "misalignment, delay, tremor and bursts cannot be tested"
 )
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""

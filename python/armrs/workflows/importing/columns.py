@@ -260,7 +260,8 @@ def _channel(symbol: str, column: RawColumn, sign: int, why: str, tables: Sequen
             symbol, column.name, "deg", sign, f"{why}; values up to {most:.3g}, so in degrees, although its header says {stated.text}"
         )
     if stated is not None:
-        return Channel(symbol, column.name, stated.text, sign, why)
+        # A unit from a row of its own is not in the name.
+        return Channel(symbol, column.name, stated.text, sign, why if column.unit in column.name else f"{why}, in {stated.text}")
     if dimension == "angle":
         in_degrees = most > _DEGREES_FROM
         reason = f"no unit stated; values up to {most:.3g}, so in {'degrees' if in_degrees else 'radians'}"
