@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -324,14 +325,17 @@ def test_files_that_all_state_a_wrong_unit_are_alike(recording: Recording, tmp_p
 
 
 def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, recording: Recording) -> None:
-    """An encoder that has counted five turns: the data set was written, refused, and left behind."""
+    """Angles counted five turns away, as import.toml has them: the data set was written, refused, and left behind."""
     samples = values(recording)
     samples[:, 1] += 1800.0
     source = tmp_path / "slow_1.csv"
     source.write_text("\n".join([";".join(["time [s]", *GERMAN[1:]]), *rows(samples, decimal=".")]) + "\n", encoding="utf-8")
+    decided = armrs.import_recordings([source], tmp_path / "set", model=KNOWN).folder / "import.toml"
+    text, count = re.subn(r"lowest = \S+", "lowest = 1620.0", decided.read_text(encoding="utf-8"))
+    decided.write_text(text, encoding="utf-8")
     with pytest.raises(BadInput, match=r"out/trials/slow_1\.csv.*looks like degrees"):
-        armrs.import_recordings([source], tmp_path / "out", model=KNOWN)
-    assert not (tmp_path / "out").exists()
+        armrs.import_recordings([decided], tmp_path / "out", model=KNOWN)
+    assert count == 1 and not (tmp_path / "out").exists()
 
 
 def test_a_name_that_no_table_has_is_refused(recording: Recording, tmp_path: Path) -> None:
