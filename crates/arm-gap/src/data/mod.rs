@@ -12,3 +12,4 @@ mod rest;
 pub mod session;
 pub(crate) mod unrepeated;
 pub mod valid_segments;
+pub mod whitening;

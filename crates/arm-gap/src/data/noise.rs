@@ -9,7 +9,8 @@ pub use arm_numerics::interleaved_dot as dot;
 use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
 
 use crate::GapError;
-use crate::data::valid_segments::{SHORTEST, ValidSegments};
+use crate::data::valid_segments::{ObservableForce, SHORTEST, ValidSegments};
+use crate::data::whitening::{Observed, Whitening};
 use crate::measurement_model::prediction::Channels;
 
 /// Highest order of the autoregressions: every segment has as many samples.
@@ -21,10 +22,12 @@ const LEAST: f64 = 5e-4;
 /// Channels at the samples of a trial that are compared.
 #[derive(Clone, Debug)]
 pub struct Thinned {
-    /// `[channel][sample]`.
+    /// `[channel][sample]`; see [`ValidSegments::pick`].
     pub channels: Channels,
     /// How far each sample is from the one before it; see [`ValidSegments::spacing`].
     pub spacing: Vec<usize>,
+    /// What the force tells at each; see [`ValidSegments::force`].
+    pub force: Vec<ObservableForce>,
 }
 
 impl From<Channels> for Thinned {
@@ -34,6 +37,7 @@ impl From<Channels> for Thinned {
         Self {
             channels,
             spacing: vec![1; count],
+            force: Vec::new(),
         }
     }
 }
@@ -44,17 +48,34 @@ impl Thinned {
         Self {
             channels: valid_segments.pick(channels),
             spacing: valid_segments.spacing(),
+            force: valid_segments.force(),
+        }
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        Observed {
+            spacing: &self.spacing,
+            force: &self.force,
         }
     }
 
     /// The pieces of a channel between which samples are missing.
-    fn runs<'a>(&self, channel: &'a [f64]) -> Vec<&'a [f64]> {
-        let inner = (1..channel.len()).filter(|&t| self.spacing[t] > 1);
-        let ends: Vec<usize> = inner.chain([channel.len()]).collect();
-        let starts = std::iter::once(0).chain(ends.iter().copied());
-        std::iter::zip(starts, &ends)
-            .map(|(a, &b)| &channel[a..b])
+    ///
+    /// * `channel` - its values
+    /// * `told` - whether a sample tells them
+    fn runs<'a>(&self, channel: &'a [f64], told: impl Fn(usize) -> bool) -> Vec<&'a [f64]> {
+        let kept: Vec<usize> = (0..channel.len()).filter(|&t| told(t)).collect();
+        let pieces = kept.chunk_by(|&a, &b| b == a + 1 && self.spacing[b] == 1);
+        pieces
+            .map(|piece| &channel[piece[0]..piece[0] + piece.len()])
             .collect()
+    }
+
+    /// The pieces of channel `c` of `all` that tell its noise: those at which the force tells both components.
+    fn pieces<'a>(&self, channel: &'a [f64], (c, all): (usize, usize)) -> Vec<&'a [f64]> {
+        let is_force = c + 2 >= all;
+        let told = |t: usize| !is_force || self.observed().force_at(t) == ObservableForce::Both;
+        self.runs(channel, told)
     }
 }
 
@@ -110,16 +131,17 @@ impl Noise {
             let rough = |d: &Thinned| roughened(&d.channels[c], least);
             let noisy: Vec<Vec<f64>> = deviations.iter().map(rough).collect();
             let pairs = std::iter::zip(deviations, &noisy);
-            let series: Vec<&[f64]> = pairs.flat_map(|(d, own)| d.runs(own)).collect();
+            let series: Vec<&[f64]> = pairs
+                .flat_map(|(d, own)| d.pieces(own, (c, channels)))
+                .collect();
             let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
             let model = if varies {
-                let taken = taken.iter().flat_map(|d| d.runs(&d.channels[c]));
+                let taken = taken.iter();
+                let taken = taken.flat_map(|d| d.pieces(&d.channels[c], (c, channels)));
                 let taken: Vec<&[f64]> = taken.collect();
                 let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
                 let order = ORDER.min(longest.saturating_sub(2));
-                let mut model = AutoRegression::selected_about_zero(&series, &taken, order)?;
-                model.sd /= told[c].max(1e-6).sqrt();
-                model
+                AutoRegression::selected_about_zero(&series, &taken, order)?
             } else {
                 AutoRegression {
                     coefficients: Vec::new(),
@@ -197,19 +219,31 @@ impl Noise {
         }
     }
 
+    /// How the samples of a trial are made white.
+    pub fn whitening(&self, valid_segments: &ValidSegments) -> Whitening {
+        let (spacing, force) = (valid_segments.spacing(), valid_segments.force());
+        let observed = Observed {
+            spacing: &spacing,
+            force: &force,
+        };
+        Whitening::new(&self.whiteners, observed)
+    }
+
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
     pub fn whiten(&self, channels: &Channels, valid_segments: &ValidSegments) -> Vec<f64> {
         self.whiten_thinned(&Thinned::of(channels, valid_segments))
     }
 
     /// Whitens a set of channels of one trial, whose samples weigh as they do there.
+    ///
+    /// * `whitening` - of the samples
     pub fn whiten_in(
         &self,
         trial: usize,
         channels: &Channels,
-        valid_segments: &ValidSegments,
+        (valid_segments, whitening): (&ValidSegments, &Whitening),
     ) -> Vec<f64> {
-        let mut row = self.whiten(channels, valid_segments);
+        let mut row = self.rows(valid_segments.pick(channels), whitening);
         if let Some(weights) = self.weights.get(trial) {
             let each = weights
                 .iter()
@@ -223,14 +257,17 @@ impl Noise {
 
     /// Whitens channels that are thinned already.
     pub fn whiten_thinned(&self, thinned: &Thinned) -> Vec<f64> {
-        self.unmixed(whitened(&self.whiteners, thinned))
+        let whitening = Whitening::new(&self.whiteners, thinned.observed());
+        self.rows(thinned.channels.clone(), &whitening)
     }
 
-    fn unmixed(&self, mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+    /// Each channel by itself, then free of what it shares with those before it.
+    fn rows(&self, mut rows: Channels, whitening: &Whitening) -> Vec<f64> {
+        whitening.apply(&mut rows);
         let n = self.whiteners.len();
         // From the last channel up: each row needs those before it unmixed.
         for c in (0..n).rev() {
-            for i in 0..rows[c].len() {
+            for i in (0..rows[c].len()).filter(|&i| whitening.is_told((c, i))) {
                 rows[c][i] = (0..=c).fold(0.0, |s, b| s + self.mix[c * n + b] * rows[b][i]);
             }
         }
@@ -241,9 +278,7 @@ impl Noise {
 /// Each channel of a series, whitened by itself.
 fn whitened(whiteners: &[Whitener], series: &Thinned) -> Channels {
     let mut white = series.channels.clone();
-    for (values, whitener) in white.iter_mut().zip(whiteners) {
-        whitener.with_gaps(&series.spacing).apply(values);
-    }
+    Whitening::new(whiteners, series.observed()).apply(&mut white);
     white
 }
 

@@ -31,7 +31,7 @@ impl Repeats {
             let mean = self.trials.iter().map(|t| t[c][i]).sum::<f64>() / n;
             scale * (value - mean)
         };
-        let spacing = self.samples.spacing();
+        let (spacing, force) = (self.samples.spacing(), self.samples.force());
         let one = |trial: &Channels| {
             let channels = trial.iter().enumerate();
             let off = channels
@@ -39,6 +39,7 @@ impl Repeats {
             Thinned {
                 channels: off.collect(),
                 spacing: spacing.clone(),
+                force: force.clone(),
             }
         };
         self.trials.iter().map(one).collect()

@@ -184,6 +184,14 @@ impl ValidSegments {
         self.samples.iter().copied()
     }
 
+    /// What the force tells at the samples; nothing is listed where that is both components at all of them.
+    pub fn force(&self) -> Vec<ObservableForce> {
+        match self.observable.is_empty() {
+            true => Vec::new(),
+            false => self.samples().map(|i| self.at(i)).collect(),
+        }
+    }
+
     /// How far each sample is from the one before it, where 1 is next to it; the first is from nothing.
     pub fn spacing(&self) -> Vec<usize> {
         let first = self.samples.first().map(|_| 0);

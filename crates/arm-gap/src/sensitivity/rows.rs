@@ -8,6 +8,7 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
+use crate::data::whitening::Whitening;
 use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::normal_equations::Cluster;
 use crate::sensitivity::response::Response;
@@ -23,6 +24,7 @@ struct Class {
     /// The movement in whose reference columns are computed.
     reference: usize,
     valid_segments: ValidSegments,
+    whitening: Whitening,
     /// Number of rows of one trial that tell anything.
     rows: usize,
     /// Positions in the list of fitted trials.
@@ -52,44 +54,25 @@ impl Rows {
     ) -> Self {
         let mut classes: Vec<Class> = Vec::new();
         for (m, &trial) in prepared.fitted.iter().enumerate() {
-            let (group, valid_segments) =
+            let (reference, valid_segments) =
                 (prepared.group_of[trial], &prepared.valid_segments[trial]);
             if !prepared.repeated {
                 // Parts of a trial stand in for the repeats that are not there.
                 for part in valid_segments.parts(PARTS) {
-                    classes.push(Class {
-                        group: classes.len(),
-                        reference: group,
-                        rows: part
-                            .rows_per_channel(prepared.session.channels())
-                            .iter()
-                            .sum(),
-                        valid_segments: part,
-                        members: vec![m],
-                        columns: Vec::new(),
-                        products: Matrix::zeros(0, 0),
-                    });
+                    classes.push(Class::new(prepared, (classes.len(), reference), part, m));
                 }
                 continue;
             }
             let known = classes
                 .iter_mut()
-                .find(|c| c.reference == group && c.valid_segments == *valid_segments);
+                .find(|c| c.reference == reference && c.valid_segments == *valid_segments);
             match known {
                 Some(class) => class.members.push(m),
-                None => classes.push(Class {
+                None => {
                     // What is broken off or disturbed has another score than its repeats, without any noise.
-                    group: classes.len(),
-                    reference: group,
-                    rows: valid_segments
-                        .rows_per_channel(prepared.session.channels())
-                        .iter()
-                        .sum(),
-                    valid_segments: valid_segments.clone(),
-                    members: vec![m],
-                    columns: Vec::new(),
-                    products: Matrix::zeros(0, 0),
-                }),
+                    let own = (classes.len(), reference);
+                    classes.push(Class::new(prepared, own, valid_segments.clone(), m));
+                }
             }
         }
         let whitened = prepared.parallel(classes.len(), |i| {
@@ -225,6 +208,26 @@ impl Rows {
 }
 
 impl Class {
+    /// A class of one fitted trial, without columns.
+    fn new<const N: usize>(
+        prepared: &PreparedSession<N>,
+        (group, reference): (usize, usize),
+        valid_segments: ValidSegments,
+        member: usize,
+    ) -> Self {
+        let told = valid_segments.rows_per_channel(prepared.session.channels());
+        Self {
+            group,
+            reference,
+            rows: told.iter().sum(),
+            whitening: prepared.noise.whitening(&valid_segments),
+            valid_segments,
+            members: vec![member],
+            columns: Vec::new(),
+            products: Matrix::zeros(0, 0),
+        }
+    }
+
     fn whitened<const N: usize>(
         &self,
         prepared: &PreparedSession<N>,
@@ -242,7 +245,7 @@ impl Class {
         let trial = prepared.fitted[self.members[0]];
         prepared
             .noise
-            .whiten_in(trial, channels, &self.valid_segments)
+            .whiten_in(trial, channels, (&self.valid_segments, &self.whitening))
     }
 }
 

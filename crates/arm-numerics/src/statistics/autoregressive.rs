@@ -243,36 +243,27 @@ impl Whitener {
         whiten(column, |t| &self.predictors[t.min(order)]);
     }
 
-    /// The whitener of series of which samples are missing.
-    ///
-    /// Each sample is predicted from as many known ones before it as the model has coefficients, at the lags that they have: exactly where
-    /// none is missing, and nearly (Vecchia 1988) after a gap.
-    ///
-    /// * `spacing` - how far each sample is from the one before it, in samples; the first is not read
-    pub fn with_gaps(&self, spacing: &[usize]) -> GappedWhitener {
-        let order = self.predictors.len() - 1;
-        let mut predictors = self.predictors.clone();
-        let mut reach = 0;
-        let place = spacing.iter().enumerate().map(|(t, step)| {
-            // How many samples lie before this one without a gap.
-            reach = if t > 0 && *step == 1 { reach + 1 } else { 0 };
-            if reach >= order.min(t) {
-                return t.min(order);
-            }
-            let before = spacing[..=t].iter().rev().take(order.min(t));
-            let lags = before.scan(0, |lag, step| {
-                *lag += step;
-                Some(*lag)
-            });
-            predictors.push(self.predictor(&lags.collect::<Vec<usize>>()));
-            predictors.len() - 1
-        });
-        let place = place.collect();
-        GappedWhitener { place, predictors }
+    /// The order of the model.
+    pub fn order(&self) -> usize {
+        self.predictors.len() - 1
+    }
+
+    /// Standard deviation of the innovations.
+    pub fn innovation(&self) -> f64 {
+        self.predictors
+            .last()
+            .map_or(0.0, |(_, inverse)| 1.0 / inverse)
     }
 
     /// The best linear predictor from the samples at some lags, nearest first, with one over the standard deviation of its error.
-    fn predictor(&self, lags: &[usize]) -> Predictor {
+    ///
+    /// Where samples are missing, each is predicted from as many known ones before it as the model has coefficients, at the lags that they
+    /// have: exactly where none is missing, and nearly (Vecchia 1988) after a gap.
+    pub fn predictor(&self, lags: &[usize]) -> (Vec<f64>, f64) {
+        let is_next = lags.iter().enumerate().all(|(k, lag)| *lag == k + 1);
+        if let Some(known) = self.predictors.get(lags.len()).filter(|_| is_next) {
+            return known.clone();
+        }
         let covariance = self.covariance(lags.last().copied().unwrap_or(0));
         let gram = Matrix::from_fn(lags.len(), lags.len(), |i, j| {
             covariance[lags[i].abs_diff(lags[j])]
@@ -284,10 +275,7 @@ impl Whitener {
         solve_upper(&factor.leading(lags.len()), lags.len(), &mut a);
         let known = dot(&a, &towards);
         // Never better known than from all that came before it.
-        let best = self
-            .predictors
-            .last()
-            .map_or(0.0, |(_, inverse)| 1.0 / (inverse * inverse));
+        let best = self.innovation() * self.innovation();
         (a, 1.0 / (covariance[0] - known).max(best).sqrt())
     }
 
@@ -302,21 +290,6 @@ impl Whitener {
             covariance.push(next.fold(0.0, |sum, (i, a)| sum + a * covariance[lag - 1 - i]));
         }
         covariance
-    }
-}
-
-/// A [`Whitener`] of series of which samples are missing.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GappedWhitener {
-    /// Which predictor each sample has.
-    place: Vec<usize>,
-    predictors: Vec<Predictor>,
-}
-
-impl GappedWhitener {
-    /// Whitens one column of as many samples in place.
-    pub fn apply(&self, column: &mut [f64]) {
-        whiten(column, |t| &self.predictors[self.place[t]]);
     }
 }
 
