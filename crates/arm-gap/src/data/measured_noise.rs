@@ -8,7 +8,10 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::GapError;
 use crate::data::noise::{Noise, Thinned, dot};
 use crate::data::prepared_session::PreparedSession;
+use crate::measurement_model::prediction::Channels;
+use crate::selection::fit::{Fitted, decided};
 use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::sensitivity::response::Response;
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// Reads the noise anew: what repeats differ in, or without repeats what a hypothesis leaves.
@@ -16,7 +19,6 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// # Errors
     /// [`GapError::Numerics`] for series that no noise can be read off.
     pub fn measure_noise(&mut self, point: &LinearizationPoint<N>) -> Result<(), GapError> {
-        let channels = self.session.channels();
         let observed_share = self.observed_share();
         let mut deviations = Vec::new();
         // For each deviation what a trial may differ by without noise.
@@ -31,21 +33,55 @@ impl<const N: usize> PreparedSession<'_, N> {
             }
         }
         self.repeated = !deviations.is_empty();
-        let range: Vec<f64> = (0..channels)
-            .map(|c| {
-                // An arm that swings freely has no torque to show, but its inertia has.
-                let seen = self.fitted.iter().flat_map(|&t| &self.courses[t].seen[c]);
-                let all = seen.chain(point.residuals.iter().flat_map(|r| &r[c]));
-                let (low, high) = extent(all.copied());
-                (high - low).max(0.0)
-            })
-            .collect();
+        let range = self.ranges(&point.residuals);
         self.noise = if self.repeated {
-            self.noise_of(&deviations, &shifts, (&range, &observed_share))?
+            self.noise_of((&deviations, &[]), &shifts, (&range, &observed_share))?
         } else {
             self.noise_of_residuals(point, (&range, &observed_share))?
         };
         Ok(())
+    }
+
+    /// Reads the noise off what a model that explains the data leaves of all fitted trials, which is more than repeats differ in: of slow
+    /// noise a trial of ten seconds holds few independent samples. What the model lacks is in it too.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::equations`].
+    pub fn measure_noise_left(
+        &mut self,
+        point: &LinearizationPoint<N>,
+        fitted: &Fitted<N>,
+    ) -> Result<(), GapError> {
+        let (coordinates, clusters) = self.equations(point, fitted, &[])?;
+        let Some((free, factor)) = decided(fitted, &coordinates, &clusters) else {
+            return Ok(());
+        };
+        let mut responses = self.responses_to(point, &point.coordinates)?;
+        responses.extend(self.responses_at(point, &fitted.hypothesis, &fitted.named())?);
+        let (mut deviations, mut taken, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
+        for (residuals, &trial) in fitted.residuals.iter().zip(&self.fitted) {
+            let (group, samples) = (self.group_of[trial], &self.valid_segments[trial]);
+            let picked = |r: &Response| Thinned::of(&r.0[group], samples);
+            let columns: Vec<Thinned> = free.iter().map(|&i| picked(&responses[i])).collect();
+            taken.extend(factor.spread().iter().map(|shares| sum(&columns, shares)));
+            deviations.push(Thinned::of(residuals, samples));
+            shifts.push(Arc::new(point.own.iter().map(picked).collect()));
+        }
+        let (range, told) = (self.ranges(&point.residuals), self.observed_share());
+        self.noise = self.noise_of((&deviations, &taken), &shifts, (&range, &told))?;
+        Ok(())
+    }
+
+    /// The size of each channel.
+    fn ranges(&self, residuals: &[Channels]) -> Vec<f64> {
+        let range = |c: usize| {
+            // An arm that swings freely has no torque to show, but its inertia has.
+            let seen = self.fitted.iter().flat_map(|&t| &self.courses[t].seen[c]);
+            let all = seen.chain(residuals.iter().flat_map(|r| &r[c]));
+            let (low, high) = extent(all.copied());
+            (high - low).max(0.0)
+        };
+        (0..self.session.channels()).map(range).collect()
     }
 
     /// The share of the samples of each channel that tell anything.
@@ -70,9 +106,11 @@ impl<const N: usize> PreparedSession<'_, N> {
 
     /// The noise of deviations, and how far each is shifted, found in turns: as much is taken for a shift as the noise and
     /// what is known of shifts allow.
+    ///
+    /// * `fitted` - the like of [`Noise::of`]'s `taken`, of what is common to all deviations
     fn noise_of(
         &self,
-        deviations: &[Thinned],
+        (deviations, fitted): (&[Thinned], &[Thinned]),
         shifts: &[Arc<Vec<Thinned>>],
         (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
@@ -84,13 +122,13 @@ impl<const N: usize> PreparedSession<'_, N> {
             .iter()
             .map(|c| c.prior.map_or(f64::INFINITY, |(_, sd)| sd))
             .collect();
-        let mut noise = Noise::of(deviations, &[], range, told)?;
+        let mut noise = Noise::of(deviations, fitted, range, told)?;
         for _ in 0..TURNS {
             if known.is_empty() {
                 break;
             }
             let mut clean = deviations.to_vec();
-            let mut taken = Vec::new();
+            let mut taken = fitted.to_vec();
             for (deviation, columns) in clean.iter_mut().zip(shifts) {
                 let row = noise.whiten_thinned(deviation);
                 let each = columns.iter().map(|c| noise.whiten_thinned(c));
@@ -109,17 +147,20 @@ impl<const N: usize> PreparedSession<'_, N> {
                     continue;
                 };
                 add(deviation, columns, &solver.solve(&score));
-                taken.extend(solver.spread().iter().map(|shares| {
-                    let mut series = deviation.clone();
-                    series.channels.iter_mut().for_each(|c| c.fill(0.0));
-                    add(&mut series, columns, shares);
-                    series
-                }));
+                taken.extend(solver.spread().iter().map(|shares| sum(columns, shares)));
             }
             noise = Noise::of(&clean, &taken, range, told)?;
         }
         Ok(noise)
     }
+}
+
+/// Shares of columns, which are some, together.
+fn sum(columns: &[Thinned], shares: &[f64]) -> Thinned {
+    let mut series = columns[0].clone();
+    series.channels.iter_mut().for_each(|c| c.fill(0.0));
+    add(&mut series, columns, shares);
+    series
 }
 
 /// Adds shares of columns, each with its channels, to a series.

@@ -8,7 +8,8 @@ use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::model_selection::Named;
-use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep};
+use crate::selection::passive_base::BaseLaw;
+use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep, Settled};
 use crate::selection::set_apart::SetApart;
 use crate::trial_specific::component::TrialSpecific;
 
@@ -67,28 +68,24 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 self.judged((amended, point), &calibrated, judging, progress)?;
         }
         progress("measuring what is left", 0.9)?;
-        let mut precision = self.precision(&point, &amended, scale)?;
-        for one in &named {
-            let missed = one.gain * amended.asked[one.slot].kind().prior().missed;
-            let is_own = |t| matches!(t, Target::Named(own, _) if own == one.slot);
-            precision.widen(is_own, Precision::ALONG * missed);
-            let joint = joint_of(&amended.hypothesis, Target::Named(one.slot, 0));
-            let is_beside = |t| joint.is_some() && joint_of(&amended.hypothesis, t) == joint;
-            precision.widen(|t| is_beside(t) && !is_own(t), Precision::BESIDE * missed);
-        }
-        for law in &base {
-            let known = self.session.effects.len() + law.base;
-            let missed = law.gain * law.question.kind().prior().missed;
-            precision.widen(
-                |t| matches!(t, Target::Known(own, _) if own == known),
-                Precision::ALONG * missed,
-            );
-        }
+        let alone = self.precision(&point, &amended, scale)?;
+        let mut precision = widened(
+            &alone,
+            &amended,
+            &named,
+            (self.session.effects.len(), &base),
+        );
         let gained: Vec<f64> = base.iter().map(|law| law.gain).collect();
         if let Some(rigid) = self.rigid(&gained) {
             (calibrated, before) = rigid;
         }
         let lack = [before, lack_of_fit(self, &point, &amended)];
+        let explained = (calibrated.cost - amended.cost) / scale;
+        if self.repeated {
+            let other;
+            (amended, other) = self.weighed_by_what_is_left((amended, point))?;
+            precision = precision.with_noise(&alone, other);
+        }
         if let Some((hypothesis, _)) = self.refined(&calibrated) {
             calibrated.hypothesis = hypothesis;
         }
@@ -104,7 +101,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for fitted in [&mut calibrated, &mut amended] {
             fitted.hypothesis.known.truncate(self.session.effects.len());
         }
-        share_out(&mut named, (calibrated.cost - amended.cost) / scale);
+        share_out(&mut named, explained);
         progress("done", 1.0)?;
         Ok(Finding {
             calibrated,
@@ -118,6 +115,20 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             ruled,
             scale,
         })
+    }
+
+    /// The amended model refitted with the noise of all fitted trials, and how well it is known then.
+    ///
+    /// Of slow noise the differences of few repeats hold few independent samples, and what they say of it is what they happen to.
+    fn weighed_by_what_is_left(
+        &mut self,
+        (amended, point): Settled<'a, N>,
+    ) -> Result<(Fitted<N>, Precision), GapError> {
+        self.measure_noise_left(&point, &amended)?;
+        let again = self.settle(amended.hypothesis.clone(), amended.asked.clone());
+        let (amended, point) = again.unwrap_or((amended, point));
+        let precision = self.precision(&point, &amended, 1.0)?;
+        Ok((amended, precision))
     }
 
     /// The calibrated and the amended model as they are in each trial, with what was set apart.
@@ -151,6 +162,33 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.in_trials((&amended.hypothesis, &rhythms)),
         ])
     }
+}
+
+/// What is known of the numbers, less what the laws may miss.
+fn widened<const N: usize>(
+    alone: &Precision,
+    amended: &Fitted<N>,
+    named: &[Named],
+    (first, base): (usize, &[BaseLaw<N>]),
+) -> Precision {
+    let mut precision = alone.clone();
+    for one in named {
+        let missed = one.gain * amended.asked[one.slot].kind().prior().missed;
+        let is_own = |t| matches!(t, Target::Named(own, _) if own == one.slot);
+        precision.widen(is_own, Precision::ALONG * missed);
+        let joint = joint_of(&amended.hypothesis, Target::Named(one.slot, 0));
+        let is_beside = |t| joint.is_some() && joint_of(&amended.hypothesis, t) == joint;
+        precision.widen(|t| is_beside(t) && !is_own(t), Precision::BESIDE * missed);
+    }
+    for law in base {
+        let known = first + law.base;
+        let missed = law.gain * law.question.kind().prior().missed;
+        precision.widen(
+            |t| matches!(t, Target::Known(own, _) if own == known),
+            Precision::ALONG * missed,
+        );
+    }
+    precision
 }
 
 /// The joint in which the law acts that a number belongs to.

@@ -369,6 +369,22 @@ impl Precision {
             }
         }
     }
+
+    /// The same where the noise is another one: what the laws may miss is as it was.
+    ///
+    /// * `alone` - with the former noise, before anything was widened
+    /// * `other` - with the other noise
+    pub fn with_noise(&self, alone: &Self, other: Self) -> Self {
+        let sd = (0..other.sd.len()).map(|i| {
+            let missed = self.sd[i] * self.sd[i] - alone.sd[i] * alone.sd[i];
+            // Where both are infinite, the difference is none.
+            libm::sqrt(other.sd[i] * other.sd[i] + f64::max(missed, 0.0))
+        });
+        Self {
+            sd: sd.collect(),
+            coordinates: other.coordinates,
+        }
+    }
 }
 
 impl<const N: usize> PreparedSession<'_, N> {
@@ -413,10 +429,28 @@ fn precision_of<const N: usize>(
     (coordinates, clusters): (Vec<Coordinate>, Vec<Cluster>),
     scale: f64,
 ) -> Precision {
-    let hypothesis = &fitted.hypothesis;
-    let mut normal = Normal::new(&clusters, &priors(hypothesis, &coordinates));
-    regularise(&mut normal.gram, hypothesis, &coordinates);
     let mut sd = vec![f64::INFINITY; coordinates.len()];
+    if let Some((free, factor)) = decided(fitted, &coordinates, &clusters) {
+        let inverse = factor.inverse();
+        for (a, &i) in free.iter().enumerate() {
+            let row = free.iter().enumerate();
+            let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
+            let widen = f64::max(scale, spread(&clusters, &weights));
+            sd[i] = (inverse[(a, a)] * widen).sqrt();
+        }
+    }
+    Precision { coordinates, sd }
+}
+
+/// The places of the coordinates that the data and what is known beforehand decide, and the factor of their equations.
+pub(crate) fn decided<const N: usize>(
+    fitted: &Fitted<N>,
+    coordinates: &[Coordinate],
+    clusters: &[Cluster],
+) -> Option<(Vec<usize>, Cholesky)> {
+    let hypothesis = &fitted.hypothesis;
+    let mut normal = Normal::new(clusters, &priors(hypothesis, coordinates));
+    regularise(&mut normal.gram, hypothesis, coordinates);
     // A size at the limit of its kind is held there: the others are known as if it were exact. What was known before is
     // known no better where it met the end of what is refitted.
     let free: Vec<usize> = (0..coordinates.len())
@@ -427,16 +461,8 @@ fn precision_of<const N: usize>(
             (inside || c.prior.is_some()) && normal.gram[(i, i)] > 0.0
         })
         .collect();
-    if let Some(factor) = Cholesky::new(normal.gram.select(&free, &free)) {
-        let inverse = factor.inverse();
-        for (a, &i) in free.iter().enumerate() {
-            let row = free.iter().enumerate();
-            let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
-            let widen = f64::max(scale, spread(&clusters, &weights));
-            sd[i] = (inverse[(a, a)] * widen).sqrt();
-        }
-    }
-    Precision { coordinates, sd }
+    let factor = Cholesky::new(normal.gram.select(&free, &free))?;
+    Some((free, factor))
 }
 
 #[cfg(test)]
@@ -491,6 +517,15 @@ mod tests {
         assert_eq!(precision.sd[1], 0.2);
         precision.widen(|_| true, -1.0);
         assert_eq!(precision.sd[1], 0.2);
+        // With half of the noise, and where nothing was known: what the law may miss is as it was.
+        let with = |sd: [f64; 2]| Precision {
+            sd: sd.to_vec(),
+            ..precision.clone()
+        };
+        let less = precision.with_noise(&with([0.1, 0.2]), with([0.05, 0.1]));
+        assert!((less.sd[0] - libm::hypot(0.05, 0.1)).abs() < 1e-15 && less.sd[1] == 0.1);
+        let none = with([f64::INFINITY; 2]);
+        assert_eq!(none.with_noise(&none, with([0.05, 0.1])).sd, [0.05, 0.1]);
         assert!((Precision::BESIDE - Precision::ALONG * Precision::ALONG).abs() < 1e-15);
     }
 }

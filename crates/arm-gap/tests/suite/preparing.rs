@@ -296,6 +296,38 @@ fn noise_is_measured_where_movements_are_repeated() {
     assert!(!prepared.repeated);
 }
 
+/// Two repeats of one movement, and a trial of another whose forces are three times as noisy: repeats tell nothing of that, what a model
+/// leaves that explains the data does.
+#[test]
+fn once_the_data_are_explained_noise_is_read_off_all_trials() {
+    let mut session = session(&[], (1e-3, 0.1));
+    let noisy = crate::sessions::session(&[], (1e-3, 0.3));
+    let of = |s: &Session<2>, i: usize| s.trials[i].clone();
+    session.trials = vec![of(&session, 0), of(&session, 1), of(&noisy, 4)];
+    let mut prepared = PreparedSession::new(&session, 1).expect("a sound session");
+    assert!(prepared.repeated);
+    let (fitted, point) = prepared.calibrate().expect("a calibration");
+    // Mean square of the white rows of the forces.
+    let mean = |prepared: &PreparedSession<2>| {
+        let rows = fitted.residuals.iter().zip(&prepared.fitted);
+        let rows = rows.flat_map(|(left, &trial)| {
+            let all = prepared.noise.whiten(left, &prepared.valid_segments[trial]);
+            all[all.len() / 2..].to_vec()
+        });
+        let (sum, count) = rows.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+        sum / count
+    };
+    let before = mean(&prepared);
+    prepared
+        .measure_noise_left(&point, &fitted)
+        .expect("what is left");
+    let after = mean(&prepared);
+    assert!(
+        before > 1.5 && (after - 1.0).abs() < 0.15,
+        "{before} {after}"
+    );
+}
+
 #[test]
 fn noise_is_never_believed_to_be_below_a_two_thousandth_of_the_range() {
     let silent: Vec<Thinned> = vec![vec![vec![0.0; 500]; 2].into(); 8];
