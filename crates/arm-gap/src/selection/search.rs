@@ -292,14 +292,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .filter(|c| c.gain > c.members.iter().map(least).sum())
                 .collect();
             let before = converged.plainer.len();
-            for (place, choice) in contenders(&choices, library).into_iter().enumerate() {
-                if place > CONTENDERS && !converged.tried.is_empty() {
+            let asking = (library, score_test);
+            let (best, reserves) = contenders(&choices, library);
+            for choice in best {
+                self.converge(choice, state, asking, &mut converged);
+            }
+            for choice in reserves {
+                if !converged.tried.is_empty() {
                     break;
                 }
-                if !converged.met.contains(&choice.members) {
-                    self.converge(&choice, state, (library, score_test), &mut converged);
-                    converged.met.push(choice.members);
-                }
+                self.converge(choice, state, asking, &mut converged);
             }
             if converged.plainer.len() == before {
                 break;
@@ -320,14 +322,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
-    /// Converges a choice by simulation.
+    /// Converges a choice by simulation, unless it has been.
     fn converge(
         &self,
-        choice: &Choice,
+        choice: Choice,
         state: &SearchState<'a, N>,
         (library, score_test): (&Library, &ScoreTest),
         converged: &mut Converged<N>,
     ) {
+        if converged.met.contains(&choice.members) {
+            return;
+        }
         let question = |&m: &usize| {
             let mut candidate = library.candidates[m].clone();
             (candidate.price, candidate.spread) = (score_test.price[m], score_test.spread[m]);
@@ -335,7 +340,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         };
         let asked: Vec<Candidate> = choice.members.iter().map(question).collect();
         let SearchState { current, point, .. } = state;
-        let Some(fitted) = self.attempt(current, (&asked, &choice.coefficients), point) else {
+        let fitted = self.attempt(current, (&asked, &choice.coefficients), point);
+        converged.met.push(choice.members);
+        let Some(fitted) = fitted else {
             return;
         };
         let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
@@ -408,13 +415,13 @@ struct Converged<const N: usize> {
     plainer: Vec<Candidate>,
 }
 
-/// The choices that are converged by simulation: the best, each with other effects, and the best of a single effect. Those behind them are
-/// for where none of these can be followed.
-fn contenders(choices: &[Choice], library: &Library) -> Vec<Choice> {
-    let mut distinct: Vec<Choice> = Vec::new();
+/// The choices that are converged by simulation, the best first, each with other effects, and the best of a single effect; and those
+/// behind them, for where none of these can be followed.
+fn contenders(choices: &[Choice], library: &Library) -> (Vec<Choice>, Vec<Choice>) {
+    let mut best: Vec<Choice> = Vec::new();
     let most = choices.first().map_or(0.0, |c| c.worth);
     for choice in choices.iter().filter(|c| c.worth > 0.5 * most) {
-        if distinct.len() >= CONTENDERS + RESERVES {
+        if best.len() >= CONTENDERS + RESERVES {
             break;
         }
         // Another shape of the same effects is refined by the fit, it need not be converged by itself.
@@ -424,20 +431,21 @@ fn contenders(choices: &[Choice], library: &Library) -> Vec<Choice> {
                     library.candidates[a].is_same_effect(&library.candidates[b].effect)
                 })
         };
-        if !distinct.iter().any(same) {
-            distinct.push(choice.clone());
+        if !best.iter().any(same) {
+            best.push(choice.clone());
         }
     }
+    let mut reserves = best.split_off(CONTENDERS.min(best.len()));
     let single = choices
         .iter()
         .find(|c| c.members.len() == 1 && c.worth > 0.0);
-    if let Some(single) = single {
-        let of = distinct.iter().position(|c| c.members == single.members);
-        if of.is_none_or(|place| place > CONTENDERS) {
-            distinct.insert(CONTENDERS.min(distinct.len()), single.clone());
-        }
+    if let Some(single) = single
+        && !best.iter().any(|c| c.members == single.members)
+    {
+        reserves.retain(|c| c.members != single.members);
+        best.push(single.clone());
     }
-    distinct
+    (best, reserves)
 }
 
 /// Whether a sensor is far from what was promised.
@@ -473,12 +481,14 @@ mod tests {
         };
         let pairs = (1..16).map(|k| choice(vec![0, k], 100.0 - k as f64));
         let all: Vec<Choice> = pairs.chain([choice(vec![3], 51.0)]).collect();
-        let found = contenders(&all, &library);
-        let members: Vec<_> = found.iter().map(|c| c.members.clone()).collect();
+        let (best, reserves) = contenders(&all, &library);
+        let members: Vec<_> = best.iter().map(|c| c.members.clone()).collect();
         assert_eq!(members[..CONTENDERS], [[0, 1], [0, 2], [0, 3], [0, 4]]);
-        assert_eq!(members[CONTENDERS], [3]);
-        assert_eq!(members[CONTENDERS + 1], [0, 5]);
-        assert_eq!(members.len(), CONTENDERS + 1 + RESERVES);
+        assert_eq!(members[CONTENDERS..], [[3]]);
+        assert_eq!(
+            (&reserves[0].members[..], reserves.len()),
+            (&[0, 5][..], RESERVES)
+        );
     }
 
     #[test]
