@@ -74,7 +74,7 @@ def _root(
 
     Simulate the experiment, identify the arm, and name what the model lacks. SI units and radians unless a name says otherwise.
 
-    Exit status: 0 done, 1 found something that needs you, 2 bad input, 130 interrupted (143 and 129 after SIGTERM and SIGHUP).
+    Exit status: 0 done, 1 done with a finding that needs attention, 2 bad input, 130 interrupted (143 and 129 after SIGTERM and SIGHUP).
     """
 
 

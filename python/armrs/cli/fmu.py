@@ -163,7 +163,7 @@ def fmu_run(
     from ..workflows.stiction import too_steep_said
 
     suffix = samples_suffix(to, out)
-    folder = writable(out, json)
+    folder = writable(out, json, verb="fmu run")
     loaded = _loaded(system, step, duration)
     arms = {name: slave for name, slave in loaded.slaves.items() if isinstance(slave, Slave)}
     console.warn([f"{name}: {said}" for name, arm in arms.items() for said in too_steep_said(arm.model, arm.internal_step)])
