@@ -60,7 +60,7 @@ def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
         {"lack_of_fit": lack, "effects": [effect()], "gap": {}, "open": [], "unexplained": {"share": 0.0, "looks_like": None}}
     )
     assert "2430 times" in said[0] and "more than 100 standard deviations" in said[0]
-    assert "(+0.0 standard deviations)" in said[1]
+    assert "(+0.0 standard deviations, limit 6)" in said[1]
 
 
 def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:
