@@ -33,6 +33,11 @@ DEPENDENCE_MEANING = (
     "model without it, over trials."
 )
 
+INTERVALS = (
+    "± is one standard deviation. Where the data alone decide, intervals reach beyond two of them to each side: they take Student's t "
+    "with few independent blocks. They end at physical limits."
+)
+
 PREDICTED = (
     "Standard deviations to be expected: with what is known beforehand, and from the data alone. What the model lacks is not in them. "
     "Relative: the latter beside the value; a parameter of an effect that is small counts as 0.05."
@@ -78,15 +83,15 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 def _identified(result: Mapping[str, Any]) -> str:
     by = [e["decided_by"] for e in result["parameters"]]
-    counts = [f"{by.count('data')} are measured", f"{by.count('prior')} are those of the model as given, adjusted to agree"]
+    counts = [f"{by.count('data')} of the {len(by)} parameters", f"the model as given {by.count('prior')}"]
     if "bound" in by:
-        counts.append(f"{by.count('bound')} are at a physical limit")
+        counts.append(f"a physical limit {by.count('bound')}")
     ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
     if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
         ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
     return (
         f"The movements determine {result['rank']} of {result['unknowns']} unknowns. "
-        f"Of the {len(by)} parameters, {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
+        f"The measurement determines {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
     )
 
 
@@ -203,7 +208,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     head(result, verdict(result))
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
-    print(f"{SYMBOLS}\n")
+    print(f"{SYMBOLS}\n{INTERVALS}\n")
     show(
         "Calibration of the sensors, what was believed beforehand being the tolerance declared",
         tables.estimates(result["calibration"], joints, level),

@@ -306,7 +306,7 @@ def _without_robot(dataset: Dataset) -> list[Problem]:
     if dataset.model.robot is not None or not any(t.robot_q is not None for t in dataset.trials):
         return []
     text = "[robot] in the model: found nothing, though the trials hold the robot's angles (qr1, qr2): gap compares joint torques only"
-    step = "add [robot] with lengths, base and elbow to the model, or import the recordings again: armrs import reads it off the angles"
+    step = "add [robot] with lengths, base and elbow to the model, or import the recordings again: armrs import estimates it"
     return [Problem("warning", text, step)]
 
 

@@ -99,7 +99,7 @@ def initialise(
     worn : sequence of Worn
         Handle and parts of an orthosis; they become part of their segments.
     robot : Robot, optional
-        The robot that leads the hand. Without it `armrs import` reads it off the angles of a robot that were recorded.
+        The robot that leads the hand. Without it `armrs import` estimates it from the recorded angles of a robot.
     replace : bool
         Whether existing files may be replaced.
 
@@ -163,7 +163,7 @@ def _assumed(
     lines.append("the grip is neutral (thumb up)")
     lines.append("joint laws are unknown: stiffness, damping and friction are left to be identified")
     if robot is None:
-        lines.append("no robot leads the hand, unless recordings hold its angles: armrs import then reads links and base off them")
+        lines.append("no robot leads the hand, unless recordings hold its angles: armrs import then estimates links and base from them")
     return tuple(lines)
 
 

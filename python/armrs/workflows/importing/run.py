@@ -198,10 +198,10 @@ def _led(model: Model, recipe: Recipe, reads: Sequence[Read]) -> tuple[Model, li
     off = f"{1e3 * apart:.1f} mm (root mean square)"
     if robot is None:
         said = f"hand and handle are {off} apart with the robot that suits best. Are its angles counted as armrs does (docs/files.md)?"
-        return model, [f"[robot]: not in the model, and not to be read off the angles: {said}"]
+        return model, [f"[robot]: not in the model, and not to be estimated from the angles: {said}"]
     lengths, base = (" and ".join(f"{v:.3f}" for v in values) for values in (robot.lengths, robot.base))
     found = f"links of {lengths} m, base {base} m forward and up of that of the arm, elbow {robot.elbow}; hand and handle then {off} apart"
-    return model.replace(robot=robot), [f"[robot]: not in the model, so read off the angles: {found}. Compare it with your robot"]
+    return model.replace(robot=robot), [f"[robot]: not in the model, so estimated from the angles: {found}. Compare it with your robot"]
 
 
 def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None, force_on: str | None, n_joints: int) -> dict[str, object]:

@@ -143,6 +143,6 @@ def _with_angles(table: RawTable, points: tuple[str, ...]) -> RawTable:
         others = [c for c in others if c.name not in names]
         for symbol, direction in (("Fy", motion.forward), ("Fz", motion.upward)):
             others.append(RawColumn(symbol, symbol, unit_of_all, in_file @ direction))
-        said = (" ".join(f"{value:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
+        said = (" ".join(f"{round(value, 3) + 0.0:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
         notes.append("forces: {} are taken in the axes of the markers; forward is ({}), up is ({})".format(", ".join(sorted(names)), *said))
     return RawTable(table.path, table.title, (*found, *others), tuple(notes))
