@@ -439,6 +439,7 @@ def _bare(title: str, channels: str) -> RawTable:
     [
         (("slow_1_angles", "slow_2_angles"), ("slow_1_force", "slow_2_force"), [("slow", 1), ("slow", 2)]),
         (("slow_1_mocap", "fast_1_mocap"), ("slow_1_ati", "fast_1_ati"), [("slow", 1), ("fast", 1)]),
+        (("slow_1_mocap", "slow_2_mocap"), ("slow_1_mini40", "slow_2_mini40"), [("slow", 1), ("slow", 2)]),
         (
             ("Winkel_S7_langsam_1", "Winkel_S7_langsam_2"),
             ("Kraft S7 langsam 1", "Kraft S7 langsam 2"),
