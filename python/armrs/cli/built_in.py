@@ -11,7 +11,7 @@ from .common import JsonFile, OutFolder, command_line, present, writable
 
 
 def demo(context: typer.Context, out: OutFolder = Path("armrs-demo"), json: JsonFile = None) -> None:
-    """Do the main job on built-in data: simulate an experiment, search for what the model lacks, add it, show the gap before and after."""
+    """Run the whole workflow on built-in data: simulate an experiment, find what the model lacks, show the gap before and after."""
     from ..report import words
     from ..report.pages import read_result
     from ..workflows.demo import run_demo
