@@ -13,6 +13,7 @@ import pytest
 import armrs
 from armrs import catalogue, cli
 from armrs.errors import ArmrsError
+from armrs.io import files as io_files
 from conftest import Session
 
 
@@ -184,6 +185,49 @@ def test_no_verb_replaces_the_report_of_another(slow_arm: Path, tmp_path: Path, 
         line = refused(capsys, *arguments, "-o", out)
         assert "report.html: file: found the report of armrs identify, allowed a folder of its own: another -o DIR" in line
     assert (out / "report.html").read_bytes() == page and not (out / "simulated.json").exists()
+
+
+def test_the_folder_of_another_verb_is_refused_before_any_work(
+    slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`gap` was refused after its search of many minutes."""
+    out = tmp_path / "out"
+    assert cli.main(["passive", str(slow_arm), "-o", str(out)]) == 0
+    capsys.readouterr()
+    monkeypatch.setattr("armrs.io.dataset.load_dataset", lambda source: pytest.fail("work was done"))
+    for verb in ("gap", "identify", "spasticity"):
+        assert "found the report of armrs passive" in refused(capsys, verb, str(slow_arm), "-o", out)
+
+
+def test_a_result_is_replaced_whole(slow_arm: Path, tmp_path: Path) -> None:
+    """Figures of the former result, and a third movement of a plan, stayed beside the new one."""
+    out = tmp_path / "out"
+    assert cli.main(["identify", str(slow_arm), "-o", str(out)]) == 0
+    files = sorted(out.rglob("*"))
+    (out / "figures" / "torques-of-another.png").write_bytes(b"")
+    (out / "notes.txt").write_text("mine", encoding="utf-8")
+    assert cli.main(["identify", str(slow_arm), "-o", str(out)]) == 0
+    assert sorted(out.rglob("*")) == sorted([*files, out / "notes.txt"])
+
+    def write(part: Path) -> list[Path]:
+        names = ["report.html", "movement-1.toml"]
+        (part / names[0]).write_text('<meta name="generator" content="armrs plan">', encoding="utf-8")
+        (part / names[1]).write_text("", encoding="utf-8")
+        return [part / name for name in names]
+
+    plan = tmp_path / "plan"
+    written = io_files.write_whole(plan, write)
+    (plan / "movement-2.toml").write_text("", encoding="utf-8")
+    assert io_files.write_whole(plan, write) == written and sorted(plan.iterdir()) == sorted(written)
+
+
+def test_files_that_no_report_says_are_its_own_are_not_replaced(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = tmp_path / "out" / "identified.toml"
+    mine.parent.mkdir()
+    mine.write_text("# mine", encoding="utf-8")
+    line = refused(capsys, "identify", str(slow_arm), "-o", mine.parent)
+    assert "identified.toml: file: found a file that armrs identify did not write: no report is beside it" in line
+    assert mine.read_text(encoding="utf-8") == "# mine" and [mine] == list(mine.parent.iterdir())
 
 
 def test_a_page_of_someone_else_is_not_replaced(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

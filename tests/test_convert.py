@@ -10,8 +10,8 @@ import pytest
 from pyarrow import parquet
 
 import armrs
-from armrs import BadInput
-from conftest import Session, csv_lines, rows
+from armrs import BadInput, cli
+from conftest import DATASET, Session, csv_lines, rows
 
 HARD = [0.1 + 0.2, -0.0, 5e-324, 1.7976931348623157e308, 1 / 3, 123456789.12345679, 1e-5, 3.0]
 
@@ -150,3 +150,26 @@ def test_measured_data_come_back_to_the_bit(data: Path, tmp_path: Path) -> None:
         for a, b in zip(first.trials, last.trials, strict=True):
             assert a.original_t.tobytes() == b.original_t.tobytes()
             assert all(a.original[column].tobytes() == b.original[column].tobytes() for column in a.original)
+
+
+def test_another_data_set_is_not_replaced(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A conversion wrote its dataset.toml and model.toml over those of the data set that was there."""
+    other = Session(tmp_path / "other")
+    other.edit("dataset.toml", DATASET.splitlines()[0], 'name = "another"')
+    before = (other.folder / "dataset.toml").read_bytes()
+    assert cli.main(["convert", str(session.folder), "-o", str(other.folder)]) == 2
+    assert "found another data set, allowed a folder of its own" in capsys.readouterr().err
+    assert (other.folder / "dataset.toml").read_bytes() == before
+    assert [cli.main(["convert", str(session.folder), "-o", str(tmp_path / "new")]) for _ in range(2)] == [0, 0]
+
+
+def test_a_model_that_exists_is_replaced_only_by_force(session: Session, capsys: pytest.CaptureFixture[str]) -> None:
+    """From model.toml to model.urdf and back, the way back took the place of the first."""
+    model = session.folder / "model.toml"
+    before = model.read_bytes()
+    assert cli.main(["convert", str(model), "--to", "urdf", "-o", str(session.folder)]) == 0
+    back = ["convert", str(session.folder / "model.urdf"), "--to", "toml", "-o", str(session.folder)]
+    assert cli.main(back) == 2
+    assert "-o: found a model.toml that exists, allowed a folder without one, or --force" in capsys.readouterr().err
+    assert model.read_bytes() == before
+    assert cli.main([*back, "--force"]) == 0 and model.read_bytes() != before

@@ -129,6 +129,19 @@ def matlab_7_3_with_units(r: Recording, folder: Path) -> Path:
     return folder / "slow_1.mat"
 
 
+def hdf5_groups(r: Recording, folder: Path) -> Path:
+    """A group for each trial with arrays of the same names, of which only the first group was read; one of them is a table."""
+    h5py = pytest.importorskip("h5py")
+    _, values = table(r, names=SI)
+    with h5py.File(folder / "session.h5", "w") as file:
+        rows = np.zeros(len(values), dtype=[(name, "f8") for name in SI])
+        for name, column in zip(SI, values.T, strict=True):
+            rows[name] = column
+            file[f"trials/slow_2/{name}"] = np.r_[column, column[-1] + 0.01 * (name == "t_s")]
+        file["trials/slow_1/samples"] = rows
+    return folder / "session.h5"
+
+
 def c3d_with_analogs(r: Recording, folder: Path) -> Path:
     """Markers at 100 Hz and the force on analog channels at 200 Hz, as ezc3d writes them."""
     ezc3d = pytest.importorskip("ezc3d")
@@ -264,6 +277,14 @@ def test_a_recording_becomes_the_true_data_set(case: str, recording: Recording, 
     worst = np.abs(trial.force_on_arm + recording.force_on_robot[:n])[same].max()
     assert worst <= max(rounding, 1e-9) * np.abs(recording.force_on_robot).max()
     assert trial.configuration in ("slow", "langsam") and trial.repeat == 1
+
+
+def test_a_group_of_hdf5_is_a_trial(recording: Recording, tmp_path: Path) -> None:
+    done = armrs.import_recordings([hdf5_groups(recording, tmp_path)], tmp_path / "session", model=KNOWN)
+    trials = armrs.load_dataset(done.folder).trials
+    assert [(t.configuration, t.repeat, len(t)) for t in trials] == [("slow", 1, len(recording.t)), ("slow", 2, len(recording.t) + 1)]
+    for trial in trials:
+        assert np.abs(trial.q[: len(recording.t)] - recording.q).max() <= 1e-12
 
 
 def test_the_offset_of_a_clock_is_found_to_a_thousandth_of_a_second(recording: Recording, tmp_path: Path) -> None:
@@ -418,6 +439,7 @@ def _bare(title: str, channels: str) -> RawTable:
     [
         (("slow_1_angles", "slow_2_angles"), ("slow_1_force", "slow_2_force"), [("slow", 1), ("slow", 2)]),
         (("slow_1_mocap", "fast_1_mocap"), ("slow_1_ati", "fast_1_ati"), [("slow", 1), ("fast", 1)]),
+        (("slow_1_mocap", "slow_2_mocap"), ("slow_1_mini40", "slow_2_mini40"), [("slow", 1), ("slow", 2)]),
         (
             ("Winkel_S7_langsam_1", "Winkel_S7_langsam_2"),
             ("Kraft S7 langsam 1", "Kraft S7 langsam 2"),

@@ -148,6 +148,16 @@ def nanoseconds(r: Recording) -> list[str]:
     return ["rosbagTimestamp,position_1,position_2,force_y,force_z", *(f"{t},{row}" for t, row in zip(stamps, samples, strict=True))]
 
 
+def from_zero(r: Recording) -> list[str]:
+    """Joints as ROS numbers them: position1 was the first, and position0 none."""
+    names = "time,field.position0,field.position1,field.wrench.force.y,field.wrench.force.z"
+    return [names, *rows(values(r, angle=1.0), ",", ".")]
+
+
+def italian(r: Recording) -> list[str]:
+    return ["Tempo [s];Spalla [gradi];Gomito [gradi];Forza Y [N];Forza Z [N]", *rows(values(r))]
+
+
 def labchart(r: Recording) -> list[str]:
     head = ["Interval=\t0.01 s", "ChannelTitle=\tShoulder\tElbow\tForce y\tForce z", "Range=\t180 deg\t180 deg\t100 N\t100 N"]
     return [*head, "UnitName=\tdeg\tdeg\tN\tN", *rows(values(r), "\t", ".")]
@@ -248,6 +258,8 @@ CASES: dict[str, tuple[Writer, dict[str, object], str]] = {
     "UTF-16 without its mark": (text(german, encoding="utf-16-le"), {}, "text in UTF-16"),
     "line ends of an old Macintosh": (text(german, end="\r"), {}, "decimal comma"),
     "nanoseconds since 1970": (text(nanoseconds), {}, "so in ns"),
+    "joints counted from zero": (text(from_zero), {}, "'field.position0', joints counted from zero"),
+    "Italian degrees": (text(italian, encoding="utf-16"), {}, "column 'Gomito [gradi]'"),
     "LabChart": (text(labchart, "slow_1.txt"), {}, "export of LabChart"),
     "LabVIEW": (text(labview, "slow_1.lvm"), {}, "cells between tabs"),
     "text under the suffix of a workbook": (text(german, "slow_1.xls"), {}, "decimal comma"),

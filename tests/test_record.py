@@ -13,6 +13,7 @@ from armrs import BadInput
 from armrs.cli import main
 from armrs.workflows.experiment import Controller, load_experiment
 from armrs.workflows.record import measure
+from conftest import Session
 
 EXPERIMENT = """\
 name = "virtual S1"
@@ -74,6 +75,23 @@ def test_writes_a_data_set_that_hides_the_truth(experiment: Path, tmp_path: Path
     story = json.loads((tmp_path / "out" / "truth" / "truth.json").read_text())
     assert story["trials"][0]["moment_Nm"] != story["trials"][1]["moment_Nm"]
     assert max(t["tracking_error_rad"] for t in done.trials) < 2e-4
+
+
+def test_a_measured_data_set_is_never_replaced(experiment: Path, session: Session, capsys: pytest.CaptureFixture[str]) -> None:
+    """It wrote its own dataset.toml and model.toml over those of the laboratory."""
+    before = {path: path.read_bytes() for path in session.folder.rglob("*") if path.is_file()}
+    assert main(["record", str(experiment), "-o", str(session.folder)]) == 2
+    assert "found a data set that armrs record did not write, allowed a folder of its own" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in session.folder.rglob("*") if path.is_file()} == before
+
+
+def test_a_recording_replaces_the_former_one_whole(experiment: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    armrs.record(experiment, out)
+    experiment.write_text(EXPERIMENT.replace('configuration = "slow"', 'configuration = "other"'), encoding="utf-8")
+    armrs.record(experiment, out)
+    for folder, suffix in (("trials", ".csv"), ("markers", ".trc")):
+        assert sorted(path.name for path in (out / folder).iterdir()) == [f"other_{k}{suffix}" for k in (1, 2, 3)]
 
 
 def test_the_markers_written_show_the_angles_recorded(experiment: Path, tmp_path: Path) -> None:

@@ -225,6 +225,7 @@ def test_a_folder_is_never_left_half_written(slow_arm: Path, tmp_path: Path, mon
     if exists:
         out.mkdir()
         (out / "passive.json").write_text("old", encoding="utf-8")
+        (out / "report.html").write_text('<meta name="generator" content="armrs passive">', encoding="utf-8")
         (out / "mine.txt").write_text("mine", encoding="utf-8")
     before = {p.name: p.read_bytes() for p in out.rglob("*") if p.is_file()}
 

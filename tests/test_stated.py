@@ -14,10 +14,12 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 
 import armrs
 from armrs.catalogue import catalogue
-from armrs.report import plotting
+from armrs.report import plotting, tables
+from armrs.report import words as common
 from armrs.thesis import simulation
-from armrs.workflows import demo, identify
+from armrs.workflows import demo, identify, setup
 from armrs.workflows.gap import figures, maps, words
+from armrs.workflows.residuals import Explained, residuals
 from test_docs import ROOT, blocks
 
 
@@ -60,7 +62,7 @@ def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
         {"lack_of_fit": lack, "effects": [effect()], "gap": {}, "open": [], "unexplained": {"share": 0.0, "looks_like": None}}
     )
     assert "2430 times" in said[0] and "more than 100 standard deviations" in said[0]
-    assert "(+0.0 standard deviations)" in said[1]
+    assert "(+0.0 standard deviations, limit 6)" in said[1]
 
 
 def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:
@@ -186,3 +188,51 @@ def test_tolerances_are_warned_of_at_the_multiples_that_files_md_says() -> None:
         return tuple(len(identify._beyond_tolerance([own], tolerance, *step)) for step in steps)  # type: ignore[return-value, list-item]
 
     assert [told(f * by) for f in (noted, warned) for by in (0.99, 1.01)] == [(0, 0), (1, 0), (1, 0), (0, 1)]
+
+
+def test_an_interval_that_ends_at_a_limit_says_so() -> None:
+    """`0.0040 ± 0.0092` stood beside `0.0000 … 0.0241` without a word."""
+    even = {
+        "name": "m1",
+        "kind": "segment",
+        "joint": 1,
+        "value": 2.0,
+        "std": 0.1,
+        "interval": (1.8, 2.2),
+        "unit": "kg",
+        "decided_by": "prior",
+    }
+    cut = even | {"name": "torque", "kind": "coulomb", "value": 0.004, "std": 0.0092, "interval": (0.0, 0.0241), "caveat": "noisy speed"}
+    table = tables.estimates([even, cut], ["shoulder"], 0.95)
+    assert [dict(zip(table.head, row, strict=True))["but"] for row in table.rows] == [None, "noisy speed, interval ends at 0"]
+
+
+def test_what_can_change_together_has_units() -> None:
+    """`m2, m1·l1 and I1 + m1·l1² can change together as 1 : -0.376 : -0.1414`: the units were those of the unknowns, in the order named."""
+    listed = [("m2", "kg"), ("m1*l1", "kg m"), ("I1 + m1*l1^2", "kg m^2")]
+    result = {
+        "not_separable": ["m1 does not act on the data", "m2, m1*l1 and I1 + m1*l1^2 trade 1 : -0.376 : -0.1414"],
+        "parameters": [{"name": name, "unit": unit} for name, unit in listed],
+        "combinations": [],
+        "scale_free": False,
+    }
+    assert common.cannot_tell(result) == [
+        "m1 does not act on the data.",
+        "Changing m2 by 1 kg, m1·l1 by -0.376 kg m and I1 + m1·l1² by -0.1414 kg m² together leaves every measurement unchanged: none is "
+        "measured alone.",
+    ]
+
+
+def test_a_weight_says_what_its_deviations_count() -> None:
+    """`0.46 ± 0.01 times the masses, 5.4 standard deviations from it`: the ± is not that of the model."""
+    assert "0.46 ± 0.01 times the masses" in (said := str(setup.Weight(0.46, 0.01, 5.4)))
+    assert "5.4 standard deviations from one, the model's own uncertainty counted" in said
+
+
+def test_a_trial_of_which_nothing_is_left_has_no_residual() -> None:
+    """The low-pass of a slow session took all samples of a short trial, and identify ended with a traceback of NumPy."""
+    trial = SimpleNamespace(role="fit", configuration="slow", t=np.arange(4.0), q=np.arange(4.0)[:, None])
+    torque = np.array([[1.0], [2.0], [4.0], [3.0]])
+    whole = Explained(trial, trial.t, torque, 0.9 * torque)  # type: ignore[arg-type]
+    none = Explained(trial, np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))  # type: ignore[arg-type]
+    assert residuals([none, whole]) == residuals([whole]) != ()

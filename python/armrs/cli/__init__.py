@@ -70,11 +70,11 @@ def _version(wanted: bool) -> None:
 def _root(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and end.")] = False,
 ) -> None:
-    """Find out what an arm is made of, when a robot leads it.
+    """Identify a passive planar arm that a robot moves by the hand.
 
-    Simulate the experiment, identify the arm, and name what the model lacks. SI units and radians unless a name says otherwise.
+    Simulate the experiment, identify the arm, and find the effects that the model lacks. SI units and radians unless a name says otherwise.
 
-    Exit status: 0 done, 1 found something that needs you, 2 bad input, 130 interrupted (143 and 129 after SIGTERM and SIGHUP).
+    Exit status: 0 done, 1 done with a finding that needs attention, 2 bad input, 130 interrupted (143 and 129 after SIGTERM and SIGHUP).
     """
 
 

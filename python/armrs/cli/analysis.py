@@ -103,7 +103,7 @@ def identify(
     from ..report.plain import identified_data
     from ..workflows.identify import identify as run_identification
 
-    folder = writable(out, json)
+    folder = writable(out, json, verb="identify")
     data = load_dataset(dataset)
     day = day_of(data, history, date)
     with console.progress("identifying"):
@@ -155,7 +155,7 @@ def gap(
         raise BadInput("--quick", Text("-o beside it"), "--json, or nothing: a first answer has no report")
     if quick and history is not None:
         raise BadInput("--quick", Text("--history beside it"), "one of them: a first answer names nothing that could be followed")
-    folder = writable(out, json)
+    folder = writable(out, json, verb="gap")
     data = load_dataset(dataset)
     day = day_of(data, history, date)
     if quick:
@@ -212,7 +212,7 @@ def passive(
     from ..report.plain import passive_data
     from ..workflows.passive import passive_moments
 
-    folder = writable(out, json)
+    folder = writable(out, json, verb="passive")
     data = load_dataset(dataset)
     day = day_of(data, history, date)
     with console.progress("passive moments"):

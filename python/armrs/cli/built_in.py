@@ -11,14 +11,14 @@ from .common import JsonFile, OutFolder, command_line, present, writable
 
 
 def demo(context: typer.Context, out: OutFolder = Path("armrs-demo"), json: JsonFile = None) -> None:
-    """Do the main job on built-in data: simulate an experiment, search for what the model lacks, add it, show the gap before and after."""
+    """Run the whole workflow on built-in data: simulate an experiment, find what the model lacks, show the gap before and after."""
     from ..report import words
     from ..report.pages import read_result
     from ..workflows.demo import run_demo
 
-    writable(out, json)
-    with console.progress("demo"):
-        result = run_demo(out, command=command_line(context))
+    writable(out, json, verb="demo")
+    with console.stages("demo") as tell:
+        result = run_demo(out, command=command_line(context), tell=tell)
     plain = read_result(out / "demo.json")
     present(lambda: plain, json, lambda: words.demo(plain, result.files))
 
@@ -31,7 +31,7 @@ def reproduce(context: typer.Context, out: OutFolder = Path("armrs-thesis"), jso
     from ..report import words
     from ..thesis import run_reproduce
 
-    writable(out, json)
+    writable(out, json, verb="reproduce")
     with console.stages("the thesis") as tell:
         result = run_reproduce(out, command=command_line(context), tell=tell)
     present(lambda: result.data, json, lambda: words.reproduced(result.data, result.files))

@@ -35,7 +35,7 @@ def spasticity(
     from ..report.clinic_results import spasticity_data, write_spasticity
     from ..workflows.spasticity import spasticity as find_reflexes
 
-    folder = writable(out, json)
+    folder = writable(out, json, verb="spasticity")
     data = load_dataset(dataset)
     day = day_of(data, history, date)
     with console.progress("reflexes"):
@@ -73,7 +73,7 @@ def cohort(
     from ..report.clinic_results import cohort_data, write_cohort
     from ..workflows.cohort import cohort as summarise
 
-    folder = writable(out, json)
+    folder = writable(out, json, verb="cohort")
     with console.progress("cohort"):
         result = summarise(source, groups=groups)
     plain = cohort_data(result, command_line(context))

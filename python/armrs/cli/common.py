@@ -85,8 +85,8 @@ def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None],
         print(f"Next: {step}")
 
 
-def writable(out: Path | None, json: Path | None = None) -> Path | None:
-    """Refuse outputs that cannot be written before any work is done."""
+def writable(out: Path | None, json: Path | None = None, *, verb: str | None = None) -> Path | None:
+    """Refuse outputs that cannot be written before any work is done, and a folder with the report of another verb."""
     if json is not None and json != _STDOUT:
         files.may_replace(json, ".json")
         files.must_be_writable(json)
@@ -95,7 +95,10 @@ def writable(out: Path | None, json: Path | None = None) -> Path | None:
     if out is None:
         return None
     files.must_be_writable(out)
-    return files.output_folder(out, "-o")
+    folder = files.output_folder(out, "-o")
+    if verb is not None:
+        files.refuse_page_of_another(folder / "report.html", verb)
+    return folder
 
 
 def _is_inside(path: Path, folder: Path) -> bool:

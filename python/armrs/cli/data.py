@@ -84,6 +84,7 @@ def convert(
         str | None, typer.Option(metavar="AXIS", help="Axis that points forward; where the arm reaches when absent.")
     ] = None,
     coordinates: Annotated[str, typer.Option(metavar="NAME,…", help="Joint angles of a MOT or STO file, first joint first.")] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace a model file that exists.")] = False,
     json: JsonFile = None,
 ) -> None:
     """Convert between file formats, every value kept to the bit; turn marker trajectories into joint angles and segment lengths."""
@@ -95,7 +96,7 @@ def convert(
     from ..report import words
 
     if to.value in _MODEL_SUFFIX:
-        _convert_model(source, out, to.value, json)
+        _convert_model(source, out, to.value, force, json)
         return
     suffix = _suffix_of(source, (*SUFFIXES, *MOTION_SUFFIXES, *MARKER_SUFFIXES))
     chosen, named = listed(points), listed(coordinates)
@@ -119,17 +120,18 @@ def convert(
     present(lambda: {"files": written}, json, lambda: print("\n".join(os.fspath(path) for path in written)))
 
 
-def _convert_model(source: Path, out: Path, to: str, json: Path | None) -> None:
+def _convert_model(source: Path, out: Path, to: str, force: bool, json: Path | None) -> None:
     """Write a model in another format: from `model.toml` to URDF, MJCF or OSIM, or from URDF or MJCF to `model.toml`."""
     from ..io.multibody import export_model, import_model
 
     writable(out, json)
     target = out / f"{source.stem}{_MODEL_SUFFIX[to]}"
+    files.not_an_input([target], [source])
+    if target.exists() and not force:
+        raise BadInput("-o", Text(f"a {target.name} that exists"), "a folder without one, or --force", file=out)
     lost: tuple[str, ...] = ()
     if to == "toml":
-        model = import_model(source)
-        files.not_an_input([target], [source])
-        model.write(target)
+        import_model(source).write(target)
     else:
         lost = export_model(source, target).lost
     console.warn(f"{to} cannot hold {line}" for line in lost)
@@ -161,7 +163,9 @@ def report(
         from ..report.clinic import load_norms, write_summary
 
         usual = () if norms is None else load_norms(norms)
-        print(write_summary(sources, files.output_folder(out, "-o") / "summary.html", usual))
+        page = files.output_folder(out, "-o") / "summary.html"
+        files.refuse_page_of_another(page, "report")
+        print(write_summary(sources, page, usual))
         return
     from ..report.pages import write_report
 

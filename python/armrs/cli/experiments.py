@@ -93,7 +93,7 @@ def simulate(
 
     if (movement is None) == (trial is None):
         raise BadInput("--movement, --trial", Text("neither" if movement is None else "both"), "one of them")
-    suffix, folder = samples_suffix(to, out), writable(out, json)
+    suffix, folder = samples_suffix(to, out), writable(out, json, verb="simulate")
     arm = load_model(model)
     reading = None if trial is None else _single_trial(trial, arm.n_joints)
     measured = None if reading is None else reading.trial
@@ -177,7 +177,7 @@ def plan(
     from ..workflows.movement import load_movement
     from ..workflows.plan_stretches import plan_stretches
 
-    folder = writable(out, json)
+    folder = writable(out, json, verb="plan")
     arm = load_model(model)
     limits = planning.Limits(
         planning.angles_of(angles_deg),
@@ -228,7 +228,7 @@ def record(
     from ..workflows.record import record as run_record
     from ..workflows.stiction import sticking_said
 
-    writable(out, json)
+    writable(out, json, verb="record")
     planned = load_experiment(experiment)
     with console.progress("recording", sum(run.repeats + run.tests for run in planned.runs)) as step:
         result = run_record(planned, out, step=step)
@@ -272,7 +272,7 @@ def sweep(
     from ..montecarlo import sweep as run_sweep
     from ..workflows.stiction import sticking_said
 
-    writable(out, json)
+    writable(out, json, verb="sweep")
     if cluster is not None and jobs is not None:
         raise BadInput("--jobs", jobs, "no --jobs beside --cluster: the cluster has its own workers")
     planned = load_sweep(source)

@@ -29,7 +29,7 @@ def export_c(
 ) -> None:
     """Write the arm of a model as C source: segments, effects, covariance, calibration of the sensors, and a self-test.
 
-    Refused by name is what a device cannot apply: effects of the contact and of the robot, a drift. See docs/firmware.md.
+    Effects that a device cannot apply (of the contact, of the robot, a drift) are refused by name. See docs/firmware.md.
     """
     from ..workflows import firmware as workflow
 

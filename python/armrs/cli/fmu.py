@@ -163,12 +163,14 @@ def fmu_run(
     from ..workflows.stiction import too_steep_said
 
     suffix = samples_suffix(to, out)
-    folder = writable(out, json)
+    folder = writable(out, json, verb="fmu run")
     loaded = _loaded(system, step, duration)
     arms = {name: slave for name, slave in loaded.slaves.items() if isinstance(slave, Slave)}
     console.warn([f"{name}: {said}" for name, arm in arms.items() for said in too_steep_said(arm.model, arm.internal_step)])
     try:
-        with console.progress("coupling", total=loaded.count * (3 if estimate else 1)) as advance:
+        # How often a system halves its step until the errors are within its accuracy is not known before.
+        total = None if estimate and loaded.refine else loaded.count * (3 if estimate else 1)
+        with console.progress("coupling", total=total) as advance:
             run = run_checked(loaded, progress=advance) if estimate else run_system(loaded, progress=advance)
     except CoupledError as error:
         run = error.run

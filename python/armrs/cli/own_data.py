@@ -226,8 +226,8 @@ def import_(
     if ask:
         columns = ",".join(filter(None, [_asked(sources, tuple(listed(points)), arm), columns]))
     try:
-        with console.progress("importing"):
-            done = import_recordings(sources, out, model=arm, columns_map=columns, **options)  # type: ignore[arg-type]
+        with console.stages("importing") as tell:
+            done = import_recordings(sources, out, model=arm, columns_map=columns, progress=tell, **options)  # type: ignore[arg-type]
     except BadInput as error:
         if ask or columns or not talking or not _about_columns(error):
             raise

@@ -71,6 +71,9 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     entries = [entry.replace(file=name) for entry, name in zip(description.trials, names, strict=True)]
     content = description.replace(name=name_of(described, description), model="model.toml" if named else None, trials=entries).to_toml()
 
+    if (out / FILE).exists() and (out / FILE).read_bytes() != content.encode("utf-8"):
+        raise BadInput("folder", Text("another data set"), "a folder of its own", file=out)
+
     def write(part: Path) -> list[Path]:
         written = [_write(_job(source, part / name)) for source, name in zip(sources, names, strict=True)]
         for model in models:

@@ -20,7 +20,9 @@ PathLike = str | os.PathLike[str]
 _HOST = re.sub(r"\W", "_", os.uname().nodename if hasattr(os, "uname") else os.environ.get("COMPUTERNAME", ""))[:32] or "host"
 _UNFINISHED = re.compile(r"\..*\.(?P<host>\w+)-(?P<process>\d+)\..*\.part")
 """Names of what a process has not finished writing: it says which process of which machine."""
-_GENERATOR = re.compile(rb'<meta name="generator" content="armrs ([a-z-]+)">')
+_GENERATOR = re.compile(rb'<meta name="generator" content="armrs ([a-z -]+)">')
+_NUMBERED = re.compile(r"(.+-)\d+(\.\w+)")
+"""Names of files that a result has several of, such as `movement-1.toml`."""
 _HEAD = 2000
 """Bytes of a page in which it says what made it."""
 _COMPLETE = ".complete"
@@ -138,13 +140,14 @@ def _write_whole(target: Path, folder: PathLike, write: Callable[[Path], list[Pa
         for name in written:
             _refuse_links(target, name)
             may_replace(target / name, name.suffix)
-            if name.suffix == ".html":
-                refuse_page_of_another(target / name, _maker(temporary / name))
+        outdated = [file for page in written if page.suffix == ".html" for file in _outdated(temporary, target, page, written)]
         _flush(temporary)
         if target.exists():
             # From here on the new files are the result: a process that ends now is completed by the next one.
             temporary = temporary.rename(temporary.with_suffix(_COMPLETE))
             _move(temporary, target)
+            for file in outdated:
+                file.unlink(missing_ok=True)
         else:
             temporary.chmod(0o777 & ~_umask())
             temporary.rename(target)
@@ -231,6 +234,24 @@ def refuse_page_of_another(path: Path, maker: str | None) -> None:
         return
     found = "a page that armrs did not make" if there is None else f"the report of armrs {there}"
     raise BadInput("file", Text(found), "a folder of its own: another -o DIR", file=path)
+
+
+def _outdated(temporary: Path, target: Path, page: Path, written: list[Path]) -> list[Path]:
+    """Return the pictures and numbered files of the former result of a verb that the new one beside `page` does not replace.
+
+    Without a page of the verb, files by these names are not its own, and are refused.
+    """
+    maker, there = _maker(temporary / page), target / page.parent
+    refuse_page_of_another(target / page, maker)
+    if not (target / page).is_file():
+        for path in (target / name for name in written if name.is_relative_to(page.parent)):
+            if path.exists():
+                found = f"a file that armrs {maker} did not write: no report is beside it"
+                raise BadInput("file", Text(found), "a folder of its own: another -o DIR", file=path)
+        return []
+    numbered = {_NUMBERED.sub(r"\1*\2", n.name) for n in written if n.parent == page.parent and _NUMBERED.fullmatch(n.name)}
+    former = [*there.glob("figures/*.png"), *there.glob("figures/*.json"), *(path for form in numbered for path in there.glob(form))]
+    return [path for path in former if path.relative_to(target) not in written]
 
 
 def _maker(path: Path) -> str | None:

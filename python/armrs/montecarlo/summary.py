@@ -15,7 +15,7 @@ from .store import Store
 SAMPLE = 20_000
 """So many values of each quantity are kept, the first ones: for percentiles and figures."""
 _REASONS = 5
-_ROUNDING = 1e-14
+_ROUNDING = 1e-12
 """Values that differ by less than this, relative to their mean, are the same."""
 _FOUND = re.compile(r"found [^,]*,")
 """What differs between cases that failed for one reason."""

@@ -440,7 +440,7 @@ def measured(results: Sequence[Mapping[str, Any]]) -> list[str]:
     seconds = data["fit"]["duration_s"] + data["test"]["duration_s"]
     lines = [
         f"The relaxed arm was moved and measured {trials} times, {seconds / 60.0:.1f} minutes in all, in {len(data['configurations'])} "
-        f"different movement{'s' * (len(data['configurations']) > 1)}."
+        f"{'different movements' if len(data['configurations']) > 1 else 'movement'}."
     ]
     ranges = data.get("range_deg")
     if ranges:

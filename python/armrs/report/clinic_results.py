@@ -84,7 +84,7 @@ def _stretches(result: Spasticity, found: JointReflex, name: str) -> Drawn:
     if right.get_legend_handles_labels()[0]:
         right.legend(fontsize="small")
     text = (
-        f"{name}, one point a stretch. Left: its largest moment, and the largest of each part of the fitted law. Right: angle and speed "
+        "One point a stretch. Left: its largest moment, and the largest of each part of the fitted law. Right: angle and speed "
         "where the reflex is first felt, at a tenth of its largest moment. The line is the speed from which on it acts, grey its interval. "
         "A latency moves the points off the line: the speed changes before the reflex is felt."
     )

@@ -68,7 +68,7 @@ def stretches(result: Mapping[str, Any]) -> Table:
         cells = [mean("speed", degrees), mean("peak_moment"), mean("work"), mean("elastic"), mean("resisting"), mean("reflex")]
         cells += [mean("catch_angle", degrees), mean("catch_speed", degrees), mean("emg_latency", 1000.0), mean("co_contraction")]
         rows.append([joints[joint - 1], configuration, len(own), *cells])
-    head = ["joint", "movement", "repeats", "speed [°/s]", "peak [N m]", "work [J]", "of it elastic [N m]", "viscous and dry [N m]"]
+    head = ["joint", "movement", "repeats", "speed [°/s]", "peak [N m]", "work [J]", "elastic [N m]", "viscous and dry [N m]"]
     head += ["reflex [N m]", "catch at [°]", "at [°/s]", "EMG after [ms]", "co-contraction"]
     used = [k for k in range(len(head)) if k < len(head) - 2 or any(row[k] != "–" for row in rows)]
     return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2)
@@ -86,12 +86,10 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 def _cohort(result: Mapping[str, Any]) -> str:
     differ = [c for c in result["contrasts"] if c["p_value"] is not None and c["p_value"] < 0.05]
     named = "; ".join(f"{c['name']} differs between {c['between'][0]} and {c['between'][1]}" for c in differ)
-    named = named[:1].upper() + named[1:] or "No difference between groups or sides is called one"
+    named = named[:1].upper() + named[1:] or "No difference between groups or sides is significant"
+    compared = f" {named}, at a level of 5 % over all of them together." if result["contrasts"] else ""
     count = len({q["name"] for q in result["quantities"]})
-    return (
-        f"{result['subjects']} subjects, {result['sessions']} sessions, {count} {'quantity' if count == 1 else 'quantities'}. "
-        f"{named}, at a level of 5 % over all of them together."
-    )
+    return f"{result['subjects']} subjects, {result['sessions']} sessions, {count} {'quantity' if count == 1 else 'quantities'}.{compared}"
 
 
 def quantities(result: Mapping[str, Any]) -> Table:

@@ -108,7 +108,7 @@ def _lines(what: str, total: float | None) -> Iterator[Callable[[str, float], No
         nonlocal wait
         while not ended.wait(wait):
             stage, done = state
-            share = f", {100.0 * done / total:.0f} %" if total and done else ""
+            share = f", {100.0 * done / total:.0f} %" if total else ""
             print(f"armrs: {stage}{share}, after {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
             wait *= 2.0
 

@@ -43,6 +43,10 @@ def digits(value: float, count: int = 3) -> str:
     return f"{float(f'{value:.{count}g}'):.{max(count, 6)}g}"
 
 
+_EVEN = 0.95
+"""An interval of which one side is that much shorter than the other ends at a limit."""
+
+
 def probability(value: float) -> str:
     """Write a probability; what is below 1e-12 is not told apart."""
     return "< 1e-12" if value < 1e-12 else f"{value:.2g}"
@@ -64,7 +68,7 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
             "{} … {}".format(*(number(v, item["std"]) for v in item["interval"])),
             unit(item["unit"]),
             item["decided_by"],
-            item.get("caveat"),
+            _but(item),
             None if item.get("given") is None else f"{item['given']:.4g}",
         ]
         for item in items
@@ -72,6 +76,15 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
     head = ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "but", "in the model"]
     used = [k for k in range(len(head)) if any(row[k] not in (None, "") for row in rows)]
     return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1, symbols=True)
+
+
+def _but(item: Mapping[str, Any]) -> str | None:
+    """Return what is to be said against an estimate: its caveat, and that its interval ends at a physical limit."""
+    said = [item["caveat"]] if item.get("caveat") else []
+    below, above = (abs(end - item["value"]) for end in item["interval"])
+    if min(below, above) < _EVEN * max(below, above):
+        said.append(f"interval ends at {item['interval'][int(above < below)] + 0.0:.3g}")
+    return ", ".join(said) or None
 
 
 def deciding(items: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -380,5 +393,5 @@ def smallest_effects(would_show: Sequence[Mapping[str, Any]]) -> Table:
         cells = rows.setdefault(key, [None] * (most + 2))
         at = w["joint"] - 1 if w["joint"] else most + ({"Fy": 0, "Fz": 1}.get(w["channel"], 0) if w["channel"] else 0)
         cells[at] = digits(w["at_least"], 2)
-    head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole or Fy", "Fz"]
+    head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole arm or Fy", "Fz"]
     return Table(head, [[kind, parameter, unit(held_in), *cells] for (kind, parameter, held_in), cells in rows.items()], 3)

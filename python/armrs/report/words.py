@@ -33,6 +33,16 @@ DEPENDENCE_MEANING = (
     "model without it, over trials."
 )
 
+INTERVALS = (
+    "± is one standard deviation. Where the data alone decide, intervals reach beyond two of them to each side: they take Student's t "
+    "with few independent blocks. They end at physical limits."
+)
+
+PREDICTED = (
+    "Standard deviations to be expected: with what is known beforehand, and from the data alone. What the model lacks is not in them. "
+    "Relative: the latter beside the value; a parameter of an effect that is small counts as 0.05."
+)
+
 WRONG_MASS = (
     "A mass or centre of mass that is wrong in the model looks like a coupling too: its weight depends on the sum of both angles, and so "
     "does what is left of it."
@@ -73,15 +83,15 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 def _identified(result: Mapping[str, Any]) -> str:
     by = [e["decided_by"] for e in result["parameters"]]
-    counts = [f"{by.count('data')} rest on the measurement", f"{by.count('prior')} on the model as given"]
+    counts = [f"{by.count('data')} of the {len(by)} parameters", f"the model as given {by.count('prior')}"]
     if "bound" in by:
-        counts.append(f"{by.count('bound')} on a physical limit")
+        counts.append(f"a physical limit {by.count('bound')}")
     ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
     if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
         ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
     return (
         f"The movements determine {result['rank']} of {result['unknowns']} unknowns. "
-        f"Of the {len(by)} parameters listed {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
+        f"The measurement determines {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
     )
 
 
@@ -174,16 +184,22 @@ def check_lines(result: Mapping[str, Any]) -> list[str]:
 
 def cannot_tell(result: Mapping[str, Any]) -> list[str]:
     """Return what the data cannot tell, a line each."""
-    lines = [_trade(line) for line in result["not_separable"]]
+    units = {tables.symbol(item["name"]): tables.unit(item["unit"]) for item in (*result["parameters"], *result["combinations"])}
+    lines = [_trade(line, units) for line in result["not_separable"]]
     if result["scale_free"]:
         lines.append("No torque acted: all values are known up to one common factor, which was taken from the model.")
     return lines
 
 
-def _trade(line: str) -> str:
+def _trade(line: str, units: Mapping[str, str]) -> str:
     """Say in a sentence which quantities trade: `m2 and m1*l1 trade 1 : -0.376`."""
     names, trades, ratio = tables.symbol(line).partition(" trade ")
-    return f"{names} can change together as {ratio}, and nothing that was measured changes." if trades else f"{names}."
+    if not trades:
+        return f"{names}."
+    first, last = names.rsplit(" and ", 1)
+    pairs = zip((*first.split(", "), last), ratio.split(" : "), strict=True)
+    changes = [f"{name} by {share} {units.get(name, '')}".rstrip() for name, share in pairs]
+    return f"Changing {', '.join(changes[:-1])} and {changes[-1]} together leaves every measurement unchanged: none is measured alone."
 
 
 def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
@@ -192,7 +208,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     head(result, verdict(result))
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
-    print(f"{SYMBOLS}\n")
+    print(f"{SYMBOLS}\n{INTERVALS}\n")
     show(
         "Calibration of the sensors, what was believed beforehand being the tolerance declared",
         tables.estimates(result["calibration"], joints, level),
@@ -219,6 +235,7 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     print("\n".join(result["story"]))
     print()
     show(result["comparison_text"], tables.comparison(result))
+    print(f"{SYMBOLS}\n")
     print(result["missing_text"])
     print()
     print("The slow movements alone cannot tell everything apart:")
@@ -337,10 +354,11 @@ def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         else "no robot in the model; "
     )
     show("", tables.predictions(result))
+    print(f"{SYMBOLS}\n\n{PREDICTED}\n")
     print(
         f"{len(result['movements'])} movements, {result['duration_s']:.3g} s with all repeats; force on the arm up to "
         f"{result['largest_force_N']:.3g} N, joints up to {result['largest_speed_rad_s']:.3g} rad/s, {robot}"
-        f"worst relative deviation {tables.percent(result['worst_relative_std'])}"
+        f"largest relative standard deviation {tables.percent(result['worst_relative_std'])}"
         + ("" if other is None else f", {other['worst_ratio']:.3g} times better than the movement compared")
     )
     for line in slowed(result):

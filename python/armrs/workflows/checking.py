@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -123,9 +123,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     """
     problems: list[Problem] = []
     checks.path("source", source)
-    if progress is not None:
-        checks.function("progress", progress)
-    tell = progress or (lambda stage, share: None)
+    tell = checks.progress(progress)
     tell("reading", 0.0)
     described = _caught(lambda: describe(source), problems)
     if described is None:
@@ -156,7 +154,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     tell("clocks", 0.6)
     problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
-    return Checked(tuple(dict.fromkeys(problems)), _abilities(dataset, blocked), dataset)
+    return Checked(_feasible(dict.fromkeys(problems), dataset), _abilities(dataset, blocked), dataset)
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
@@ -186,6 +184,8 @@ def _remedy(error: ArmrsError) -> str:
     """Return the next step about an error."""
     if not isinstance(error, BadInput):
         return "correct the file that it names"
+    if (error.hint or error.allowed).endswith("or that file"):
+        return "give the folder that armrs import, record or demo wrote"
     place = error.place.rpartition(", ")[2]
     for start, step in _FILES.items():
         if place.startswith(start):
@@ -223,10 +223,20 @@ _WARNINGS = (
     ("a joint that is held", "nothing, if the joint was held; else repair its sensor"),
     ("begin them at one", "cut the trials at a rest"),
     ("at a higher rate", "record the robot at a higher rate, or let it start and stop smoothly"),
-    ("are compared by joint torques", "leave such trials out, or add what they lack"),
+    ("are compared by joint torques", "add what they lack, or leave these trials out"),
     ("no model is named", "nothing, or name a model of your own: model = in dataset.toml"),
 )
 """By words of a warning, what to do about it."""
+
+
+def _feasible(problems: Iterable[Problem], dataset: Dataset) -> tuple[Problem, ...]:
+    """Return problems whose next step does not leave every trial out."""
+    told = list(problems)
+    concerned: dict[str, str] = {}
+    for p in told:
+        concerned[p.next_step] = concerned.get(p.next_step, "") + p.text
+    all_of_them = {step for step, text in concerned.items() if all(trial.file in text for trial in dataset.trials)}
+    return tuple(replace(p, next_step=p.next_step.partition(", or leave")[0]) if p.next_step in all_of_them else p for p in told)
 
 
 def _warned(text: str) -> Problem:
@@ -296,7 +306,7 @@ def _without_robot(dataset: Dataset) -> list[Problem]:
     if dataset.model.robot is not None or not any(t.robot_q is not None for t in dataset.trials):
         return []
     text = "[robot] in the model: found nothing, though the trials hold the robot's angles (qr1, qr2): gap compares joint torques only"
-    step = "add [robot] with lengths, base and elbow to the model, or import the recordings again: armrs import reads it off the angles"
+    step = "add [robot] with lengths, base and elbow to the model, or import the recordings again: armrs import estimates it"
     return [Problem("warning", text, step)]
 
 
@@ -364,7 +374,7 @@ def _how_passive(efforts: Sequence[Trial]) -> str:
     slow = sorted({t.configuration for t in efforts if _speed(t) <= _SLOW})
     if slow:
         return f"slow movements: {', '.join(slow)}"
-    return f"no movement is slower than {_SLOW:g} rad/s: viscosity is in its moments too" if efforts else "no forces and no torques"
+    return f"no movement is slower than {_SLOW:g} rad/s: the moments contain viscosity" if efforts else "no forces and no torques"
 
 
 def _how_gap(dataset: Dataset) -> str:

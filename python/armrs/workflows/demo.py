@@ -191,7 +191,7 @@ def _trial(name: str, repeat: int, role: str, read: Readings) -> Trial:
 
 
 def run_demo(
-    folder: str | os.PathLike[str], *, command: str | None = None, say: Callable[[str], None] = lambda line: None
+    folder: str | os.PathLike[str], *, command: str | None = None, tell: Callable[[str, float], None] = lambda stage, share: None
 ) -> Demonstration:
     """Simulate, write data sets, read them back, search for what the model lacks, identify it, and report the gap before and after.
 
@@ -201,13 +201,13 @@ def run_demo(
         Everything is written below it.
     command : str, optional
         For the report: how to repeat this.
-    say : callable
-        Called with what is being done.
+    tell : callable
+        Called with the name of the stage and the share of the stages that are done, 0 to 1.
     """
     results_of: list[Demonstration] = []
 
     def write(out: Path) -> list[Path]:
-        made = _demonstrate(out, command, say)
+        made = _demonstrate(out, command, tell)
         results_of.append(made)
         return list(made.files)
 
@@ -230,27 +230,27 @@ def _moved(dataset: Dataset, home: Path) -> Dataset:
     return dataset.replace(folder=home, model_path=home / "model.toml")
 
 
-def _demonstrate(out: Path, command: str | None, say: Callable[[str], None]) -> Demonstration:
+def _demonstrate(out: Path, command: str | None, tell: Callable[[str, float], None]) -> Demonstration:
     truth = true_model()
-    say("simulating the experiment")
+    tell("simulating the experiment", 0.0)
     description = write_dataset(measure(truth), out / "data")
     second = write_dataset(measure_two_speeds(truth), out / "session")
     files.write_text(
         out / "truth.toml", f"# SYNTHETIC: what was simulated. The identification never reads it.\n{truth.to_toml()}", kind=".toml"
     )
     dataset, session = load_dataset(description), load_dataset(second)
-    say("searching for what the model lacks")
+    tell("searching for what the model lacks", 1 / 7)
     gap = find_gap(session, separate=False)
-    say("searching in the slow movements alone")
+    tell("searching in the slow movements alone", 2 / 7)
     slow = find_gap(slow_movements(session), separate=False)
-    say("passive moments")
+    tell("passive moments", 3 / 7)
     passive = passive_moments(dataset)
-    say("identifying the model as it was handed over")
+    tell("identifying the model as it was handed over", 4 / 7)
     plain = identify(dataset, with_effects=())
-    say("identifying with what was found")
+    tell("identifying with what was found", 5 / 7)
     found = identify(dataset, with_effects=found_in_joints(gap))
     made = Demonstration(truth, found, plain, passive, gap, slow, (description, second))
-    say("writing the report")
+    tell("writing the report", 6 / 7)
     return dataclasses.replace(made, files=(description, second, *_write(out, made, command)))
 
 

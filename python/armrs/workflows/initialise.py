@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import checks
-from ..anthropometry import SEGMENTS, UNCERTAINTY, Expected, literature_model, segment_expectations
+from ..anthropometry import SEGMENTS, UNCERTAINTY, literature_model
 from ..errors import BadInput, Text
 from ..io import files
 from ..model import Model, Robot, Segment, Subject
@@ -99,7 +99,7 @@ def initialise(
     worn : sequence of Worn
         Handle and parts of an orthosis; they become part of their segments.
     robot : Robot, optional
-        The robot that leads the hand. Without it `armrs import` reads it off the angles of a robot that were recorded.
+        The robot that leads the hand. Without it `armrs import` estimates it from the recorded angles of a robot.
     replace : bool
         Whether existing files may be replaced.
 
@@ -125,12 +125,11 @@ def initialise(
     for name in ("dataset.toml", "model.toml"):
         if (target / name).exists() and not replace:
             raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)
-    expected = segment_expectations(body_mass, height, sex, lengths)
     model = literature_model(Subject(body_mass, height, sex), lengths).replace(robot=robot)
     segments = model.segments
     for item in worn:
         model = model.with_mass(item.segment, item.mass, item.at)
-    assumed = _assumed(segments, expected, lengths, worn, robot)
+    assumed = _assumed(segments, lengths, worn, robot)
 
     def write(part: Path) -> list[Path]:
         files.write_text(part / "model.toml", _model_text(model, assumed), kind=".toml")
@@ -143,20 +142,16 @@ def initialise(
 
 def _assumed(
     segments: Sequence[Segment],
-    expected: Sequence[Expected],
     lengths: Sequence[float | None],
     worn: Sequence[Worn],
     robot: Robot | None,
 ) -> tuple[str, ...]:
     lines = []
-    for s, e, measured in zip(segments, expected, lengths, strict=True):
+    for s, measured in zip(segments, lengths, strict=True):
         source = "measured" if measured is not None else "scaled with height"
-        mass, com = (f" ± {e.mass[1]:.3f}", f" ± {e.com[1]:.3f}") if s.name == e.name else ("", "")
-        lines.append(
-            f"{s.name}: length {s.length:.3f} m ({source}), mass {s.mass:.3f}{mass} kg, centre of mass {s.com:.3f}{com} m from its joint"
-        )
+        lines.append(f"{s.name}: length {s.length:.3f} m ({source}), mass {s.mass:.3f} kg, centre of mass {s.com:.3f} m from its joint")
     lines += [f"{SEGMENTS[w.segment - 1]}: {w.mass:g} kg worn at {'its end' if w.at is None else f'{w.at:g} m'}" for w in worn]
-    lines.append(f"masses, centres of mass and inertias are uncertain by {100 * UNCERTAINTY:.0f} % (one standard deviation)")
+    lines.append(f"masses, centres of mass, inertias: uncertain by {100 * UNCERTAINTY:.0f} % (one standard deviation, segment_uncertainty)")
     if len(segments) == len(SEGMENTS) - 1:
         lines.append(
             "the hand belongs to the forearm, which reaches from the elbow to the handle; three lengths make it a segment of its own"
@@ -168,7 +163,7 @@ def _assumed(
     lines.append("the grip is neutral (thumb up)")
     lines.append("joint laws are unknown: stiffness, damping and friction are left to be identified")
     if robot is None:
-        lines.append("no robot leads the hand, unless recordings hold its angles: armrs import then reads links and base off them")
+        lines.append("no robot leads the hand, unless recordings hold its angles: armrs import then estimates links and base from them")
     return tuple(lines)
 
 

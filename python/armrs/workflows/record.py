@@ -14,11 +14,11 @@ from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import ArmrsError, BadInput, Text
 from ..io import files
-from ..io.dataset import Dataset, write_dataset
+from ..io.dataset import FILE, Dataset, write_dataset
 from ..io.markers import Markers, planar_motion
 from ..io.opensim import write_trc
 from ..io.trial import FEWEST_SAMPLES, Trial
-from ..model import AddedMass, Effect, Model
+from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .movement import Movement
@@ -111,9 +111,13 @@ def record(
     """
     experiment = checks.loaded("experiment", experiment, Experiment, load_experiment)
     out = files.output_folder(folder)
+    former = _former(out)
     check_required(experiment)
     measured = measure(experiment, step=step)
-    return Recorded(measured.dataset, experiment, measured.trials, _write(measured, experiment, out))
+    written = _write(measured, experiment, out)
+    for path in former - {*written, *(out / trial.file for trial in measured.dataset.trials)}:
+        path.unlink(missing_ok=True)
+    return Recorded(measured.dataset, experiment, measured.trials, written)
 
 
 @dataclass(frozen=True, eq=False)
@@ -398,6 +402,16 @@ def _added(runs: tuple[Run, ...], kept: set[str]) -> tuple[AddedMass, ...]:
             if run.configuration in kept:
                 by_item.setdefault((item.segment, item.mass, item.at), []).append(run.configuration)
     return tuple(AddedMass(*key, configurations=tuple(names)) for key, names in by_item.items())
+
+
+def _former(out: Path) -> set[Path]:
+    """Return trials and markers that a former recording left in a folder; a data set of another origin is never replaced."""
+    if not (out / FILE).exists():
+        return set()
+    if not (out / "truth" / "truth.toml").is_file():
+        raise BadInput("folder", Text("a data set that armrs record did not write"), "a folder of its own", file=out)
+    names = [name for entry in Description.load(out / FILE).trials if (name := Path(entry.file)).parent == Path("trials")]
+    return {out / name for name in names} | {out / "markers" / name.with_suffix(".trc").name for name in names}
 
 
 def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path, ...]:

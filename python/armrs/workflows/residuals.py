@@ -69,7 +69,7 @@ class Residual:
 
 def residuals(explained: Sequence[Explained]) -> tuple[Residual, ...]:
     """Return what is left of the torque of every joint."""
-    fit = [e for e in explained if e.trial.role == "fit"]
+    fit = [e for e in explained if e.trial.role == "fit" and len(e.measured)]  # of a short trial nothing may be left
     spread = np.std(np.concatenate([e.measured for e in fit]), axis=0)
     left = np.std(np.concatenate([e.measured - e.fitted for e in fit]), axis=0)
     products = list(_products(fit))

@@ -169,7 +169,7 @@ class Weight:
             if abs(self.factor / ratio - 1.0) < _SAME_UNIT
         ]
         causes = " or ".join([*units, "a wrong body mass", "a mass that the model lacks"])
-        return f"{found}, {self.apart:.1f} standard deviations from it: {causes}?"
+        return f"{found}, {self.apart:.1f} standard deviations from one, the model's own uncertainty counted: {causes}?"
 
 
 def other_weight(dataset: Dataset) -> Weight | None:

@@ -435,9 +435,9 @@ def _asked(
         _check_duration(duration, dt, rate)
     led = driven(model, drive, coupling)
     if duration is not None and led.times is not None and duration > led.times[-1] + 1e-6 * dt:
-        raise BadInput("duration", duration, f"at most {led.times[-1]:.10g} s, the length of the trial")
+        raise BadInput("duration", duration, f"at most {np.floor(1e4 * led.times[-1]) / 1e4:.6g} s, the length of the trial")
     if duration is None and led.times is not None and rate * led.times[-1] < 1.0:
-        raise BadInput("rate", rate, f"at least one sample interval in the {led.times[-1]:.10g} s of the trial")
+        raise BadInput("rate", rate, f"at least one sample interval in the {led.times[-1]:.6g} s of the trial")
     angles, speeds = start
     if isinstance(drive, Trial) and angles is None:
         first = int(np.argmax(np.isfinite(drive.q).all(axis=1)))
@@ -494,7 +494,7 @@ def _check_duration(duration: float, dt: float, rate: float) -> None:
         raise BadInput("duration", duration, f"{1.0 / rate:g} s (one interval between samples) to {_MOST_STEPS * dt:g} s")
     steps = duration / dt
     if abs(steps - round(steps)) > 1e-9 * steps:
-        raise BadInput("duration", duration, f"a whole number of steps of {dt:g} s", hint=f"nearest: {round(steps) * dt:.10g} s")
+        raise BadInput("duration", duration, f"a whole number of steps of {dt:g} s", hint=f"nearest: {round(steps) * dt:.9g} s")
 
 
 @dataclass(frozen=True, eq=False)

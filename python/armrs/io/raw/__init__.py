@@ -26,7 +26,7 @@ _READERS: dict[tuple[str, ...], Callable[[Path], RawTable | list[RawTable]]] = {
 _INSTEAD = {
     (".ods", ".xlsb", ".numbers"): "save it as .xlsx or .csv",
     (".gz", ".zip", ".bz2", ".xz", ".7z"): "unpack it first",
-    (".tdms", ".acq", ".adicht", ".bag", ".mcap", ".h5", ".hdf5", ".tdf", ".slx"): "export it as text, .mat or C3D from its program",
+    (".tdms", ".acq", ".adicht", ".bag", ".mcap", ".tdf", ".slx"): "export it as text, .mat or C3D from its program",
 }
 """What to do with files of other formats."""
 
@@ -41,7 +41,7 @@ def read_raw(path: Path) -> list[RawTable]:
     path : Path
         By its suffix: text (`.csv`, `.txt`, `.tsv`, `.dat`, `.asc`, `.log`, `.lvm`, `.xls` between tabs), also as Vicon,
         Qualisys, OptiTrack, LabChart and Biodex export it;
-        Excel, MATLAB, NumPy, Parquet, OpenSim motion (`.mot`, `.sto`), TRC or C3D.
+        Excel, MATLAB, HDF5, NumPy, Parquet, OpenSim motion (`.mot`, `.sto`), TRC or C3D.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""MATLAB files, version 5 (SciPy) and 7.3 (HDF5): vectors by their names, matrices by name and column."""
+"""MATLAB files, version 5 (SciPy) and 7.3, and other HDF5 files: vectors by their names, matrices by name and column."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .. import apart
 from .matlab_arrays import HDF5
 from .table import NoTable, RawTable, column
 
-SUFFIXES = (".mat",)
+SUFFIXES = (".mat", ".h5", ".hdf5")
 _FEWEST = 3
 _FORCE = re.compile(r"force|kraft|fuerza|forza|^f$", flags=re.IGNORECASE)
 _AXES = {2: "yz", 3: "xyz"}
@@ -24,21 +24,22 @@ _AXES = {2: "yz", 3: "xyz"}
 
 
 def read_matlab(path: Path) -> list[RawTable]:
-    """Read the numeric vectors and matrices of a MATLAB file that are as long as its longest.
+    """Read the numeric vectors and matrices of a MATLAB or HDF5 file that are as long as its longest.
 
     An array of structs, or a cell array of them, is a table for each.
 
     Raises
     ------
     BadInput
-        When it is no MATLAB file, or holds no vectors of equal length. Without the file's name in it.
+        When it is no such file, or holds no vectors of equal length. Without the file's name in it.
     ArmrsError
-        When a version 7.3 file needs h5py, of the extra `files`.
+        When an HDF5 file, as of version 7.3, needs h5py, of the extra `files`.
     """
     head = path.read_bytes()[:520]
     if HDF5 in (head[:8], head[512:520]) and find_spec("h5py") is None:
-        raise ArmrsError('MATLAB files of version 7.3 need h5py: pip install "armrs[files]"')
-    with apart.content("armrs.io.raw.matlab_arrays", path, "a MATLAB file of version 5 or 7.3") as arrays:
+        raise ArmrsError('HDF5 files and MATLAB files of version 7.3 need h5py: pip install "armrs[files]"')
+    kind = "a MATLAB file of version 5 or 7.3" if path.suffix.lower() == ".mat" else "an HDF5 file"
+    with apart.content("armrs.io.raw.matlab_arrays", path, kind) as arrays:
         names, units = (json.loads(str(arrays[key])) for key in ("names", "units"))
         return [table_of(path, title, {name: arrays[place] for name, place in of.items()}, units) for title, of in names]
 

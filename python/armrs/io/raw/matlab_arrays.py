@@ -1,4 +1,4 @@
-"""The numeric arrays of a MATLAB file, version 5 (SciPy) and 7.3 (HDF5): `python -m armrs.io.raw.matlab_arrays FILE OUT.npz`.
+"""The numeric arrays of a MATLAB file (version 5, 7.3) or of another HDF5 file: `python -m armrs.io.raw.matlab_arrays FILE OUT.npz`.
 
 Damaged files crash both libraries, so that a process of its own reads them (`apart`).
 """
@@ -6,6 +6,7 @@ Damaged files crash both libraries, so that a process of its own reads them (`ap
 from __future__ import annotations
 
 import json
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,12 @@ def arrays_of(path: Path) -> dict[str, np.ndarray]:
     """Return the arrays of all tables of a file under numbers; in JSON, under `names` their titles and names, under `units` their units."""
     head = path.read_bytes()[:520]
     units: dict[str, str] = {}
-    tables = [(path.stem, _version_7_3(path, units))] if HDF5 in (head[:8], head[512:520]) else _version_5(path)
+    if HDF5 in (head[:8], head[512:520]):
+        tables = _hdf5(path, units)
+    elif path.suffix.lower() == ".mat":
+        tables = _version_5(path)
+    else:
+        raise ValueError("no HDF5 file")
     found: dict[str, np.ndarray] = {}
     names: list[tuple[str, dict[str, str]]] = []
     for title, arrays in tables:
@@ -90,7 +96,25 @@ def _unit_of(item: Any) -> str:
     return stated.decode("utf-8", "replace") if isinstance(stated, bytes) else stated if isinstance(stated, str) else ""
 
 
-def _version_7_3(path: Path, units: dict[str, str]) -> dict[str, np.ndarray]:
+def _hdf5(path: Path, units: dict[str, str]) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """Return the arrays of an HDF5 file; where groups hold arrays of the same names, as groups of trials do, each is a table."""
+    parts = [(name.split("/"), value) for name, value in _placed(path, units).items()]
+    levels = zip(*(part[:-1] for part, _ in parts), strict=False)
+    shared = len(list(takewhile(lambda level: len(set(level)) == 1, levels)))
+    whole: dict[str, np.ndarray] = {}
+    together: dict[str, np.ndarray] = {}
+    groups: dict[str, dict[str, np.ndarray]] = {}
+    for part, value in parts:
+        group = together if len(part) == shared + 1 else groups.setdefault(part[shared], {})
+        group.setdefault(part[-1], value)
+        whole.setdefault(part[-1], value)
+    if len(groups) > 1 and len(whole) < len(parts):
+        return [(f"{path.stem} {group}", together | arrays) for group, arrays in groups.items()]
+    return [(path.stem, whole)]
+
+
+def _placed(path: Path, units: dict[str, str]) -> dict[str, np.ndarray]:
+    """Return the numeric arrays of an HDF5 file and the fields of its tables by their places, and add to `units` by their names."""
     import h5py
 
     found: dict[str, np.ndarray] = {}
@@ -106,17 +130,17 @@ def _version_7_3(path: Path, units: dict[str, str]) -> dict[str, np.ndarray]:
             if item.size > _MOST:
                 raise ValueError(f"{name} has {item.size} values, at most {_MOST} are read")
             value = np.asarray(item[()])
-            last = name.rsplit("/", 1)[-1]
-            if np.issubdtype(value.dtype, np.number):
-                if last not in found:
-                    units[last] = _unit_of(item)
-                _keep(last, value.T, found)
+            fields = value.dtype.names
+            for place, part in [(name, value)] if fields is None else [(f"{name}/{field}", value[field]) for field in fields]:
+                if np.issubdtype(part.dtype, np.number):
+                    units.setdefault(place.rsplit("/", 1)[-1], _unit_of(item))
+                    _keep(place, part.T, found)
 
     try:
         with h5py.File(path, "r") as file:
             file.visititems(visit)
     except Exception as error:  # h5py raises OSError, RuntimeError, KeyError and others for damaged files
-        raise ValueError(f"no readable MATLAB file ({error})") from None
+        raise ValueError(f"no readable {'MATLAB' if path.suffix.lower() == '.mat' else 'HDF5'} file ({error})") from None
     return found
 
 

@@ -89,6 +89,11 @@ class RawTable:
     remarks: tuple[Remark, ...] = ()
 
     @property
+    def called(self) -> str:
+        """The file, with the title where it holds several recordings."""
+        return f"{self.path}" if self.title == self.path.stem else f"{self.path} ({self.title})"
+
+    @property
     def n_rows(self) -> int:
         """Number of samples."""
         return len(self.columns[0].values) if self.columns else 0

@@ -27,7 +27,8 @@ def _spelled(dimension: str, units: dict[str, float]) -> dict[str, Unit]:
 UNITS: dict[str, Unit] = {
     **_spelled("time", {"s sec secs second seconds sek sekunden": 1.0, "min": 60.0}),
     **_spelled("time", {"ms msec millisec milliseconds millisekunden": 1e-3, "µs us μs usec": 1e-6, "ns nsec nanoseconds": 1e-9}),
-    **_spelled("angle", {"rad radian radians": 1.0, "deg ° degree degrees grad grados": _DEGREE, "mrad": 1e-3}),
+    **_spelled("angle", {"rad radian radians": 1.0, "deg ° degree degrees": _DEGREE, "mrad": 1e-3}),
+    **_spelled("angle", {"deg grad grados gradi graus degré degrés graden stopinje stopnie": _DEGREE}),
     **_spelled("speed", {"rad/s rad_s rads": 1.0, "deg/s °/s deg_s grad/s deg/sec": _DEGREE}),
     **_spelled("force", {"N newton newtons": 1.0, "kN": 1e3, "mN": 1e-3, "daN": 10.0}),
     **_spelled("force", {"kgf kp": _KILOGRAM_FORCE, "lbf lb lbs": _POUND_FORCE}),

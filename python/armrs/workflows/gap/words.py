@@ -147,10 +147,10 @@ def left(result: Mapping[str, Any]) -> list[str]:
     for which, words in (("calibrated", "The calibrated model"), ("amended", "The model with the named effects")):
         lack = result["lack_of_fit"][which]
         if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
-            verdict = f"{'more' if lack['z'] >= MISFIT else 'no more'} than noise may leave, {MISFIT:g} standard deviations"
+            verdict = f"{'more' if lack['z'] >= MISFIT else 'no more'} than noise explains"
             lines.append(
-                f"{words} leaves {digits(lack['ratio'])} times the square of what repeats differ by ({_deviations(lack['z'])} "
-                f"standard deviations): {verdict}."
+                f"{words} leaves residuals that repeats share, with {digits(lack['ratio'])} times the variance between repeats: {verdict} "
+                f"({_deviations(lack['z'])} standard deviations, limit {MISFIT:g})."
             )
     if not lines:
         lines.append(_UNTESTED)
@@ -202,12 +202,17 @@ def quick(result: Mapping[str, Any]) -> None:
         said = f"{effect_name(worth[0])} may be missing"
     else:
         said = f"{effect_name(worth[0])} explains most of {len(worth)} that may be missing, and several of them may be one"
-    noise = "" if z is None or z != z else f"; the calibrated model leaves {'more than' if z >= MISFIT else 'what is'} noise ({z:+.1f})"
+    noise = (
+        ""
+        if z is None or z != z
+        else f"; the calibrated model leaves {'more than' if z >= MISFIT else 'what is'} noise ({_deviations(z)} standard deviations)"
+    )
     print(f"{common.name(result)}{label}, a first look: {said}{noise}.\n")
     common.show("Gap on the test trials, root mean square of simulated less measured", gap({**result, "effects": []}))
     if result["gap"]:
         print(f"{symbols(result)}\n")
     common.show("What each would explain alone, to first order", suspects(result))
+    print("Gain: twice the log-likelihood that the effect adds; needed: what it must exceed to be named.\n")
     print("Nothing is named yet: `armrs gap` without --quick converges by simulation, looks at several together, and confirms.")
 
 
@@ -217,7 +222,7 @@ def suspects(data: Mapping[str, Any], most: int = 10) -> Table:
     for s in data["suspects"][:most]:
         sizes = ", ".join(f"{name} {value:.3g}" for name, value in s["parameters"].items())
         rows.append([s["kind"], s["joint"] or s["channel"], f"{sizes} {unit(s['unit'])}".rstrip(), f"{s['gain']:.3g}", f"{s['price']:.3g}"])
-    return Table(["effect", "at", "size", "would explain", "would have to"], rows, 3)
+    return Table(["effect", "at", "size", "gain", "gain needed"], rows, 3)
 
 
 def missing(data: Mapping[str, Any]) -> Table:
@@ -314,7 +319,7 @@ def nearest(data: Mapping[str, Any], most: int = 8) -> Table:
     """Return what came nearest to being named and was not."""
     asked = sorted((w for w in data["would_have_seen"] if w.get("price")), key=lambda w: w["price"] - w["gain"])
     rows = [[w["kind"], w["joint"] or w["channel"], f"{w['gain']:.3g}", f"{w['price']:.3g}"] for w in asked[:most]]
-    return Table(["effect", "at", "would explain", "would have to"], rows, 2)
+    return Table(["effect", "at", "gain", "gain needed"], rows, 2)
 
 
 def calibration(data: Mapping[str, Any]) -> Table:

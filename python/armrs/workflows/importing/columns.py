@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ... import checks
 from ...errors import BadInput, Text, unknown_name
 from ...io.raw import RawColumn, RawTable
 from ...io.raw.units import UNITS, unit
@@ -185,6 +186,7 @@ def parse_map(text: str) -> dict[str, tuple[str, int]]:
     BadInput
         For a part that is not `SYMBOL=COLUMN`.
     """
+    checks.instance("columns_map", text, str)
     found: dict[str, tuple[str, int]] = {}
     for part in re.split(r",(?=\s*(?:t|q\d|qr\d|dq\d|tau\d|F[yz]|P[yz]|Mx|emg_\w+)\s*=)", text):
         if not part.strip():
@@ -221,16 +223,27 @@ def guess(tables: Sequence[RawTable], given: Mapping[str, tuple[str, int]], prob
         said = None if id(c) in taken else symbol_of(c)
         if said and said not in chosen:
             named.setdefault(said, []).append(c)
-    for symbol, columns in named.items():
+    for symbol, columns in _from_one(named).items():
         if len(columns) > 1 and not symbol.startswith("emg_"):
             found = Text(" and ".join(repr(c.name) for c in columns))
             problems.append(
                 BadInput("columns", found, f"one column for {symbol}", file=table.path, hint=f"--map '{symbol}={columns[0].name}'")
             )
         turned = symbol[0] in "FP" and bool((_BACK | _DOWN) & set(words(columns[0].label)))
-        chosen[symbol] = (columns[0], -1 if turned else 1, f"by its name {columns[0].name!r}")
+        counted = "" if symbol in named and columns is named[symbol] else ", joints counted from zero"
+        chosen[symbol] = (columns[0], -1 if turned else 1, f"by its name {columns[0].name!r}{counted}")
     channels = [_channel(symbol, c, sign, why, tables, problems) for symbol, (c, sign, why) in chosen.items()]
     return [_in_one_turn(channel, tables) for channel in channels if channel is not None]
+
+
+def _from_one(named: Mapping[str, list[RawColumn]]) -> dict[str, list[RawColumn]]:
+    """Return columns by symbols that count joints from one, also where names count them from zero (`position0`, as of ROS)."""
+    found = {}
+    for symbol, columns in named.items():
+        kind, number = symbol.rstrip("0123456789"), symbol.lstrip("abcdefghijklmnopqrstuvwxyz")
+        from_zero = kind in ("q", "qr", "dq", "tau") and f"{kind}0" in named
+        found[f"{kind}{int(number) + 1}" if from_zero else symbol] = columns
+    return found
 
 
 def _is_unit(column: RawColumn) -> bool:

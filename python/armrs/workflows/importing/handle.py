@@ -14,7 +14,7 @@ _APART = 0.05
 """Largest distance of hand and handle, relative to the arm's length: positions farther away have another origin."""
 
 _HELD = 0.02
-"""The same, up to which a robot is read off the angles: slips, soft contact and tape measures leave millimetres."""
+"""The same, up to which a robot is taken from the angles: slips, soft contact and tape measures leave millimetres."""
 _STIFFNESS = 10_000.0
 """Of a contact that the model does not state, as everywhere [N/m]."""
 _SLIPPED = 2.0

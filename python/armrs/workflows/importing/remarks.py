@@ -22,8 +22,8 @@ def said(tables: Sequence[RawTable]) -> list[str]:
             by_note.setdefault(note, []).append(table)
     lines = []
     for note, those in by_note.items():
-        more = f" and {len(those) - 1} more" if len(those) > 1 else ""
-        lines.append(note if len(those) == len(tables) else f"{note}: {those[0].path}{more}")
+        more = f" and {len(those) - 1} more recording{'s' * (len(those) > 2)}" if len(those) > 1 else ""
+        lines.append(note if len(those) == len(tables) else f"{note}: {those[0].called}{more}")
     return lines
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as changed
 from pathlib import Path
@@ -30,6 +30,8 @@ from .samples import cleaned
 
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
 _TOLD_BY = "BadInputs.problems holds"
+_READ, _DECIDED = 0.5, 0.9
+"""Shares of the work after which recordings are read, and after which conventions are decided."""
 _NAMED = 8
 """Columns that a line names at most."""
 
@@ -90,6 +92,7 @@ def import_recordings(
     points: Sequence[str] = (),
     rate: float | None = None,
     replace: bool = False,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Imported:
     """Turn own recordings into a data set.
 
@@ -119,6 +122,8 @@ def import_recordings(
         Sample rate of recordings without a column of time [Hz].
     replace : bool
         Whether the data set of a former import may be replaced, whole and with what was edited in it.
+    progress : callable, optional
+        Called with the name of the stage and the share that is done, 0 to 1.
 
     Returns
     -------
@@ -131,12 +136,12 @@ def import_recordings(
     """
     checks.instance("sources", sources, list, tuple)
     paths = [checks.path("sources", source) for source in sources]
-    checks.instance("columns_map", columns_map, str)
     points = checks.instances("points", points, str)
     rate = None if rate is None else checks.number("rate", rate, above=0.0, most=1e6, unit="Hz")
     if not paths:
         raise BadInput("sources", Text("nothing"), "one recording or more")
     former = _former(files.output_folder(out), checks.flag("replace", replace))
+    tell = checks.progress(progress)
     if isinstance(model, Model):
         loaded, about = model, (Subject(), Tolerance())
     else:
@@ -148,12 +153,12 @@ def import_recordings(
         notes, doubts = [f"as {paths[0]} says"], list[str]()
     else:
         given = _given(angles, zero, clockwise, force_on, loaded.n_joints)
-        recipe, reads, notes, doubts = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate)
+        recipe, reads, notes, doubts = _decided(paths, loaded, columns.parse_map(columns_map), given, tuple(points), rate, tell)
     reads = [changed(read, trial=changed(read.trial, remarks=_remarks(read, recipe.channels))) for read in reads]
     recipe = changed(recipe, trials=tuple(changed(t, remarks=r.trial.remarks) for t, r in zip(recipe.trials, reads, strict=True)))
     loaded, said = _led(loaded, recipe, reads)
-    folder = _write(files.output_folder(out), former, loaded, recipe, reads, about)
-    return Imported(folder, recipe, (*notes, *said), tuple(doubts))
+    tell("writing", _DECIDED)
+    return Imported(_write(files.output_folder(out), former, loaded, recipe, reads, about), recipe, (*notes, *said), tuple(doubts))
 
 
 def _is_recipe(paths: Sequence[Path]) -> bool:
@@ -193,10 +198,10 @@ def _led(model: Model, recipe: Recipe, reads: Sequence[Read]) -> tuple[Model, li
     off = f"{1e3 * apart:.1f} mm (root mean square)"
     if robot is None:
         said = f"hand and handle are {off} apart with the robot that suits best. Are its angles counted as armrs does (docs/files.md)?"
-        return model, [f"[robot]: not in the model, and not to be read off the angles: {said}"]
+        return model, [f"[robot]: not in the model, and not to be estimated from the angles: {said}"]
     lengths, base = (" and ".join(f"{v:.3f}" for v in values) for values in (robot.lengths, robot.base))
     found = f"links of {lengths} m, base {base} m forward and up of that of the arm, elbow {robot.elbow}; hand and handle then {off} apart"
-    return model.replace(robot=robot), [f"[robot]: not in the model, so read off the angles: {found}. Compare it with your robot"]
+    return model.replace(robot=robot), [f"[robot]: not in the model, so estimated from the angles: {found}. Compare it with your robot"]
 
 
 def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None, force_on: str | None, n_joints: int) -> dict[str, object]:
@@ -221,10 +226,11 @@ def _decided(
     given: Mapping[str, object],
     points: tuple[str, ...],
     rate: float | None,
+    tell: Callable[[str, float], None],
 ) -> tuple[Recipe, list[Read], list[str], list[str]]:
     """Return what all files say together; every problem is collected before any is raised."""
     problems: list[BadInput] = []
-    sources = raw.read_all(paths, points, problems)
+    sources = raw.read_all(paths, points, problems, lambda stage, share: tell(stage, _READ * share))
     tables = sources.tables
     mapped_tables = [part for table in tables for part in cleaned(_renamed(table, mapped), rate, sources.notes)]
     named, left, roles = trials.arrange(mapped_tables)
@@ -264,6 +270,7 @@ def _decided(
     _alike(force_tables, [c for c in channels if c.symbol[0] in "FM"], problems)
     if len(problems) > of_files:
         raise BadInputs.of(problems, _TOLD_BY)
+    tell("finding clocks and conventions", _READ)
     reads = aligning.aligned(named, channels, model, given, problems)
     clocks, doubts = list[str](), list[str]()
     if any(c.symbol == "Fy" for c in channels):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -36,20 +36,26 @@ class Sources:
     notes: list[str] = field(default_factory=list)
 
 
-def read_all(paths: Sequence[Path], points: tuple[str, ...], problems: list[BadInput]) -> Sources:
-    """Read files, and the recordings in folders by the order of their names; what cannot be read is added to `problems`."""
+def read_all(
+    paths: Sequence[Path], points: tuple[str, ...], problems: list[BadInput], tell: Callable[[str, float], None] = lambda stage, share: None
+) -> Sources:
+    """Read files, and the recordings in folders by the order of their names; what cannot be read is added to `problems`.
+
+    `tell` is called with the file that is read and the share of files that were read.
+    """
     found = Sources()
-    for path in paths:
-        for file in _files(path, found, problems):
-            try:
-                found.tables += read(file, points)
-            except NoTable as error:  # noqa: PERF203 (every file is asked)
-                if file in found.in_folders:
-                    found.notes.append(f"left out, since it holds no table: {file}")
-                else:
-                    problems.append(error)
-            except BadInput as error:
+    listed = [file for path in paths for file in _files(path, found, problems)]
+    for k, file in enumerate(listed):
+        tell(f"reading {file.name}", k / len(listed))
+        try:
+            found.tables += read(file, points)
+        except NoTable as error:
+            if file in found.in_folders:
+                found.notes.append(f"left out, since it holds no table: {file}")
+            else:
                 problems.append(error)
+        except BadInput as error:
+            problems.append(error)
     found.tables = _once(found.tables, found.notes)
     return found
 
@@ -89,12 +95,8 @@ def _once(tables: Sequence[RawTable], notes: list[str]) -> list[RawTable]:
         if same is None:
             kept.append(table)
         else:
-            notes.append(f"left out, since it holds the same samples as {_called(same)}: {_called(table)}")
+            notes.append(f"left out, since it holds the same samples as {same.called}: {table.called}")
     return kept
-
-
-def _called(table: RawTable) -> str:
-    return f"{table.path}" if table.title == table.path.stem else f"{table.path} ({table.title})"
 
 
 def _same_samples(a: RawTable, b: RawTable) -> bool:
@@ -141,6 +143,6 @@ def _with_angles(table: RawTable, points: tuple[str, ...]) -> RawTable:
         others = [c for c in others if c.name not in names]
         for symbol, direction in (("Fy", motion.forward), ("Fz", motion.upward)):
             others.append(RawColumn(symbol, symbol, unit_of_all, in_file @ direction))
-        said = (" ".join(f"{value:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
+        said = (" ".join(f"{round(value, 3) + 0.0:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
         notes.append("forces: {} are taken in the axes of the markers; forward is ({}), up is ({})".format(", ".join(sorted(names)), *said))
     return RawTable(table.path, table.title, (*found, *others), tuple(notes))

@@ -120,8 +120,7 @@ def _pairs(angles: Sequence[RawTable], forces: Sequence[RawTable]) -> dict[int, 
         by_key = {_key(table, besides): table for table in forces}
         found = {id(table): by_key[_key(table, besides)] for table in angles if _key(table, besides) in by_key} | found
     for table in angles:
-        own = set(_key(table))
-        near = [f for f in forces if len(own ^ set(_key(f))) <= 2 * _OTHER_WORDS and _numbers(table) == _numbers(f)]
+        near = [f for f in forces if _differ_by_device(table, f)]
         if id(table) not in found and len(near) == 1:
             found[id(table)] = near[0]
     if not found and len(angles) == len(forces) == 1:
@@ -129,5 +128,8 @@ def _pairs(angles: Sequence[RawTable], forces: Sequence[RawTable]) -> dict[int, 
     return found
 
 
-def _numbers(table: RawTable) -> list[str]:
-    return [w for w in words(table.title) if w.isdigit()]
+def _differ_by_device(table: RawTable, other: RawTable) -> bool:
+    """Whether two names differ by a word for a device each at most, such as `mocap` and `mini40`; `slow1` and `slow2` differ otherwise."""
+    mine, others = ({w for w in _SEPARATORS.split(t.title.lower()) if w not in _FORCE_WORDS | _ANGLE_WORDS} for t in (table, other))
+    letters = [{"".join(c for c in word if c.isalpha()) for word in own} for own in (mine - others, others - mine)]
+    return all(len(own) <= _OTHER_WORDS and "" not in own for own in letters) and not letters[0] & letters[1]
