@@ -6,12 +6,15 @@ import re
 import subprocess
 import zipfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from armrs.cosim.library import platform_folder
 from armrs.fmu import names
 
 Change = Callable[[str], str]
+SOURCE = Path(__file__).parent / "defective.c"
 
 SMALL = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="small" instantiationToken="{small}" variableNamingConvention="structured">
@@ -293,21 +296,41 @@ CLOCKS: dict[str, tuple[Change, str]] = {
 """Edits of the small FMU's description, which has clocks."""
 
 
-def small(folder: Path, defect: str = "", description: str = SMALL) -> Path:
-    """Compile the small FMU with one thing that it does wrong."""
-    source = Path(__file__).parent / "defective.c"
-    text = source.read_text(encoding="utf-8")
+@cache
+def stubs() -> str:
+    """Return C for the functions of FMI 3.0 that the small library does not have: each says that it failed."""
+    text = SOURCE.read_text(encoding="utf-8")
     missing = [f"fmi3{name}" for name in names.FUNCTIONS[3] if f" fmi3{name}(" not in text and f"*fmi3{name}(" not in text]
-    stubs = folder / "stubs.c"
-    stubs.write_text("".join(f"int {name}(void) {{ return 3; }}\n" for name in missing), encoding="utf-8")
+    return "".join(f"int {name}(void) {{ return 3; }}\n" for name in missing)
+
+
+@cache
+def library(defect: str, *others: str) -> bytes:
+    """Compile the small library with one thing that it does wrong, and other C beside it."""
+    with TemporaryDirectory() as folder:
+        built = Path(folder) / "small"
+        sources = [str(SOURCE)]
+        for number, text in enumerate((stubs(), *others)):
+            path = Path(folder) / f"{number}.c"
+            path.write_text(text, encoding="utf-8")
+            sources.append(str(path))
+        command = ["cc", "-shared", "-fPIC", "-w", *([f"-D{defect}"] if defect else []), "-o", str(built), *sources, "-lm"]
+        subprocess.run(command, check=True, capture_output=True)
+        return built.read_bytes()
+
+
+def small(folder: Path, defect: str = "", description: str = SMALL) -> Path:
+    """Write the small FMU with one thing that it does wrong."""
+    return packed(folder / f"small{defect}.fmu", description, small=library(defect))
+
+
+def packed(path: Path, description: str, **libraries: bytes) -> Path:
+    """Write an FMU of libraries by their names."""
     place, suffix = platform_folder(3)
-    library = folder / f"small{suffix}"
-    command = ["cc", "-shared", "-fPIC", "-w", *([f"-D{defect}"] if defect else []), "-o", str(library), str(source), str(stubs), "-lm"]
-    subprocess.run(command, check=True, capture_output=True)
-    path = folder / f"small{defect}.fmu"
-    with zipfile.ZipFile(path, "w") as packed:
-        packed.writestr("modelDescription.xml", description)
-        packed.write(library, f"binaries/{place}/small{suffix}")
+    with zipfile.ZipFile(path, "w") as files:
+        files.writestr("modelDescription.xml", description)
+        for name, content in libraries.items():
+            files.writestr(f"binaries/{place}/{name}{suffix}", content)
     return path
 
 

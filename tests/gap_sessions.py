@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 import armrs
@@ -17,8 +19,9 @@ def model(*effects: armrs.Effect) -> armrs.Model:
     return armrs.Model(segments, joints, segment_uncertainty=0.02, robot=ROBOT, contact=contact, effects=effects)
 
 
+@cache
 def session(*hidden: armrs.Effect, seed: int = 0, engine: str = "rapier") -> Dataset:
-    """Return a session that an engine makes: two movements, three repeats to fit and one to test of each."""
+    """Return a session that an engine makes: two movements, three repeats to fit and one to test of each. It is frozen, and made once."""
     movements = {
         "slow": armrs.Movement(np.radians([[-60, 50], [-30, 50], [-30, 85], [-60, 50]]), speed=0.4, acceleration=1.6, shape="smooth"),
         "fast": armrs.Movement(np.radians([[-50, 80], [-20, 40], [-50, 80]]), speed=1.0, acceleration=4.0, shape="smooth"),

@@ -9,12 +9,15 @@ import pkgutil
 import re
 import typing
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
+import pytest
 from matplotlib.axes import Axes
 
 import armrs
-from armrs import cosim, online
+from armrs import cli, cosim, online
 from armrs.report import pages
 from armrs.tabular import Series, Tabular
 
@@ -47,6 +50,15 @@ def returned() -> dict[str, type]:
             if inspect.isclass(kind) and not typing.get_origin(kind) and kind.__name__ not in NO_RESULTS:
                 found[name] = kind
     return found
+
+
+def behind(module: ModuleType, name: str, *arguments: str) -> tuple[int, Any]:
+    """Run a command, and return its status and what the function that it calls returned."""
+    held: list[Any] = []
+    function = getattr(module, name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, name, lambda *given, **named: held.append(function(*given, **named)) or held[0])
+        return cli.main(list(arguments)), held[0]
 
 
 def faults(result: Tabular, folder: Path) -> list[str]:

@@ -26,12 +26,9 @@ WITHIN = 5.0
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, armrs.Demonstration]:
     """What the command wrote, and what the function that it calls returned."""
     out = tmp_path_factory.mktemp("session") / "demo"
-    returned: list[armrs.Demonstration] = []
-    run = demo.run_demo
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(demo, "run_demo", lambda *args, **kwargs: returned.append(run(*args, **kwargs)) or returned[0])
-        assert cli.main(["demo", "-o", str(out), "--json", str(out / "copy.json")]) == 0
-    return out, returned[0]
+    status, returned = results.behind(demo, "run_demo", "demo", "-o", str(out), "--json", str(out / "copy.json"))
+    assert status == 0
+    return out, returned
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,9 @@ def record():
 
 
 def test_recovers_what_made_the_record(record):
-    fitted = armrs.fit_by_simulation(model([0.1, 0.1]), MOVEMENT, record.q, record.force_on_arm, FREE, **NOISE)
+    # Stored by columns, as arrays of pandas are.
+    q, force = np.asfortranarray(record.q), np.asfortranarray(record.force_on_arm)
+    fitted = armrs.fit_by_simulation(model([0.1, 0.1]), MOVEMENT, q, force, FREE, **NOISE)
     assert fitted.settled
     assert fitted.residual_rms < 1e-4
     assert fitted.values == pytest.approx(dict(zip(FREE, [0.3, 0.12], strict=True)), rel=1e-5)

@@ -17,14 +17,12 @@ import pytest
 import fmu_defects
 from armrs import cli
 from armrs.cosim.imported import ImportedSlave
-from armrs.cosim.library import platform_folder
 from armrs.errors import BadInput, SlaveError
 from armrs.fmu.check import check_fmu
 from armrs.fmu.export import export_fmu
 from armrs.workflows.demo import true_model
 
 CASES = [(fmi, name) for fmi in (2, 3) for name in (*fmu_defects.BOTH, *(fmu_defects.TWO if fmi == 2 else fmu_defects.THREE))]
-PLACE, SUFFIX = platform_folder(3)
 NEEDS_COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 LIMITED = pytest.mark.skipif(sys.platform != "linux", reason="memory and writing are limited on Linux alone")
 
@@ -140,13 +138,9 @@ def test_an_fmu_that_needs_its_tool_is_no_defect(tmp_path: Path) -> None:
 @NEEDS_COMPILER
 def test_each_interface_may_have_a_library_of_its_own(tmp_path: Path) -> None:
     description = fmu_defects.SMALL.replace('<ModelExchange modelIdentifier="small"', '<ModelExchange modelIdentifier="other"')
-    source = fmu_defects.small(tmp_path, "RATES_REFUSED", description)
-    shutil.move(tmp_path / f"small{SUFFIX}", tmp_path / f"other{SUFFIX}")
-    fmu_defects.small(tmp_path)
-    with zipfile.ZipFile(source, "w") as packed:
-        packed.writestr("modelDescription.xml", description)
-        for name in ("small", "other"):
-            packed.write(tmp_path / f"{name}{SUFFIX}", f"binaries/{PLACE}/{name}{SUFFIX}")
+    source = fmu_defects.packed(
+        tmp_path / "two.fmu", description, small=fmu_defects.library(""), other=fmu_defects.library("RATES_REFUSED")
+    )
     [found] = errors(source)
     assert "GetContinuousStateDerivatives" in found
 
@@ -200,15 +194,8 @@ def test_there_are_more_than_120_of_them() -> None:
 @NEEDS_COMPILER
 def test_a_library_writes_nothing_outside_its_folder(tmp_path: Path) -> None:
     outside = tmp_path / "outside.txt"
-    source = fmu_defects.small(tmp_path)
     stub = f'#include <stdio.h>\n__attribute__((constructor)) static void write(void) {{ FILE *f = fopen("{outside}", "w"); if (f) fclose(f); }}\n'
-    (tmp_path / "write.c").write_text(stub, encoding="utf-8")
-    library = tmp_path / "small.so"
-    parts = [str(Path(fmu_defects.__file__).parent / "defective.c"), str(tmp_path / "stubs.c"), str(tmp_path / "write.c")]
-    subprocess.run(["cc", "-shared", "-fPIC", "-w", "-o", str(library), *parts, "-lm"], check=True)
-    with zipfile.ZipFile(source, "w") as packed:
-        packed.writestr("modelDescription.xml", fmu_defects.SMALL)
-        packed.write(library, f"binaries/{PLACE}/small{SUFFIX}")
+    source = fmu_defects.packed(tmp_path / "small.fmu", fmu_defects.SMALL, small=fmu_defects.library("", stub))
     found = check_fmu(source)
     if any(f.place == "sandbox" for f in found):
         pytest.skip("this kernel has no Landlock")

@@ -96,6 +96,13 @@ def test_sample_by_sample_is_the_whole_log(log: online.Log, replayed: online.Rep
     assert estimator.health.age == replayed.age[1599]
 
 
+def test_a_log_stored_by_columns_is_read_by_rows(log: online.Log, replayed: online.Replay) -> None:
+    q, force = (np.asfortranarray(column[:900]) for column in (log.q, log.force_on_arm))
+    again = online.replay(online.Log(log.t[:900], q, force), MODEL, every=1)
+    assert np.array_equal(again.values, replayed.values[:900])
+    assert np.array_equal(again.torque, replayed.torque[:900], equal_nan=True)
+
+
 def test_the_estimator_learns_the_arm_that_made_the_log(replayed: online.Replay) -> None:
     """From segments that are 10 % too heavy: the first moments, which carry the arm, come back to those of the truth."""
     truth = armrs.Arm.from_model(TRUTH).first_moments

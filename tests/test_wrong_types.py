@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs import ArmrsError, BadInput
+from armrs import ArmrsError, BadInput, _armrs
 from armrs.workflows.demo import handed_over, true_model
 
 MODEL = true_model()
@@ -216,6 +216,17 @@ def test_arrays_stored_by_columns_are_read_by_rows(name: str) -> None:
     count = {"coriolis": 2, "inverse_dynamics": 3, "forward_dynamics": 3}.get(name, 1)
     given = np.random.default_rng(1).normal(size=(count, 5, 2))
     np.testing.assert_array_equal(kernel(*map(np.asfortranarray, given)), kernel(*given))
+
+
+def test_the_digest_of_an_array_is_that_of_its_rows() -> None:
+    def digest(values: np.ndarray) -> str:
+        made = _armrs.Digest([])
+        made.column("q", values.size)
+        made.values(values)
+        return made.value()
+
+    values = np.random.default_rng(1).normal(size=(5, 2))
+    assert digest(np.asfortranarray(values)) == digest(values) == digest(values.ravel()) != digest(values.T)
 
 
 def test_numbers_of_other_kinds_are_numbers() -> None:

@@ -468,6 +468,25 @@ pub(crate) fn decided<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement_model::hypothesis::tests::plain;
+
+    /// Noise leaves a cost of one for each row; a gain of 0.2 counts there, and with 10 000 too much left one of a ten thousandth more.
+    #[test]
+    fn much_is_left_from_a_half_beyond_noise_on_and_little_gains_count_near_it() {
+        let fitted = |cost| Fitted {
+            hypothesis: plain(),
+            asked: Vec::new(),
+            cost,
+            rows: 1000,
+            residuals: Vec::new(),
+        };
+        assert_eq!(
+            [1490.0, 1510.0].map(|cost| fitted(cost).leaves_much()),
+            [false, true]
+        );
+        let enough = [900.0, 1000.0, 11_000.0].map(|cost| fitted(cost).enough());
+        assert_eq!(enough, [0.2, 0.2, 1.2]);
+    }
 
     fn equations(gram: f64, score: f64, room: (f64, f64)) -> Equations {
         let matrix = || Matrix::from_fn(1, 1, |_, _| gram);

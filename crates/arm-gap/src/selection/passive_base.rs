@@ -506,4 +506,13 @@ mod tests {
         assert_eq!(least_of(&of(Kind::Elastic, 2), &crossed, NAMED), NAMED);
         assert_eq!(least_of(&of(Kind::Viscous, 0), &crossed, NAMED), NAMED);
     }
+
+    /// Of nine laws, each with a first parameter that is not negative, chance names one in 80 sessions; a rare law has odds of 20 against it.
+    #[test]
+    fn limits_have_the_probabilities_that_they_stand_for() {
+        let false_name = 9.0 * 0.5 * chi_square_tail(NAMED, 1);
+        assert!((1.0 / false_name - 82.0).abs() < 2.0, "{false_name}");
+        assert!((libm::exp(0.5 * ODDS) - 20.0).abs() < 0.5);
+        assert_eq!(libm::sqrt(STAYS), 2.0);
+    }
 }

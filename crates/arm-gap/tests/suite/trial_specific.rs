@@ -170,3 +170,38 @@ fn a_rhythm_is_put_into_the_runs_where_a_joint_rubs() {
     let (inside, alone) = (left(true), left(false));
     assert!(inside < 0.33 * alone, "{inside} {alone}");
 }
+
+/// A rhythm whose runs cannot be simulated, here with an amplitude that no arm survives, is taken out of the channels alone: neither they
+/// nor the runs have it afterwards.
+#[test]
+fn a_rhythm_that_cannot_be_put_into_the_runs_is_taken_out_of_the_channels() {
+    let session = trembling();
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let point = prepared.linearize(&session.given()).expect("a run");
+    let found = prepared.rhythm(&point, Line::BetweenRepeats);
+    let mut found = found.expect("a spectrum").expect("a rhythm");
+    found.effect.parameters[0] = 1e9;
+    assert!(prepared.sized(&point, &found).is_none());
+    prepared.take_out(&point, &found).expect("finite channels");
+    let after = prepared.linearize(&session.given()).expect("a run");
+    let left = prepared.rhythm(&after, Line::BetweenRepeats);
+    assert!(
+        left.expect("a spectrum")
+            .is_none_or(|r| !r.swings_with(&found))
+    );
+}
+
+/// In the first order of a rhythm a joint with dry friction answers as it does without one; runs with it tell its phase.
+#[test]
+fn the_phase_of_a_rhythm_is_that_of_runs_where_a_joint_rubs() {
+    let session = trembling();
+    let prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let tremor = Effect::new(Kind::named("tremor").expect("known"), 0).with(&[0.8, 5.5, 0.0]);
+    for trial in [1, 6] {
+        let course = &prepared.courses[trial];
+        let own = session.in_trial((&session.given(), &[tremor]), course);
+        let own = own.expect("a run");
+        let off = own.named[0].parameters[2] - TAU * 0.37 * trial as f64;
+        assert!((off - TAU * (off / TAU).round()).abs() < 0.1, "{off}");
+    }
+}

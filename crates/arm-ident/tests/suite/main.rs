@@ -1,8 +1,12 @@
 //! One module per source file, or more where one is not enough; `noise`, `synthetic` and `joint_method` are what they share.
 
+mod bits;
 mod by_simulation;
 mod cascade;
 mod design;
+// What they simulate and identify is compiled for this suite as it is.
+#[path = "../../../crosscheck/src/digests.rs"]
+mod digests;
 mod imperfections;
 mod joint;
 mod joint_input;

@@ -1,5 +1,7 @@
 use arm_numerics::NumericsError;
-use arm_numerics::statistics::distributions::{student_t_quantile, student_t_two_sided_tail};
+use arm_numerics::statistics::distributions::{
+    chi_square_tail, student_t_quantile, student_t_two_sided_tail,
+};
 
 /// Agreement asked of quantiles and tails.
 const TOLERANCE: f64 = 1e-10;
@@ -80,4 +82,18 @@ fn refuses_what_has_no_answer() {
     assert!(student_t_quantile(f64::NAN, 3.0).is_err());
     assert!(student_t_two_sided_tail(f64::NAN, 3.0).is_err());
     assert_eq!(student_t_two_sided_tail(f64::INFINITY, 3.0), Ok(0.0));
+}
+
+#[test]
+fn tails_of_chi_square_match_tables() {
+    // Abramowitz, Stegun, table 26.8.
+    for (x, dof, tail) in [
+        (3.841_459, 1, 0.05),
+        (5.991_465, 2, 0.05),
+        (7.814_728, 3, 0.05),
+        (13.276_70, 4, 0.01),
+        (20.515_01, 5, 0.001),
+    ] {
+        assert!((chi_square_tail(x, dof) - tail).abs() < 1e-7, "{dof}");
+    }
 }

@@ -12,4 +12,5 @@ mod long_run;
 mod noise;
 mod program;
 mod sandwich_covariance;
+mod spectrum;
 mod svd;
