@@ -20,7 +20,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: help demo test bench bench-kernels hidden fuzz crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows clean build format rust python
+.PHONY: help demo test bench bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -149,6 +149,15 @@ fuzz: $(STAMPS)/dev ## changed files, fuzzed readers and kills, a minute each (F
 	$(BIN)/python -m pip install "atheris>=3,<4"
 	for reader in $(FUZZED); do \
 	  mkdir -p out/fuzz/$$reader && $(BIN)/python bench/fuzz/readers.py $$reader -artifact_prefix=out/fuzz/ -max_total_time=$$((60 * $(FUZZ_MINUTES))) out/fuzz/$$reader || exit 1; \
+	done
+
+# libFuzzer's counters of coverage need a nightly compiler.
+fuzz-rust: ## the readers and the C interface in Rust under libFuzzer, a minute each (FUZZ_MINUTES)
+	command -v cargo-fuzz > /dev/null || cargo install --quiet --locked cargo-fuzz
+	mkdir -p out/fuzz/files out/fuzz/firmware
+	cp examples/cosim/arm.toml out/fuzz/files/
+	for target in files firmware; do \
+	  cargo +nightly fuzz run --fuzz-dir bench/fuzz/native $$target out/fuzz/$$target -- -max_total_time=$$((60 * $(FUZZ_MINUTES))) -timeout=10 -rss_limit_mb=4096 -artifact_prefix=out/fuzz/ || exit 1; \
 	done
 
 sdist: $(STAMPS)/venv ## the source archive, in out/wheels, and a wheel built from it
