@@ -1,7 +1,7 @@
 //! Text as a model and as a data set: refused, or written and read again without a change.
 #![no_main]
 
-use arm_model::{Dataset, Model};
+use arm_model::{Description, Model};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
@@ -18,8 +18,9 @@ fuzz_target!(|text: &str| {
         );
         let _ = model.core_effects();
     }
-    if let Ok(dataset) = Dataset::from_toml(text) {
-        let again = Dataset::from_toml(&dataset.to_toml()).expect("what was written can be read");
+    if let Ok(dataset) = Description::from_toml(text) {
+        let again =
+            Description::from_toml(&dataset.to_toml()).expect("what was written can be read");
         assert!(again == dataset, "{dataset:?}\n{again:?}");
     }
 });
