@@ -140,7 +140,7 @@ def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
         "data": {"name": "d", "joints": []},
         "level": 0.95,
     }
-    monkeypatch.setattr(demo, "run_demo", lambda out, command: Stub)
+    monkeypatch.setattr(demo, "run_demo", lambda out, command, tell: Stub)
     (tmp_path / "demo.json").write_text(json.dumps(plain), encoding="utf-8")
     assert cli.main(["demo", "-o", str(tmp_path)]) == 0
     go_on, last = capsys.readouterr().out.splitlines()[-2:]

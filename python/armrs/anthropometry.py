@@ -77,13 +77,18 @@ def segment_expectations(
     body_mass = checks.number("body_mass", body_mass, least=1.0, most=500.0, unit="kg")
     height = checks.number("height", height, least=0.3, most=3.0, unit="m", hint="centimetres?")
     checks.choice("sex", sex, ("male", "female"))
+    check_lengths(lengths)
+    return tuple(Expected(**item) for item in _armrs.literature(body_mass, height, sex, list(lengths)))
+
+
+def check_lengths(lengths: Sequence[float | None]) -> None:
+    """Refuse what are no lengths of one to three segments [m], None where one is scaled with height."""
     checks.instance("lengths", lengths, list, tuple)
     if not 1 <= len(lengths) <= len(SEGMENTS):
         raise BadInput("lengths", Text(f"{len(lengths)} lengths"), f"1 to {len(SEGMENTS)}: {', '.join(SEGMENTS)}")
     for k, length in enumerate(lengths, start=1):
         if length is not None:
             checks.number(f"lengths, {k}", length, above=0.0, most=1.0, unit="m", hint="centimetres or millimetres?")
-    return tuple(Expected(**item) for item in _armrs.literature(body_mass, height, sex, list(lengths)))
 
 
 def literature_model(subject: Subject, lengths: Sequence[float | None] | None = None) -> Model:
@@ -121,8 +126,7 @@ def literature_arm(subject: Subject, lengths: list[float | None]) -> tuple[tuple
     if missing:
         raise BadInput(f"[subject], {missing[0]}", Text("nothing"), "a value: the literature needs it")
     assert subject.body_mass is not None and subject.height is not None and subject.sex is not None
-    if not 1 <= len(lengths) <= len(SEGMENTS):
-        raise BadInput("lengths", Text(f"{len(lengths)} lengths"), f"1 to {len(SEGMENTS)}: {', '.join(SEGMENTS)}")
+    check_lengths(lengths)
     parts = _armrs.literature(subject.body_mass, subject.height, subject.sex, [lengths[0], None, None] if len(lengths) == 2 else lengths)
     return tuple(segments_of(parts, lengths)), parts
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import checks
-from ..anthropometry import SEGMENTS, UNCERTAINTY, literature_model
+from ..anthropometry import SEGMENTS, UNCERTAINTY, check_lengths, literature_model
 from ..errors import BadInput, Text
 from ..io import files
 from ..model import Model, Robot, Segment, Subject
@@ -119,6 +119,7 @@ def initialise(
     """
     target = files.output_folder(folder)
     checks.flag("replace", replace)
+    check_lengths(lengths)
     worn = checks.instances("worn", worn, Worn)
     if robot is not None:
         checks.instance("robot", robot, Robot)
