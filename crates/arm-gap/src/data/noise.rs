@@ -60,22 +60,13 @@ impl Thinned {
     }
 
     /// The pieces of a channel between which samples are missing.
-    ///
-    /// * `channel` - its values
-    /// * `told` - whether a sample tells them
-    fn runs<'a>(&self, channel: &'a [f64], told: impl Fn(usize) -> bool) -> Vec<&'a [f64]> {
-        let kept: Vec<usize> = (0..channel.len()).filter(|&t| told(t)).collect();
-        let pieces = kept.chunk_by(|&a, &b| b == a + 1 && self.spacing[b] == 1);
-        pieces
-            .map(|piece| &channel[piece[0]..piece[0] + piece.len()])
+    fn runs<'a>(&self, channel: &'a [f64]) -> Vec<&'a [f64]> {
+        let inner = (1..channel.len()).filter(|&t| self.spacing[t] > 1);
+        let ends: Vec<usize> = inner.chain([channel.len()]).collect();
+        let starts = std::iter::once(0).chain(ends.iter().copied());
+        std::iter::zip(starts, &ends)
+            .map(|(a, &b)| &channel[a..b])
             .collect()
-    }
-
-    /// The pieces of channel `c` of `all` that tell its noise: those at which the force tells both components.
-    fn pieces<'a>(&self, channel: &'a [f64], (c, all): (usize, usize)) -> Vec<&'a [f64]> {
-        let is_force = c + 2 >= all;
-        let told = |t: usize| !is_force || self.observed().force_at(t) == ObservableForce::Both;
-        self.runs(channel, told)
     }
 }
 
@@ -131,17 +122,16 @@ impl Noise {
             let rough = |d: &Thinned| roughened(&d.channels[c], least);
             let noisy: Vec<Vec<f64>> = deviations.iter().map(rough).collect();
             let pairs = std::iter::zip(deviations, &noisy);
-            let series: Vec<&[f64]> = pairs
-                .flat_map(|(d, own)| d.pieces(own, (c, channels)))
-                .collect();
+            let series: Vec<&[f64]> = pairs.flat_map(|(d, own)| d.runs(own)).collect();
             let varies = series.iter().any(|s| s.iter().any(|v| *v != s[0]));
             let model = if varies {
-                let taken = taken.iter();
-                let taken = taken.flat_map(|d| d.pieces(&d.channels[c], (c, channels)));
+                let taken = taken.iter().flat_map(|d| d.runs(&d.channels[c]));
                 let taken: Vec<&[f64]> = taken.collect();
                 let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
                 let order = ORDER.min(longest.saturating_sub(2));
-                AutoRegression::selected_about_zero(&series, &taken, order)?
+                let mut model = AutoRegression::selected_about_zero(&series, &taken, order)?;
+                model.sd /= told[c].max(1e-6).sqrt();
+                model
             } else {
                 AutoRegression {
                     coefficients: Vec::new(),
