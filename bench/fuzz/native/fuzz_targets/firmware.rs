@@ -46,12 +46,17 @@ struct Moving {
 }
 
 #[derive(Arbitrary, Debug)]
+enum Dynamics {
+    Inverse,
+    Forward,
+}
+
+#[derive(Arbitrary, Debug)]
 enum Call {
     Advance(Moving, Number),
     Kinematics([Number; ARMRS_JOINTS]),
     Gravity([Number; ARMRS_JOINTS]),
-    Inverse(Moving, [Number; 6]),
-    Forward(Moving, [Number; 6]),
+    Dynamics(Dynamics, Moving, [Number; 6]),
     Path(Vec<[Number; ARMRS_JOINTS]>, [Number; 3], bool, Number),
     Learn([Number; 2], Box<[[Number; 12]; 4]>),
 }
@@ -243,22 +248,12 @@ fuzz_target!(|case: Case| {
                     let status = armrs_gravity(&arm, q.as_ptr(), out.as_mut_ptr());
                     finite(status, &out);
                 }
-                Call::Inverse(moving, on) => {
-                    let status = armrs_inverse_dynamics(
-                        &arm,
-                        &moving.motion(),
-                        &load(*on),
-                        out.as_mut_ptr(),
-                    );
-                    finite(status, &out);
-                }
-                Call::Forward(moving, on) => {
-                    let status = armrs_forward_dynamics(
-                        &arm,
-                        &moving.motion(),
-                        &load(*on),
-                        out.as_mut_ptr(),
-                    );
+                Call::Dynamics(which, moving, on) => {
+                    let dynamics = match which {
+                        Dynamics::Inverse => armrs_inverse_dynamics,
+                        Dynamics::Forward => armrs_forward_dynamics,
+                    };
+                    let status = dynamics(&arm, &moving.motion(), &load(*on), out.as_mut_ptr());
                     finite(status, &out);
                 }
                 Call::Path(waypoints, limits, smooth, time) => {

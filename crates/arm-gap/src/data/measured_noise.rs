@@ -46,24 +46,27 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// noise a trial of ten seconds holds few independent samples. What the model lacks is in it too.
     ///
     /// # Errors
-    /// As [`PreparedSession::equations`].
+    /// As [`PreparedSession::responses_at`].
     pub fn measure_noise_left(
         &mut self,
         point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
     ) -> Result<(), GapError> {
-        let (coordinates, clusters) = self.equations(point, fitted, &[])?;
+        let named = self.responses_at(point, &fitted.hypothesis, &fitted.named())?;
+        let each: Vec<&Response> = named.iter().collect();
+        let (coordinates, clusters) = self.equations_with(point, fitted, &each);
         let Some((free, factor)) = decided(fitted, &coordinates, &clusters) else {
             return Ok(());
         };
         let mut responses = self.responses_to(point, &point.coordinates)?;
-        responses.extend(self.responses_at(point, &fitted.hypothesis, &fitted.named())?);
+        responses.extend(named);
+        let spread = factor.spread();
         let (mut deviations, mut taken, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
         for (residuals, &trial) in fitted.residuals.iter().zip(&self.fitted) {
             let (group, samples) = (self.group_of[trial], &self.valid_segments[trial]);
             let picked = |r: &Response| Thinned::of(&r.0[group], samples);
             let columns: Vec<Thinned> = free.iter().map(|&i| picked(&responses[i])).collect();
-            taken.extend(factor.spread().iter().map(|shares| sum(&columns, shares)));
+            taken.extend(spread.iter().map(|shares| sum(&columns, shares)));
             deviations.push(Thinned::of(residuals, samples));
             shifts.push(Arc::new(point.own.iter().map(picked).collect()));
         }
@@ -130,8 +133,10 @@ impl<const N: usize> PreparedSession<'_, N> {
             let mut clean = deviations.to_vec();
             let mut taken = fitted.to_vec();
             for (deviation, columns) in clean.iter_mut().zip(shifts) {
-                let row = noise.whiten_thinned(deviation);
-                let each = columns.iter().map(|c| noise.whiten_thinned(c));
+                let whitening = noise.whitening_at(deviation.observed());
+                let white = |series: &Thinned| noise.rows(series.channels.clone(), &whitening);
+                let row = white(deviation);
+                let each = columns.iter().map(white);
                 let whitened: Vec<Vec<f64>> = each.collect();
                 let k = known.len();
                 let gram = Matrix::from_fn(k, k, |a, b| {

@@ -52,7 +52,8 @@ impl Thinned {
         }
     }
 
-    fn observed(&self) -> Observed<'_> {
+    /// Which samples these are.
+    pub fn observed(&self) -> Observed<'_> {
         Observed {
             spacing: &self.spacing,
             force: &self.force,
@@ -212,16 +213,23 @@ impl Noise {
     /// How the samples of a trial are made white.
     pub fn whitening(&self, valid_segments: &ValidSegments) -> Whitening {
         let (spacing, force) = (valid_segments.spacing(), valid_segments.force());
-        let observed = Observed {
+        self.whitening_at(Observed {
             spacing: &spacing,
             force: &force,
-        };
+        })
+    }
+
+    /// The same of samples that are thinned already.
+    pub fn whitening_at(&self, observed: Observed<'_>) -> Whitening {
         Whitening::new(&self.whiteners, observed)
     }
 
     /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
     pub fn whiten(&self, channels: &Channels, valid_segments: &ValidSegments) -> Vec<f64> {
-        self.whiten_thinned(&Thinned::of(channels, valid_segments))
+        self.rows(
+            valid_segments.pick(channels),
+            &self.whitening(valid_segments),
+        )
     }
 
     /// Whitens a set of channels of one trial, whose samples weigh as they do there.
@@ -247,12 +255,13 @@ impl Noise {
 
     /// Whitens channels that are thinned already.
     pub fn whiten_thinned(&self, thinned: &Thinned) -> Vec<f64> {
-        let whitening = Whitening::new(&self.whiteners, thinned.observed());
+        let whitening = self.whitening_at(thinned.observed());
         self.rows(thinned.channels.clone(), &whitening)
     }
 
-    /// Each channel by itself, then free of what it shares with those before it.
-    fn rows(&self, mut rows: Channels, whitening: &Whitening) -> Vec<f64> {
+    /// The rows of channels at the samples of a whitening, made white there: each channel by itself, then free of what it shares with
+    /// those before it.
+    pub fn rows(&self, mut rows: Channels, whitening: &Whitening) -> Vec<f64> {
         whitening.apply(&mut rows);
         let n = self.whiteners.len();
         // From the last channel up: each row needs those before it unmixed.

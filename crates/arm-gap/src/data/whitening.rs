@@ -7,13 +7,10 @@
 use std::collections::BTreeMap;
 
 use arm_core::Plane;
-use arm_numerics::statistics::autoregressive::Whitener;
+use arm_numerics::statistics::autoregressive::{Predictor, Whitener};
 
 use crate::data::valid_segments::ObservableForce;
 use crate::measurement_model::prediction::Channels;
-
-/// Factors of samples at some lags, and one over the standard deviation of what they leave.
-type Predictor = (Vec<f64>, f64);
 
 /// Which samples there are, and what the force tells at each.
 #[derive(Clone, Copy)]
@@ -45,8 +42,8 @@ enum Row {
 /// How the samples of a trial are made white, channel by channel.
 #[derive(Clone, Debug)]
 pub struct Whitening {
-    /// Of each channel by order.
-    predictors: Vec<Vec<Predictor>>,
+    /// Of each channel.
+    whiteners: Vec<Whitener>,
     /// `[channel][sample]`.
     rows: Vec<Vec<Row>>,
 }
@@ -80,7 +77,7 @@ impl Whitening {
         });
         Self {
             rows: rows.collect(),
-            predictors: whiteners.iter().map(by_order).collect(),
+            whiteners: whiteners.to_vec(),
         }
     }
 
@@ -92,13 +89,12 @@ impl Whitening {
     /// Makes channels white in place.
     pub fn apply(&self, channels: &mut Channels) {
         for (c, rows) in self.rows.iter().enumerate() {
-            let predictors = &self.predictors[c];
             // Backwards, so that every sample still finds its unfiltered past; a component of the force finds both in it, since that
             // stands in the channel which is made white first.
             for (t, row) in rows.iter().enumerate().rev() {
                 let (foretold, inverse) = match row {
-                    Row::Next(order) => {
-                        let (factors, inverse) = &predictors[*order];
+                    Row::Next(count) => {
+                        let (factors, inverse) = self.whiteners[c].next(*count);
                         let past = channels[c][..t].iter().rev();
                         let sum = factors.iter().zip(past).fold(0.0, |s, (a, v)| s + a * v);
                         (sum, *inverse)
@@ -115,14 +111,6 @@ impl Whitening {
             }
         }
     }
-}
-
-/// The predictors of a channel from no sample, one, two … right before.
-fn by_order(whitener: &Whitener) -> Vec<Predictor> {
-    let lags: Vec<usize> = (1..=whitener.order()).collect();
-    (0..=lags.len())
-        .map(|order| whitener.predictor(&lags[..order]))
-        .collect()
 }
 
 /// What is known when the rows of a channel are made.

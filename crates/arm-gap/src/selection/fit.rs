@@ -120,7 +120,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// The same with responses that are known.
-    fn equations_with(
+    pub(crate) fn equations_with(
         &self,
         point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,

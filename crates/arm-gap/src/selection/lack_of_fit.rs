@@ -46,15 +46,18 @@ pub fn lack_of_fit<const N: usize>(
             continue;
         };
         let valid_segments = &valid_segments;
+        let whitening = prepared.noise.whitening(valid_segments);
+        let white = |channels| {
+            prepared
+                .noise
+                .rows(valid_segments.pick(channels), &whitening)
+        };
         let own = point.own.iter();
-        let columns = orthogonal(
-            own.map(|r| prepared.noise.whiten(&r.0[group], valid_segments))
-                .collect(),
-        );
+        let columns = orthogonal(own.map(|r| white(&r.0[group])).collect());
         let rows: Vec<Vec<f64>> = members
             .iter()
             .map(|&m| {
-                let mut row = prepared.noise.whiten(&fitted.residuals[m], valid_segments);
+                let mut row = white(&fitted.residuals[m]);
                 project_off(&mut row, &columns);
                 row
             })

@@ -6,6 +6,7 @@ use crate::candidates::candidate::price;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
+use crate::measurement_model::prediction::Channels;
 use crate::selection::lack_of_fit::{orthogonal, project_off};
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -73,6 +74,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         /// Share of what explains most on the grid of times below which a time of its own helps no more.
         const NEAR: f64 = 0.5;
         let trial = self.fitted[suspect.place];
+        let whitening = self.noise.whitening(&suspect.samples);
+        let white =
+            |channels: &Channels| self.noise.rows(suspect.samples.pick(channels), &whitening);
         let see = |shape: Shape| {
             if self.is_left_out(
                 trial,
@@ -81,7 +85,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 return None;
             }
             let row = |(p, channels): &(usize, _)| {
-                let mut row = self.noise.whiten(channels, &suspect.samples);
+                let mut row = white(channels);
                 project_off(&mut row, &suspect.usual);
                 (*p, row)
             };
@@ -151,10 +155,15 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn compared(&self, point: &LinearizationPoint<N>, place: usize) -> Option<Compared> {
         let trial = self.fitted[place];
         let (others, samples) = self.repeats_of(place)?;
-        let white = |m: &usize| self.noise.whiten(&point.residuals[*m], &samples);
+        let whitening = self.noise.whitening(&samples);
+        let white = |channels: &Channels| self.noise.rows(samples.pick(channels), &whitening);
         // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
-        let usual = self.usual(point, trial, &samples);
-        let (own, others): (_, Vec<Vec<f64>>) = (white(&place), others.iter().map(white).collect());
+        let usual = self.usual(point, trial, white);
+        let residuals = |m: usize| white(&point.residuals[m]);
+        let (own, others): (_, Vec<Vec<f64>>) = (
+            residuals(place),
+            others.into_iter().map(residuals).collect(),
+        );
         let mut deviation = deviation(&own, &others);
         project_off(&mut deviation, &usual);
         Some(Compared {
@@ -172,7 +181,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         &self,
         point: &LinearizationPoint<N>,
         trial: usize,
-        samples: &ValidSegments,
+        white: impl Fn(&Channels) -> Vec<f64>,
     ) -> Vec<Vec<f64>> {
         let length = self.session.trials[trial].len();
         let constant = |j: usize| {
@@ -181,10 +190,8 @@ impl<const N: usize> PreparedSession<'_, N> {
             channels
         };
         let own = point.own.iter();
-        let placed = own.map(|r| self.noise.whiten(&r.0[self.group_of[trial]], samples));
-        let columns: Vec<Vec<f64>> = placed
-            .chain((0..N).map(|j| self.noise.whiten(&constant(j), samples)))
-            .collect();
+        let placed = own.map(|r| white(&r.0[self.group_of[trial]]));
+        let columns: Vec<Vec<f64>> = placed.chain((0..N).map(|j| white(&constant(j)))).collect();
         orthogonal(columns)
     }
 

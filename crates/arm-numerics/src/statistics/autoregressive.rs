@@ -207,7 +207,7 @@ pub struct Whitener {
 }
 
 /// Coefficients of the samples before, the nearest first, with one over the standard deviation of the error.
-type Predictor = (Vec<f64>, f64);
+pub type Predictor = (Vec<f64>, f64);
 
 impl Whitener {
     /// The whitener of a model.
@@ -239,8 +239,7 @@ impl Whitener {
 
     /// Whitens one column of one trial in place.
     pub fn apply(&self, column: &mut [f64]) {
-        let order = self.predictors.len() - 1;
-        whiten(column, |t| &self.predictors[t.min(order)]);
+        whiten(column, |t| self.next(t));
     }
 
     /// The order of the model.
@@ -255,11 +254,16 @@ impl Whitener {
             .map_or(0.0, |(_, inverse)| 1.0 / inverse)
     }
 
+    /// The predictor from so many samples right before, at most as many as the model has coefficients.
+    pub fn next(&self, count: usize) -> &Predictor {
+        &self.predictors[count.min(self.order())]
+    }
+
     /// The best linear predictor from the samples at some lags, nearest first, with one over the standard deviation of its error.
     ///
     /// Where samples are missing, each is predicted from as many known ones before it as the model has coefficients, at the lags that they
     /// have: exactly where none is missing, and nearly (Vecchia 1988) after a gap.
-    pub fn predictor(&self, lags: &[usize]) -> (Vec<f64>, f64) {
+    pub fn predictor(&self, lags: &[usize]) -> Predictor {
         let is_next = lags.iter().enumerate().all(|(k, lag)| *lag == k + 1);
         if let Some(known) = self.predictors.get(lags.len()).filter(|_| is_next) {
             return known.clone();
@@ -281,11 +285,10 @@ impl Whitener {
 
     /// Autocovariance at lags up to one: each from those below it, by the predictor of the highest order that they allow.
     fn covariance(&self, most: usize) -> Vec<f64> {
-        let order = self.predictors.len() - 1;
         let (_, inverse) = self.predictors[0];
         let mut covariance = vec![1.0 / (inverse * inverse)];
         for lag in 1..=most {
-            let (a, _) = &self.predictors[lag.min(order)];
+            let (a, _) = self.next(lag);
             let next = a.iter().enumerate();
             covariance.push(next.fold(0.0, |sum, (i, a)| sum + a * covariance[lag - 1 - i]));
         }
