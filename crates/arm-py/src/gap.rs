@@ -31,6 +31,8 @@ pub struct Settings {
     tolerance: Py<model::Tolerance>,
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
+    /// Of which trials the robot's motion between the samples is not known.
+    unresolved: Vec<bool>,
     threads: usize,
     /// Names of kinds of one's own that are asked besides the catalogue.
     own: Vec<String>,
@@ -66,6 +68,7 @@ impl<'a, 'py> Call<'a, 'py> {
             } else {
                 ComparisonMode::Torque
             },
+            unresolved: settings.unresolved.clone(),
             own: settings
                 .own
                 .iter()

@@ -47,6 +47,8 @@ pub struct Course<const N: usize> {
     /// Samples over which a gap is measured: those that were measured. Where torques are compared, those [`MARGIN`] away from ends
     /// and gaps, next to which filters and differences have guessed.
     pub counted: Vec<bool>,
+    /// Whether forces are compared in the common band only: above it they hang on what the robot did between its samples.
+    in_band: bool,
     times: Vec<f64>,
     handle: Vec<Plane<f64>>,
     /// How far the base is from its place \[m\], where its path was measured and drives a simulation.
@@ -126,12 +128,7 @@ impl<const N: usize> Session<N> {
         let seen = smooth(&raw, band, trial.rate)?;
         let handle = match &trial.handle {
             Some(points) if self.comparison == ComparisonMode::Led => {
-                let axis = |a: usize| points.iter().map(|p| p[a]).collect::<Vec<_>>();
-                let band = (HANDLE_BAND * band).min(0.4 * trial.rate);
-                let smooth = smooth(&[axis(0), axis(1)], band, trial.rate)?;
-                (0..points.len())
-                    .map(|i| [smooth[0][i], smooth[1][i]])
-                    .collect()
+                handle_path(points, HANDLE_BAND * band, trial.rate)?
             }
             _ => Vec::new(),
         };
@@ -152,6 +149,7 @@ impl<const N: usize> Session<N> {
             rate: trial.rate,
             band,
             counted: away_from_gaps(&trial.valid, margin),
+            in_band: self.unresolved.get(number) == Some(&true),
             times,
             handle,
             base,
@@ -313,12 +311,13 @@ impl<const N: usize> Session<N> {
         Ok(angles.chain(forces).collect())
     }
 
-    /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led; torques in the common band, for
-    /// what differentiated angles say above it is noise.
-    pub fn measured_in<'c>(&self, course: &'c Course<N>) -> &'c Channels {
+    /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led, but for forces whose robot is not
+    /// known between its samples; torques in the common band, for what differentiated angles say above it is noise.
+    pub fn measured_in(&self, course: &Course<N>) -> Channels {
         match self.comparison {
-            ComparisonMode::Led => &course.raw,
-            ComparisonMode::Torque => &course.seen,
+            ComparisonMode::Led if course.in_band => forces_of(&course.seen, course.raw.clone()),
+            ComparisonMode::Led => course.raw.clone(),
+            ComparisonMode::Torque => course.seen.clone(),
         }
     }
 
@@ -333,6 +332,10 @@ impl<const N: usize> Session<N> {
     ) -> Result<Channels, SimulationError> {
         let run = self.run(hypothesis, course)?;
         match self.comparison {
+            ComparisonMode::Led if course.in_band => {
+                let raw = self.read_raw(hypothesis, course, &run)?;
+                Ok(forces_of(&self.read(hypothesis, course, &run)?, raw))
+            }
             ComparisonMode::Led => self.read_raw(hypothesis, course, &run),
             ComparisonMode::Torque => self.read(hypothesis, course, &run),
         }
@@ -431,12 +434,34 @@ fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, 
     Ok(measured(if quiet { &angles } else { trial }, band)?)
 }
 
+/// The path of the handle \[m\] without what is above a band \[Hz\]; as it is where samples hold hardly more than the band: to take
+/// little noise away there would round what the robot does from one sample to the next.
+fn handle_path(points: &[Plane<f64>], band: f64, rate: f64) -> Result<Vec<Plane<f64>>, GapError> {
+    /// Share of the sampling rate that a band may be.
+    const LARGEST: f64 = 0.4;
+    if band >= LARGEST * rate {
+        return Ok(points.to_vec());
+    }
+    let axis = |a: usize| points.iter().map(|p| p[a]).collect::<Vec<_>>();
+    let smooth = smooth(&[axis(0), axis(1)], band, rate)?;
+    Ok((0..points.len())
+        .map(|i| [smooth[0][i], smooth[1][i]])
+        .collect())
+}
+
 /// Low-passes every channel without phase.
 ///
 /// # Errors
 /// [`GapError::Numerics`] for channels too short for the filter or not finite.
 pub fn smooth(channels: &[Vec<f64>], band: f64, rate: f64) -> Result<Channels, GapError> {
     Ok(low_pass(band, rate)?.both_ways_all(channels)?)
+}
+
+/// Channels of a led arm with the forces, which are the last two, of others.
+fn forces_of(forces: &Channels, mut channels: Channels) -> Channels {
+    let first = channels.len().saturating_sub(2);
+    channels[first..].clone_from_slice(&forces[first..]);
+    channels
 }
 
 /// Channels less channels, over the samples that both have.
@@ -550,6 +575,7 @@ pub(crate) mod tests {
             tolerance: Tolerance::default(),
             trials: vec![trial],
             comparison: ComparisonMode::Led,
+            unresolved: Vec::new(),
             own: Vec::new(),
             base: Vec::new(),
             start: [[0.0; 3]; 2],
@@ -584,5 +610,38 @@ pub(crate) mod tests {
         let middle = course.handle[50..150].iter().map(|p| p[1] * p[1]);
         let power = middle.sum::<f64>() / 100.0;
         assert!((power / 0.5e-6 - 0.5).abs() < 0.01, "{power}");
+    }
+
+    /// At 50 Hz the band of the path is 0.4 of the rate.
+    #[test]
+    fn a_path_of_few_samples_is_not_rounded() {
+        let session = resting(50.0);
+        let recorded = session.trials[0].handle.as_ref().expect("a path");
+        assert_eq!(&session.course(0).expect("a course").handle, recorded);
+        assert_ne!(
+            resting(60.0).course(0).expect("a course").handle,
+            resting(60.0).trials[0].handle.clone().expect("a path")
+        );
+    }
+
+    #[test]
+    fn forces_are_compared_in_the_band_where_the_path_is_unresolved() {
+        let mut session = resting(100.0);
+        let force = session.trials[0].force_on_arm.as_mut().expect("forces");
+        force[50][0] = 1.0;
+        session.trials[0].q[50][0] = 1.0;
+        let as_read = session.course(0).expect("a course");
+        assert_eq!(session.measured_in(&as_read), as_read.raw);
+        session.unresolved = vec![true];
+        let course = session.course(0).expect("a course");
+        let compared = session.measured_in(&course);
+        assert_eq!(compared[..2], course.raw[..2]);
+        assert_eq!(compared[2..], course.seen[2..]);
+        assert!(compared[2][50] < 0.5, "{}", compared[2][50]);
+        let shown = session.shown_in(&session.given(), &course).expect("a run");
+        let read = session
+            .run(&session.given(), &course)
+            .and_then(|run| session.read(&session.given(), &course, &run));
+        assert_eq!(shown[2..], read.expect("channels")[2..]);
     }
 }

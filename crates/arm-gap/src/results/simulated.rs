@@ -72,7 +72,7 @@ impl SimulatedTrial {
             test: trial.role == Role::Test,
             rate: course.rate,
             counted: course.counted.clone(),
-            measured: session.measured_in(course).clone(),
+            measured: session.measured_in(course),
             shown: [const { None }; 3],
             free: [const { None }; 3],
         }

@@ -14,32 +14,42 @@ from ...model import Contact, Model
 _SHARE = 1.0 / 16.0
 """Error of the path through all samples, as a share of what a cubic through every second one misses of the others: about a twelfth
 where the acceleration jumps, less where it does not. The force foretold with it is that which development sessions leave."""
-_PLAIN = 2.0
-"""A movement is warned of where the path is uncertain by that many times what its repeats differ by."""
+_PLAIN = 0.5
+"""A path is not known where it is uncertain by that many times what repeats of the movement differ by: a contact that rings makes two to
+three times as much of it, and a gap is open from half its floor on."""
 _LEAST = 8
 """Samples below which a trial tells nothing of its path."""
 
 
 def unresolved(dataset: Dataset, led: bool) -> list[str]:
-    """Return a warning of the movements whose forces hang on what the robot did between the samples, or nothing.
-
-    With a stiff contact the handle's path between the samples is felt as a force. Where that is more than twice what repeats of the
-    movement differ by, a simulation misses the force by so much, whatever the arm is made of.
-    """
+    """Return a warning of the movements whose forces hang on what the robot did between the samples, or nothing."""
     if not led:
         return []
-    uncertain = []
+    uncertain = [
+        f"{name!r} (by {missed:.2g} N, where repeats differ by {differ:.2g} N)"
+        for name, (missed, differ) in unresolved_movements(dataset).items()
+    ]
+    if not uncertain:
+        return []
+    return [
+        f"what the robot does between its samples is not known well enough for the force in {', '.join(uncertain)}: the gap of the force "
+        "is measured below 5 Hz or a fifth of the sampling rate there; to see more, record the robot at a higher rate, or let it start and "
+        "stop smoothly"
+    ]
+
+
+def unresolved_movements(dataset: Dataset) -> dict[str, tuple[float, float]]:
+    """Return by movement the force that its path is uncertain by, and what its repeats differ by [N], where the first is too much.
+
+    With a stiff contact the handle's path between the samples is felt as a force: a simulation misses it, whatever the arm is made of.
+    """
+    found = {}
     for name in dict.fromkeys(t.configuration for t in dataset.trials):
         trials = [t for t in dataset.trials if t.configuration == name]
         missed, differ = max(_missed(dataset.model, t) for t in trials), _scatter(trials)
         if differ is not None and missed > _PLAIN * differ:
-            uncertain.append(f"{name!r} (by {missed:.2g} N, where repeats differ by {differ:.2g} N)")
-    if not uncertain:
-        return []
-    return [
-        f"what the robot does between its samples is not known well enough for the force in {', '.join(uncertain)}: a gap that is open "
-        "there may be of the samples, not of the arm; record the robot at a higher rate, or let it start and stop smoothly"
-    ]
+            found[name] = (missed, differ)
+    return found
 
 
 def _missed(model: Model, trial: Trial) -> float:
