@@ -5,12 +5,13 @@
 //! identified together with the segments: along the measured motion or, where a joint's speed is noise, along the simulated one.
 
 use std::cell::LazyCell;
+use std::collections::BTreeMap;
 
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
 use arm_ident::inference::estimate::{Estimate, Identified};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::inference::start::{middle, weight_moment};
-use arm_ident::regression::trial::{Model, Role};
+use arm_ident::regression::trial::{Model, Role, Trial};
 use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::extent::extent;
 
@@ -59,20 +60,20 @@ impl<const N: usize> Session<N> {
             held: self.effects.clone(),
             contact: self.contact,
         };
-        let along = |motion| {
+        let along = |motion, trials: &[Trial<N>]| {
             let options = Options {
                 motion,
                 tolerance: self.tolerance,
                 ..Options::default()
             };
-            identify(&model, &self.trials, &options)
+            identify(&model, trials, &options)
         };
-        let Ok(mut found) = along(MotionSource::Measured) else {
+        let Ok(mut found) = along(MotionSource::Measured, &self.trials) else {
             return self;
         };
         let noisy = found.speed_noise.iter().any(|&noise| noise > NOISY);
         if noisy && self.comparison == ComparisonMode::Led {
-            found = along(MotionSource::Auto).unwrap_or(found);
+            found = along(MotionSource::Auto, &self.first_repeats()).unwrap_or(found);
         }
         let laws = self.hidden_by_friction(estimated(&found), (&found, &model));
         let still = match self.comparison {
@@ -115,6 +116,22 @@ impl<const N: usize> Session<N> {
             .map(|change| change.clamp(-far, far));
         }
         self
+    }
+
+    /// The first fit trials of each movement. The search starts from what these tell and refits it with all; two tell what repeats differ
+    /// by, and to simulate all of them again and again would take longer than the search.
+    fn first_repeats(&self) -> Vec<Trial<N>> {
+        /// Of each movement.
+        const REPEATS: usize = 2;
+        let mut taken = BTreeMap::new();
+        let fit = self.trials.iter().filter(|t| t.role == Role::Fit);
+        fit.filter(|t| {
+            let count = taken.entry(t.configuration).or_insert(0);
+            *count += 1;
+            *count <= REPEATS
+        })
+        .cloned()
+        .collect()
     }
 
     /// Laws that were identified; those of a joint whose spring does not show beside its dry friction are read off the samples in which it
@@ -257,6 +274,30 @@ mod tests {
         };
         assert_eq!(still(0.0095), [true, true]);
         assert_eq!(still(0.0105), [false, true]);
+    }
+
+    #[test]
+    fn the_base_starts_from_two_repeats_of_each_movement() {
+        let mut session = resting(100.0);
+        let one = session.trials[0].clone();
+        session.trials = [
+            (0, Role::Fit),
+            (0, Role::Test),
+            (1, Role::Fit),
+            (0, Role::Fit),
+            (0, Role::Fit),
+        ]
+        .iter()
+        .zip(100..)
+        .map(|(&(configuration, role), rate)| Trial {
+            configuration,
+            role,
+            rate: f64::from(rate),
+            ..one.clone()
+        })
+        .collect();
+        let taken: Vec<f64> = session.first_repeats().iter().map(|t| t.rate).collect();
+        assert_eq!(taken, [100.0, 102.0, 103.0]);
     }
 
     /// A spring as large as the weight of the arm beyond its joint, at rest within a radian of the middle.

@@ -43,6 +43,9 @@ pub enum MotionSource {
 /// A fit that leaves this much more than repeats differ by, as a mean ratio of the channels' deviations, may be in a wrong minimum.
 const MISFIT: f64 = 2.0;
 
+/// Fits from two starts whose ends differ by less are in the same minimum: twice the logarithm of a likelihood.
+const AGREED: f64 = 1.0;
+
 /// Choices of an identification.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -148,6 +151,8 @@ struct Task<'a, const N: usize> {
 
 /// Where rounds of a fit ended.
 struct Settled<const N: usize> {
+    /// Where they began.
+    start: Model<N>,
     model: Model<N>,
     solved: Solved,
     prepared: Vec<Pieces>,
@@ -168,6 +173,13 @@ fn better<T, const N: usize>(
         (Ok(one), Ok(other)) if other.1.better_than(&one.1) => Ok(other),
         (Ok(one), _) => Ok(one),
         (Err(_), other) => other,
+    }
+}
+
+impl<const N: usize> Settled<N> {
+    /// Whether two fits ended in the same minimum.
+    fn agrees_with(&self, other: &Self) -> bool {
+        self.settled && other.settled && (self.objective - other.objective).abs() < AGREED
     }
 }
 
@@ -201,27 +213,33 @@ impl<const N: usize> Task<'_, N> {
         let measured = || self.by_measured(model, options.cutoff);
         let simulated = |from: &Model<N>| self.by_simulation(from, options.cutoff);
         let certain = |(task, found)| (task, found, None);
+        let restarted = |(task, found): (Self, _)| (task, task.restarted(found));
         match options.motion {
-            MotionSource::Simulated => return simulated(model).map(certain),
+            MotionSource::Simulated => return simulated(model).map(restarted).map(certain),
             MotionSource::Auto if self.fit.iter().all(|t| can_simulate(t)) => {}
             MotionSource::Auto | MotionSource::Measured => return measured().map(certain),
         }
         let mut best = simulated(model);
         let given = best.as_ref().is_ok_and(|(_, found)| self.done(found));
         if given {
-            return best.map(certain);
+            return best.map(restarted).map(certain);
         }
         // An arm of which little is known moves elsewhere than its model, and a fit along a motion that is not the arm's may end in the
         // wrong minimum.
         let seen = measured();
         let starts = seen.iter().map(|(_, found)| found.model.clone());
         for start in starts.chain(SHARES.map(|share| typical(model, self.fit, share))) {
-            best = better(best, simulated(&start));
-            if best.as_ref().is_ok_and(|(_, found)| self.done(found)) {
+            let other = simulated(&start);
+            let agreed = match (&best, &other) {
+                (Ok((_, one)), Ok((_, other))) => one.agrees_with(other),
+                _ => false,
+            };
+            best = better(best, other);
+            if agreed || best.as_ref().is_ok_and(|(_, found)| self.done(found)) {
                 break;
             }
         }
-        match best {
+        match best.map(restarted) {
             Ok(found) => Ok(certain(found)),
             Err(error) => seen.map(|(task, found)| (task, found, Some(error))),
         }
@@ -254,21 +272,18 @@ impl<const N: usize> Task<'_, N> {
     ) -> Result<(Self, Settled<N>), IdentError> {
         self.simulate = true;
         self.cutoff = cutoff.unwrap_or(self.cutoff);
-        let first = damped(from, self.cutoff);
-        let found = self.settle(first.clone())?;
-        // Where the robot holds every joint the motion is known, and the problem has one minimum.
-        let found = if N > HELD {
-            self.restarted(found, &first)
-        } else {
-            found
-        };
+        let found = self.settle(damped(from, self.cutoff))?;
         Ok((self, found))
     }
 
     /// The best of further starts where a fit may have ended in the wrong minimum.
-    fn restarted(&self, found: Settled<N>, first: &Model<N>) -> Settled<N> {
+    fn restarted(&self, found: Settled<N>) -> Settled<N> {
+        // Where the robot holds every joint the motion is known, and the problem has one minimum.
+        if N <= HELD {
+            return found;
+        }
         let unknowns = self.unknowns;
-        let from = values(first, unknowns);
+        let from = values(&found.start, unknowns);
         let start: Vec<f64> = of_effects(unknowns).map(|(k, _)| from[k]).collect();
         let limits: Vec<[f64; 2]> = of_effects(unknowns).map(|(_, u)| [u.min, u.max]).collect();
         best(found, &start, &limits, |other, effects| {
@@ -290,7 +305,7 @@ impl<const N: usize> Task<'_, N> {
             simulate,
             scale_free,
         } = *self;
-        let mut current = start;
+        let mut current = start.clone();
         let (mut last, mut prepared): (Option<Solved>, Vec<Pieces>) = (None, Vec::new());
         let (mut shown, mut refused, mut settled) = (current.clone(), None, false);
         for _ in 0..MOST_ROUNDS {
@@ -335,6 +350,7 @@ impl<const N: usize> Task<'_, N> {
         let objective = self.objective(&prepared, &solved.outcome.x);
         let excess = self.excess(&prepared, &solved.outcome.x);
         Ok(Settled {
+            start,
             model: current,
             solved,
             prepared,
