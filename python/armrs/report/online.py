@@ -63,8 +63,7 @@ def _health(result: Replay) -> Drawn:
 
 def _estimates(result: Replay) -> Drawn:
     """Draw every unknown over time with twice its standard deviation."""
-    columns = min(3, len(result.estimates))
-    rows = -(-len(result.estimates) // columns)
+    rows, columns = plotting.grid(len(result.estimates))
     figure = plotting.figure(3.4 * columns, 2.1 * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for k, e in enumerate(result.estimates):
