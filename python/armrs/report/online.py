@@ -55,7 +55,7 @@ def _health(result: Replay) -> Drawn:
     age.plot(result.t, result.age, color=plotting.GREY)
     age.set(title="time since a sample was learned from", ylabel="[s]", xlabel="time [s]", ylim=(0.0, None))
     text = (
-        "Above, when samples were learned from (green) and refused (red), with their number. Limit the support by the torque that the "
+        "Above, when samples were learned from (green) and refused (orange), with their number. Limit the support by the torque that the "
         "estimate leaves unexplained and by the time since something was learned."
     )
     return Drawn("health", "Health of the estimator", text, figure)
