@@ -242,6 +242,8 @@ def test_markers_of_unknown_names_are_listed(run: armrs.Simulation, tmp_path: Pa
         ("P1:R.Shoulder P1:R.Elbow P1:R.Wrist", 2, "R.Shoulder R.Elbow R.Wrist"),
         ("ac_r el_r em_r rs_r us_r hm3_r", 3, "ac_r el_r+em_r rs_r+us_r hm3_r"),
         ("Shoulder_L Elbow_Lat_L Elbow_Med_L Handle", 2, "Shoulder_L Elbow_Lat_L+Elbow_Med_L Handle"),
+        ("r_acromion r_humerus_epicondyle r_radius_styloid", 2, "r_acromion r_humerus_epicondyle r_radius_styloid"),  # OpenSim's arm26
+        ("CLAV_AC ACRO_tip EPICl EPICm STYLr STYLr_up STYLu", 2, "ACRO_tip EPICl+EPICm STYLr+STYLu"),
         ("RSHO LSHO RELB LELB Handle", 2, ""),
         ("RSHO RELB RWRA", 2, ""),
         ("SHO ELB WRI HAND", 1, ""),

@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-_SHOULDER = ("gh", "sho", "shoulder", "schulter", "acromion", "acr", "acro", "ac", "sae")
+_SHOULDER = ("gh", "sho", "shoulder", "schulter", "acromion", "acr", "acro", "acrotip", "ac", "sae")
 _ELBOW = (
     "elbl+elbm", "elbowl+elbowm", "elblat+elbmed", "elbowlat+elbowmed", "elbowlateral+elbowmedial", "el+em", "elb+elbm", "elb+mel",
-    "elbo+elbi", "hle+hme", "lep+mep", "ej", "elb", "elbow", "ellbogen",
+    "elbo+elbi", "hle+hme", "lep+mep", "epicl+epicm", "humerusepicondyle", "ej", "elb", "elbow", "ellbogen",
 )  # fmt: skip
 _WRIST = (
     "wra+wrb", "wril+wrim", "wristl+wristm", "wrilat+wrimed", "wristlat+wristmed", "wristlateral+wristmedial", "wristradius+wristulna",
-    "wrr+wru", "rs+us", "rsp+usp", "wj", "wri", "wrist", "handgelenk",
+    "wrr+wru", "rs+us", "rsp+usp", "stylr+stylu", "radiusstyloid+ulnastyloid", "radiusstyloid", "wj", "wri", "wrist", "handgelenk",
 )  # fmt: skip
 _HANDLE = ("handle", "grip", "griff", "hand", "hm3", "mc3", "mcp3", "fin", "finger", "knuckle", "tip", "hm2", "mc2")
 """Names of markers without side, blanks and marks; `A+B` is the point half way. The first that is there is taken."""
