@@ -216,7 +216,8 @@ HUNG = """<mujoco><compiler angle="degree" balanceinertia="true"/><option gravit
     <inertial pos="0.01 0.02 -0.15" quat="0.9 0.1 0.2 0.3" mass="2" diaginertia="0.02 0.03 0.025"/>
     <body name="fore" pos="0 0.05 -0.3" quat="0.8 0 0.6 0"><joint name="two" axis="0 1 0"/>
       <inertial pos="0.1 0 0.02" mass="1" fullinertia="0.01 0.011 0.012 0.001 0 0"/><site name="hand" pos="0.25 0 0.05"/>
-  </body></body></worldbody></mujoco>"""
+  </body></body></worldbody>
+  <tendon><fixed stiffness="2" springlength="0.3"><joint joint="one" coef="0.8"/><joint joint="two" coef="1"/></fixed></tendon></mujoco>"""
 
 
 def test_a_chain_of_another_tool_moves_as_mujoco_moves_it(tmp_path: Path) -> None:
@@ -225,12 +226,14 @@ def test_a_chain_of_another_tool_moves_as_mujoco_moves_it(tmp_path: Path) -> Non
     path.write_text(HUNG)
     found, theirs, rng = read_model(path), mujoco.MjModel.from_xml_string(HUNG), np.random.default_rng(2)
     data, zeros, spring = mujoco.MjData(theirs), np.array(found.zeros), found.model.joints[0]
+    both = found.model.effects[0].parameters
     for _ in range(5):
         q, qd, torque = rng.uniform(-1.0, 1.0, (3, 2))
         data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q, qd, 0.0
         mujoco.mj_forward(theirs, data)
         passive = -spring.stiffness * (q[0] + zeros[0] - spring.rest) - spring.viscosity * qd[0]
-        assert data.qfrc_passive == pytest.approx([passive, 0.0])
+        pull = -both["stiffness"] * (both["ratio"] * (q[0] + zeros[0]) + q[1] + zeros[1] - both["rest"])
+        assert data.qfrc_passive == pytest.approx([passive + both["ratio"] * pull, pull])
         data.qfrc_applied[:] = torque - data.qfrc_passive
         mujoco.mj_forward(theirs, data)
         moved = armrs.Arm.from_model(found.model).forward_dynamics((q + zeros)[None], qd[None], torque[None])[0]

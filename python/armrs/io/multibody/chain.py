@@ -6,13 +6,13 @@ Offsets along the axes do not change how the chain moves, and are left out.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...errors import BadInput, Text
-from ...model import Effect, Joint, Model, Segment
+from ...model import Joint, Model, Segment
 from .joints import numbers
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -55,7 +55,7 @@ class Imported:
     zeros: tuple[float, ...]
 
 
-def planar(hinges: Sequence[Hinge], tip: np.ndarray | None, gravity: float = 9.81, effects: Iterable[Effect] = ()) -> Imported:
+def planar(hinges: Sequence[Hinge], tip: np.ndarray | None, gravity: float = 9.81) -> Imported:
     """Return a chain as an arm in the plane across its axes. Without a tip, the last segment ends at its centre of mass."""
     forward, normal = _plane(hinges)
     bodies = [_whole(hinge) for hinge in hinges]
@@ -80,13 +80,12 @@ def planar(hinges: Sequence[Hinge], tip: np.ndarray | None, gravity: float = 9.8
         segments.append(Segment(hinge.name, length, body.mass, along, float(normal @ body.inertia @ normal), com_normal=aside))
         joints.append(hinge.joint.replace(rest=hinge.joint.rest + zero) if hinge.joint.stiffness else hinge.joint)
     first = hinges[0].place
-    moved = [_moved(effect, zeros) for effect in effects]
     if abs(forward[1] - 1.0) > _PARALLEL:
         notes.append(f"forward is {numbers(*np.round(forward, 4) + 0.0)} of the file: the arm is seen against its first axis")
     for joint, zero in zip(joints, zeros, strict=True):
         if abs(zero) > _PARALLEL:
             notes.append(f"{joint.name}: its angle is that of the file {'+' if zero > 0.0 else '−'} {abs(math.degrees(zero)):.4g}°")
-    model = Model(tuple(segments), tuple(joints), gravity=gravity, base=(float(first @ forward), float(first @ _UP)), effects=tuple(moved))
+    model = Model(tuple(segments), tuple(joints), gravity=gravity, base=(float(first @ forward), float(first @ _UP)))
     return Imported(model, tuple(notes), tuple(zeros))
 
 
@@ -122,12 +121,3 @@ def _whole(hinge: Hinge) -> Body:
         d = body.com - com
         inertia += body.inertia + body.mass * (d @ d * np.eye(3) - np.outer(d, d))
     return Body(mass, com, inertia)
-
-
-def _moved(effect: Effect, zeros: Sequence[float]) -> Effect:
-    """Return a spring over two joints with its rest in the angles of the arm."""
-    if effect.kind != "biarticular" or effect.joint is None:
-        return effect
-    values = effect.parameters
-    shift = values["ratio"] * zeros[effect.joint - 2] + zeros[effect.joint - 1]
-    return effect.replace(parameters={**values, "rest": values["rest"] + shift})

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -84,8 +86,9 @@ def read(text: str) -> Imported:
             break
         body = inner[0]
     sites = body.findall("site")
-    springs = [_spring(fixed, [hinge.joint.name for hinge in hinges]) for fixed in root.findall("tendon/fixed")]
-    return planar(hinges, turned @ _place(sites[-1]) if sites else None, -gravity[2], (*rotors, *springs))
+    found = planar(hinges, turned @ _place(sites[-1]) if sites else None, -gravity[2])
+    springs = [_spring(fixed, [hinge.joint.name for hinge in hinges], found.zeros) for fixed in root.findall("tendon/fixed")]
+    return replace(found, model=found.model.replace(effects=(*rotors, *springs)))
 
 
 def _angle(root: ET.Element) -> str:
@@ -156,12 +159,14 @@ def _joint(body: ET.Element, turn: float) -> tuple[Joint, np.ndarray, float]:
     return law, axis / np.linalg.norm(axis), rotor
 
 
-def _spring(fixed: ET.Element, names: list[str]) -> Effect:
+def _spring(fixed: ET.Element, names: list[str], zeros: Sequence[float]) -> Effect:
+    """Return a spring over two joints, its rest in the angles of the arm."""
     parts = [(p.get("joint"), vector(p, "coef", 1)[0]) for p in fixed.findall("joint")]
     if len(parts) == 2 and parts[1][0] in names and parts[0][0] in names:
         near, far = names.index(parts[0][0]), names.index(parts[1][0])
         if far == near + 1 and parts[1][1] == 1.0:
             values = {"ratio": parts[0][1]}
-            values |= {"stiffness": vector(fixed, "stiffness", 1, (0.0,))[0], "rest": vector(fixed, "springlength", 1, (0.0,))[0]}
+            rest = vector(fixed, "springlength", 1, (0.0,))[0] + (parts[0][1] * zeros[near] + zeros[far])
+            values |= {"stiffness": vector(fixed, "stiffness", 1, (0.0,))[0], "rest": rest}
             return Effect("biarticular", far + 1, parameters=values)
     raise BadInput("<tendon> fixed", Text(str(parts)), "two joints one after the other, the far one with coef 1")
