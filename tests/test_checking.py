@@ -61,7 +61,9 @@ def besides(problems: Sequence[Problem]) -> list[str]:
 
 
 def test_a_sound_session_has_no_problem_but_that_it_has_no_robot(session: Path) -> None:
-    assert besides(check_dataset(session).problems) == []
+    problems = check_dataset(session).problems
+    assert besides(problems) == []
+    assert [p.next_step for p in problems] == ["add what they lack"]  # to leave out what all of them lack leaves none
 
 
 def test_forces_on_another_clock_are_named(session: Path, tmp_path: Path) -> None:

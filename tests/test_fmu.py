@@ -358,3 +358,18 @@ def test_effects_that_do_not_travel_are_said(tmp_path: Path, monkeypatch: pytest
     assert json.loads(Path("e.json").read_text(encoding="utf-8"))["left_out"] == ["contact_damping", "time_delay"]
     assert cli.main(["fmu", "export", "arm.toml", "--port", "motion", "-o", "motion.fmu", "--json", "m.json"]) == 0
     assert json.loads(Path("m.json").read_text(encoding="utf-8"))["left_out"] == ["time_delay"]
+
+
+def test_an_fmu_of_another_tool_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It was replaced without a word."""
+    target, command = tmp_path / "arm.fmu", ["fmu", "export", str(tmp_path / "arm.toml"), "-o", str(tmp_path / "arm.fmu")]
+    true_model().write(tmp_path / "arm.toml")
+    with zipfile.ZipFile(target, "w") as other:
+        other.writestr("modelDescription.xml", "<fmiModelDescription/>")
+    before = target.read_bytes()
+    assert cli.main(command) == 2
+    assert "found a .fmu file that armrs did not write, allowed another name, or --force" in capsys.readouterr().err
+    assert target.read_bytes() == before
+    assert cli.main([*command, "--force"]) == 0
+    written = target.read_bytes()
+    assert cli.main([*command, "--fmi", "2"]) == 0 and target.read_bytes() != written

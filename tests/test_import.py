@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -142,7 +143,7 @@ def hdf5_groups(r: Recording, folder: Path) -> Path:
     return folder / "session.h5"
 
 
-def c3d_with_analogs(r: Recording, folder: Path) -> Path:
+def c3d_with_analogs(r: Recording, folder: Path, *, labels: Sequence[str] = ("SHO", "ELB", "HAND")) -> Path:
     """Markers at 100 Hz and the force on analog channels at 200 Hz, as ezc3d writes them."""
     ezc3d = pytest.importorskip("ezc3d")
     absolute = np.cumsum(r.q, axis=1)
@@ -154,7 +155,7 @@ def c3d_with_analogs(r: Recording, folder: Path) -> Path:
     points[3] = 1.0
     content = ezc3d.c3d()
     content["parameters"]["POINT"]["RATE"]["value"] = [100.0]
-    content["parameters"]["POINT"]["LABELS"]["value"] = ["SHO", "ELB", "HAND"]
+    content["parameters"]["POINT"]["LABELS"]["value"] = list(labels)
     content["parameters"]["POINT"]["UNITS"]["value"] = ["m"]
     content["data"]["points"] = points
     twice = np.arange(2 * len(r.t)) / 200.0
@@ -238,7 +239,8 @@ CASES: dict[str, tuple[Writer, dict[str, object], float]] = {
     "MATLAB 5": (matlab_5, {}, 0.0),
     "MATLAB 7.3": (matlab_7_3, {}, 0.0),
     "MATLAB 7.3 with attributes for units": (matlab_7_3_with_units, {}, 1e-12),
-    "C3D with analogs": (c3d_with_analogs, {"points": ("SHO", "ELB", "HAND")}, 3e-6),
+    "C3D with analogs": (c3d_with_analogs, {}, 3e-6),
+    "C3D with markers of other names": (partial(c3d_with_analogs, labels=("M1", "M2", "M3")), {"points": ("M1", "M2", "M3")}, 3e-6),
     "OpenSim storage": (motion_file, {}, 0.0),
     "Parquet": (parquet, {}, 0.0),
     "tabs": (text("slow_1.txt", sep="\t"), {}, 0.0),
@@ -329,7 +331,7 @@ HOPELESS: dict[str, tuple[Writer, tuple[str, ...]]] = {
         ),
         ("time that does not increase", "a unit of force for Fy"),
     ),
-    "markers without their names": (c3d_with_analogs, ("shoulder to handle, of SHO, ELB, HAND",)),
+    "markers without their names": (partial(c3d_with_analogs, labels=("M1", "M2", "M3")), ("and of the handle, of M1, M2, M3",)),
     "a picture, words and a table": (
         lambda r, folder: _three_wrong(r, folder),
         ("binary data", "no block of rows", "found angles of 1 joint,"),

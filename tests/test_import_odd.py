@@ -40,6 +40,13 @@ def german(r: Recording) -> list[str]:
     return [";".join(GERMAN), *rows(values(r, t=1e3))]
 
 
+JAPANESE = ("時間 [ms]", "肩角度 [deg]", "肘角度 [deg]", "前方力 [N]", "上方力 [N]")
+
+
+def japanese(r: Recording) -> list[str]:
+    return [",".join(JAPANESE), *rows(values(r, t=1e3), ",", ".")]
+
+
 def thousands(r: Recording) -> list[str]:
     marked = [f"{t:,.1f}".replace(",", "_").replace(".", ",").replace("_", ".") for t in 1e3 * r.t]
     return [";".join(GERMAN), *(f"{t};{row}" for t, row in zip(marked, rows(values(r)[:, 1:]), strict=True))]
@@ -255,6 +262,11 @@ CASES: dict[str, tuple[Writer, dict[str, object], str]] = {
     "whole numbers with marks for thousands": (text(whole_thousands), {}, "decimal comma"),
     "a row twice": (text(doubled), {}, "1 row that repeats the row before"),
     "degrees under the name of radians": (text(labelled_rad), {}, "in degrees, although its header says rad"),
+    "Shift-JIS": (
+        text(japanese, encoding="cp932"),
+        {"columns_map": ",".join(f"{symbol}={name}" for symbol, name in zip(("t", "q1", "q2", "Fy", "Fz"), JAPANESE, strict=True))},
+        "text in Shift-JIS",
+    ),
     "UTF-16 without its mark": (text(german, encoding="utf-16-le"), {}, "text in UTF-16"),
     "line ends of an old Macintosh": (text(german, end="\r"), {}, "decimal comma"),
     "nanoseconds since 1970": (text(nanoseconds), {}, "so in ns"),

@@ -15,6 +15,7 @@ import pytest
 import armrs
 from armrs.errors import BadInput
 from armrs.io.raw import read_raw
+from armrs.workflows.importing import joint_markers
 
 LENGTHS = (0.322, 0.264)
 SEGMENTS = (
@@ -215,9 +216,41 @@ def test_joint_angles_of_model_outputs_need_to_be_chosen(run: armrs.Simulation, 
     assert np.abs(trial.q - run.q).max() < 1e-6
 
 
-def test_markers_without_their_names_are_listed(run: armrs.Simulation, tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="--points: found nothing, allowed the markers of the joints, shoulder to handle, of SHO, ELB, HAND"):
-        armrs.import_recordings([vicon(run, tmp_path)], tmp_path / "session", model=KNOWN)
+def test_markers_are_recognised_by_their_names(run: armrs.Simulation, tmp_path: Path) -> None:
+    done = armrs.import_recordings([vicon(run, tmp_path)], tmp_path / "session", model=KNOWN)
+    assert done.recipe.points == ("SHO", "ELB", "HAND")
+    assert "joints and handle are the markers SHO, ELB, HAND, by their names; --points names others" in done.notes
+    again = armrs.import_recordings([done.folder / "import.toml"], tmp_path / "again", model=KNOWN)
+    assert np.array_equal(armrs.load_dataset(again.folder).trials[0].q, armrs.load_dataset(done.folder).trials[0].q)
+    assert np.abs(armrs.load_dataset(done.folder).trials[0].q - run.q).max() < 1e-5
+
+
+def test_markers_of_unknown_names_are_listed(run: armrs.Simulation, tmp_path: Path) -> None:
+    path = vicon(run, tmp_path)
+    path.write_text(path.read_text().replace("S7:ELB", "S7:M2"))
+    allowed = "3 markers, of the joints from the shoulder on and of the handle, of SHO, M2, HAND"
+    with pytest.raises(BadInput, match=f"--points: found nothing, allowed {allowed}"):
+        armrs.import_recordings([path], tmp_path / "session", model=KNOWN)
+
+
+@pytest.mark.parametrize(
+    ("names", "n_joints", "points"),
+    [
+        ("LSHO RSHO RUPA RELB RWRA RWRB RFIN", 2, "RSHO RELB RFIN"),
+        ("LSHO RSHO RUPA RELB RWRA RWRB RFIN", 3, "RSHO RELB RWRA+RWRB RFIN"),
+        ("LSHO LELB LFIN RSHO RELB RFIN", 2, ""),
+        ("P1:R.Shoulder P1:R.Elbow P1:R.Wrist", 2, "R.Shoulder R.Elbow R.Wrist"),
+        ("ac_r el_r em_r rs_r us_r hm3_r", 3, "ac_r el_r+em_r rs_r+us_r hm3_r"),
+        ("Shoulder_L Elbow_Lat_L Elbow_Med_L Handle", 2, "Shoulder_L Elbow_Lat_L+Elbow_Med_L Handle"),
+        ("r_acromion r_humerus_epicondyle r_radius_styloid", 2, "r_acromion r_humerus_epicondyle r_radius_styloid"),  # OpenSim's arm26
+        ("CLAV_AC ACRO_tip EPICl EPICm STYLr STYLr_up STYLu", 2, "ACRO_tip EPICl+EPICm STYLr+STYLu"),
+        ("RSHO LSHO RELB LELB Handle", 2, ""),
+        ("RSHO RELB RWRA", 2, ""),
+        ("SHO ELB WRI HAND", 1, ""),
+    ],
+)
+def test_marker_sets_that_are_known(names: str, n_joints: int, points: str) -> None:
+    assert joint_markers.guess(names.split(), n_joints) == tuple(points.split())
 
 
 BIODEX = [

@@ -11,6 +11,7 @@ import pytest
 import armrs
 from armrs import cli
 from armrs._armrs import Rig
+from armrs.io.multibody import read_model
 
 SEGMENTS = (
     armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165),
@@ -134,8 +135,10 @@ def edited(change: Callable[[str], str]) -> Callable[[Path], Path]:
     ("change", "words"),
     [
         (lambda s: "<!DOCTYPE x [<!ENTITY a 'b'>]>" + s.split("?>")[1], "document type"),
-        (lambda s: s.replace('xyz="1 0 0"', 'xyz="0 1 0"', 1), "1 0 0"),
-        (lambda s: s.replace('type="continuous"', 'type="prismatic"', 1), "continuous or revolute"),
+        (lambda s: s.replace('xyz="1 0 0"', 'xyz="0 1 0"', 1), "as of the first joint: the arm moves in one plane"),
+        (lambda s: s.replace('xyz="1 0 0"', 'xyz="0 0 1"'), "a horizontal axis"),
+        (lambda s: s.replace('xyz="1 0 0"', 'xyz="0 0 0"'), "a direction"),
+        (lambda s: s.replace('type="continuous"', 'type="prismatic"', 1), "continuous, revolute or fixed"),
         (lambda s: s.replace("<robot", "<sdf", 1).replace("</robot", "</sdf"), "<robot>"),
         (lambda s: s.replace('value="2.114"', 'value="heavy"'), "finite number"),
         (lambda s: s[: len(s) // 2], "well-formed"),
@@ -168,3 +171,70 @@ def test_the_command_converts_models_both_ways(tmp_path: Path, capsys: pytest.Ca
     assert cli.main(["convert", str(tmp_path / "out" / "arm.xml"), "--to", "toml", "-o", str(tmp_path / "back")]) == 0
     assert armrs.load_model(tmp_path / "back" / "arm.toml").joints == RICH.joints
     assert cli.main(["convert", str(tmp_path / "out" / "arm.xml"), "--to", "osim", "-o", str(tmp_path / "back")]) == 2
+
+
+TILTED = """<robot name="hanging">
+  <joint name="weld" type="fixed"><parent link="world"/><child link="stand"/><origin xyz="0.1 0.2 0.9" rpy="0 0 0"/></joint>
+  <link name="stand"/>
+  <joint name="one" type="continuous"><parent link="stand"/><child link="upper"/><origin xyz="0.02 0.03 0"/><axis xyz="0 2 0"/>
+    <dynamics damping="0.1" friction="0"/></joint>
+  <link name="upper"><inertial><origin xyz="0.01 0 -0.15" rpy="0.1 0.2 0.3"/><mass value="2"/>
+    <inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="0.002" iyz="-0.001"/></inertial></link>
+  <joint name="clamp" type="fixed"><parent link="upper"/><child link="weight"/><origin xyz="0.05 0.02 -0.2" rpy="0 0.4 0"/></joint>
+  <link name="weight"><inertial><origin xyz="0 0 0.01"/><mass value="0.5"/>
+    <inertia ixx="0.001" iyy="0.002" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="two" type="continuous"><parent link="weight"/><child link="fore"/><origin xyz="0 0 -0.1" rpy="0 1.0 0"/>
+    <axis xyz="0 1 0"/></joint>
+  <link name="fore"><inertial><origin xyz="0.1 0 0.02"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.011" izz="0.012" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="hand" type="fixed"><parent link="fore"/><child link="tip"/><origin xyz="0.25 0 0.05"/></joint><link name="tip"/>
+</robot>"""
+"""As other tools write chains: an axis along y, links that hang at zero, turned frames, and a weight that is fixed to a link."""
+
+
+def test_a_chain_of_another_tool_moves_as_pinocchio_moves_it(tmp_path: Path) -> None:
+    """Public files were all refused: axes along y, a `world` without a link, links along z."""
+    pin = pytest.importorskip("pinocchio")
+    path = tmp_path / "hanging.urdf"
+    path.write_text(TILTED)
+    with pytest.warns(armrs.ArmrsWarning, match="one: its angle is that of the file") as told:
+        ours = armrs.import_model(path)
+    assert [str(line.message).split(":")[0] for line in told] == ["forward is -1.0 0.0 0.0 of the file", "one", "two"]
+    # Pinocchio wants the link that other readers supply.
+    theirs = pin.buildModelFromXML(TILTED.replace('<link name="stand"/>', '<link name="stand"/><link name="world"/>'))
+    data, rng, zeros = theirs.createData(), np.random.default_rng(1), np.array(read_model(path).zeros)
+    assert ours.joints[0].viscosity == 0.1
+    for _ in range(5):
+        q, qd, torque = rng.uniform(-1.0, 1.0, (3, 2))
+        expected = pin.aba(theirs, data, np.array([f(a) for a in q for f in (np.cos, np.sin)]), qd, torque)
+        found = armrs.Arm.from_model(ours).forward_dynamics((q + zeros)[None], qd[None], torque[None])[0]
+        assert found == pytest.approx(expected, rel=1e-9)
+
+
+HUNG = """<mujoco><compiler angle="degree" balanceinertia="true"/><option gravity="0 0 -9.81"/><worldbody>
+  <body name="upper" pos="0.1 0 1"><joint name="one" axis="0 1 0" stiffness="3" springref="20" damping="0.2"/>
+    <inertial pos="0.01 0.02 -0.15" quat="0.9 0.1 0.2 0.3" mass="2" diaginertia="0.02 0.03 0.025"/>
+    <body name="fore" pos="0 0.05 -0.3" quat="0.8 0 0.6 0"><joint name="two" axis="0 1 0"/>
+      <inertial pos="0.1 0 0.02" mass="1" fullinertia="0.01 0.011 0.012 0.001 0 0"/><site name="hand" pos="0.25 0 0.05"/>
+  </body></body></worldbody>
+  <tendon><fixed stiffness="2" springlength="0.3"><joint joint="one" coef="0.8"/><joint joint="two" coef="1"/></fixed></tendon></mujoco>"""
+
+
+def test_a_chain_of_another_tool_moves_as_mujoco_moves_it(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "hung.xml"
+    path.write_text(HUNG)
+    found, theirs, rng = read_model(path), mujoco.MjModel.from_xml_string(HUNG), np.random.default_rng(2)
+    data, zeros, spring = mujoco.MjData(theirs), np.array(found.zeros), found.model.joints[0]
+    both = found.model.effects[0].parameters
+    for _ in range(5):
+        q, qd, torque = rng.uniform(-1.0, 1.0, (3, 2))
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q, qd, 0.0
+        mujoco.mj_forward(theirs, data)
+        passive = -spring.stiffness * (q[0] + zeros[0] - spring.rest) - spring.viscosity * qd[0]
+        pull = -both["stiffness"] * (both["ratio"] * (q[0] + zeros[0]) + q[1] + zeros[1] - both["rest"])
+        assert data.qfrc_passive == pytest.approx([passive + both["ratio"] * pull, pull])
+        data.qfrc_applied[:] = torque - data.qfrc_passive
+        mujoco.mj_forward(theirs, data)
+        moved = armrs.Arm.from_model(found.model).forward_dynamics((q + zeros)[None], qd[None], torque[None])[0]
+        assert moved == pytest.approx(data.qacc, rel=1e-9)

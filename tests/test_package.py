@@ -83,12 +83,3 @@ def test_what_make_installs_reads_c3d() -> None:
     assert '"ezc3d' in files
     lines = re.findall(r"maturin develop (.*)", (ROOT / "Makefile").read_text(encoding="utf-8"))
     assert lines and all("files" in line.partition("--extras ")[2].split()[0].rstrip(";").split(",") for line in lines)
-
-
-def test_the_readme_says_who_wrote_the_thesis() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert re.search(
-        r"Timotej Kodek, \*Estimation of Upper Extremity Biomechanical Parameters[^*]+\*.*University\s+of Ljubljana.*2004",
-        readme,
-        flags=re.S,
-    )

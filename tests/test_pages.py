@@ -191,6 +191,8 @@ SYMBOLS = {
     "identify": ["m is the mass of a segment, ℓ the distance", "I₁ + m₁·ℓ₁²", "stiffness·rest is the torque of that spring at angle zero"],
     "sweep": ["m is the mass of a segment", "By data is the share"],
     "notebook": ["m is the mass of a segment"],
+    "history": ["m is the mass of a segment, ℓ the distance", "p is the probability of a difference at least as large without a change"],
+    "cohort": ["Between and within are the standard deviations of subjects and of their sessions"],
     "gap": ["q1 and q2: the angle of joint 1", "Fz: the contact force upward", "In formulas R is the torque with which a joint resists"],
 }
 

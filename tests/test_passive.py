@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,19 @@ def test_gaps_stay_gaps(session: Session) -> None:
     assert np.isnan(first.moment).any()
     assert np.isfinite(first.moment).any()
     assert (first.direction[np.isnan(first.q)] == 0).all()
+
+
+def test_the_share_that_is_done_grows(slow_arm: Path, tmp_path: Path) -> None:
+    told: list[tuple[str, float]] = []
+    for name in ("a", "b"):
+        shutil.copytree(slow_arm, tmp_path / name)
+    armrs.passive_moments(slow_arm, progress=lambda stage, share: told.append((stage, share)))
+    assert told == [("passive moments of slow", 0.0)]
+    told.clear()
+    armrs.cohort(tmp_path, progress=lambda stage, share: told.append((stage, share)))
+    shares = [share for _, share in told]
+    assert [stage for stage, _ in told[:2]] == ["passive moments of a", "passive moments of b"]
+    assert shares == sorted(shares) and shares[:2] == [0.0, 0.4] and all(0.8 <= share < 1.0 for share in shares[2:])
 
 
 def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -129,6 +129,12 @@ def test_labels_of_large_numbers_do_not_collide() -> None:
     assert ax.xaxis.get_offset_text().get_text() == "1e5"
 
 
+@pytest.mark.parametrize(("count", "shape"), [(0, (1, 1)), (1, (1, 1)), (3, (1, 3)), (4, (2, 2)), (5, (2, 3)), (7, (3, 3))])
+def test_a_grid_leaves_few_places_empty(count: int, shape: tuple[int, int]) -> None:
+    """Four panels were three, and one below."""
+    assert plotting.grid(count) == shape
+
+
 def test_without_axes_a_figure_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot

@@ -303,3 +303,25 @@ def test_an_archive_reads_nothing_outside(folder: Path) -> None:
         files.write(folder / "Gain.fmu", "Gain.fmu")
     with pytest.raises(BadInput, match=r"outside\.ssp: source: found .*allowed a file inside the archive"):
         load_ssp(path, step=0.5)
+
+
+def test_an_archive_of_another_tool_is_kept(folder: Path, tmp_path: Path) -> None:
+    target = tmp_path / "arms.ssp"
+    with zipfile.ZipFile(target, "w") as other:
+        other.writestr("SystemStructure.ssd", "<ssd:SystemStructureDescription/>")
+    system = load_system(arms(folder))
+    with pytest.raises(BadInput, match=r"found a \.ssp file that armrs did not write, allowed another name, or --force"):
+        export_ssp(system, target)
+    ours = export_ssp(system, target, replace=True).read_bytes()
+    assert export_ssp(system, target, fmi=3).read_bytes() != ours
+    system.free()
+
+
+def test_a_system_is_not_written_over_itself(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    system = load_system(arms(folder))
+    path = export_ssp(system, tmp_path / "arms.ssp")
+    system.free()
+    monkeypatch.chdir(tmp_path)
+    before = path.read_bytes()
+    assert cli.main(["fmu", "ssp", "arms.ssp", "--fmi", "3"]) == 2
+    assert path.read_bytes() == before

@@ -24,7 +24,7 @@ import armrs
 from armrs import cli, views
 from armrs.cosim.accuracy import run_checked
 from armrs.cosim.system import load_system
-from armrs.tabular import Framed, Tabular
+from armrs.tabular import Framed, Tabular, Tidy
 from armrs.workflows import history
 from armrs.workflows.demo import true_model
 from browser import opened
@@ -259,3 +259,13 @@ def test_the_tables_of_a_check_an_import_a_recording_and_a_coupled_run(slow_arm:
     assert recorded.to_dataframe()["tracking_error"].max() < 0.1
     series = coupled.to_xarray()
     assert series.sizes["time"] == len(coupled.t) and series["arm.q[1]"].attrs["units"] == "rad"
+
+
+def test_minus_zero_has_no_sign() -> None:
+    """Forces of a wall that is not touched were shown as -0."""
+
+    class Forces(Framed):
+        def tidy(self) -> Tidy:
+            return Tidy({"F": [-0.0, -0.5]}, {})
+
+    assert re.findall(r"<td>(.*?)</td>", Forces()._repr_html_()) == ["0", "-0.5"]

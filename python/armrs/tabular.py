@@ -227,4 +227,4 @@ def _cell(value: object, name: str) -> str:
         return ""
     if isinstance(value, float) and name.startswith("p_") and value < _SMALLEST:
         return f"< {_SMALLEST:g}"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)  # of minus zero its sign goes

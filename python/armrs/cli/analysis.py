@@ -215,8 +215,8 @@ def passive(
     folder = writable(out, json, verb="passive")
     data = load_dataset(dataset)
     day = day_of(data, history, date)
-    with console.progress("passive moments"):
-        result = passive_moments(data, cutoff=cutoff_hz, bins=bins)
+    with console.stages("passive moments") as tell:
+        result = passive_moments(data, cutoff=cutoff_hz, bins=bins, progress=tell)
     plain = passive_data(result, command_line(context))
     with kept(history, result, day, plain):
         written = []

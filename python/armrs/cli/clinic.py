@@ -38,8 +38,8 @@ def spasticity(
     folder = writable(out, json, verb="spasticity")
     data = load_dataset(dataset)
     day = day_of(data, history, date)
-    with console.progress("reflexes"):
-        result = find_reflexes(data, cutoff=cutoff_hz)
+    with console.stages("reflexes") as tell:
+        result = find_reflexes(data, cutoff=cutoff_hz, progress=tell)
     plain = spasticity_data(result, command_line(context))
     with kept(history, result, day, plain):
         written = write_spasticity(result, plain, folder) if folder else []
@@ -74,8 +74,8 @@ def cohort(
     from ..workflows.cohort import cohort as summarise
 
     folder = writable(out, json, verb="cohort")
-    with console.progress("cohort"):
-        result = summarise(source, groups=groups)
+    with console.stages("cohort") as tell:
+        result = summarise(source, groups=groups, progress=tell)
     plain = cohort_data(result, command_line(context))
     written = write_cohort(result, plain, folder) if folder else []
     console.warn(list(result.warnings))

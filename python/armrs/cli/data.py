@@ -122,7 +122,7 @@ def convert(
 
 def _convert_model(source: Path, out: Path, to: str, force: bool, json: Path | None) -> None:
     """Write a model in another format: from `model.toml` to URDF, MJCF or OSIM, or from URDF or MJCF to `model.toml`."""
-    from ..io.multibody import export_model, import_model
+    from ..io.multibody import export_model, read_model
 
     writable(out, json)
     target = out / f"{source.stem}{_MODEL_SUFFIX[to]}"
@@ -131,7 +131,9 @@ def _convert_model(source: Path, out: Path, to: str, force: bool, json: Path | N
         raise BadInput("-o", Text(f"a {target.name} that exists"), "a folder without one, or --force", file=out)
     lost: tuple[str, ...] = ()
     if to == "toml":
-        import_model(source).write(target)
+        found = read_model(source)
+        found.model.write(target)
+        console.warn(found.notes)
     else:
         lost = export_model(source, target).lost
     console.warn(f"{to} cannot hold {line}" for line in lost)

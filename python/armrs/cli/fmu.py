@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import BadInput, Text
+from ..io import files
 from ..report import console
 from .common import ArchiveFile, JsonFile, MaybeFolder, OutFile, SamplesFormat, command_line, present, samples_suffix, writable
 
@@ -52,6 +53,7 @@ def fmu_export(
     rest: Annotated[bool, typer.Option("--rest", help="Start at the equilibrium reached from these angles.")] = False,
     dt: Annotated[float, typer.Option(help="Inner step [s], above 0.")] = 0.25e-3,
     library: Libraries = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an FMU that armrs did not write.")] = False,
     json: JsonFile = None,
 ) -> None:
     """Export an arm as a functional mock-up unit (FMU) for co-simulation and Model Exchange; no compiler is needed.
@@ -71,7 +73,7 @@ def fmu_export(
     except BadInput as error:
         option = {"step": "--dt", "start": "--start-deg"}.get(error.place)
         raise error if option is None or error.file else BadInput(option, error.found, error.allowed) from None
-    written = export_fmu(slave, target, fmi=int(version.value), libraries=library)
+    written = export_fmu(slave, target, fmi=int(version.value), libraries=library, replace=force)
     binaries, _, without = collected(int(version.value), library)
     if without:
         console.warn([f"left out: {', '.join(without)}, because FMI 2.0 has no folder for them; export with --fmi 3"])
@@ -195,6 +197,7 @@ def fmu_ssp(
     out: ArchiveFile = None,
     version: Annotated[Fmi, typer.Option("--fmi", help="FMI version of the exported arms: 2.0 or 3.0.")] = Fmi.two,
     library: Libraries = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an archive that armrs did not write.")] = False,
     json: JsonFile = None,
 ) -> None:
     """Write a system as an .ssp archive of SSP 1.0, for OMSimulator, libcosim, ecos, FMPy and others.
@@ -205,9 +208,10 @@ def fmu_ssp(
 
     writable(None, json)
     target = out if out is not None else Path(system.with_suffix(".ssp").name)
+    files.not_an_input([target], [system])
     loaded = _loaded(system, None, None)
     try:
-        written = export_ssp(loaded, target, fmi=int(version.value), libraries=library)
+        written = export_ssp(loaded, target, fmi=int(version.value), libraries=library, replace=force)
     except BadInput as error:
         raise error if error.file else error.within(file=system) from None
     finally:

@@ -195,7 +195,9 @@ def import_(
     zero: Annotated[Zero | None, typer.Option(help="Direction of the first segment at angle zero.")] = None,
     clockwise: Annotated[str | None, typer.Option(metavar="1,2,…|none", help="Joints whose angle is clockwise positive.")] = None,
     force_on: Annotated[Side | None, typer.Option("--force-on", help="Body on which the recorded force acts.")] = None,
-    points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the midpoint.")] = "",
+    points: Annotated[
+        str, typer.Option(metavar="A,B+C,…", help="Markers from the first joint to the handle; B+C is the midpoint. By name when absent.")
+    ] = "",
     rate_hz: Annotated[float | None, typer.Option(help="Sample rate of recordings without a column of time [Hz].")] = None,
     ask: Annotated[bool, typer.Option("--ask", help="Ask for each column on the terminal, with a guess and its reason.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the data set of a former import, with what was edited in it.")] = False,

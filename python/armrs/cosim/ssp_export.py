@@ -24,7 +24,14 @@ _KINDS = {"Float": "Real", "Int": "Integer", "UInt": "Integer", "Boolean": "Bool
 _MOMENT = (1980, 1, 1, 0, 0, 0)
 
 
-def export_ssp(system: System, path: str | os.PathLike[str], *, fmi: int = 2, libraries: str | os.PathLike[str] | None = None) -> Path:
+def export_ssp(
+    system: System,
+    path: str | os.PathLike[str],
+    *,
+    fmi: int = 2,
+    libraries: str | os.PathLike[str] | None = None,
+    replace: bool = False,
+) -> Path:
     """Write a system as an `.ssp` archive: arms are exported as FMUs, FMUs are taken along as they are.
 
     Algorithm, accuracy and what holds within a step go into annotations, since SSP has no words for them; the communication step also into
@@ -39,6 +46,8 @@ def export_ssp(system: System, path: str | os.PathLike[str], *, fmi: int = 2, li
         Version of the standard of the exported arms. Most tools that read SSP take FMI 2.0.
     libraries : path, optional
         As in `armrs.fmu.export_fmu`.
+    replace : bool
+        Whether an archive of another tool may be replaced; one of armrs always is.
 
     Raises
     ------
@@ -47,6 +56,8 @@ def export_ssp(system: System, path: str | os.PathLike[str], *, fmi: int = 2, li
     """
     target = checks.path("path", path)
     files.may_replace(target, ".ssp")
+    if not checks.flag("replace", replace):
+        files.may_replace_archive(target, ".ssp", ROOT, ANNOTATION)
     with tempfile.TemporaryDirectory(prefix="armrs-ssp-") as place:
         content = {}
         for number, slave in enumerate(system.slaves.values(), start=1):

@@ -18,6 +18,8 @@ from .libraries import collected
 
 IDENTIFIER = "ArmRs"
 """Name of the library inside an FMU."""
+_ARM = "resources/arm.json"
+"""The arm in an FMU of armrs."""
 _MOMENT = (1980, 1, 1, 0, 0, 0)
 """The earliest time an archive can hold: files in an FMU carry no date of their making."""
 _SPDX = b"SPDX-License-Identifier: MIT OR Apache-2.0\n"
@@ -34,6 +36,7 @@ def export_fmu(
     rest: bool = False,
     name: str | None = None,
     libraries: str | os.PathLike[str] | None = None,
+    replace: bool = False,
 ) -> Path:
     """Write an arm as a functional mock-up unit for co-simulation.
 
@@ -55,6 +58,8 @@ def export_fmu(
         Name of the model in the description; that of the file when absent.
     libraries : path, optional
         Libraries for several machines, see `armrs.fmu.libraries`; that of this machine alone when absent.
+    replace : bool
+        Whether an FMU of another tool may be replaced; one of armrs always is.
 
     Returns
     -------
@@ -68,6 +73,8 @@ def export_fmu(
     target = checks.path("path", path)
     checks.text("path", target.stem)
     files.may_replace(target, ".fmu")
+    if not checks.flag("replace", replace):
+        files.may_replace_archive(target, ".fmu", _ARM)
     fmi = checks.whole("fmi", fmi, least=2, most=3)
     if not isinstance(model, Slave):
         model = Slave(model, port=port, start=start, rest=rest, name=target.stem if name is None else name)
@@ -92,7 +99,7 @@ def contents(slave: Slave, fmi: int, libraries: str | os.PathLike[str] | None = 
     listed = {
         "modelDescription.xml": description.encode(),
         **{f"binaries/{place}/{IDENTIFIER}{suffix}": content for (place, suffix), content in binaries.items()},
-        "resources/arm.json": slave.compiled.json.encode(),
+        _ARM: slave.compiled.json.encode(),
     }
     if terminals is None:
         listed |= {

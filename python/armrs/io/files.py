@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -331,6 +332,17 @@ def may_replace(path: PathLike, kind: str) -> None:
         raise BadInput(
             "file", Text(f"an existing file with suffix {target.suffix!r}"), f"a new file, or a {kind} file to replace", file=path
         )
+
+
+def may_replace_archive(path: PathLike, kind: str, member: str, mark: str = "") -> None:
+    """Refuse to replace an archive without a `member` that holds the `mark` of what armrs writes."""
+    target = Path(path)
+    if not target.is_file() or target.stat().st_size == 0:
+        return
+    with suppress(OSError, zipfile.BadZipFile, KeyError, RuntimeError, NotImplementedError), zipfile.ZipFile(target) as archive:
+        if mark.encode() in archive.read(member):
+            return
+    raise BadInput("file", Text(f"a {kind} file that armrs did not write"), "another name, or --force", file=path)
 
 
 def output_folder(path: PathLike, place: str = "folder") -> Path:

@@ -37,8 +37,7 @@ def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:
     there = [q for q in quantities if q.value.n]
     there = [q for q in there if _varies(q)] or there
     shown = sorted(there, key=lambda q: q.decided_by["data"] / q.value.n, reverse=True)[:MOST_PANELS]
-    columns = min(3, len(shown))
-    rows = -(-len(shown) // columns)
+    rows, columns = plotting.grid(len(shown))
     figure = plotting.figure(3.6 * columns, 3.1 * rows)
     for ax, quantity in zip(figure.subplots(rows, columns, squeeze=False).ravel(), shown, strict=False):
         _panel(quantity, ax)

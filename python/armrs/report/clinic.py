@@ -546,8 +546,7 @@ def _picture(lines: Sequence[Line], doubted: Sequence[str]) -> html.Picture | No
         return None
     with plotting.style():
         joints = list(dict.fromkeys(line.joint for line in lines))
-        columns = min(3, len(shown))
-        rows = -(-len(shown) // columns)
+        rows, columns = plotting.grid(len(shown))
         figure = plotting.figure(3.1 * columns + 0.8, (0.36 * len(joints) + 1.0) * rows)
         axes = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
         for ax in axes[len(shown) :]:

@@ -99,8 +99,7 @@ def cohort_figures(result: Cohort) -> Figures:
 def _cohort(result: Cohort) -> Drawn:
     """Draw every quantity: subjects by group, norm bands behind."""
     names = list(dict.fromkeys(q.name for q in result.quantities))[:MOST_QUANTITIES]
-    columns = min(3, len(names))
-    rows = -(-len(names) // columns)
+    rows, columns = plotting.grid(len(names))
     figure = plotting.figure(3.3 * columns, 2.6 * rows)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, name in zip(axes, names, strict=False):

@@ -69,7 +69,7 @@ def stretches(result: Mapping[str, Any]) -> Table:
         cells += [mean("catch_angle", degrees), mean("catch_speed", degrees), mean("emg_latency", 1000.0), mean("co_contraction")]
         rows.append([joints[joint - 1], configuration, len(own), *cells])
     head = ["joint", "movement", "repeats", "speed [°/s]", "peak [N m]", "work [J]", "elastic [N m]", "viscous and dry [N m]"]
-    head += ["reflex [N m]", "catch at [°]", "at [°/s]", "EMG after [ms]", "co-contraction"]
+    head += ["reflex [N m]", "catch at [°]", "its speed [°/s]", "EMG after [ms]", "co-contraction"]
     used = [k for k in range(len(head)) if k < len(head) - 2 or any(row[k] != "–" for row in rows)]
     return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2)
 

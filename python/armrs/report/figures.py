@@ -131,8 +131,7 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Figures:
 
 def _history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
     """Draw every parameter over sessions, with twice its standard deviation."""
-    columns = min(3, max(1, len(courses)))
-    rows = max(1, -(-len(courses) // columns))
+    rows, columns = plotting.grid(len(courses))
     figure = plotting.figure(3.6 * columns, 2.4 * rows)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, course in zip(axes, courses, strict=False):
@@ -161,8 +160,7 @@ def planned(data: Mapping[str, Any], model: Model) -> Figures:
 
 def _movements(movements: Sequence[Mapping[str, Any]], model: Model) -> Drawn:
     """Draw the arm at the waypoints of every movement, and the path of the hand."""
-    columns = min(3, len(movements))
-    rows = -(-len(movements) // columns)
+    rows, columns = plotting.grid(len(movements))
     figure = plotting.figure(3.7 * columns, 4.4 * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
     for number, (ax, movement) in enumerate(zip(axes, movements, strict=False), start=1):

@@ -55,7 +55,7 @@ def _health(result: Replay) -> Drawn:
     age.plot(result.t, result.age, color=plotting.GREY)
     age.set(title="time since a sample was learned from", ylabel="[s]", xlabel="time [s]", ylim=(0.0, None))
     text = (
-        "Above, when samples were learned from (green) and refused (red), with their number. Limit the support by the torque that the "
+        "Above, when samples were learned from (green) and refused (orange), with their number. Limit the support by the torque that the "
         "estimate leaves unexplained and by the time since something was learned."
     )
     return Drawn("health", "Health of the estimator", text, figure)
@@ -63,8 +63,7 @@ def _health(result: Replay) -> Drawn:
 
 def _estimates(result: Replay) -> Drawn:
     """Draw every unknown over time with twice its standard deviation."""
-    columns = min(3, len(result.estimates))
-    rows = -(-len(result.estimates) // columns)
+    rows, columns = plotting.grid(len(result.estimates))
     figure = plotting.figure(3.4 * columns, 2.1 * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for k, e in enumerate(result.estimates):

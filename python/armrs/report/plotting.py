@@ -87,6 +87,12 @@ def in_pyplot() -> Iterator[None]:
         _IN_PYPLOT.reset(before)
 
 
+def grid(count: int) -> tuple[int, int]:
+    """Return rows and columns of as many panels, at most three side by side; four are a square, which leaves no place empty."""
+    columns = 2 if count == 4 else min(3, max(1, count))
+    return -(-max(1, count) // columns), columns
+
+
 def figure(width: float, height: float) -> Figure:
     """Return an empty figure [inches]; but for `in_pyplot`, no window and no global state knows it."""
     if _IN_PYPLOT.get():

@@ -381,7 +381,8 @@ def comparison(data: Mapping[str, Any]) -> Table:
         ]
         for c in data["comparison"]
     ]
-    return Table(["quantity", "unit", "known", "identified", "± std", "error [%]", "error in the thesis [%]", "decided by"], rows, left=2)
+    head = ["quantity", "unit", "known", "identified", "± std", "error [%]", "error in the thesis [%]", "decided by"]
+    return Table(head, rows, left=2, symbols=True)
 
 
 def smallest_effects(would_show: Sequence[Mapping[str, Any]]) -> Table:

@@ -17,7 +17,8 @@ SYMBOLS_ON_PAGES = SYMBOLS.replace(", l the", ", ℓ the")
 HISTORY_MEANING = (
     "What was measured in each session. A change is set against the uncertainty of both sessions, which is the scatter of their own "
     "repeats, and called one at a level of 5 % over all parameters together. What differs between days without being a change of the "
-    "joint, such as where the arm was strapped, is not in that scatter."
+    "joint, such as where the arm was strapped, is not in that scatter. p is the probability of a difference at least as large without a "
+    "change, corrected for the number of parameters (Holm)."
 )
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "

@@ -230,12 +230,13 @@ _WARNINGS = (
 
 
 def _feasible(problems: Iterable[Problem], dataset: Dataset) -> tuple[Problem, ...]:
-    """Return problems whose next step does not leave every trial out."""
+    """Return problems whose next step does not leave every trial out: what names no trial is of all of them."""
     told = list(problems)
     concerned: dict[str, str] = {}
     for p in told:
         concerned[p.next_step] = concerned.get(p.next_step, "") + p.text
-    all_of_them = {step for step, text in concerned.items() if all(trial.file in text for trial in dataset.trials)}
+    named = {step: [trial.file in text for trial in dataset.trials] for step, text in concerned.items()}
+    all_of_them = {step for step, there in named.items() if all(there) or not any(there)}
     return tuple(replace(p, next_step=p.next_step.partition(", or leave")[0]) if p.next_step in all_of_them else p for p in told)
 
 

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -164,12 +164,19 @@ class Cohort(Tabular):
         }
 
 
+_COMPUTED = 0.8
+"""Share of the work after which the passive moments of data sets are known."""
 ALL = "all"
 """The group of those of whom none is stated."""
 
 
 @telling
-def cohort(source: str | os.PathLike[str], *, groups: str | os.PathLike[str] | None = None) -> Cohort:
+def cohort(
+    source: str | os.PathLike[str],
+    *,
+    groups: str | os.PathLike[str] | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Cohort:
     """Summarise a table of values, or a folder of results or data sets.
 
     Parameters
@@ -180,6 +187,8 @@ def cohort(source: str | os.PathLike[str], *, groups: str | os.PathLike[str] | N
         are computed.
     groups : path, optional
         For a folder: a CSV with columns subject, group and side; subject is the subject's or the data set's name.
+    progress : callable, optional
+        Called with the name of the stage and the share that is done, 0 to 1.
 
     Raises
     ------
@@ -191,15 +200,17 @@ def cohort(source: str | os.PathLike[str], *, groups: str | os.PathLike[str] | N
     >>> armrs.cohort("values.csv").quantities[0].norm  # doctest: +SKIP
     (0.31, 0.74)
     """
-    path = checks.path("source", source)
+    path, tell = checks.path("source", source), checks.progress(progress)
     if path.is_dir():
-        values, warnings = _of_folder(path, _groups(groups))
+        values, warnings = _of_folder(path, _groups(groups), tell)
     elif groups is not None:
         raise BadInput("groups", Text("a table beside a table"), "a folder: a table has its own columns group and side")
     else:
         values, warnings = _of_table(path), []
     quantities, contrasts = [], []
-    for name in dict.fromkeys(v.quantity for v in values):
+    names = list(dict.fromkeys(v.quantity for v in values))
+    for k, name in enumerate(names):
+        tell(name, _COMPUTED + (1.0 - _COMPUTED) * k / len(names))
         own = [v for v in values if v.quantity == name]
         units = {v.unit for v in own}
         if len(units) > 1:
@@ -324,7 +335,7 @@ def _groups(path: str | os.PathLike[str] | None) -> Mapping[str, tuple[str, str]
     return {row["subject"]: (row.get("group", ""), row.get("side", "")) for _, row in _rows(file, ["subject"], ["group", "side"])}
 
 
-def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]]) -> tuple[list[Value], list[str]]:
+def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]], tell: Callable[[str, float], None]) -> tuple[list[Value], list[str]]:
     """Return the values of all results in a folder, or of its data sets where there are none."""
     results: list[dict[str, Any]] = []
     warnings: list[str] = []
@@ -336,7 +347,7 @@ def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]]) -> tuple[lis
         if isinstance(data, dict) and data.get("verb") in ("identify", "passive", "gap", "spasticity"):
             results.append(data)
     if not results:
-        results, warnings = _computed(folder)
+        results, warnings = _computed(folder, tell)
     if not results:
         raise BadInput(
             "source", Text("a folder without results and data sets"), "JSON of armrs identify, passive, gap or spasticity", file=folder
@@ -345,9 +356,13 @@ def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]]) -> tuple[lis
     return values, warnings
 
 
-def _computed(folder: Path) -> tuple[list[dict[str, Any]], list[str]]:
+def _computed(folder: Path, tell: Callable[[str, float], None]) -> tuple[list[dict[str, Any]], list[str]]:
     """Return the passive moments of every data set in a folder, and which could not be had."""
-    found = [_passive(file.parent) for file in sorted(folder.rglob("dataset.toml"))]
+    found = []
+    listed = sorted(folder.rglob("dataset.toml"))
+    for k, file in enumerate(listed):
+        tell(f"passive moments of {file.parent.name}", _COMPUTED * k / len(listed))
+        found.append(_passive(file.parent))
     return [f for f in found if isinstance(f, dict)], [f for f in found if isinstance(f, str)]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -266,7 +266,11 @@ def _estimate(name: str, joint: int | None, interval: tuple[float, float], unit:
 
 @telling
 def passive_moments(
-    dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEFAULT_CUTOFF, bins: int = DEFAULT_BINS
+    dataset: Dataset | str | os.PathLike[str],
+    *,
+    cutoff: float = DEFAULT_CUTOFF,
+    bins: int = DEFAULT_BINS,
+    progress: Callable[[str, float], None] | None = None,
 ) -> PassiveMoments:
     """Compute the passive moment of every joint in slow movements, and its elastic and dissipative parts.
 
@@ -281,6 +285,8 @@ def passive_moments(
         Cutoff of the zero-phase low-pass of angles and forces, -3 dB of both passes [Hz].
     bins : int
         Angle bins over the range of each joint in each configuration.
+    progress : callable, optional
+        Called with the name of the stage and the share that is done, 0 to 1.
 
     Returns
     -------
@@ -294,12 +300,15 @@ def passive_moments(
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     bins = checks.whole("bins", bins, least=2, most=1000)
     cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
+    tell = checks.progress(progress)
     refuse_implausible(dataset, robot_matters=False)
     trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
     trials, conditioned = _without_preconditioning(trials)
     wrong = find_wrong_setup(dataset)
     curves, warnings = [], [*([] if wrong is None else [str(wrong)]), *conditioned]
-    for configuration in dict.fromkeys(t.configuration for t in dataset.trials):
+    configurations = list(dict.fromkeys(t.configuration for t in dataset.trials))
+    for k, configuration in enumerate(configurations):
+        tell(f"passive moments of {configuration}", k / len(configurations))
         repeats = [m for m in trials if m.trial.configuration == configuration]
         lost = []
         for joint in range(dataset.model.n_joints):

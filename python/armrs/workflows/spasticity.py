@@ -170,7 +170,12 @@ class Spasticity(Tabular):
 
 
 @telling
-def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEFAULT_CUTOFF) -> Spasticity:
+def spasticity(
+    dataset: Dataset | str | os.PathLike[str],
+    *,
+    cutoff: float = DEFAULT_CUTOFF,
+    progress: Callable[[str, float], None] | None = None,
+) -> Spasticity:
     """Find the stretch reflex of every joint that was stretched at several speeds: threshold, gain and latency with intervals.
 
     See `armrs.analysis.stretches` for the law. The resisting moment is that of `passive_moments`, without its slow low-pass: torque of the
@@ -182,6 +187,8 @@ def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEF
         Trials in which joints are stretched, slow to fast; three repeats of three to five speeds in all at least four trials.
     cutoff : float
         Of the zero-phase low-pass of angles and forces, -3 dB of both passes [Hz]; at most 0.4 of the sample rate.
+    progress : callable, optional
+        Called with the name of the stage and the share that is done, 0 to 1.
 
     Raises
     ------
@@ -198,6 +205,7 @@ def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEF
     cutoff = checks.number("cutoff", cutoff, above=0.0, unit="Hz")
     # A slow recording is not refused for a default: it is asked with what it holds.
     cutoff = min(cutoff, 0.4 * slowest)
+    tell = checks.progress(progress)
     refuse_implausible(dataset, robot_matters=False)
     # Activity of the muscles is what is looked for here: samples with it count.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
@@ -205,6 +213,7 @@ def spasticity(dataset: Dataset | str | os.PathLike[str], *, cutoff: float = DEF
     moments = [_moments(dataset, trial, cutoff) for trial in whole]
     found, warnings = [], []
     for joint in range(dataset.model.n_joints):
+        tell(f"reflexes of the {dataset.model.joints[joint].name}", joint / dataset.model.n_joints)
         own = [(m, s) for m, fine in moments if (s := _stretch(dataset, m, joint, cutoff, fine)) is not None]
         speeds = [float(np.abs(s.qd).max()) for _, s in own]
         if len(own) < stretches.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):

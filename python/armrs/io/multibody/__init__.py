@@ -6,20 +6,22 @@ Each format holds a part of what acts on an arm. What it cannot hold is listed, 
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from ... import checks
-from ...errors import BadInput, Text
+from ...errors import ArmrsWarning, BadInput, Text
 from ...model import Model, load_model
 from .. import files
 from ..tomlfile import read_text
 from . import mjcf, osim, urdf
+from .chain import Imported
 from .joints import Exported
 
 _WRITERS: dict[str, Callable[[Model], Exported]] = {".urdf": urdf.write, ".xml": mjcf.write, ".osim": osim.write}
-_READERS: dict[str, Callable[[str], Model]] = {".urdf": urdf.read, ".xml": mjcf.read}
+_READERS: dict[str, Callable[[str], Imported]] = {".urdf": urdf.read, ".xml": mjcf.read}
 _LARGEST = 16 << 20
 
 
@@ -80,18 +82,27 @@ def import_model(path: str | os.PathLike[str]) -> Model:
     Parameters
     ----------
     path : path
-        A `.urdf` or MJCF `.xml` file with one unbranched chain of hinges whose axes are parallel.
+        A `.urdf` or MJCF `.xml` file with one unbranched chain of hinges whose axes are parallel and horizontal.
 
     Returns
     -------
     Model
-        y is forward, z is up, angles are counted counter-clockwise from +y.
+        Angles are counted as in the file, from the line of the segment before; of the first segment from forward. Where the file
+        counts from elsewhere, or forward is not its +y, a warning says so.
 
     Raises
     ------
     BadInput
         For a chain that is not planar, that branches, or that has joints or elements without an equal here.
     """
+    found = read_model(path)
+    for note in found.notes:
+        warnings.warn(note, ArmrsWarning, stacklevel=2)
+    return found.model
+
+
+def read_model(path: str | os.PathLike[str]) -> Imported:
+    """Return what `import_model` does, with what its user has to know."""
     source = checks.path("path", path)
     read = _READERS.get(source.suffix.lower())
     if read is None:

@@ -5,13 +5,19 @@ Source: MuJoCo's XML reference, elements `body`, `joint`, `inertial`, `tendon/fi
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from ...errors import BadInput, Text
-from ...model import Effect, Joint, Model, Segment
+from ...model import Effect, Joint, Model
+from .chain import Body, Hinge, Imported, planar
 from .joints import Exported, document, laws, lost_effects, lost_robot, number, numbers, parse, vector
 
-_KNOWN_JOINT = {"name", "type", "axis", "pos", "stiffness", "springref", "damping", "frictionloss", "armature", "ref", "limited"}
+_KNOWN_JOINT = {"name", "type", "axis", "pos", "stiffness", "springref", "damping", "frictionloss", "armature", "ref", "limited", "range"}
 
 
 def write(model: Model) -> Exported:
@@ -51,7 +57,7 @@ def _is_two_joint_spring(effect: Effect) -> bool:
     return effect.kind == "biarticular" and (effect.joint or 0) >= 2 and effect.parameters["stiffness"] >= 0.0
 
 
-def read(text: str) -> Model:
+def read(text: str) -> Imported:
     """Return the planar chain of an MJCF file."""
     root = parse(text, "mujoco")
     _refuse_foreign(root)
@@ -63,63 +69,77 @@ def read(text: str) -> Model:
     bodies = world.findall("body") if world is not None else []
     if len(bodies) != 1:
         raise BadInput("<worldbody>", Text(f"{len(bodies)} bodies"), "one chain")
-    base = _place(bodies[0])
-    segments, joints, rotors = [], [], []
-    chain = [bodies[0]]
-    while inner := chain[-1].findall("body"):
-        if len(inner) > 1:
-            raise BadInput(f"<body {chain[-1].get('name')!r}>", Text(f"{len(inner)} bodies"), "an unbranched chain")
-        chain.append(inner[0])
-    for k, body in enumerate(chain):
-        end = _place(chain[k + 1]) if k + 1 < len(chain) else _site(body)
-        segments.append(_segment(body, end, k))
-        joint, rotor = _joint(body)
-        joints.append(joint)
+    turn = 1.0 if _angle(root) == "radian" else math.pi / 180.0
+    hinges: list[Hinge] = []
+    rotors: list[Effect] = []
+    turned, body = np.eye(3), bodies[0]
+    while True:
+        place, turned = turned @ _place(body), turned @ _rotation(body)
+        joint, axis, rotor = _joint(body, turn)
+        hinges.append(Hinge(body.get("name") or f"segment {len(hinges) + 1}", joint, turned @ axis, place, [_body(body, turned)]))
         if rotor:
-            rotors.append(Effect("motor_inertia", k + 1, parameters={"inertia": rotor}))
-    springs = [_spring(fixed, [j.name for j in joints]) for fixed in root.findall("tendon/fixed")]
-    return Model(tuple(segments), tuple(joints), gravity=-gravity[2], base=base, effects=(*rotors, *springs))
+            rotors.append(Effect("motor_inertia", len(hinges), parameters={"inertia": rotor}))
+        inner = body.findall("body")
+        if len(inner) > 1:
+            raise BadInput(f"<body {body.get('name')!r}>", Text(f"{len(inner)} bodies"), "an unbranched chain")
+        if not inner:
+            break
+        body = inner[0]
+    sites = body.findall("site")
+    found = planar(hinges, turned @ _place(sites[-1]) if sites else None, -gravity[2])
+    springs = [_spring(fixed, [hinge.joint.name for hinge in hinges], found.zeros) for fixed in root.findall("tendon/fixed")]
+    return replace(found, model=found.model.replace(effects=(*rotors, *springs)))
+
+
+def _angle(root: ET.Element) -> str:
+    compiler = root.find("compiler")
+    return compiler.get("angle", "degree") if compiler is not None else "degree"
 
 
 def _refuse_foreign(root: ET.Element) -> None:
-    compiler = root.find("compiler")
-    if (compiler.get("angle", "degree") if compiler is not None else "degree") != "radian":
-        raise BadInput("<compiler> angle", Text("degrees, MuJoCo's default"), 'angle="radian"')
     for tag in ("default", "include", "equality", "actuator", "contact"):
         element = root.find(tag)
         if element is not None and (len(element) or element.attrib):
             raise BadInput(f"<{tag}>", Text("elements that change the arm"), f"a file without <{tag}>: save it as MuJoCo compiled it")
 
 
-def _place(body: ET.Element) -> tuple[float, float]:
-    x, y, z = vector(body, "pos", 3, (0.0, 0.0, 0.0))
-    turned = [key for key in ("quat", "euler", "axisangle", "xyaxes", "zaxis") if body.get(key) is not None]
-    if x or turned:
-        raise BadInput(
-            f"<body {body.get('name')!r}>", Text(f"x = {x:g} m{' and ' + turned[0] if turned else ''}"), "in the plane y, z, not turned"
-        )
-    return y, z
+def _place(element: ET.Element) -> np.ndarray:
+    return np.array(vector(element, "pos", 3, (0.0, 0.0, 0.0)))
 
 
-def _site(body: ET.Element) -> tuple[float, float]:
-    sites = body.findall("site")
-    if not sites:
-        raise BadInput(f"<body {body.get('name')!r}>", Text("no <site>"), "a site at the hand: it says how long the last segment is")
-    return _place(sites[-1])
+def _rotation(element: ET.Element) -> np.ndarray:
+    """Return how a body or its axes of inertia are turned."""
+    other = [key for key in ("euler", "axisangle", "xyaxes", "zaxis") if element.get(key) is not None]
+    if other:
+        raise BadInput(f"<{element.tag} {element.get('name')!r}>", Text(other[0]), "quat: save the file as MuJoCo compiled it")
+    w, x, y, z = np.array(vector(element, "quat", 4, (1.0, 0.0, 0.0, 0.0)))
+    if (square := w * w + x * x + y * y + z * z) == 0.0:
+        raise BadInput(f"<{element.tag} {element.get('name')!r}> quat", Text("0 0 0 0"), "a rotation")
+    s = 2.0 / square
+    return np.array(
+        [
+            [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+            [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
+            [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)],
+        ]
+    )
 
 
-def _segment(body: ET.Element, end: tuple[float, float], k: int) -> Segment:
-    name = body.get("name") or f"segment {k + 1}"
+def _body(body: ET.Element, turned: np.ndarray) -> Body:
     inertial = body.find("inertial")
     if inertial is None:
-        raise BadInput(f"<body {name!r}>", Text("no <inertial>"), "mass, centre of mass and inertia: save the file as MuJoCo compiled it")
-    if end[1] != 0.0:
-        raise BadInput(f"<body {name!r}>", Text(f"its end at z = {end[1]:g} m"), "along y: angles count from the line between joints")
-    com = _place(inertial)
-    return Segment(name, end[0], vector(inertial, "mass", 1)[0], com[0], vector(inertial, "diaginertia", 3)[0], com_normal=com[1])
+        hint = "mass, centre of mass and inertia: save the file as MuJoCo compiled it"
+        raise BadInput(f"<body {body.get('name')!r}>", Text("no <inertial>"), hint)
+    if inertial.get("fullinertia") is not None:
+        xx, yy, zz, xy, xz, yz = vector(inertial, "fullinertia", 6)
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    else:
+        inertia = np.diag(vector(inertial, "diaginertia", 3))
+    about = turned @ _rotation(inertial)
+    return Body(vector(inertial, "mass", 1)[0], turned @ _place(inertial), about @ inertia @ about.T)
 
 
-def _joint(body: ET.Element) -> tuple[Joint, float]:
+def _joint(body: ET.Element, turn: float) -> tuple[Joint, np.ndarray, float]:
     joints = body.findall("joint")
     if len(joints) != 1 or body.find("freejoint") is not None:
         raise BadInput(f"<body {body.get('name')!r}>", Text(f"{len(joints)} hinges"), "one")
@@ -129,20 +149,24 @@ def _joint(body: ET.Element) -> tuple[Joint, float]:
     if joint.get("type", "hinge") != "hinge" or foreign or vector(joint, "pos", 3, (0.0,) * 3) != (0.0, 0.0, 0.0):
         found = Text(f"type {joint.get('type', 'hinge')}{', ' + ', '.join(sorted(foreign)) if foreign else ''}")
         raise BadInput(f"<joint {name!r}>", found, "a hinge at the start of its body with stiffness, damping, frictionloss, armature")
-    if vector(joint, "axis", 3, (0.0, 0.0, 1.0)) != (1.0, 0.0, 0.0) or vector(joint, "ref", 1, (0.0,))[0]:
-        raise BadInput(f"<joint {name!r}>", Text("another axis, or a reference angle"), "axis 1 0 0, ref 0")
+    axis = np.array(vector(joint, "axis", 3, (0.0, 0.0, 1.0)))
+    if not axis.any() or vector(joint, "ref", 1, (0.0,))[0]:
+        raise BadInput(f"<joint {name!r}>", Text("no axis, or a reference angle"), "an axis, ref 0")
     k, rest, viscosity, coulomb, rotor = (
         vector(joint, key, 1, (0.0,))[0] for key in ("stiffness", "springref", "damping", "frictionloss", "armature")
     )
-    return Joint(name, stiffness=k, rest=rest, viscosity=viscosity, coulomb=coulomb), rotor
+    law = Joint(name, stiffness=k, rest=turn * rest, viscosity=viscosity, coulomb=coulomb)
+    return law, axis / np.linalg.norm(axis), rotor
 
 
-def _spring(fixed: ET.Element, names: list[str]) -> Effect:
+def _spring(fixed: ET.Element, names: list[str], zeros: Sequence[float]) -> Effect:
+    """Return a spring over two joints, its rest in the angles of the arm."""
     parts = [(p.get("joint"), vector(p, "coef", 1)[0]) for p in fixed.findall("joint")]
     if len(parts) == 2 and parts[1][0] in names and parts[0][0] in names:
         near, far = names.index(parts[0][0]), names.index(parts[1][0])
         if far == near + 1 and parts[1][1] == 1.0:
             values = {"ratio": parts[0][1]}
-            values |= {"stiffness": vector(fixed, "stiffness", 1, (0.0,))[0], "rest": vector(fixed, "springlength", 1, (0.0,))[0]}
+            rest = vector(fixed, "springlength", 1, (0.0,))[0] + (parts[0][1] * zeros[near] + zeros[far])
+            values |= {"stiffness": vector(fixed, "stiffness", 1, (0.0,))[0], "rest": rest}
             return Effect("biarticular", far + 1, parameters=values)
     raise BadInput("<tendon> fixed", Text(str(parts)), "two joints one after the other, the far one with coef 1")

@@ -1,4 +1,4 @@
-"""URDF: links and revolute joints with damping and friction. Axis +x, so that the plane is y forward, z up.
+"""URDF: links and revolute joints with damping and friction. Written with axes +x, so that the plane is y forward, z up.
 
 Source: the specification of the XML elements `robot`, `link` and `joint` of ROS.
 """
@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
+import numpy as np
+
 from ...errors import BadInput, Text
-from ...model import Joint, Model, Segment
+from ...model import Joint, Model
+from .chain import Body, Hinge, Imported, planar
 from .joints import Exported, document, laws, lost_effects, lost_robot, number, numbers, parse, vector
 
 _ROOT = "ground"
 _TIP = "hand_tip"
-_PARALLEL = 1e-9
 _HELD = ("continuous", "revolute")
 
 
@@ -54,18 +56,21 @@ def write(model: Model) -> Exported:
     return Exported(document(robot), tuple(lost))
 
 
-def read(text: str) -> Model:
+def read(text: str) -> Imported:
     """Return the planar chain of a URDF file."""
     robot = parse(text, "robot")
     links = {link.get("name", ""): link for link in robot.findall("link")}
-    joints = robot.findall("joint")
     by_parent: dict[str, list[ET.Element]] = {}
-    for joint in joints:
+    children = set()
+    for joint in robot.findall("joint"):
         if joint.find("mimic") is not None:
             raise BadInput(f"<joint {joint.get('name')!r}>", Text("mimic"), "joints that move by themselves")
         by_parent.setdefault(_end(joint, "parent"), []).append(joint)
-    children = {_end(joint, "child") for joint in joints}
-    roots = [name for name in links if name not in children]
+        child = _end(joint, "child")
+        if child in children or child not in links:
+            raise BadInput(f"<joint {joint.get('name')!r}>", child, "a link of the file that was not met before")
+        children.add(child)
+    roots = [name for name in dict.fromkeys([*links, *by_parent]) if name not in children]  # `world` may have no link of its own
     if len(roots) != 1:
         raise BadInput("links", Text(f"{len(roots)} roots"), "one")
     return _walk(roots[0], links, by_parent)
@@ -78,75 +83,79 @@ def _end(joint: ET.Element, which: str) -> str:
     return element.get("link", "")
 
 
-def _walk(root: str, links: dict[str, ET.Element], by_parent: dict[str, list[ET.Element]]) -> Model:
-    base: tuple[float, float] | None = None
-    segments: list[tuple[ET.Element, ET.Element]] = []
-    origins: list[tuple[float, float]] = []
-    at, seen = root, {root}
-    tip: tuple[float, float] | None = None
-    while branches := by_parent.get(at, []):
-        if len(branches) > 1:
-            raise BadInput(f"<link {at!r}>", Text(f"{len(branches)} joints"), "an unbranched chain")
-        (joint,) = branches
-        place = _planar_origin(joint)
-        child = _end(joint, "child")
-        if child in seen or child not in links:
-            raise BadInput(f"<joint {joint.get('name')!r}>", child, "a link of the file that was not met before")
-        seen.add(child)
-        at = child
-        if joint.get("type") == "fixed":
-            tip = place
-            continue
-        if joint.get("type") not in _HELD or tip is not None:
+def _walk(root: str, links: dict[str, ET.Element], by_parent: dict[str, list[ET.Element]]) -> Imported:
+    hinges: list[Hinge] = []
+    tip: np.ndarray | None = None
+    met = 0
+    # Links that move together, with their places from the last hinge and their directions.
+    at = [(root, np.zeros(3), np.eye(3))]
+    while at:
+        onward: list[tuple[ET.Element, np.ndarray, np.ndarray]] = []
+        fixed = list(at)
+        while fixed:
+            name, place, turned = fixed.pop(0)
+            if hinges and name in links:
+                hinges[-1].bodies += _bodies(links[name], place, turned)
+            for joint in by_parent.get(name, []):
+                met += 1
+                there, rotation = place + turned @ _vector(joint, "xyz"), turned @ _rotation(_vector(joint, "rpy"))
+                if joint.get("type") == "fixed":
+                    fixed.append((_end(joint, "child"), there, rotation))
+                    tip = there
+                elif joint.get("type") in _HELD:
+                    onward.append((joint, there, rotation))
+                else:
+                    raise BadInput(f"<joint {joint.get('name')!r}>", joint.get("type"), "continuous, revolute or fixed")
+        if len(onward) > 1:
             raise BadInput(
-                f"<joint {joint.get('name')!r}>", joint.get("type"), "continuous or revolute; fixed only at the end of the chain"
+                "joints", Text(", ".join(repr(joint.get("name")) for joint, _, _ in onward)), "one after the other: an unbranched chain"
             )
-        _axis(joint)
-        if base is None:
-            base = place
-        else:
-            origins.append(place)
-        segments.append((joint, links[child]))
-    if base is None:
-        raise BadInput("joints", Text("none that turns"), "a chain of hinges")
-    if tip is None:
-        raise BadInput(f"<link {at!r}>", Text("no end"), "a fixed joint at the hand: it says how long the last segment is")
-    ends = [*origins, tip]
-    made = [_segment(link, end) for (_, link), end in zip(segments, ends, strict=True)]
-    return Model(tuple(made), tuple(_joint(joint) for joint, _ in segments), base=base)
+        at = []
+        for joint, there, rotation in onward:
+            child = _end(joint, "child")
+            hinges.append(Hinge(child, _joint(joint), rotation @ _axis(joint), there))
+            at, tip = [(child, np.zeros(3), rotation)], None
+    if met < sum(map(len, by_parent.values())):
+        raise BadInput("joints", Text("a ring of links"), "a chain that begins at one link")
+    return planar(hinges, tip)
 
 
-def _planar_origin(joint: ET.Element) -> tuple[float, float]:
+def _vector(joint: ET.Element, key: str) -> np.ndarray:
     origin = joint.find("origin")
-    if origin is None:
-        return 0.0, 0.0
-    x, y, z = vector(origin, "xyz", 3, (0.0, 0.0, 0.0))
-    roll = vector(origin, "rpy", 3, (0.0, 0.0, 0.0))
-    if any(roll) or abs(x) > _PARALLEL:
-        raise BadInput(f"<joint {joint.get('name')!r}> origin", Text("turned, or beside the plane y, z"), "rpy 0 0 0 and x 0")
-    return y, z
+    return np.array(vector(origin, key, 3, (0.0, 0.0, 0.0)) if origin is not None else (0.0, 0.0, 0.0))
 
 
-def _axis(joint: ET.Element) -> None:
+def _rotation(rpy: np.ndarray) -> np.ndarray:
+    """Return the rotation by roll, pitch and yaw about fixed axes."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    pitch = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    yaw = np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]])
+    return yaw @ pitch @ roll
+
+
+def _axis(joint: ET.Element) -> np.ndarray:
     axis = joint.find("axis")
-    found = vector(axis, "xyz", 3) if axis is not None else (1.0, 0.0, 0.0)
-    if abs(found[0] - 1.0) > _PARALLEL or max(abs(found[1]), abs(found[2])) > _PARALLEL:
-        raise BadInput(f"<joint {joint.get('name')!r}> axis", Text(numbers(*found)), "1 0 0: the arm moves in the plane y, z")
+    found = np.array(vector(axis, "xyz", 3) if axis is not None else (1.0, 0.0, 0.0))
+    length = np.linalg.norm(found)
+    if length == 0.0:
+        raise BadInput(f"<joint {joint.get('name')!r}> axis", Text(numbers(*found)), "a direction")
+    return found / length
 
 
-def _segment(link: ET.Element, end: tuple[float, float]) -> Segment:
-    name = link.get("name", "")
-    if end[1] != 0.0:
-        raise BadInput(
-            f"<link {name!r}>", Text(f"its next joint at z = {end[1]:g} m"), "along y: angles count from the line between joints"
-        )
+def _bodies(link: ET.Element, place: np.ndarray, turned: np.ndarray) -> list[Body]:
     inertial = link.find("inertial")
-    mass, inertia = (inertial.find(k) if inertial is not None else None for k in ("mass", "inertia"))
-    if inertial is None or mass is None or inertia is None:
-        raise BadInput(f"<link {name!r}>", Text("no mass or inertia"), "an <inertial> with both")
-    origin = inertial.find("origin")
-    _, com, normal = vector(origin, "xyz", 3, (0.0, 0.0, 0.0)) if origin is not None else (0.0, 0.0, 0.0)
-    return Segment(name, end[0], vector(mass, "value", 1)[0], com, vector(inertia, "ixx", 1)[0], com_normal=normal)
+    if inertial is None:
+        return []
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or inertia is None:
+        raise BadInput(f"<link {link.get('name')!r}>", Text("no mass or inertia"), "an <inertial> with both")
+    xx, yy, zz, xy, xz, yz = (
+        vector(inertia, key, 1, None if key in ("ixx", "iyy", "izz") else (0.0,))[0] for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    )
+    about = turned @ _rotation(_vector(inertial, "rpy"))
+    tensor = about @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ about.T
+    return [Body(vector(mass, "value", 1)[0], place + turned @ _vector(inertial, "xyz"), tensor)]
 
 
 def _joint(joint: ET.Element) -> Joint:

@@ -37,6 +37,8 @@ _NUMBER = {
     ",": re.compile(r"[-+]?(\d+,?\d*|,\d+|[1-9]\d{0,2}((\.\d{3})+,\d*|(\.\d{3}){2,}))([eE][-+]?\d+)?"),
 }
 """Numbers by their decimal mark; thousands are recognised as such where a decimal mark follows, or where the mark stands twice."""
+_JAPANESE = re.compile(rb"([\x81-\x9f][\x40-\x7e\x80-\xfc]){2}")
+"""Two characters of Shift-JIS in a row, of its kana and common kanji: no Western word has letters of these bytes side by side."""
 _THOUSANDS = re.compile("(?<=\\d)[\u00a0\u202f\u2009'\u2019](?=\\d{3}(?!\\d))")
 """Marks for thousands that are no decimal mark: narrow and other blanks, and the Swiss apostrophe."""
 _BAD_CELLS = 0.1
@@ -117,7 +119,8 @@ def _decoded(raw: bytes) -> tuple[str, str]:
     try:
         content, name = raw.decode("utf-8"), "UTF-8"
     except UnicodeDecodeError:
-        content, name = raw.decode("cp1252", errors="replace"), "Windows-1252"
+        codec, name = ("cp932", "Shift-JIS") if _JAPANESE.search(raw) else ("cp1252", "Windows-1252")
+        content = raw.decode(codec, errors="replace")
     if "\0" in content:
         raise BadInput("file", Text("binary data"), "a text table")
     return content, name

@@ -45,7 +45,7 @@ def questions(paths: Sequence[Path], points: tuple[str, ...], joints: Sequence[s
         When no file has columns.
     """
     problems: list[BadInput] = []
-    tables = [table for table in sources.read_all(paths, points, problems).tables if table.columns]
+    tables = [table for table in sources.read_all(paths, points, len(joints), problems).tables if table.columns]
     if not tables:
         raise problems[0] if problems else BadInput("file", "nothing", "a recording with columns", file=paths[0])
     table = next((t for t in tables if any((symbol_of(c) or "").startswith("q") for c in t.columns)), tables[0])

@@ -117,7 +117,7 @@ def import_recordings(
         What the recorded force acts on.
         The four above are read off the data where they are not given.
     points : sequence of str
-        Markers of the joints, shoulder to handle, for C3D and TRC files.
+        Markers of the joints, shoulder to handle, for C3D and TRC files. Without them the names of common marker sets are recognised.
     rate : float, optional
         Sample rate of recordings without a column of time [Hz].
     replace : bool
@@ -230,14 +230,16 @@ def _decided(
 ) -> tuple[Recipe, list[Read], list[str], list[str]]:
     """Return what all files say together; every problem is collected before any is raised."""
     problems: list[BadInput] = []
-    sources = raw.read_all(paths, points, problems, lambda stage, share: tell(stage, _READ * share))
+    sought = 0 if any(symbol.startswith("q") for symbol in mapped) else model.n_joints
+    sources = raw.read_all(paths, points, sought, problems, lambda stage, share: tell(stage, _READ * share))
     tables = sources.tables
     mapped_tables = [part for table in tables for part in cleaned(_renamed(table, mapped), rate, sources.notes)]
     named, left, roles = trials.arrange(mapped_tables)
     seen = next((t for t in left if t.markers is not None), None)
-    if seen is not None and seen.markers is not None and not points:
+    if seen is not None and seen.markers is not None and not sources.points:
         names = ", ".join(dict.fromkeys(name.rpartition(":")[2] for name in seen.markers.names))
-        problems.append(BadInput("--points", Text("nothing"), f"the markers of the joints, shoulder to handle, of {names}", file=seen.path))
+        wanted = f"{model.n_joints + 1} markers, of the joints from the shoulder on and of the handle, of {names}"
+        problems.append(BadInput("--points", Text("nothing"), wanted, file=seen.path))
         left = [t for t in left if t.markers is None]
     elif not tables and not problems:
         found = Text("no recording of a movement" if sources.notes else "only a file that accompanies another recording")
@@ -282,7 +284,7 @@ def _decided(
     if problems:
         raise BadInputs.of(problems, _TOLD_BY)
     origin = _origin(reads, channels, convention, model, axes)
-    recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), points, origin, rate)
+    recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), sources.points, origin, rate)
     notes = [*sources.notes, *remarks.said(tables), *axes, *partial]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)

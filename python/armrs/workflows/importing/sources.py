@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import BadInput, Text
 from ...io.markers import planar_motion
 from ...io.raw import SUFFIXES, NoTable, RawColumn, RawTable, read_raw
-from . import columns
+from . import columns, joint_markers
 
 _AXES = ("Fx", "Fy", "Fz")
 _MOST = 5
@@ -29,33 +29,42 @@ class Sources:
         Files that were found in a folder: one without a table is left out, one that was named is refused.
     notes : list of str
         What was left out, and why.
+    points : tuple of str
+        Markers of the joints: those that were named, or a guess from the names in the first file with markers.
     """
 
     tables: list[RawTable] = field(default_factory=list)
     in_folders: set[Path] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
+    points: tuple[str, ...] = ()
 
 
 def read_all(
-    paths: Sequence[Path], points: tuple[str, ...], problems: list[BadInput], tell: Callable[[str, float], None] = lambda stage, share: None
+    paths: Sequence[Path],
+    points: tuple[str, ...],
+    n_joints: int,
+    problems: list[BadInput],
+    tell: Callable[[str, float], None] = lambda stage, share: None,
 ) -> Sources:
     """Read files, and the recordings in folders by the order of their names; what cannot be read is added to `problems`.
 
     `tell` is called with the file that is read and the share of files that were read.
     """
-    found = Sources()
+    found = Sources(points=points)
     listed = [file for path in paths for file in _files(path, found, problems)]
     for k, file in enumerate(listed):
         tell(f"reading {file.name}", k / len(listed))
         try:
-            found.tables += read(file, points)
+            tables = read(file)
+            _guess_points(tables, n_joints, found)
+            found.tables += [_with_angles(table, found.points) for table in tables]
         except NoTable as error:
             if file in found.in_folders:
                 found.notes.append(f"left out, since it holds no table: {file}")
             else:
                 problems.append(error)
         except BadInput as error:
-            problems.append(error)
+            problems.append(error.within(file=error.file or file))
     found.tables = _once(found.tables, found.notes)
     return found
 
@@ -79,10 +88,22 @@ def _files(path: Path, found: Sources, problems: list[BadInput]) -> list[Path]:
     return recordings
 
 
-def read(path: Path, points: tuple[str, ...]) -> list[RawTable]:
+def _guess_points(tables: Sequence[RawTable], n_joints: int, found: Sources) -> None:
+    """Take the markers of the joints from their names in the first table with markers and no angles, unless they were named."""
+    if found.points:
+        return
+    for table in tables:
+        if table.markers is not None and not any((columns.symbol_of(c) or "").startswith("q") for c in table.columns):
+            found.points = joint_markers.guess(table.markers.names, n_joints)
+            if found.points:
+                found.notes.append(f"joints and handle are the markers {', '.join(found.points)}, by their names; --points names others")
+            return
+
+
+def read(path: Path, points: tuple[str, ...] = ()) -> list[RawTable]:
     """Return the tables of a file; markers become angles where `points` names those of the joints."""
     try:
-        return [_with_angles(table, points) if points and table.markers is not None else table for table in read_raw(path)]
+        return [_with_angles(table, points) for table in read_raw(path)]
     except BadInput as error:
         raise error.within(file=error.file or path) from None
 
@@ -122,7 +143,7 @@ def _step(values: np.ndarray) -> float:
 
 def _with_angles(table: RawTable, points: tuple[str, ...]) -> RawTable:
     """Return a table with the angles that its markers show, on their clock, and its forces in the plane of the movement."""
-    if table.markers is None:
+    if table.markers is None or not points:
         return table
     motion = planar_motion(table.markers, points)
     found = [RawColumn("time", "time", "s", motion.t)]
