@@ -97,10 +97,10 @@ fmu-libraries: $(STAMPS)/dev ## libraries for FMUs on Linux and Windows, in out/
 	$(BIN)/python -m pip install ziglang cargo-zigbuild
 	scripts/crosscheck --strict fmu
 
-# On Linux with Zig's linker, which knows old versions of glibc; elsewhere as it is.
-OLD_GLIBC := $(if $(filter Linux,$(shell uname)),yes)
+# Where there is glibc, with Zig's linker, which knows old versions of it; elsewhere, musl too, as it is.
+OLD_GLIBC := $(shell getconf GNU_LIBC_VERSION 2>/dev/null)
 
-wheel: $(STAMPS)/venv ## a wheel for others, in out/wheels; on Linux for glibc 2.17 and newer
+wheel: $(STAMPS)/venv ## a wheel for others, in out/wheels; with glibc for 2.17 and newer
 	$(if $(OLD_GLIBC),$(BIN)/python -m pip install ziglang cargo-zigbuild)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python scripts/fmu_library.py $(if $(OLD_GLIBC),--portable)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --out out/wheels $(if $(OLD_GLIBC),--zig --compatibility manylinux_2_17)
