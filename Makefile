@@ -187,7 +187,8 @@ guide: ## add the effect of the developer guide to a copy, as it says, and test 
 # The kernels and the verdict; what survives is answered in docs/developer.md.
 MUTATED := crates/arm-core/src/dynamics.rs crates/arm-core/src/gravity.rs crates/arm-core/src/inertia.rs crates/arm-core/src/coriolis.rs
 mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels and verdict: hours. Needs cargo-mutants
-	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants --cargo-arg=--test --cargo-arg=suite
+	cargo mutants -p arm-gap -f crates/arm-gap/src/results/verdict.rs -o out/mutants/verdict --cargo-arg=--lib -- verdict
+	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants/kernels --cargo-arg=--test --cargo-arg=suite
 
 # The package of actionlint itself downloads the program; that of this fork brings it along.
 lint-workflows: $(STAMPS)/venv ## lint .github/workflows
