@@ -41,3 +41,13 @@ def test_the_conda_recipe_asks_for_what_the_package_asks_for() -> None:
     run = recipe.partition("  run:\n")[2].partition("\n\n")[0]
     found = re.findall(r"(?:- |then: )([\w-]+) (>=\S+)", run)
     assert {OTHER_NAMES.get(name, name) + least for name, least in found} == wanted | {f"python{project['requires-python']}"}
+
+
+def test_every_published_crate_carries_its_licences() -> None:
+    published = [
+        path.parent for path in (ROOT / "crates").glob("*/Cargo.toml") if "publish.workspace = true" in path.read_text(encoding="utf-8")
+    ]
+    assert len(published) == 9
+    for crate in published:
+        for name in ("LICENSE-MIT", "LICENSE-APACHE"):
+            assert (crate / name).read_bytes() == (ROOT / name).read_bytes(), crate.name
