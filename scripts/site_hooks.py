@@ -23,8 +23,7 @@ ELSEWHERE = {
     "equations.md": "python/armrs/thesis/equations.md",
 }
 """Pages of the site by the files that they are made of, from the root of the repository."""
-EXCERPT = 600
-"""Characters of a section that the search keeps as they are: more than its results show."""
+_BLOCK = re.compile(r"<(pre|table|p|ul|ol)\b.*?</\1>", flags=re.S)
 _NAMED_BLOCK = re.compile(r"^```(\w+) ([^\n\"=]+)$", flags=re.M)
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', flags=re.S)
 
@@ -88,15 +87,15 @@ def on_post_build(config: MkDocsConfig) -> None:
 
 
 def _searched(text: str, *, summary: bool) -> str:
-    """Return what is searched of a section: its beginning, then every further word once, without tags. Of the Python API the summary."""
-    if summary:
-        paragraph = re.search("<p>(.*?)</p>", text, flags=re.S)
-        text = paragraph[1] if paragraph else ""
-    text = " ".join(re.sub("<[^>]+>", " ", text).split())
-    cut = len(text) if len(text) <= EXCERPT else text.rfind(" ", 0, EXCERPT)
-    shown = text[:cut].split()
-    further = [word for word in dict.fromkeys(text[cut:].split()) if word not in shown and any(map(str.isalpha, word))]
-    return " ".join([*shown, *(["…"] if further else []), *further])
+    """Return what is searched of a section: its paragraphs, and each word of its tables and code once; of the Python API one paragraph."""
+    kept = []
+    for block in _BLOCK.finditer(text):
+        words = re.sub("<[^>]+>", " ", block[0]).split()
+        if block[1] in ("pre", "table"):
+            words = [word for word in dict.fromkeys(words) if any(map(str.isalpha, word))]
+        if not summary or block[1] == "p":
+            kept.append(f"<p>{' '.join(words)}</p>")
+    return "".join(kept[:1] if summary else kept)
 
 
 def _named_dialog(output: str) -> str:
