@@ -23,7 +23,7 @@ ELSEWHERE = {
     "equations.md": "python/armrs/thesis/equations.md",
 }
 """Pages of the site by the files that they are made of, from the root of the repository."""
-_BLOCK = re.compile(r"<(pre|table|p|ul|ol)\b.*?</\1>", flags=re.S)
+_PROSE = re.compile(r"(<(?:p|ul|ol)\b.*?</(?:p|ul|ol)>)", flags=re.S)
 _NAMED_BLOCK = re.compile(r"^```(\w+) ([^\n\"=]+)$", flags=re.M)
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', flags=re.S)
 
@@ -89,11 +89,10 @@ def on_post_build(config: MkDocsConfig) -> None:
 def _searched(text: str, *, summary: bool) -> str:
     """Return what is searched of a section: its paragraphs, and each word of its tables and code once; of the Python API one paragraph."""
     kept = []
-    for block in _BLOCK.finditer(text):
-        words = re.sub("<[^>]+>", " ", block[0]).split()
-        if block[1] in ("pre", "table"):
-            words = [word for word in dict.fromkeys(words) if any(map(str.isalpha, word))]
-        if not summary or block[1] == "p":
+    for k, block in enumerate(_PROSE.split(text)):
+        plain, prose = re.sub("<[^>]+>", " ", block), k % 2 == 1
+        words = plain.split() if prose else list(dict.fromkeys(re.findall(r"[^\W\d][\w.-]*\w", html.unescape(plain))))
+        if words and (prose or not summary):
             kept.append(f"<p>{' '.join(words)}</p>")
     return "".join(kept[:1] if summary else kept)
 
