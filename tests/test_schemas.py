@@ -11,6 +11,7 @@ import pytest
 
 from armrs.io import tomlfile
 from conftest import DATASET, MODEL
+from test_docs import DOCS, blocks
 
 jsonschema = pytest.importorskip("jsonschema")
 SCRIPT = Path(__file__).parent.parent / "scripts" / "schemas.py"
@@ -29,7 +30,12 @@ def test_the_schemas_are_those_of_the_core() -> None:
         assert path.read_text(encoding="utf-8") == text, f"{path.name} is old: run scripts/schemas.py"
 
 
-@pytest.mark.parametrize(("name", "text"), [("model", MODEL), ("dataset", DATASET)])
+SHOWN = {name: text for _, name, text in blocks(DOCS / "files.md")}
+MOVEMENT, EXPERIMENT, SWEEP = (SHOWN[name] for name in ("swing.toml", "EXPERIMENT.toml", "SWEEP.toml"))
+TEXTS = {"model": MODEL, "dataset": DATASET, "movement": MOVEMENT, "experiment": EXPERIMENT, "sweep": SWEEP}
+
+
+@pytest.mark.parametrize(("name", "text"), TEXTS.items())
 def test_what_the_readers_take_is_valid(name: str, text: str, tmp_path: Path) -> None:
     assert errors(name, text, tmp_path) == []
 
@@ -42,10 +48,17 @@ def test_what_the_readers_take_is_valid(name: str, text: str, tmp_path: Path) ->
         ("model", "viscosity = 0.25", "viskosity = 0.25"),
         ("model", "lengths = [0.45, 0.45]", "lengths = [0.45]"),
         ("dataset", 'role = "fit"', 'role = "train"'),
+        ("movement", "waypoints_deg", "waypoints"),
+        ("movement", "speed_rad_s = 0.1", "speed_rad_s = 0.1\nspeed_deg_s = 5.0"),
+        ("experiment", "force_bits = 12", "force_bits = 12.5"),
+        ("experiment", "bandwidth_rad_s", "bandwith_rad_s"),
+        ("experiment", "repeats = 2", "repeats = -1"),
+        ("sweep", 'experiment = "EXPERIMENT.toml"', ""),
+        ("sweep", "range = [0.9, 1.1]", "range = [0.9, 1.1]\nvalues = [1.0]"),
     ],
 )
 def test_what_the_readers_refuse_is_not(name: str, old: str, new: str, tmp_path: Path) -> None:
-    text = {"model": MODEL, "dataset": DATASET}[name]
+    text = TEXTS[name]
     assert old in text
     assert errors(name, text.replace(old, new, 1), tmp_path)
 

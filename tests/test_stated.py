@@ -28,9 +28,10 @@ def gap_of(**channel: float | None) -> dict[str, Any]:
     return {"gap": {"Fy_N": whole}, "effects": [{"trial": None}], "open": []}
 
 
-def test_the_readme_counts_the_effects_that_are_searched_for() -> None:
+def test_documents_count_the_effects_that_are_searched_for() -> None:
     searched = sum(kind.searched and not kind.own for kind in catalogue().values())
     assert f"armrs searches {searched} effects" in (ROOT / "README.md").read_text()
+    assert f"Y, of {searched} kinds" in (ROOT / "docs/peers.md").read_text()
 
 
 @pytest.mark.parametrize(("after", "closed"), [(0.1, "100%"), (0.35, "50%"), (0.2, "100%")])
