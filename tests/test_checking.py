@@ -13,7 +13,7 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.workflows import demo
-from armrs.workflows.checking import Problem, check_dataset, grouped
+from armrs.workflows.checking import Ability, Checked, Problem, check_dataset, grouped
 from test_import import KNOWN, SI, Recording, recording, repeated, table, write_text
 
 __all__ = ["recording"]
@@ -241,3 +241,9 @@ def test_what_follows_from_a_fault_is_none(tmp_path: Path, text: str, said: list
     problems = check_dataset(tmp_path).problems
     assert len(problems) == len(said) and all(part in p.text for part, p in zip(said, problems, strict=True)), problems
     assert all(p.next_step == "correct it in the file that it names" for p in problems)
+
+
+def test_a_single_problem_is_not_in_the_plural() -> None:
+    wrong, odd = Problem("error", "wrong"), Problem("warning", "odd")
+    assert repr(Checked((wrong, odd), (Ability("gap", False, "wrong"),))) == "Checked(1 error, 1 warning; usable by no verb)"
+    assert repr(Checked((odd, odd), (Ability("gap", True, ""),))) == "Checked(0 errors, 2 warnings; usable by gap)"

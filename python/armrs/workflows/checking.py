@@ -88,9 +88,10 @@ class Checked(Tabular):
         return tuple(p for p in self.problems if p.level == "error")
 
     def __repr__(self) -> str:
-        warnings = len(self.problems) - len(self.errors)
+        numbers = {"error": len(self.errors), "warning": len(self.problems) - len(self.errors)}
+        found = ", ".join(f"{number} {what}{'s' * (number != 1)}" for what, number in numbers.items())
         able = ", ".join(v.verb for v in self.verbs if v.able) or "no verb"
-        return f"Checked({len(self.errors)} errors, {warnings} warnings; usable by {able})"
+        return f"Checked({found}; usable by {able})"
 
     def tidy(self) -> Tidy:
         """Return the problems, one a row."""
