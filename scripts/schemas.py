@@ -231,7 +231,7 @@ def sweep() -> Any:
     }
     identify = {
         "method": {"enum": ["joint", "cascade"], "default": "joint"},
-        "with": list_of({"enum": sorted(catalogue())}),
+        "with": list_of({"enum": sorted(k.kind for k in catalogue().values() if not k.own)}),
         "motion": {"enum": ["auto", "measured", "simulated"], "default": "auto"},
         "cutoff_Hz": number("of the low-pass [Hz]", above=0.0),
         "level": number("probability of the intervals", above=0.0, default=0.95),

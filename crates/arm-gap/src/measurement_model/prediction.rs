@@ -48,7 +48,7 @@ pub struct Course<const N: usize> {
     /// and gaps, next to which filters and differences have guessed.
     pub counted: Vec<bool>,
     /// Whether forces are compared in the common band only: above it they hang on what the robot did between its samples.
-    in_band: bool,
+    pub(super) in_band: bool,
     times: Vec<f64>,
     handle: Vec<Plane<f64>>,
     /// How far the base is from its place \[m\], where its path was measured and drives a simulation.
@@ -311,36 +311,6 @@ impl<const N: usize> Session<N> {
         Ok(angles.chain(forces).collect())
     }
 
-    /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led, but for forces whose robot is not
-    /// known between its samples; torques in the common band, for what differentiated angles say above it is noise.
-    pub fn measured_in(&self, course: &Course<N>) -> Channels {
-        match self.comparison {
-            ComparisonMode::Led if course.in_band => forces_of(&course.seen, course.raw.clone()),
-            ComparisonMode::Led => course.raw.clone(),
-            ComparisonMode::Torque => course.seen.clone(),
-        }
-    }
-
-    /// What a hypothesis shows in the place of [`Session::measured_in`].
-    ///
-    /// # Errors
-    /// As [`Session::run`] and [`Session::read`].
-    pub fn shown_in(
-        &self,
-        hypothesis: &Hypothesis<N>,
-        course: &Course<N>,
-    ) -> Result<Channels, SimulationError> {
-        let run = self.run(hypothesis, course)?;
-        match self.comparison {
-            ComparisonMode::Led if course.in_band => {
-                let raw = self.read_raw(hypothesis, course, &run)?;
-                Ok(forces_of(&self.read(hypothesis, course, &run)?, raw))
-            }
-            ComparisonMode::Led => self.read_raw(hypothesis, course, &run),
-            ComparisonMode::Torque => self.read(hypothesis, course, &run),
-        }
-    }
-
     /// Joint torques by inverse dynamics of the measured motion.
     ///
     /// # Errors
@@ -455,13 +425,6 @@ fn handle_path(points: &[Plane<f64>], band: f64, rate: f64) -> Result<Vec<Plane<
 /// [`GapError::Numerics`] for channels too short for the filter or not finite.
 pub fn smooth(channels: &[Vec<f64>], band: f64, rate: f64) -> Result<Channels, GapError> {
     Ok(low_pass(band, rate)?.both_ways_all(channels)?)
-}
-
-/// Channels of a led arm with the forces, which are the last two, of others.
-fn forces_of(forces: &Channels, mut channels: Channels) -> Channels {
-    let first = channels.len().saturating_sub(2);
-    channels[first..].clone_from_slice(&forces[first..]);
-    channels
 }
 
 /// Channels less channels, over the samples that both have.
@@ -622,26 +585,5 @@ pub(crate) mod tests {
             resting(60.0).course(0).expect("a course").handle,
             resting(60.0).trials[0].handle.clone().expect("a path")
         );
-    }
-
-    #[test]
-    fn forces_are_compared_in_the_band_where_the_path_is_unresolved() {
-        let mut session = resting(100.0);
-        let force = session.trials[0].force_on_arm.as_mut().expect("forces");
-        force[50][0] = 1.0;
-        session.trials[0].q[50][0] = 1.0;
-        let as_read = session.course(0).expect("a course");
-        assert_eq!(session.measured_in(&as_read), as_read.raw);
-        session.unresolved = vec![true];
-        let course = session.course(0).expect("a course");
-        let compared = session.measured_in(&course);
-        assert_eq!(compared[..2], course.raw[..2]);
-        assert_eq!(compared[2..], course.seen[2..]);
-        assert!(compared[2][50] < 0.5, "{}", compared[2][50]);
-        let shown = session.shown_in(&session.given(), &course).expect("a run");
-        let read = session
-            .run(&session.given(), &course)
-            .and_then(|run| session.read(&session.given(), &course, &run));
-        assert_eq!(shown[2..], read.expect("channels")[2..]);
     }
 }
