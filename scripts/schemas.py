@@ -44,6 +44,11 @@ def parameter(p: Parameter) -> Any:
     return within | {"anyOf": [{"const": 0}, bounds]}
 
 
+def kinds() -> list[Kind]:
+    """Return the kinds of the catalogue, without those that a user has added to this process."""
+    return [kind for kind in catalogue().values() if not kind.own]
+
+
 def effect(kind: Kind) -> Any:
     """Return the schema of an effect of one kind."""
     places = {"joint": {"type": "integer", "minimum": kind.first_joint}, "channel": {"enum": list(FORCE_CHANNELS)}}
@@ -91,7 +96,7 @@ def rig() -> dict[str, Any]:
     return {
         "robot": table(robot, ["lengths", "base"]),
         "contact": table(contact, ["stiffness"]),
-        "effect": list_of({"oneOf": [effect(kind) for kind in catalogue().values() if not kind.own]}),
+        "effect": list_of({"oneOf": [effect(kind) for kind in kinds()]}),
     }
 
 
@@ -231,7 +236,7 @@ def sweep() -> Any:
     }
     identify = {
         "method": {"enum": ["joint", "cascade"], "default": "joint"},
-        "with": list_of({"enum": sorted(k.kind for k in catalogue().values() if not k.own)}),
+        "with": list_of({"enum": sorted(kind.kind for kind in kinds())}),
         "motion": {"enum": ["auto", "measured", "simulated"], "default": "auto"},
         "cutoff_Hz": number("of the low-pass [Hz]", above=0.0),
         "level": number("probability of the intervals", above=0.0, default=0.95),

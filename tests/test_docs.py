@@ -224,6 +224,9 @@ def test_the_thesis_is_cited() -> None:
         text = " ".join((ROOT / name).read_text(encoding="utf-8").split())
         assert "Kodek" in text and "Timotej" in text and "2004" in text, name
         assert "Estimation of Upper Extremity Biomechanical Parameters Using a Robot Manipulator" in text, name
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    cited = r"Timotej Kodek, \*Estimation of Upper Extremity Biomechanical Parameters[^*]+\*.*University\s+of Ljubljana.*2004"
+    assert re.search(cited, readme, flags=re.S)
     assert all(part in THESIS for part in ("Timotej Kodek", "Using a Robot Manipulator", "2004"))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..io.dataset import Dataset, load_dataset
 from . import figures, live, moving, plain, recording
-from .tables import Table
+from .tables import Table, how_many
 from .view import View
 
 if TYPE_CHECKING:
@@ -35,17 +35,12 @@ def recordings(dataset: Dataset | None, section: str = "") -> figures.Figures:
 def verdict(result: Mapping[str, Any]) -> str:
     """Return a check or an import in a sentence."""
     if result["verb"] == "import":
-        count = len(result["trials"])
-        return f"{count} trial{'s' * (count != 1)} imported: {result['convention']['words']}."
+        return f"{how_many(len(result['trials']), 'trial')} imported: {result['convention']['words']}."
     errors = sum(p["level"] == "error" for p in result["problems"])
     warnings = len(result["problems"]) - errors
     able = [v["verb"] for v in result["verbs"] if v["able"]]
-    found = f"{_count(errors, 'error')} and {_count(warnings, 'warning')}" if result["problems"] else "No problem was found"
+    found = f"{how_many(errors, 'error')} and {how_many(warnings, 'warning')}" if result["problems"] else "No problem was found"
     return f"{found}; {', '.join(able) or 'no verb'} can use the data."
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def problems(result: Mapping[str, Any]) -> list[str]:

@@ -47,6 +47,11 @@ _EVEN = 0.95
 """An interval of which one side is that much shorter than the other ends at a limit."""
 
 
+def how_many(number: int, what: str) -> str:
+    """Return a number of things in words: one of them without the plural."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 def probability(value: float) -> str:
     """Write a probability; what is below 1e-12 is not told apart."""
     return "< 1e-12" if value < 1e-12 else f"{value:.2g}"

@@ -19,6 +19,7 @@ from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, 
 from ..io.samples import header_of
 from ..io.trial import Trial, moving_bases, still_angles
 from ..model import Description, Model
+from ..report.tables import how_many
 from ..tabular import Tabular, Tidy
 from . import setup
 from .gap import suspicion
@@ -88,8 +89,7 @@ class Checked(Tabular):
         return tuple(p for p in self.problems if p.level == "error")
 
     def __repr__(self) -> str:
-        numbers = {"error": len(self.errors), "warning": len(self.problems) - len(self.errors)}
-        found = ", ".join(f"{number} {what}{'s' * (number != 1)}" for what, number in numbers.items())
+        found = f"{how_many(len(self.errors), 'error')}, {how_many(len(self.problems) - len(self.errors), 'warning')}"
         able = ", ".join(v.verb for v in self.verbs if v.able) or "no verb"
         return f"Checked({found}; usable by {able})"
 

@@ -224,12 +224,15 @@ impl Noise {
         Whitening::new(&self.whiteners, observed)
     }
 
-    /// Whitens a set of channels at the samples of a trial; the rows of all channels, one after the other.
+    /// Whitens sets of channels at the samples of a trial; the rows of all channels, one after the other.
+    pub fn white_at(&self, valid_segments: &ValidSegments) -> impl Fn(&Channels) -> Vec<f64> {
+        let whitening = self.whitening(valid_segments);
+        move |channels| self.rows(valid_segments.pick(channels), &whitening)
+    }
+
+    /// Whitens a set of channels at the samples of a trial.
     pub fn whiten(&self, channels: &Channels, valid_segments: &ValidSegments) -> Vec<f64> {
-        self.rows(
-            valid_segments.pick(channels),
-            &self.whitening(valid_segments),
-        )
+        self.white_at(valid_segments)(channels)
     }
 
     /// Whitens a set of channels of one trial, whose samples weigh as they do there.

@@ -4,14 +4,14 @@ use arm_sim::SimulationError;
 
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course};
+use crate::measurement_model::prediction::{Channels, Course, in_common_band};
 
 impl<const N: usize> Session<N> {
     /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led, but for forces whose robot is not
     /// known between its samples; torques in the common band, for what differentiated angles say above it is noise.
     pub fn measured_in(&self, course: &Course<N>) -> Channels {
         match self.comparison {
-            ComparisonMode::Led if course.in_band => forces_of(&course.seen, course.raw.clone()),
+            ComparisonMode::Led if course.in_band => [&course.raw[..N], &course.seen[N..]].concat(),
             ComparisonMode::Led => course.raw.clone(),
             ComparisonMode::Torque => course.seen.clone(),
         }
@@ -30,19 +30,12 @@ impl<const N: usize> Session<N> {
         match self.comparison {
             ComparisonMode::Led if course.in_band => {
                 let raw = self.read_raw(hypothesis, course, &run)?;
-                Ok(forces_of(&self.read(hypothesis, course, &run)?, raw))
+                Ok([&raw[..N], &in_common_band(&raw[N..], course)?].concat())
             }
             ComparisonMode::Led => self.read_raw(hypothesis, course, &run),
             ComparisonMode::Torque => self.read(hypothesis, course, &run),
         }
     }
-}
-
-/// Channels of a led arm with the forces, which are the last two, of others.
-fn forces_of(forces: &Channels, mut channels: Channels) -> Channels {
-    let first = channels.len().saturating_sub(2);
-    channels[first..].clone_from_slice(&forces[first..]);
-    channels
 }
 
 #[cfg(test)]

@@ -128,7 +128,7 @@ impl<const N: usize> Session<N> {
         let seen = smooth(&raw, band, trial.rate)?;
         let handle = match &trial.handle {
             Some(points) if self.comparison == ComparisonMode::Led => {
-                handle_path(points, HANDLE_BAND * band, trial.rate)?
+                smooth_path(points, HANDLE_BAND * band, trial.rate)?
             }
             _ => Vec::new(),
         };
@@ -273,12 +273,7 @@ impl<const N: usize> Session<N> {
         course: &Course<N>,
         run: &Run<N>,
     ) -> Result<Channels, SimulationError> {
-        let raw = self.read_raw(hypothesis, course, run)?;
-        smooth(&raw, course.band, course.rate).map_err(|_| SimulationError::Setting {
-            name: "simulated channel",
-            found: f64::NAN,
-            allowed: "finite numbers",
-        })
+        in_common_band(&self.read_raw(hypothesis, course, run)?, course)
     }
 
     /// What the sensors would read of a run.
@@ -406,7 +401,7 @@ fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, 
 
 /// The path of the handle \[m\] without what is above a band \[Hz\]; as it is where samples hold hardly more than the band: to take
 /// little noise away there would round what the robot does from one sample to the next.
-fn handle_path(points: &[Plane<f64>], band: f64, rate: f64) -> Result<Vec<Plane<f64>>, GapError> {
+fn smooth_path(points: &[Plane<f64>], band: f64, rate: f64) -> Result<Vec<Plane<f64>>, GapError> {
     /// Share of the sampling rate that a band may be.
     const LARGEST: f64 = 0.4;
     if band >= LARGEST * rate {
@@ -425,6 +420,21 @@ fn handle_path(points: &[Plane<f64>], band: f64, rate: f64) -> Result<Vec<Plane<
 /// [`GapError::Numerics`] for channels too short for the filter or not finite.
 pub fn smooth(channels: &[Vec<f64>], band: f64, rate: f64) -> Result<Channels, GapError> {
     Ok(low_pass(band, rate)?.both_ways_all(channels)?)
+}
+
+/// Simulated channels in the common band of a trial.
+///
+/// # Errors
+/// [`SimulationError`] for a channel that is not finite.
+pub(super) fn in_common_band<const N: usize>(
+    channels: &[Vec<f64>],
+    course: &Course<N>,
+) -> Result<Channels, SimulationError> {
+    smooth(channels, course.band, course.rate).map_err(|_| SimulationError::Setting {
+        name: "simulated channel",
+        found: f64::NAN,
+        allowed: "finite numbers",
+    })
 }
 
 /// Channels less channels, over the samples that both have.

@@ -46,12 +46,7 @@ pub fn lack_of_fit<const N: usize>(
             continue;
         };
         let valid_segments = &valid_segments;
-        let whitening = prepared.noise.whitening(valid_segments);
-        let white = |channels| {
-            prepared
-                .noise
-                .rows(valid_segments.pick(channels), &whitening)
-        };
+        let white = prepared.noise.white_at(valid_segments);
         let own = point.own.iter();
         let columns = orthogonal(own.map(|r| white(&r.0[group])).collect());
         let rows: Vec<Vec<f64>> = members

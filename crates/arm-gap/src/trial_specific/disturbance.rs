@@ -74,9 +74,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         /// Share of what explains most on the grid of times below which a time of its own helps no more.
         const NEAR: f64 = 0.5;
         let trial = self.fitted[suspect.place];
-        let whitening = self.noise.whitening(&suspect.samples);
-        let white =
-            |channels: &Channels| self.noise.rows(suspect.samples.pick(channels), &whitening);
+        let white = self.noise.white_at(&suspect.samples);
         let see = |shape: Shape| {
             if self.is_left_out(
                 trial,
@@ -155,15 +153,15 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn compared(&self, point: &LinearizationPoint<N>, place: usize) -> Option<Compared> {
         let trial = self.fitted[place];
         let (others, samples) = self.repeats_of(place)?;
-        let whitening = self.noise.whitening(&samples);
-        let white = |channels: &Channels| self.noise.rows(samples.pick(channels), &whitening);
+        let white = self.noise.white_at(&samples);
         // How the hand holds the handle and how a sensor sits differ from trial to trial: that is no disturbance.
-        let usual = self.usual(point, trial, white);
+        let usual = self.usual(point, trial, &white);
         let residuals = |m: usize| white(&point.residuals[m]);
         let (own, others): (_, Vec<Vec<f64>>) = (
             residuals(place),
             others.into_iter().map(residuals).collect(),
         );
+        drop(white);
         let mut deviation = deviation(&own, &others);
         project_off(&mut deviation, &usual);
         Some(Compared {
