@@ -35,7 +35,7 @@ impl<const N: usize> Linear<'_, N> {
         let friction = self.session.friction_at_start(changed, course)?;
         let answer = self.follow(&plant, &hands, (&near, &friction));
         let answer = answer.ok_or(ASTRAY)?;
-        let mut sensed = self.sensed(&plant, Some(&answer));
+        let mut sensed = self.sensed(&plant, Some(&answer), 0);
         // A low-pass ends where the trial ends.
         let count = course.raw[0].len();
         sensed

@@ -4,7 +4,9 @@
 //! arm answers it as a linear system with coefficients that follow the run ([`Slopes`]). A joint that set-valued friction holds in the
 //! run does not answer, and one that slips does so against its friction. A hundred candidates cost less than one simulation each.
 
-use arm_core::effect::{MAX_STATES, States, advance_states, any_state};
+use arm_core::effect::{
+    Effect, MAX_STATES, States, advance_states, any_state, dry_friction, resisting_besides_dry,
+};
 use arm_core::{Joints, Plane, Reading, Setup};
 use arm_sim::{Change, SimulationError, Slopes, cubic_weights};
 use nalgebra::SMatrix;
@@ -59,10 +61,16 @@ pub struct Linear<'a, const N: usize> {
     /// Length of a step of the solution \[s\].
     pub(super) step: f64,
     setup: Setup<f64, N>,
+    /// Effects that resist in joints.
+    resisting: Vec<Effect<f64>>,
+    /// Effects that the sensors show.
+    sensing: Vec<Effect<f64>>,
     /// The run at every record.
     records: Vec<State<N>>,
     /// Force on the arm at every record.
     recorded_force: Vec<Plane<f64>>,
+    /// The same as the sensor of the run shows it at the samples of the trial, without its errors.
+    delayed_force: Vec<Plane<f64>>,
     /// The run at every step.
     pub(super) states: Vec<State<N>>,
     pub(super) hands: Vec<Hand>,
@@ -70,8 +78,6 @@ pub struct Linear<'a, const N: usize> {
     pub(super) dry: bool,
     /// Direction in which each joint slips, 0 for none.
     ways: Vec<Joints<f64, N>>,
-    /// What joint effects resist with where joints slip.
-    resisted: Vec<Joints<f64, N>>,
     pub(super) balances: Vec<Balance<N>>,
     /// How what is left over and the force follow the motion in each step.
     pub(super) slopes: Vec<Slopes<N>>,
@@ -119,12 +125,14 @@ impl<'a, const N: usize> Linear<'a, N> {
             step: interval * grid.stride as f64,
             setup: plant.setup,
             dry: plant.dry,
+            resisting: Vec::new(),
+            sensing: Vec::new(),
             recorded_force: Vec::with_capacity(records.len()),
+            delayed_force: Vec::new(),
             states: records.iter().step_by(grid.stride).copied().collect(),
             records,
             hands: Vec::new(),
             ways: Vec::new(),
-            resisted: Vec::new(),
             balances: Vec::new(),
             slopes: Vec::new(),
             inverse: Vec::new(),
@@ -142,7 +150,8 @@ impl<'a, const N: usize> Linear<'a, N> {
             linear.recorded_force.push(force);
         }
         linear.hands = every.into_iter().step_by(grid.stride).collect();
-        let memories = linear.memories(&plant);
+        linear.delayed_force = linear.force_after(plant.setup.force_delay);
+        let memories = linear.memories(&plant.resisting);
         for i in 0..linear.states.len() {
             let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
             linear.differentiate(&plant, i, memory);
@@ -153,7 +162,8 @@ impl<'a, const N: usize> Linear<'a, N> {
                 &held_at_start(&linear.balances[0].friction),
             )
         });
-        linear.base = linear.sensed(&plant, None);
+        linear.base = linear.sensed(&plant, None, 0);
+        (linear.resisting, linear.sensing) = (plant.resisting, plant.sensing);
         Ok(linear)
     }
 
@@ -173,22 +183,17 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 
     /// The states of effects that have one, along the run; nothing where none has.
-    fn memories(&self, plant: &Plant<N>) -> Vec<Vec<States<f64>>> {
-        if !any_state(&plant.resisting) {
+    fn memories(&self, effects: &[Effect<f64>]) -> Vec<Vec<States<f64>>> {
+        if !any_state(effects) {
             return Vec::new();
         }
-        let mut now = vec![[0.0; MAX_STATES]; plant.resisting.len()];
+        let mut now = vec![[0.0; MAX_STATES]; effects.len()];
         let motion = |state: &State<N>| state.motion();
         let mut out = Vec::with_capacity(self.states.len());
         for (i, state) in self.states.iter().enumerate() {
             if i > 0 {
                 let before = motion(&self.states[i - 1]);
-                advance_states(
-                    &plant.resisting,
-                    (&before, &motion(state)),
-                    &mut now,
-                    self.step,
-                );
+                advance_states(effects, (&before, &motion(state)), &mut now, self.step);
             }
             out.push(now.clone());
         }
@@ -210,8 +215,6 @@ impl<'a, const N: usize> Linear<'a, N> {
         let inverse = inverse_of_free(&slopes.of_step(self.step), &held);
         self.inverse.push(inverse);
         self.held.push(held);
-        let resisted = plant.resisted(&middle.motion, memory, &way);
-        self.resisted.push(resisted);
         self.ways.push(way);
         self.slopes.push(slopes);
         self.balances.push(middle);
@@ -252,7 +255,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             false => nowhere,
         };
         let sensed = if sensing && start == nowhere {
-            self.sensed(&plant, None)
+            self.sensed(&plant, None, 0)
         } else {
             let own;
             let hands = if moves_handle {
@@ -262,7 +265,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                 &self.hands
             };
             let answer = self.solve(&plant, hands, start);
-            self.sensed(&plant, Some(&answer))
+            self.sensed(&plant, Some(&answer), self.first_changed(&plant, &answer))
         };
         let mut out = sensed;
         for (channel, base) in out.iter_mut().zip(&self.base) {
@@ -300,26 +303,18 @@ impl<'a, const N: usize> Linear<'a, N> {
         [moved, released]: [Joints<f64, N>; 2],
     ) -> Vec<(Joints<f64, N>, Plane<f64>)> {
         let h = self.step;
-        let memories = self.memories(plant);
+        let pushes = self.pushes(plant, hands);
         let mut change = Change::default();
         let mut out = Vec::with_capacity(self.states.len());
-        // A change of joint effects alone needs no more than their torque.
-        let same_rig = plant.setup == self.setup && std::ptr::eq(hands, self.hands.as_slice());
-        for i in 0..self.states.len() {
-            let own = &self.balances[i];
-            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
-            let (push, force) = if same_rig {
-                let changed = plant.resisted(&own.motion, memory, &self.ways[i]);
-                (self.resisted[i] - changed, own.force)
-            } else {
-                let changed = balance(plant, &self.states[i], hands[i], memory);
-                let friction = (own.friction - changed.friction).component_mul(&self.ways[i]);
-                (own.torque - changed.torque + friction, changed.force)
-            };
+        let nothing = Joints::<f64, N>::zeros();
+        let mut is_still = true;
+        for (i, (push, force)) in pushes.into_iter().enumerate() {
             let slopes = &self.slopes[i];
             if i == 0 {
                 change.q = moved + self.rest * (push + released - slopes.stiffness * moved);
-            } else {
+                is_still = change.q == nothing;
+            } else if !is_still || push != nothing {
+                is_still = false;
                 for j in (0..N).filter(|&j| self.held[i][j]) {
                     (change.qd[j], change.qdd[j]) = (0.0, 0.0);
                 }
@@ -327,10 +322,72 @@ impl<'a, const N: usize> Linear<'a, N> {
             }
             let [by_angle, by_speed] = &slopes.force;
             let follow = by_angle * change.q + by_speed * change.qd;
-            let direct = [0, 1].map(|c| force[c] - own.force[c] + follow[c]);
-            out.push((change.q, direct));
+            out.push((change.q, [0, 1].map(|c| force[c] + follow[c])));
         }
         out
+    }
+
+    /// Torque that the motion of the run leaves over in another plant, and the force on the arm there beyond that of the run, at every step.
+    fn pushes(&self, plant: &Plant<N>, hands: &[Hand]) -> Vec<(Joints<f64, N>, Plane<f64>)> {
+        let steps = 0..self.states.len();
+        let mut both = self.resisting.iter().chain(&plant.resisting);
+        let same_rig = plant.setup == self.setup && std::ptr::eq(hands, self.hands.as_slice());
+        if !same_rig && both.any(|e| e.kind.feels_force()) {
+            let memories = self.memories(&plant.resisting);
+            let one = |i: usize| {
+                let own = &self.balances[i];
+                let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
+                let changed = balance(plant, &self.states[i], hands[i], memory);
+                let friction = (own.friction - changed.friction).component_mul(&self.ways[i]);
+                let push = own.torque - changed.torque + friction;
+                (push, [0, 1].map(|c| changed.force[c] - own.force[c]))
+            };
+            return steps.map(one).collect();
+        }
+        // What the same effects resist with takes itself out.
+        let less = self.resisted(&beyond(&self.resisting, &plant.resisting));
+        let more = self.resisted(&beyond(&plant.resisting, &self.resisting));
+        let push = |i: usize| less[i] - more[i];
+        if same_rig {
+            return steps.map(|i| (push(i), [0.0; 2])).collect();
+        }
+        let bare = plant.without_effects();
+        let one = |i: usize| {
+            let own = &self.balances[i];
+            let changed = balance(&bare, &self.states[i], hands[i], &[]);
+            let rigid = own.torque - own.resisted - changed.torque;
+            let force = [0, 1].map(|c| changed.force[c] - own.force[c]);
+            (rigid + push(i), force)
+        };
+        steps.map(one).collect()
+    }
+
+    /// What joint effects resist with at every step, where joints slip as in the run \[N m\].
+    fn resisted(&self, effects: &[Effect<f64>]) -> Vec<Joints<f64, N>> {
+        if effects.is_empty() {
+            return vec![Joints::zeros(); self.states.len()];
+        }
+        let memories = self.memories(effects);
+        let one = |i: usize| {
+            let motion = &self.balances[i].motion;
+            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
+            let friction = Joints::from(dry_friction(effects, motion, memory));
+            resisting_besides_dry(effects, motion, memory) + friction.component_mul(&self.ways[i])
+        };
+        (0..self.states.len()).map(one).collect()
+    }
+
+    /// The first sample that shows a change of the motion; before it, the sensors of another plant show what those of the run do.
+    fn first_changed(&self, plant: &Plant<N>, changes: &[(Joints<f64, N>, Plane<f64>)]) -> usize {
+        if plant.sensing != self.sensing || plant.setup.force_delay != self.setup.force_delay {
+            return 0;
+        }
+        let still = |(q, force): &&(Joints<f64, N>, Plane<f64>)| {
+            *q == Joints::<f64, N>::zeros() && *force == [0.0; 2]
+        };
+        let steps = changes.iter().take_while(still).count();
+        let first = steps.saturating_sub(1) * self.grid.stride / self.grid.parts;
+        first.min(self.base[0].len())
     }
 
     /// Steps to beyond so many samples of the trial.
@@ -349,15 +406,33 @@ impl<'a, const N: usize> Linear<'a, N> {
         })
     }
 
+    /// Force on the arm at the samples of the trial, as long ago as a sensor is late \[s\].
+    fn force_after(&self, delay: f64) -> Vec<Plane<f64>> {
+        let Grid { parts, stride } = self.grid;
+        let last = self.records.len() - 1;
+        let delay = delay / self.step * stride as f64;
+        let at = |sample: usize| {
+            let record = (sample * parts).min(last) as f64;
+            cubic(&self.recorded_force, (record - delay).max(0.0))
+        };
+        (0..self.course.raw[0].len()).map(at).collect()
+    }
+
     /// What the sensors read of the run with changes on it, at the samples of the trial.
+    ///
+    /// * `first` - sample before which they show what those of the run do
     pub(super) fn sensed(
         &self,
         plant: &Plant<N>,
         changes: Option<&[(Joints<f64, N>, Plane<f64>)]>,
+        first: usize,
     ) -> Channels {
         let Grid { parts, stride } = self.grid;
         let count = self.course.raw[0].len();
-        let mut channels = vec![Vec::with_capacity(count); N + 2];
+        let mut channels: Channels = match first {
+            0 => vec![Vec::with_capacity(count); N + 2],
+            _ => self.base.iter().map(|c| c[..first].to_vec()).collect(),
+        };
         let last = self.records.len() - 1;
         // Between two steps changes go straight.
         let change = |record: f64| {
@@ -372,20 +447,22 @@ impl<'a, const N: usize> Linear<'a, N> {
                 [0, 1].map(|c| force[c] + share * (next_force[c] - force[c])),
             ))
         };
-        let force_at = |place: f64| {
-            let place = place.clamp(0.0, last as f64);
-            let force = cubic(&self.recorded_force, place);
-            let (_, more) = change(place).unwrap_or((Joints::zeros(), [0.0; 2]));
-            [0, 1].map(|c| force[c] + more[c])
+        let own;
+        let forces = if plant.setup.force_delay == self.setup.force_delay {
+            &self.delayed_force
+        } else {
+            own = self.force_after(plant.setup.force_delay);
+            &own
         };
         let delay = plant.setup.force_delay / self.step * stride as f64;
-        for sample in 0..count {
+        for sample in first..count {
             let i = (sample * parts).min(last);
             let more = change(i as f64).map_or_else(Joints::zeros, |c| c.0);
+            let pulled = change((i as f64 - delay).max(0.0)).map_or([0.0; 2], |c| c.1);
             let mut reading = Reading::<f64, N> {
                 time: self.records[i].time,
                 q: self.records[i].q + more,
-                force_on_arm: force_at(i as f64 - delay),
+                force_on_arm: [0, 1].map(|c| forces[sample][c] + pulled[c]),
                 moment_on_arm: 0.0,
             };
             for effect in &plant.sensing {
@@ -400,6 +477,19 @@ impl<'a, const N: usize> Linear<'a, N> {
         }
         channels
     }
+}
+
+/// The effects of one list that another does not have.
+fn beyond(effects: &[Effect<f64>], others: &[Effect<f64>]) -> Vec<Effect<f64>> {
+    let mut others = others.to_vec();
+    let is_new = |effect: &&Effect<f64>| match others.iter().position(|o| o == *effect) {
+        Some(same) => {
+            others.swap_remove(same);
+            false
+        }
+        None => true,
+    };
+    effects.iter().filter(is_new).copied().collect()
 }
 
 /// The value at a place among samples of the cubic through the four samples about it (Lagrange).
@@ -458,6 +548,16 @@ mod tests {
         }
         assert_eq!(cubic(&samples, 12.0), samples[12]);
         assert_eq!(cubic(&samples, 39.0), samples[39]);
+    }
+
+    #[test]
+    fn of_two_lists_of_effects_what_both_have_counts_once_for_each() {
+        use arm_core::effect::Kind;
+        let of = |size: f64| Effect::<f64>::new(Kind::Viscous, 1).with(&[size]);
+        let (one, two, three) = (of(1.0), of(2.0), of(3.0));
+        assert_eq!(beyond(&[one, two, one], &[one, three]), [two, one]);
+        assert_eq!(beyond(&[one, three], &[one, two, one]), [three]);
+        assert!(beyond(&[two, one], &[one, two]).is_empty());
     }
 
     #[test]

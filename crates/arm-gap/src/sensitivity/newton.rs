@@ -188,6 +188,7 @@ mod tests {
     fn balance(friction: f64) -> Balance<1> {
         Balance {
             torque: Joints::zeros(),
+            resisted: Joints::zeros(),
             friction: Joints::repeat(friction),
             force: [0.0; 2],
             motion: Motion::new(0.0, Joints::zeros(), Joints::zeros()),

@@ -52,6 +52,16 @@ impl<const N: usize> Plant<N> {
         })
     }
 
+    /// The same without what resists in joints.
+    pub fn without_effects(&self) -> Self {
+        Self {
+            resisting: Vec::new(),
+            sensing: Vec::new(),
+            dry: false,
+            ..*self
+        }
+    }
+
     /// The chain as seen from its base, and how far and how fast the base has moved, with the first joint and by itself.
     ///
     /// A base that is accelerated is one that stands in another gravity.
@@ -83,17 +93,6 @@ impl<const N: usize> Plant<N> {
             true => Joints::from(dry_friction(&self.resisting, motion, memory)),
             false => Joints::zeros(),
         }
-    }
-
-    /// What joint effects resist with where joints slip in given directions (1, −1, and 0 for none) \[N m\].
-    pub fn resisted(
-        &self,
-        motion: &Motion<f64, N>,
-        memory: &[States<f64>],
-        way: &Joints<f64, N>,
-    ) -> Joints<f64, N> {
-        resisting_besides_dry(&self.resisting, motion, memory)
-            + self.friction(motion, memory).component_mul(way)
     }
 
     /// Position and velocity of the handle as it stands in the hand.
@@ -156,6 +155,8 @@ impl<const N: usize> State<N> {
 pub(super) struct Balance<const N: usize> {
     /// Torque left over besides set-valued dry friction.
     pub torque: Joints<f64, N>,
+    /// What joint effects resist with, which is part of it.
+    pub resisted: Joints<f64, N>,
     /// Most that this friction can resist with.
     pub friction: Joints<f64, N>,
     /// Force on the arm.
@@ -193,9 +194,10 @@ pub(super) fn balance<const N: usize>(
         let u = plant.setup.base_motion;
         torque[0] += u[0] * through[0][0] + u[1] * through[0][1];
     }
-    torque += resisting_besides_dry(&plant.resisting, &motion, memory);
+    let resisted = resisting_besides_dry(&plant.resisting, &motion, memory);
     Balance {
-        torque,
+        torque: torque + resisted,
+        resisted,
         friction: plant.friction(&motion, memory),
         force,
         motion,

@@ -21,13 +21,23 @@ impl<const N: usize> PreparedSession<'_, N> {
     ///
     /// * `scale` - misfit for each degree of freedom
     pub fn disturbance(&self, point: &LinearizationPoint<N>, scale: f64) -> Option<TrialSpecific> {
-        let compared: Vec<Compared> = (0..self.fitted.len())
+        let mut compared: Vec<Compared> = (0..self.fitted.len())
             .filter_map(|m| self.compared(point, m))
             .filter(|one| stands_out(&one.deviation, self.session.channels(), scale))
             .collect();
+        // Repeats of a movement share what disturbances would show.
+        let group = |one: &Compared| self.group_of[self.fitted[one.place]];
+        compared.sort_by_key(group);
+        let mut shown: Option<(usize, Vec<Shape>)> = None;
         let mut best: Option<(f64, TrialSpecific)> = None;
         for suspect in &compared {
-            let (explained, scale) = self.explained(point, suspect, scale);
+            let group = group(suspect);
+            let shapes = match shown.take() {
+                Some((own, shapes)) if own == group => shapes,
+                _ => self.shapes_in(point, group),
+            };
+            let (explained, scale) = self.explained(point, (suspect, &shapes), scale);
+            shown = Some((group, shapes));
             let Some(first) = explained.first() else {
                 continue;
             };
@@ -68,14 +78,15 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn explained(
         &self,
         point: &LinearizationPoint<N>,
-        suspect: &Compared,
+        (suspect, shapes): (&Compared, &[Shape]),
         scale: f64,
     ) -> (Vec<Explained>, f64) {
         /// Share of what explains most on the grid of times below which a time of its own helps no more.
         const NEAR: f64 = 0.5;
         let trial = self.fitted[suspect.place];
         let white = self.noise.white_at(&suspect.samples);
-        let see = |shape: Shape| {
+        let group = self.group_of[trial];
+        let see = |shape: &Shape| {
             if self.is_left_out(
                 trial,
                 shape.effect.parameters[timing_of(shape.effect.kind).0],
@@ -90,8 +101,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             let rows = shape.columns.iter().map(row).collect();
             Asked::along(shape.effect, rows, &suspect.deviation)
         };
-        let shapes = self.shapes_in(point, trial);
-        let asked: Vec<Asked> = shapes.into_iter().filter_map(see).collect();
+        let asked: Vec<Asked> = shapes.iter().filter_map(see).collect();
         let mut clearest: Vec<(f64, &Asked)> = Vec::new();
         let held = held_either_way(&point.hypothesis.effects());
         let possible = asked
@@ -108,7 +118,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
         let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
         clearest.retain(|(gain, _)| *gain > NEAR * most);
-        let answer = |effect| see(self.shape_of(point, trial, effect)?);
+        let answer = |effect| see(&self.shape_of(point, group, effect)?);
         let at_its_time = |(_, one): &(f64, &Asked)| {
             let asked = timed((*one).clone(), &suspect.deviation, answer);
             Explained::of(asked, &suspect.deviation)

@@ -18,11 +18,11 @@ pub(super) struct Shape {
 }
 
 impl<const N: usize> PreparedSession<'_, N> {
-    /// What the channels of a trial's movement would show of what acts or slips once.
+    /// What the channels of a movement would show of what acts or slips once.
     pub(super) fn shape_of(
         &self,
         point: &LinearizationPoint<N>,
-        trial: usize,
+        group: usize,
         effect: Effect<f64>,
     ) -> Option<Shape> {
         /// Torque that is small and yet seen \[N m\].
@@ -30,7 +30,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let part = effect.kind.prior().parts.first()?;
         let (sizes, unit) = (part.sizes, part.small);
         let unit = if unit > 0.0 { unit } else { TORQUE };
-        let line = point.lines.get(self.group_of[trial])?;
+        let line = point.lines.get(group)?;
         let column = |&p: &usize| {
             let mut changed = point.hypothesis.clone();
             let mut one = effect;
@@ -44,14 +44,14 @@ impl<const N: usize> PreparedSession<'_, N> {
         Some(Shape { effect, columns })
     }
 
-    /// Disturbances of a trial: bursts in every joint, slips of the handle and of every angle sensor.
-    pub(super) fn shapes_in(&self, point: &LinearizationPoint<N>, trial: usize) -> Vec<Shape> {
+    /// Disturbances of a movement: bursts in every joint, slips of the handle and of every angle sensor.
+    pub(super) fn shapes_in(&self, point: &LinearizationPoint<N>, group: usize) -> Vec<Shape> {
         /// Durations of bursts that are tried \[s\], each twice the one before.
         const LONG: [f64; 3] = [0.3, 0.6, 1.2];
         if point.lines.is_empty() {
             return Vec::new();
         }
-        let course = &self.courses[self.references[self.group_of[trial]]];
+        let course = &self.courses[self.references[group]];
         let count = course.raw[0].len();
         let starts = (count as f64 / course.rate / EVERY) as usize;
         let of = |nature: Nature| KINDS.iter().filter(move |k| k.prior().nature == nature);
@@ -68,7 +68,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             let at = |s| Effect::new(kind, 0).with(&[0.0, 0.0, EVERY * s as f64]);
             effects.extend(within.clone().map(at));
         }
-        let answered = self.parallel(effects.len(), |i| self.shape_of(point, trial, effects[i]));
+        let answered = self.parallel(effects.len(), |i| self.shape_of(point, group, effects[i]));
         let mut shapes: Vec<Shape> = answered.into_iter().flatten().collect();
         let sensors = KINDS
             .iter()

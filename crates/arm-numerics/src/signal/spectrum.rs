@@ -13,16 +13,36 @@ const AROUND: (f64, f64) = (0.3, 1.5);
 
 /// One Fourier coefficient of a column, tapered by a Hann window.
 pub fn coefficient(column: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
+    swing(&tapered(column), frequency, rate)
+}
+
+/// A column without its mean under a Hann window, scaled so that the coefficient of a swing is its size.
+fn tapered(column: &[f64]) -> Vec<f64> {
     let n = column.len() as f64;
-    let mut sum = [0.0; 2];
     let mean = column.iter().sum::<f64>() / n;
-    for (i, value) in column.iter().enumerate() {
+    let one = |(i, value): (usize, &f64)| {
         let taper = 0.5 - 0.5 * libm::cos(TAU * (i as f64 + 0.5) / n);
-        let (sin, cos) = libm::sincos(TAU * frequency * i as f64 / rate);
-        sum[0] += taper * (value - mean) * cos;
-        sum[1] -= taper * (value - mean) * sin;
+        taper * (value - mean) * 4.0 / n
+    };
+    column.iter().enumerate().map(one).collect()
+}
+
+/// One Fourier coefficient of a tapered column.
+fn swing(tapered: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
+    /// Samples over which a phase is turned on before it is computed anew: so many roundings add up.
+    const TURNS: usize = 32;
+    let (sin, cos) = libm::sincos(TAU * frequency / rate);
+    let mut sum = [0.0; 2];
+    for (chunk, values) in tapered.chunks(TURNS).enumerate() {
+        let phase = TAU * frequency * (chunk * TURNS) as f64 / rate;
+        let (mut s, mut c) = libm::sincos(phase);
+        for value in values {
+            sum[0] += value * c;
+            sum[1] -= value * s;
+            (s, c) = (s * cos + c * sin, c * cos - s * sin);
+        }
     }
-    sum.map(|s| s * 4.0 / n)
+    sum
 }
 
 /// How swings of several trials are put together.
@@ -36,9 +56,11 @@ pub enum Sum {
 
 impl Sum {
     /// Power of one channel of all trials at a frequency.
-    fn power(self, trials: &[&Vec<Vec<f64>>], c: usize, (frequency, rate): (f64, f64)) -> f64 {
-        let count = trials.len() as f64;
-        let each = trials.iter().map(|t| coefficient(&t[c], frequency, rate));
+    ///
+    /// * `tapered` - the channel in every trial
+    fn power(self, tapered: &[Vec<f64>], (frequency, rate): (f64, f64)) -> f64 {
+        let count = tapered.len() as f64;
+        let each = tapered.iter().map(|t| swing(t, frequency, rate));
         match self {
             Self::Powers => each.map(|[a, b]| a * a + b * b).sum::<f64>() / count,
             Self::Swings => {
@@ -72,10 +94,12 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Opti
     let highest = HIGHEST.min(0.45 * rate);
     let count = ((highest - lowest) / step) as usize;
     let frequency = |k: usize| lowest + step * k as f64;
+    let of_channel = |c: usize| trials.iter().map(|t| tapered(&t[c])).collect();
+    let all: Vec<Vec<Vec<f64>>> = (0..channels).map(of_channel).collect();
     let mut best: Option<(f64, f64)> = None;
-    for c in 0..channels {
+    for channel in &all {
         let power: Vec<f64> = (0..count)
-            .map(|k| sum.power(trials, c, (frequency(k), rate)))
+            .map(|k| sum.power(channel, (frequency(k), rate)))
             .collect();
         for k in 0..count {
             let around: Vec<f64> = (0..count)
@@ -103,17 +127,15 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Opti
         }
     }
     let (_, near) = best?;
+    let square = |t: &Vec<f64>| t.iter().map(|v| v * v).sum::<f64>();
+    let size = |c: usize| trials.iter().map(|t| square(&t[c])).sum::<f64>();
+    let sizes: Vec<f64> = (0..channels)
+        .map(|c| size(c).max(f64::MIN_POSITIVE))
+        .collect();
     // The peak of all channels together, on a finer grid.
     let total = |f: f64| -> f64 {
-        let mut all = 0.0;
-        for c in 0..channels {
-            let size: f64 = trials
-                .iter()
-                .map(|t| t[c].iter().map(|v| v * v).sum::<f64>())
-                .sum();
-            all += sum.power(trials, c, (f, rate)) / size.max(f64::MIN_POSITIVE);
-        }
-        all
+        let share = |(channel, size): (&Vec<_>, &f64)| sum.power(channel, (f, rate)) / size;
+        std::iter::zip(&all, &sizes).map(share).sum()
     };
     let fine = 0.1 * step;
     let around = (-10..=10).map(|k| near + fine * f64::from(k));
