@@ -8,7 +8,8 @@ use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::sensitivity::linearization_point::{Change, LinearizationPoint};
+use crate::sensitivity::linear_response::Change;
+use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
 /// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.

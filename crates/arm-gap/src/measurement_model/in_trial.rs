@@ -15,6 +15,7 @@ use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
+use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::slope;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::normal_equations::solve;
@@ -53,12 +54,12 @@ impl<const N: usize> Session<N> {
         let trial = ShownTrial::of(self, &own, course)?;
         let mut columns = Vec::new();
         for c in &placed {
-            let moved = own.clone().with(c.target, own.get(c.target) + c.step);
-            let reach = (
-                self.is_sensing(&own, c.target),
-                matches!(c.target, Target::Shift(_)),
-            );
-            columns.push(trial.response(&moved, c.step, reach)?);
+            columns.push(trial.response(&Change {
+                changed: own.clone().with(c.target, own.get(c.target) + c.step),
+                size: c.step,
+                sensing: self.is_sensing(&own, c.target),
+                moves_handle: matches!(c.target, Target::Shift(_)),
+            })?);
         }
         columns.extend(trial.swings(&own, &rhythms)?);
         let left = difference(&course.seen, &trial.shown);
@@ -146,17 +147,14 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
     }
 
     /// What the sensors would read more, for one unit of a change.
-    ///
-    /// * `reach` - whether the change reaches the sensors alone, and whether it moves the handle's path
-    fn response(
-        &self,
-        changed: &Hypothesis<N>,
-        size: f64,
-        reach: (bool, bool),
-    ) -> Result<Channels, SimulationError> {
+    fn response(&self, change: &Change<N>) -> Result<Channels, SimulationError> {
         match &self.line {
-            Some(line) => line.response(changed, size, reach),
-            None => Ok(slope(&self.torques(changed)?, &self.shown, size)),
+            Some(line) => line.response(change),
+            None => Ok(slope(
+                &self.torques(&change.changed)?,
+                &self.shown,
+                change.size,
+            )),
         }
     }
 
@@ -171,7 +169,7 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
             for phase in [0.0, 0.5 * core::f64::consts::PI] {
                 let mut swinging = hypothesis.clone();
                 swinging.named.push(with_phase(rhythm, phase));
-                columns.push(self.response(&swinging, 1.0, (false, false))?);
+                columns.push(self.response(&Change::of(swinging, 1.0))?);
             }
         }
         Ok(columns)

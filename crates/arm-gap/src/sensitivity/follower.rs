@@ -35,7 +35,7 @@ impl<const N: usize> Linear<'_, N> {
         let friction = self.session.friction_at_start(changed, course)?;
         let answer = self.follow(&plant, &hands, (&near, &friction));
         let answer = answer.ok_or(ASTRAY)?;
-        let mut sensed = self.sensed(&plant, Some(&answer), 0);
+        let mut sensed = self.sensed(&plant, Some(&answer), None);
         // A low-pass ends where the trial ends.
         let count = course.raw[0].len();
         sensed
@@ -154,7 +154,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             other: SMatrix::zeros(),
             pushed: [zero; 2],
             modes: [Mode::Sticks; N],
-            dry: plant.dry || line.dry,
+            dry: plant.dry || line.own.plant.dry,
         }
     }
 

@@ -4,7 +4,7 @@
 //! One trial of each movement is simulated. Repeats follow it along their own handle's path, other hypotheses follow it
 //! as changes; both cost a hundredth of a simulation.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 
 use arm_sim::SimulationError;
 
@@ -13,22 +13,10 @@ use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
+use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::Rows;
-
-/// A change of a hypothesis whose response is asked.
-#[derive(Clone, Debug)]
-pub struct Change<const N: usize> {
-    /// The hypothesis with the change made.
-    pub changed: Hypothesis<N>,
-    /// Its size.
-    pub size: f64,
-    /// Whether it reaches the sensors alone.
-    pub sensing: bool,
-    /// Whether it moves the handle's path.
-    pub moves_handle: bool,
-}
 
 /// A hypothesis that was simulated.
 pub struct LinearizationPoint<'a, const N: usize> {
@@ -46,8 +34,6 @@ pub struct LinearizationPoint<'a, const N: usize> {
     pub own: Vec<Response>,
     /// Rows of the nuisances.
     pub rows: Rows,
-    /// The hypothesis whose residuals were asked last, with what the sensors would read of it: its responses are asked next.
-    followed: Mutex<Option<(Hypothesis<N>, Vec<Channels>)>>,
 }
 
 impl<const N: usize> LinearizationPoint<'_, N> {
@@ -66,7 +52,6 @@ impl<const N: usize> LinearizationPoint<'_, N> {
             coordinates,
             own: self.own.clone(),
             rows: self.rows.without(&columns),
-            followed: Mutex::default(),
         }
     }
 }
@@ -93,7 +78,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             coordinates: self.nuisances(),
             own: Vec::new(),
             rows: Rows::default(),
-            followed: Mutex::default(),
         };
         point.shown = self.shown(&point, hypothesis)?;
         let one = |i: usize| {
@@ -203,12 +187,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             .collect();
         let one = |(residual, &trial)| difference(residual, &changes[self.group_of[trial]]);
         let residuals = std::iter::zip(&point.residuals, &self.fitted).map(one);
-        let residuals = residuals.collect();
-        *point
-            .followed
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner) = Some((hypothesis.clone(), shown));
-        Ok(residuals)
+        Ok(residuals.collect())
     }
 
     /// How changes of the anchor's hypothesis change what the channels of each group's reference read, for one unit.
@@ -223,6 +202,46 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.each_response(point, changes).into_iter().collect()
     }
 
+    /// The same for changes of a hypothesis away from the anchor, along the runs of the anchor.
+    ///
+    /// # Errors
+    /// [`GapError::Simulation`] where the hypothesis or a change is not possible.
+    fn responses_beside(
+        &self,
+        point: &LinearizationPoint<N>,
+        hypothesis: &Hypothesis<N>,
+        changes: &[Change<N>],
+    ) -> Result<Vec<Response>, GapError> {
+        let failed = |group: usize| {
+            let trial = self.references[group];
+            move |source| GapError::Simulation { trial, source }
+        };
+        let Some(_) = point.lines.first() else {
+            let base = self.shown(point, hypothesis)?;
+            let one = |change: &Change<N>| {
+                let shown = self.shown(point, &change.changed)?;
+                let each = std::iter::zip(&shown, &base).map(|(a, b)| slope(a, b, change.size));
+                Ok(Response(each.collect()))
+            };
+            return changes.iter().map(one).collect();
+        };
+        let groups = self.references.len();
+        let origin = |group: usize| point.lines[group].origin(hypothesis).map_err(failed(group));
+        let origins = self.parallel(groups, origin);
+        let origins = origins.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let one = |job: usize| {
+            let (change, group) = (&changes[job / groups], job % groups);
+            let response = point.lines[group].response_from(&origins[group], change);
+            response.map_err(failed(group))
+        };
+        let all = self.parallel(changes.len() * groups, one);
+        let mut all = all.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter();
+        let each = changes
+            .iter()
+            .map(|_| Response(all.by_ref().take(groups).collect()));
+        Ok(each.collect())
+    }
+
     /// The same, where some of the changes may not be possible.
     pub fn each_response(
         &self,
@@ -234,10 +253,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let (change, group) = (&changes[job / groups], job % groups);
             let trial = self.references[group];
             let response = match point.lines.get(group) {
-                Some(line) => {
-                    let reach = (change.sensing, change.moves_handle);
-                    line.response(&change.changed, change.size, reach)
-                }
+                Some(line) => line.response(change),
                 None => self
                     .follow(point, &change.changed, (group, &self.courses[trial]))
                     .map(|shown| slope(&shown, &point.shown[group], change.size)),
@@ -284,19 +300,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if *hypothesis == point.hypothesis || coordinates.is_empty() {
             return self.responses_to(point, coordinates);
         }
-        let last = point.followed.lock();
-        let last = last.unwrap_or_else(PoisonError::into_inner).take();
-        let base = match last {
-            Some((followed, shown)) if followed == *hypothesis => shown,
-            _ => self.shown(point, hypothesis)?,
-        };
-        let one = |c: &Coordinate| {
-            let change = self.nudged(hypothesis, c);
-            let shown = self.shown(point, &change.changed)?;
-            let each = std::iter::zip(&shown, &base).map(|(a, b)| slope(a, b, change.size));
-            Ok(Response(each.collect()))
-        };
-        coordinates.iter().map(one).collect()
+        let each = coordinates.iter();
+        let changes: Vec<_> = each.map(|c| self.nudged(hypothesis, c)).collect();
+        self.responses_beside(point, hypothesis, &changes)
     }
 
     /// A hypothesis with one number changed a little.

@@ -1,14 +1,10 @@
-//! Responses of a led arm to small changes, from the equation of motion linearised along one simulated run.
+//! One simulated run of a led arm with the equation of motion linearised along it.
 //!
-//! A change of the rig, an effect or the handle's path leaves a torque over in the equation of motion of the run. The
-//! arm answers it as a linear system with coefficients that follow the run ([`Slopes`]). A joint that set-valued friction holds in the
-//! run does not answer, and one that slips does so against its friction. A hundred candidates cost less than one simulation each.
+//! A joint that set-valued friction holds in the run does not answer changes, and one that slips does so against its friction.
 
-use arm_core::effect::{
-    Effect, MAX_STATES, States, advance_states, any_state, dry_friction, resisting_besides_dry,
-};
-use arm_core::{Joints, Plane, Reading, Setup};
-use arm_sim::{Change, SimulationError, Slopes, cubic_weights};
+use arm_core::effect::{Effect, MAX_STATES, States, advance_states, any_state};
+use arm_core::{Joints, Plane, Reading};
+use arm_sim::{SimulationError, Slopes, cubic_weights};
 use nalgebra::SMatrix;
 use std::sync::Arc;
 
@@ -16,16 +12,17 @@ use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
 use crate::measurement_model::start::held_at_start;
+use crate::sensitivity::linear_response::Origin;
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;
 
 /// The instants at which a run is recorded and solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Grid {
+pub(super) struct Grid {
     /// Records for each sample of the trial.
-    parts: usize,
+    pub parts: usize,
     /// Records for each step of the solution.
-    stride: usize,
+    pub stride: usize,
 }
 
 impl Grid {
@@ -57,14 +54,11 @@ pub const ASTRAY: SimulationError = SimulationError::Setting {
 pub struct Linear<'a, const N: usize> {
     pub(super) session: &'a Session<N>,
     pub(super) course: Arc<Course<N>>,
-    grid: Grid,
+    pub(super) grid: Grid,
     /// Length of a step of the solution \[s\].
     pub(super) step: f64,
-    setup: Setup<f64, N>,
-    /// Effects that resist in joints.
-    resisting: Vec<Effect<f64>>,
-    /// Effects that the sensors show.
-    sensing: Vec<Effect<f64>>,
+    /// The hypothesis of the run.
+    pub(super) own: Origin<N>,
     /// The run at every record.
     records: Vec<State<N>>,
     /// Force on the arm at every record.
@@ -74,22 +68,17 @@ pub struct Linear<'a, const N: usize> {
     /// The run at every step.
     pub(super) states: Vec<State<N>>,
     pub(super) hands: Vec<Hand>,
-    /// Whether some joint has dry friction that is set-valued.
-    pub(super) dry: bool,
     /// Direction in which each joint slips, 0 for none.
-    ways: Vec<Joints<f64, N>>,
+    pub(super) ways: Vec<Joints<f64, N>>,
     pub(super) balances: Vec<Balance<N>>,
     /// How what is left over and the force follow the motion in each step.
     pub(super) slopes: Vec<Slopes<N>>,
     /// The inverse of what multiplies new accelerations, for the joints that friction does not hold.
     pub(super) inverse: Vec<SMatrix<f64, N, N>>,
     /// Which joints friction holds.
-    held: Vec<[bool; N]>,
+    pub(super) held: Vec<[bool; N]>,
     /// Angles of the first instant for one unit of torque left over at rest.
     pub(super) rest: SMatrix<f64, N, N>,
-    /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
-    start: (Joints<f64, N>, Joints<f64, N>),
-    base: Channels,
 }
 
 impl<'a, const N: usize> Linear<'a, N> {
@@ -118,15 +107,16 @@ impl<'a, const N: usize> Linear<'a, N> {
                 qdd: at(&recording.qdd, i),
             })
             .collect();
+        let start = (
+            course.start(hypothesis),
+            session.friction_at_start(hypothesis, course)?,
+        );
         let mut linear = Self {
             session,
             course: Arc::clone(course),
             grid,
             step: interval * grid.stride as f64,
-            setup: plant.setup,
-            dry: plant.dry,
-            resisting: Vec::new(),
-            sensing: Vec::new(),
+            own: Origin::of(plant, start),
             recorded_force: Vec::with_capacity(records.len()),
             delayed_force: Vec::new(),
             states: records.iter().step_by(grid.stride).copied().collect(),
@@ -138,23 +128,19 @@ impl<'a, const N: usize> Linear<'a, N> {
             inverse: Vec::new(),
             held: Vec::new(),
             rest: SMatrix::zeros(),
-            start: (
-                course.start(hypothesis),
-                session.friction_at_start(hypothesis, course)?,
-            ),
-            base: Vec::new(),
         };
+        let plant = &linear.own.plant;
         let every = hands(course, hypothesis, (linear.records.len(), interval))?;
         for (record, hand) in std::iter::zip(&linear.records, &every) {
-            let force = balance(&plant, record, *hand, &[]).force;
+            let force = balance(plant, record, *hand, &[]).force;
             linear.recorded_force.push(force);
         }
         linear.hands = every.into_iter().step_by(grid.stride).collect();
         linear.delayed_force = linear.force_after(plant.setup.force_delay);
         let memories = linear.memories(&plant.resisting);
+        linear.balances = linear.balances_of(plant, &memories);
         for i in 0..linear.states.len() {
-            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
-            linear.differentiate(&plant, i, memory);
+            linear.differentiate(i, memories.get(i).map_or(&[], Vec::as_slice));
         }
         linear.rest = linear.slopes.first().map_or_else(SMatrix::zeros, |slopes| {
             inverse_of_free(
@@ -162,8 +148,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                 &held_at_start(&linear.balances[0].friction),
             )
         });
-        linear.base = linear.sensed(&plant, None, 0);
-        (linear.resisting, linear.sensing) = (plant.resisting, plant.sensing);
+        linear.own.shown = linear.sensed(&linear.own.plant, None, None);
         Ok(linear)
     }
 
@@ -172,7 +157,7 @@ impl<'a, const N: usize> Linear<'a, N> {
     /// # Errors
     /// [`SimulationError`] for a channel that is not finite.
     pub fn shown(&self) -> Result<Channels, SimulationError> {
-        smooth(&self.base, self.course.band, self.course.rate).map_err(|_| ASTRAY)
+        smooth(&self.own.shown, self.course.band, self.course.rate).map_err(|_| ASTRAY)
     }
 
     /// Angles \[rad\], speeds \[rad/s\] and accelerations \[rad/s²\] of the joints at a sample of the trial.
@@ -183,7 +168,7 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 
     /// The states of effects that have one, along the run; nothing where none has.
-    fn memories(&self, effects: &[Effect<f64>]) -> Vec<Vec<States<f64>>> {
+    pub(super) fn memories(&self, effects: &[Effect<f64>]) -> Vec<Vec<States<f64>>> {
         if !any_state(effects) {
             return Vec::new();
         }
@@ -200,16 +185,31 @@ impl<'a, const N: usize> Linear<'a, N> {
         out
     }
 
-    fn differentiate(&mut self, plant: &Plant<N>, i: usize, memory: &[States<f64>]) {
-        let (state, hand) = (self.states[i], self.hands[i]);
-        let middle = balance(plant, &state, hand, memory);
+    /// What another plant says of the motion of the run at every step, led as the run is.
+    ///
+    /// * `memories` - the states of its effects along the run
+    pub(super) fn balances_of(
+        &self,
+        plant: &Plant<N>,
+        memories: &[Vec<States<f64>>],
+    ) -> Vec<Balance<N>> {
+        let one = |i: usize| {
+            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
+            balance(plant, &self.states[i], self.hands[i], memory)
+        };
+        (0..self.states.len()).map(one).collect()
+    }
+
+    fn differentiate(&mut self, i: usize, memory: &[States<f64>]) {
+        let (state, hand, middle) = (self.states[i], self.hands[i], &self.balances[i]);
         let way = Joints::from_fn(|j, _| Mode::of(state.qd[j]).way());
         let held: [bool; N] = std::array::from_fn(|j| middle.friction[j] > 0.0 && way[j] == 0.0);
         let left_over = |there: &Balance<N>| there.torque + there.friction.component_mul(&way);
         let at = [state.q, state.qd, state.qdd];
-        let slopes = Slopes::around(at, &left_over(&middle), |q, qd, qdd| {
+        let slopes = Slopes::around(at, &left_over(middle), |q, qd, qdd| {
             let (time, q, qd, qdd) = (state.time, *q, *qd, *qdd);
-            let there = balance(plant, &State { time, q, qd, qdd }, hand, memory);
+            let there = State { time, q, qd, qdd };
+            let there = balance(&self.own.plant, &there, hand, memory);
             (left_over(&there), there.force)
         });
         let inverse = inverse_of_free(&slopes.of_step(self.step), &held);
@@ -217,177 +217,6 @@ impl<'a, const N: usize> Linear<'a, N> {
         self.held.push(held);
         self.ways.push(way);
         self.slopes.push(slopes);
-        self.balances.push(middle);
-    }
-
-    /// What the sensors would read more, for one unit of a change.
-    ///
-    /// * `changed` - the hypothesis with the change made
-    /// * `size` - of the change
-    /// * `moves_handle` - whether the path of the handle is another
-    ///
-    /// # Errors
-    /// [`SimulationError`] for a rig that cannot be.
-    pub fn response(
-        &self,
-        changed: &Hypothesis<N>,
-        size: f64,
-        (sensing, moves_handle): (bool, bool),
-    ) -> Result<Channels, SimulationError> {
-        let raw = self.response_raw(changed, size, (sensing, moves_handle))?;
-        smooth(&raw, self.course.band, self.course.rate).map_err(|_| ASTRAY)
-    }
-
-    /// The same before the low-pass.
-    ///
-    /// # Errors
-    /// As [`Linear::response`].
-    pub fn response_raw(
-        &self,
-        changed: &Hypothesis<N>,
-        size: f64,
-        (sensing, moves_handle): (bool, bool),
-    ) -> Result<Channels, SimulationError> {
-        let plant = Plant::new(self.session, changed, &self.course.rhythms)?;
-        let nowhere = [Joints::<f64, N>::zeros(); 2];
-        let start = match self.dry || plant.dry {
-            true => self.start_of(&plant, changed)?,
-            false => nowhere,
-        };
-        let sensed = if sensing && start == nowhere {
-            self.sensed(&plant, None, 0)
-        } else {
-            let own;
-            let hands = if moves_handle {
-                own = hands(&self.course, changed, (self.states.len(), self.step))?;
-                &own
-            } else {
-                &self.hands
-            };
-            let answer = self.solve(&plant, hands, start);
-            self.sensed(&plant, Some(&answer), self.first_changed(&plant, &answer))
-        };
-        let mut out = sensed;
-        for (channel, base) in out.iter_mut().zip(&self.base) {
-            for (value, base) in channel.iter_mut().zip(base) {
-                *value = (*value - base) / size;
-            }
-        }
-        Ok(out)
-    }
-
-    /// How far another hypothesis starts from the run: the joints that dry friction holds where they are measured, and what dry friction
-    /// resists less with in the others.
-    fn start_of(
-        &self,
-        plant: &Plant<N>,
-        changed: &Hypothesis<N>,
-    ) -> Result<[Joints<f64, N>; 2], SimulationError> {
-        let (near, friction) = self.start;
-        let most = plant.friction(&self.balances[0].motion, &[]);
-        let held = held_at_start(&most);
-        let moved = self.course.start(changed) - near;
-        Ok([
-            Joints::from_fn(|j, _| if held[j] { moved[j] } else { 0.0 }),
-            friction - self.session.friction_at_start(changed, &self.course)?,
-        ])
-    }
-
-    /// Changes of angles and forces along the run when another plant takes its place.
-    ///
-    /// * `start` - see [`Linear::start_of`]
-    fn solve(
-        &self,
-        plant: &Plant<N>,
-        hands: &[Hand],
-        [moved, released]: [Joints<f64, N>; 2],
-    ) -> Vec<(Joints<f64, N>, Plane<f64>)> {
-        let h = self.step;
-        let pushes = self.pushes(plant, hands);
-        let mut change = Change::default();
-        let mut out = Vec::with_capacity(self.states.len());
-        let nothing = Joints::<f64, N>::zeros();
-        let mut is_still = true;
-        for (i, (push, force)) in pushes.into_iter().enumerate() {
-            let slopes = &self.slopes[i];
-            if i == 0 {
-                change.q = moved + self.rest * (push + released - slopes.stiffness * moved);
-                is_still = change.q == nothing;
-            } else if !is_still || push != nothing {
-                is_still = false;
-                for j in (0..N).filter(|&j| self.held[i][j]) {
-                    (change.qd[j], change.qdd[j]) = (0.0, 0.0);
-                }
-                change.advance(slopes, &self.inverse[i], &push, h);
-            }
-            let [by_angle, by_speed] = &slopes.force;
-            let follow = by_angle * change.q + by_speed * change.qd;
-            out.push((change.q, [0, 1].map(|c| force[c] + follow[c])));
-        }
-        out
-    }
-
-    /// Torque that the motion of the run leaves over in another plant, and the force on the arm there beyond that of the run, at every step.
-    fn pushes(&self, plant: &Plant<N>, hands: &[Hand]) -> Vec<(Joints<f64, N>, Plane<f64>)> {
-        let steps = 0..self.states.len();
-        let mut both = self.resisting.iter().chain(&plant.resisting);
-        let same_rig = plant.setup == self.setup && std::ptr::eq(hands, self.hands.as_slice());
-        if !same_rig && both.any(|e| e.kind.feels_force()) {
-            let memories = self.memories(&plant.resisting);
-            let one = |i: usize| {
-                let own = &self.balances[i];
-                let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
-                let changed = balance(plant, &self.states[i], hands[i], memory);
-                let friction = (own.friction - changed.friction).component_mul(&self.ways[i]);
-                let push = own.torque - changed.torque + friction;
-                (push, [0, 1].map(|c| changed.force[c] - own.force[c]))
-            };
-            return steps.map(one).collect();
-        }
-        // What the same effects resist with takes itself out.
-        let less = self.resisted(&beyond(&self.resisting, &plant.resisting));
-        let more = self.resisted(&beyond(&plant.resisting, &self.resisting));
-        let push = |i: usize| less[i] - more[i];
-        if same_rig {
-            return steps.map(|i| (push(i), [0.0; 2])).collect();
-        }
-        let bare = plant.without_effects();
-        let one = |i: usize| {
-            let own = &self.balances[i];
-            let changed = balance(&bare, &self.states[i], hands[i], &[]);
-            let rigid = own.torque - own.resisted - changed.torque;
-            let force = [0, 1].map(|c| changed.force[c] - own.force[c]);
-            (rigid + push(i), force)
-        };
-        steps.map(one).collect()
-    }
-
-    /// What joint effects resist with at every step, where joints slip as in the run \[N m\].
-    fn resisted(&self, effects: &[Effect<f64>]) -> Vec<Joints<f64, N>> {
-        if effects.is_empty() {
-            return vec![Joints::zeros(); self.states.len()];
-        }
-        let memories = self.memories(effects);
-        let one = |i: usize| {
-            let motion = &self.balances[i].motion;
-            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
-            let friction = Joints::from(dry_friction(effects, motion, memory));
-            resisting_besides_dry(effects, motion, memory) + friction.component_mul(&self.ways[i])
-        };
-        (0..self.states.len()).map(one).collect()
-    }
-
-    /// The first sample that shows a change of the motion; before it, the sensors of another plant show what those of the run do.
-    fn first_changed(&self, plant: &Plant<N>, changes: &[(Joints<f64, N>, Plane<f64>)]) -> usize {
-        if plant.sensing != self.sensing || plant.setup.force_delay != self.setup.force_delay {
-            return 0;
-        }
-        let still = |(q, force): &&(Joints<f64, N>, Plane<f64>)| {
-            *q == Joints::<f64, N>::zeros() && *force == [0.0; 2]
-        };
-        let steps = changes.iter().take_while(still).count();
-        let first = steps.saturating_sub(1) * self.grid.stride / self.grid.parts;
-        first.min(self.base[0].len())
     }
 
     /// Steps to beyond so many samples of the trial.
@@ -420,19 +249,17 @@ impl<'a, const N: usize> Linear<'a, N> {
 
     /// What the sensors read of the run with changes on it, at the samples of the trial.
     ///
-    /// * `first` - sample before which they show what those of the run do
+    /// * `known` - what they read at its first samples
     pub(super) fn sensed(
         &self,
         plant: &Plant<N>,
         changes: Option<&[(Joints<f64, N>, Plane<f64>)]>,
-        first: usize,
+        known: Option<Channels>,
     ) -> Channels {
         let Grid { parts, stride } = self.grid;
         let count = self.course.raw[0].len();
-        let mut channels: Channels = match first {
-            0 => vec![Vec::with_capacity(count); N + 2],
-            _ => self.base.iter().map(|c| c[..first].to_vec()).collect(),
-        };
+        let mut channels = known.unwrap_or_else(|| vec![Vec::with_capacity(count); N + 2]);
+        let first = channels[0].len();
         let last = self.records.len() - 1;
         // Between two steps changes go straight.
         let change = |record: f64| {
@@ -448,7 +275,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             ))
         };
         let own;
-        let forces = if plant.setup.force_delay == self.setup.force_delay {
+        let forces = if plant.setup.force_delay == self.own.plant.setup.force_delay {
             &self.delayed_force
         } else {
             own = self.force_after(plant.setup.force_delay);
@@ -477,19 +304,6 @@ impl<'a, const N: usize> Linear<'a, N> {
         }
         channels
     }
-}
-
-/// The effects of one list that another does not have.
-fn beyond(effects: &[Effect<f64>], others: &[Effect<f64>]) -> Vec<Effect<f64>> {
-    let mut others = others.to_vec();
-    let is_new = |effect: &&Effect<f64>| match others.iter().position(|o| o == *effect) {
-        Some(same) => {
-            others.swap_remove(same);
-            false
-        }
-        None => true,
-    };
-    effects.iter().filter(is_new).copied().collect()
 }
 
 /// The value at a place among samples of the cubic through the four samples about it (Lagrange).
@@ -548,16 +362,6 @@ mod tests {
         }
         assert_eq!(cubic(&samples, 12.0), samples[12]);
         assert_eq!(cubic(&samples, 39.0), samples[39]);
-    }
-
-    #[test]
-    fn of_two_lists_of_effects_what_both_have_counts_once_for_each() {
-        use arm_core::effect::Kind;
-        let of = |size: f64| Effect::<f64>::new(Kind::Viscous, 1).with(&[size]);
-        let (one, two, three) = (of(1.0), of(2.0), of(3.0));
-        assert_eq!(beyond(&[one, two, one], &[one, three]), [two, one]);
-        assert_eq!(beyond(&[one, three], &[one, two, one]), [three]);
-        assert!(beyond(&[two, one], &[one, two]).is_empty());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::prediction::{Channels, smooth};
+use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::timing_of;
 
@@ -37,7 +38,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             sizes.iter().for_each(|&size| one.parameters[size] = 0.0);
             one.parameters[p] = unit;
             changed.named.push(one);
-            let channels = line.response(&changed, unit, (false, false)).ok()?;
+            let channels = line.response(&Change::of(changed, unit)).ok()?;
             Some((p, channels))
         };
         let columns = sizes.iter().map(column).collect::<Option<Vec<_>>>()?;

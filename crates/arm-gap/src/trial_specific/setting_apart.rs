@@ -7,6 +7,7 @@ use arm_core::effect::Nature;
 use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::prediction::{Course, smooth};
+use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 use crate::trial_specific::tremor_detection::{UNIT, common_swing, small};
@@ -79,7 +80,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                     changed
                         .named
                         .push(small(column, trial_specific.wave()[0], quarter));
-                    let Ok(swing) = line.response_raw(&changed, UNIT, (false, false)) else {
+                    let Ok(swing) = line.response_raw(&Change::of(changed, UNIT)) else {
                         continue;
                     };
                     for (channel, swing) in course.raw.iter_mut().zip(&swing) {

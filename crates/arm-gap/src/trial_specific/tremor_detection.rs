@@ -10,6 +10,7 @@ use crate::data::prepared_session::PreparedSession;
 use crate::data::repeats::same_rate;
 use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
+use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::trial_specific::component::{TrialSpecific, shapes_of};
 use crate::trial_specific::spectral_line::SpectralLine;
@@ -255,7 +256,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             let each = columns.iter().map(|effect| {
                 let mut changed = point.hypothesis.clone();
                 changed.named.push(small(effect, frequency, false));
-                line.response_raw(&changed, UNIT, (false, false)).ok()
+                line.response_raw(&Change::of(changed, UNIT)).ok()
             });
             each.collect()
         })

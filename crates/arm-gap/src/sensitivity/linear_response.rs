@@ -1,0 +1,303 @@
+//! Responses of a led arm to small changes, along a run that is linearised.
+//!
+//! A change of the rig, an effect or the handle's path leaves a torque over in the equation of motion of the run. The arm answers it as a
+//! linear system with coefficients that follow the run. A hundred candidates cost less than one simulation each.
+
+use std::sync::OnceLock;
+
+use arm_core::effect::{Effect, dry_friction, resisting_besides_dry};
+use arm_core::{Joints, Plane};
+use arm_sim::SimulationError;
+
+use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::prediction::{Channels, smooth};
+use crate::measurement_model::start::held_at_start;
+use crate::sensitivity::linearized_run::{ASTRAY, Linear};
+use crate::sensitivity::plant::{Balance, Hand, Plant, balance, hands};
+
+/// A hypothesis from which changes are told: that of the run, or one beside it.
+pub struct Origin<const N: usize> {
+    pub(super) plant: Plant<N>,
+    /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
+    start: (Joints<f64, N>, Joints<f64, N>),
+    /// What its sensors read of the motion of the run.
+    pub(super) shown: Channels,
+    /// What it says of the motion of the run, where that was asked.
+    balances: OnceLock<Vec<Balance<N>>>,
+}
+
+impl<const N: usize> Origin<N> {
+    pub(super) fn of(plant: Plant<N>, start: (Joints<f64, N>, Joints<f64, N>)) -> Self {
+        Self {
+            plant,
+            start,
+            shown: Channels::new(),
+            balances: OnceLock::new(),
+        }
+    }
+}
+
+/// A change of a hypothesis whose response is asked.
+#[derive(Clone, Debug)]
+pub struct Change<const N: usize> {
+    /// The hypothesis with the change made.
+    pub changed: Hypothesis<N>,
+    /// Its size.
+    pub size: f64,
+    /// Whether it reaches the sensors alone.
+    pub sensing: bool,
+    /// Whether it moves the handle's path; told from the run itself alone.
+    pub moves_handle: bool,
+}
+
+impl<const N: usize> Change<N> {
+    /// A change that moves the arm by other ways than the handle's path.
+    pub fn of(changed: Hypothesis<N>, size: f64) -> Self {
+        let (sensing, moves_handle) = (false, false);
+        Self {
+            changed,
+            size,
+            sensing,
+            moves_handle,
+        }
+    }
+}
+
+/// Changes of the angles and of the force at a step.
+type Answer<const N: usize> = (Joints<f64, N>, Plane<f64>);
+
+impl<const N: usize> Linear<'_, N> {
+    /// A hypothesis beside the run as the origin of changes.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig that cannot be.
+    pub fn origin(&self, hypothesis: &Hypothesis<N>) -> Result<Origin<N>, SimulationError> {
+        let plant = Plant::new(self.session, hypothesis, &self.course.rhythms)?;
+        let start = (
+            self.course.start(hypothesis),
+            self.session.friction_at_start(hypothesis, &self.course)?,
+        );
+        let shown = self.sensed(&plant, None, None);
+        let origin = Origin::of(plant, start);
+        Ok(Origin { shown, ..origin })
+    }
+
+    /// What the sensors would read more, for one unit of a change of the hypothesis of the run.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig that cannot be.
+    pub fn response(&self, asked: &Change<N>) -> Result<Channels, SimulationError> {
+        self.response_from(&self.own, asked)
+    }
+
+    /// The same before the low-pass.
+    ///
+    /// # Errors
+    /// As [`Linear::response`].
+    pub fn response_raw(&self, asked: &Change<N>) -> Result<Channels, SimulationError> {
+        self.response_raw_from(&self.own, asked)
+    }
+
+    /// What the sensors would read more, for one unit of a change of a hypothesis that need not be that of the run.
+    ///
+    /// # Errors
+    /// As [`Linear::response`].
+    pub fn response_from(
+        &self,
+        origin: &Origin<N>,
+        asked: &Change<N>,
+    ) -> Result<Channels, SimulationError> {
+        let raw = self.response_raw_from(origin, asked)?;
+        smooth(&raw, self.course.band, self.course.rate).map_err(|_| ASTRAY)
+    }
+
+    fn response_raw_from(
+        &self,
+        origin: &Origin<N>,
+        asked: &Change<N>,
+    ) -> Result<Channels, SimulationError> {
+        let plant = Plant::new(self.session, &asked.changed, &self.course.rhythms)?;
+        let nowhere = [Joints::<f64, N>::zeros(); 2];
+        let start = match origin.plant.dry || plant.dry {
+            true => self.start_from(origin, &plant, &asked.changed)?,
+            false => nowhere,
+        };
+        let mut out = if asked.sensing && start == nowhere {
+            self.sensed(&plant, None, None)
+        } else {
+            let own;
+            let hands = if asked.moves_handle {
+                own = hands(&self.course, &asked.changed, (self.states.len(), self.step))?;
+                &own
+            } else {
+                &self.hands
+            };
+            let answers = self.solve((origin, &plant), hands, start);
+            let known = self.unchanged((origin, &plant), &answers);
+            self.sensed(&plant, Some(&answers), known)
+        };
+        for (channel, base) in out.iter_mut().zip(&origin.shown) {
+            for (value, base) in channel.iter_mut().zip(base) {
+                *value = (*value - base) / asked.size;
+            }
+        }
+        Ok(out)
+    }
+
+    /// How far another hypothesis starts from the origin: the joints that dry friction holds where they are measured, and what dry
+    /// friction resists less with in the others.
+    fn start_from(
+        &self,
+        origin: &Origin<N>,
+        plant: &Plant<N>,
+        changed: &Hypothesis<N>,
+    ) -> Result<[Joints<f64, N>; 2], SimulationError> {
+        let (near, friction) = origin.start;
+        let most = plant.friction(&self.balances[0].motion, &[]);
+        let held = held_at_start(&most);
+        let moved = self.course.start(changed) - near;
+        Ok([
+            Joints::from_fn(|j, _| if held[j] { moved[j] } else { 0.0 }),
+            friction - self.session.friction_at_start(changed, &self.course)?,
+        ])
+    }
+
+    /// Changes of angles and forces along the run when another plant takes the place of the origin.
+    ///
+    /// * `start` - see [`Linear::start_from`]
+    fn solve(
+        &self,
+        plants: (&Origin<N>, &Plant<N>),
+        hands: &[Hand],
+        [moved, released]: [Joints<f64, N>; 2],
+    ) -> Vec<Answer<N>> {
+        let nothing = Joints::<f64, N>::zeros();
+        let mut change = arm_sim::Change::default();
+        let mut out = Vec::with_capacity(self.states.len());
+        let mut is_still = true;
+        for (i, (push, force)) in self.pushes(plants, hands).into_iter().enumerate() {
+            let slopes = &self.slopes[i];
+            if i == 0 {
+                change.q = moved + self.rest * (push + released - slopes.stiffness * moved);
+                is_still = change.q == nothing;
+            } else if !is_still || push != nothing {
+                is_still = false;
+                for j in (0..N).filter(|&j| self.held[i][j]) {
+                    (change.qd[j], change.qdd[j]) = (0.0, 0.0);
+                }
+                change.advance(slopes, &self.inverse[i], &push, self.step);
+            }
+            let [by_angle, by_speed] = &slopes.force;
+            let follow = by_angle * change.q + by_speed * change.qd;
+            out.push((change.q, [0, 1].map(|c| force[c] + follow[c])));
+        }
+        out
+    }
+
+    /// Torque that the motion of the run leaves over in another plant beyond the origin, and the force on the arm likewise, at every step.
+    fn pushes(&self, (origin, plant): (&Origin<N>, &Plant<N>), hands: &[Hand]) -> Vec<Answer<N>> {
+        let steps = 0..self.states.len();
+        let before = &origin.plant;
+        let same_rig = plant.setup == before.setup && std::ptr::eq(hands, self.hands.as_slice());
+        let mut both = before.resisting.iter().chain(&plant.resisting);
+        if !same_rig && both.any(|e| e.kind.feels_force()) {
+            let memories = self.memories(&plant.resisting);
+            let own = self.balances_from(origin);
+            let one = |i: usize| {
+                let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
+                let changed = balance(plant, &self.states[i], hands[i], memory);
+                let friction = (own[i].friction - changed.friction).component_mul(&self.ways[i]);
+                let push = own[i].torque - changed.torque + friction;
+                (push, [0, 1].map(|c| changed.force[c] - own[i].force[c]))
+            };
+            return steps.map(one).collect();
+        }
+        // What the same effects resist with takes itself out.
+        let less = self.resisted(&beyond(&before.resisting, &plant.resisting));
+        let more = self.resisted(&beyond(&plant.resisting, &before.resisting));
+        let push = |i: usize| less[i] - more[i];
+        if same_rig {
+            return steps.map(|i| (push(i), [0.0; 2])).collect();
+        }
+        let bare = plant.without_effects();
+        let own = self.balances_from(origin);
+        let one = |i: usize| {
+            let changed = balance(&bare, &self.states[i], hands[i], &[]);
+            let rigid = own[i].torque - own[i].resisted - changed.torque;
+            let force = [0, 1].map(|c| changed.force[c] - own[i].force[c]);
+            (rigid + push(i), force)
+        };
+        steps.map(one).collect()
+    }
+
+    /// What an origin says of the motion of the run.
+    fn balances_from<'o>(&'o self, origin: &'o Origin<N>) -> &'o [Balance<N>] {
+        if std::ptr::eq(origin, &raw const self.own) {
+            return &self.balances;
+        }
+        let there = || self.balances_of(&origin.plant, &self.memories(&origin.plant.resisting));
+        origin.balances.get_or_init(there)
+    }
+
+    /// What joint effects resist with at every step, where joints slip as in the run \[N m\].
+    fn resisted(&self, effects: &[Effect<f64>]) -> Vec<Joints<f64, N>> {
+        if effects.is_empty() {
+            return vec![Joints::zeros(); self.states.len()];
+        }
+        let memories = self.memories(effects);
+        let one = |i: usize| {
+            let motion = &self.balances[i].motion;
+            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
+            let friction = Joints::from(dry_friction(effects, motion, memory));
+            resisting_besides_dry(effects, motion, memory) + friction.component_mul(&self.ways[i])
+        };
+        (0..self.states.len()).map(one).collect()
+    }
+
+    /// What the sensors read before the motion changes; `None` where they are others than those of the origin.
+    fn unchanged(
+        &self,
+        (origin, plant): (&Origin<N>, &Plant<N>),
+        answers: &[Answer<N>],
+    ) -> Option<Channels> {
+        let before = &origin.plant;
+        if plant.sensing != before.sensing || plant.setup.force_delay != before.setup.force_delay {
+            return None;
+        }
+        let is_still =
+            |(q, force): &&Answer<N>| *q == Joints::<f64, N>::zeros() && *force == [0.0; 2];
+        let steps = answers.iter().take_while(is_still).count();
+        let samples = steps.saturating_sub(1) * self.grid.stride / self.grid.parts;
+        let known = |channel: &Vec<f64>| channel[..samples.min(channel.len())].to_vec();
+        Some(origin.shown.iter().map(known).collect())
+    }
+}
+
+/// The effects of one list that another does not have.
+fn beyond(effects: &[Effect<f64>], others: &[Effect<f64>]) -> Vec<Effect<f64>> {
+    let mut others = others.to_vec();
+    let is_new = |effect: &&Effect<f64>| match others.iter().position(|o| o == *effect) {
+        Some(same) => {
+            others.swap_remove(same);
+            false
+        }
+        None => true,
+    };
+    effects.iter().filter(is_new).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    #[test]
+    fn of_two_lists_of_effects_what_both_have_counts_once_for_each() {
+        let of = |size: f64| Effect::<f64>::new(Kind::Viscous, 1).with(&[size]);
+        let (one, two, three) = (of(1.0), of(2.0), of(3.0));
+        assert_eq!(beyond(&[one, two, one], &[one, three]), [two, one]);
+        assert_eq!(beyond(&[one, three], &[one, two, one]), [three]);
+        assert!(beyond(&[two, one], &[one, two]).is_empty());
+    }
+}
