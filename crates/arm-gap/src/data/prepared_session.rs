@@ -25,6 +25,7 @@ pub(crate) struct Rest {
 }
 
 /// A session made ready.
+#[derive(Clone)]
 pub struct PreparedSession<'a, const N: usize> {
     /// What is challenged and by what.
     pub session: &'a Session<N>,
@@ -55,7 +56,7 @@ pub struct PreparedSession<'a, const N: usize> {
     /// Threads.
     pub threads: usize,
     /// The runs of the hypotheses that were simulated last: a search comes back to what it has tried.
-    pub(crate) simulated: Mutex<Vec<SimulatedRuns<'a, N>>>,
+    pub(crate) simulated: Arc<Mutex<Vec<SimulatedRuns<'a, N>>>>,
 }
 
 /// A hypothesis, and its run on the reference of each group.
@@ -124,7 +125,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             dropped: session.base.iter().map(|law| !law.likely).collect(),
             start: None,
             threads,
-            simulated: Mutex::default(),
+            simulated: Arc::default(),
         })
     }
 

@@ -54,14 +54,42 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             settled = self.set_apart(settled, &mut apart)?;
         }
         let mut state = self.search_from(settled, None, progress)?;
-        state = self.with_base_reconsidered(state, None, progress)?;
+        state = self.or_as_it_was(state, &mut apart, |all, state, _| {
+            all.with_base_reconsidered(state, None, progress)
+        })?;
         if led {
-            state = self.rhythm_asked_again(state, &mut apart, progress)?;
-            state = self.rhythm_in_phase(state, &mut apart, progress)?;
+            state = self.or_as_it_was(state, &mut apart, |all, state, apart| {
+                all.rhythm_asked_again(state, apart, progress)
+            })?;
+            state = self.or_as_it_was(state, &mut apart, |all, state, apart| {
+                all.rhythm_in_phase(state, apart, progress)
+            })?;
         }
-        state = self.disturbances_asked_again(state, &mut apart)?;
+        state = self.or_as_it_was(state, &mut apart, Self::disturbances_asked_again)?;
         let (state, named) = self.judged_in_turns(state, apart.periodic, progress)?;
         self.concluded((state, named), apart, progress)
+    }
+
+    /// Goes on from what was found; where that leads to an arm that cannot be simulated, what was found before stands.
+    fn or_as_it_was(
+        &mut self,
+        state: SearchState<'a, N>,
+        apart: &mut SetApart<N>,
+        go_on: impl FnOnce(
+            &mut Self,
+            SearchState<'a, N>,
+            &mut SetApart<N>,
+        ) -> Result<SearchState<'a, N>, GapError>,
+    ) -> Result<SearchState<'a, N>, GapError> {
+        let before = (self.clone(), state.clone(), apart.clone());
+        match go_on(self, state, apart) {
+            Err(GapError::Simulation { .. }) => {
+                let found;
+                (*self, found, *apart) = before;
+                Ok(found)
+            }
+            other => other,
+        }
     }
 
     /// Judges what was found, and searches on where another effect took the place of one: a coarser law could have missed what is seen

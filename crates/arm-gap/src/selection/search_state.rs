@@ -41,6 +41,7 @@ pub type Progress<'a> = &'a (dyn Fn(&str, f64) -> Result<(), GapError> + Sync);
 pub(crate) type Settled<'a, const N: usize> = (Fitted<N>, LinearizationPoint<'a, N>);
 
 /// What was found of effects that last.
+#[derive(Clone)]
 pub(crate) struct SearchState<'a, const N: usize> {
     pub calibrated: Fitted<N>,
     /// What the calibrated model leaves, at the same samples and with the same noise.

@@ -16,6 +16,7 @@ use crate::trial_specific::tremor_detection::Line;
 /// Most disturbances of single trials that are named.
 const DISTURBANCES: usize = 4;
 /// What is kept apart from effects that last.
+#[derive(Clone)]
 pub(crate) struct SetApart<const N: usize> {
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,

@@ -19,6 +19,7 @@ use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::Rows;
 
 /// A hypothesis that was simulated.
+#[derive(Clone)]
 pub struct LinearizationPoint<'a, const N: usize> {
     /// The hypothesis.
     pub hypothesis: Hypothesis<N>,

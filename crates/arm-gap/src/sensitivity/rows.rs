@@ -36,7 +36,7 @@ struct Class {
 }
 
 /// Whitened columns of the fitted trials.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Rows {
     classes: Vec<Class>,
     /// Standard deviations of what belongs to each trial alone.
