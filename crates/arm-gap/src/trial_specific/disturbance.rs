@@ -273,10 +273,12 @@ fn held_either_way(effects: &[Effect<f64>]) -> f64 {
         .fold(0.0, |most, e| f64::max(most, e.parameters[0]))
 }
 
-/// Whether a disturbance is a burst that dry friction of the final model may hold: it was found before that friction was.
+/// Whether a disturbance is a burst that dry friction of the final model may hold, within two standard deviations of its size: it was found
+/// before that friction was.
 pub(crate) fn is_held(one: &TrialSpecific, effects: &[Effect<f64>]) -> bool {
     let is_burst = one.effect.kind.prior().nature == Nature::Burst;
-    is_burst && one.effect.parameters[0].abs() <= held_either_way(effects)
+    let uncertain = one.sd.first().map_or(0.0, |sd| 2.0 * sd);
+    is_burst && one.effect.parameters[0].abs() <= held_either_way(effects) + uncertain
 }
 
 /// What muscles can do in a joint at most \[N m\]; anything where nothing weighs.
@@ -360,7 +362,7 @@ mod tests {
     fn a_burst_that_the_final_friction_may_hold_is_none() {
         let of = |kind: &str, size: f64| TrialSpecific {
             effect: Effect::new(Kind::named(kind).expect("known"), 0).with(&[size]),
-            sd: Vec::new(),
+            sd: vec![0.01],
             trial: Some(0),
             gain: 50.0,
             rivals: Vec::new(),
@@ -369,7 +371,7 @@ mod tests {
             sizes: Vec::new(),
         };
         let dry = [Effect::<f64>::new(Kind::Coulomb, 1).with(&[0.2])];
-        assert!(is_held(&of("voluntary", -0.39), &dry) && !is_held(&of("voluntary", 0.41), &dry));
+        assert!(is_held(&of("voluntary", -0.41), &dry) && !is_held(&of("voluntary", 0.43), &dry));
         assert!(
             !is_held(&of("handle_slip", 0.01), &dry),
             "a slip is no torque"
