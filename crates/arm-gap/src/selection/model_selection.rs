@@ -29,8 +29,10 @@ pub(crate) const TIE: f64 = 10.0;
 const RIVALS: usize = 5;
 /// Share of what a named effect gains that another must gain to first order to be converged in its place.
 const RIVAL: f64 = 0.6;
-/// Times that a better alternative may take the place of a named effect.
+/// Times that an alternative may take the place of a named effect where it is hardly better,
 const EXCHANGES: usize = 4;
+/// and where it explains more by a tie or more: each time less is left, so that this ends by itself.
+const CLEAR_EXCHANGES: usize = 16;
 
 /// Part of what a law misses that an effect in another place can stand for: what misses acts in the joint of the law, and seldom
 /// looks like something else.
@@ -273,15 +275,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 // A shape that is refined may stand for what the law of another one misses.
                 let bent = self.mimicked_beside((&fitted, slot, less), &[], &point);
                 let better = rivals.iter().find(|r| {
-                    self.takes_over(
-                        &r.alternative,
-                        (&fitted.asked[slot], gain / scale),
-                        bent / scale,
-                    )
+                    let clear = r.alternative.worse < -TIE;
+                    exchanges < if clear { CLEAR_EXCHANGES } else { EXCHANGES }
+                        && self.takes_over(
+                            &r.alternative,
+                            (&fitted.asked[slot], gain / scale),
+                            bent / scale,
+                        )
                 });
-                if exchanges < EXCHANGES
-                    && let Some(better) = better
-                {
+                if let Some(better) = better {
                     exchanges += 1;
                     let Fitted {
                         hypothesis, asked, ..

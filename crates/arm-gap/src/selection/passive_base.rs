@@ -15,7 +15,7 @@ use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::selection::model_selection::{Alternative, Named};
+use crate::selection::model_selection::{Alternative, Named, TIE};
 use crate::selection::search_state::Settled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
@@ -50,6 +50,8 @@ pub(crate) struct BaseLaw<const N: usize> {
     pub alternatives: Vec<Alternative>,
     /// The hypothesis in which something else takes its place, where that explains more.
     better: Option<Fitted<N>>,
+    /// What came clearly nearer to the data with something else in its place, whatever that is.
+    nearer: Option<Fitted<N>>,
 }
 
 /// What a law of the base must gain: a spring that a named spring over two joints crosses need only be there.
@@ -290,6 +292,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 continue;
             }
             let mut laws = self.base_laws(&settled, &terms, scale)?;
+            if exchanges < EXCHANGES
+                && let Some(nearer) = self.fitted_from_nearer(&settled.0, &laws)
+            {
+                exchanges += 1;
+                settled = nearer;
+                continue;
+            }
             let better = laws
                 .iter_mut()
                 .find_map(|law| Some((law.base, law.better.take()?)));
@@ -307,6 +316,23 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
             }
         }
+    }
+
+    /// The fit once more from where another law in the place of one came clearly nearer to the data, where that is nearer with the law itself:
+    /// then not the law was wrong, but the fit had stopped short.
+    fn fitted_from_nearer(
+        &self,
+        fitted: &Fitted<N>,
+        laws: &[BaseLaw<N>],
+    ) -> Option<Settled<'a, N>> {
+        let first = self.session.effects.len();
+        laws.iter().find_map(|law| {
+            let mut start = law.nearer.as_ref()?.hypothesis.clone();
+            start.named.pop();
+            start.known[first + law.base] = fitted.hypothesis.known[first + law.base];
+            let again = self.settle(start, fitted.asked.clone()).ok()?;
+            (again.0.cost + again.0.enough() < fitted.cost).then_some(again)
+        })
     }
 
     /// The laws of the base as they would be among the named effects, each with what could stand in its place in the same joint.
@@ -331,6 +357,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 gain: term.gain / scale,
                 alternatives: Vec::new(),
                 better: None,
+                nearer: None,
             });
         }
         for joint in 0..N {
@@ -382,6 +409,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let place = (slot, &less, twin);
         let rivals = self.rivals(fitted, place, (point, library), scale);
         let mut rivals = rivals.unwrap_or_default();
+        let all = rivals.iter().map(|r| &r.fitted);
+        law.nearer = all
+            .filter(|rival| rival.cost + TIE * scale < fitted.cost)
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+            .cloned();
         for rival in &mut rivals {
             let alternative = &mut rival.alternative;
             if !alternative.candidate.kind().prior().passive {

@@ -217,15 +217,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let trial = self.references[group];
             move |source| GapError::Simulation { trial, source }
         };
-        let Some(_) = point.lines.first() else {
-            let base = self.shown(point, hypothesis)?;
-            let one = |change: &Change<N>| {
-                let shown = self.shown(point, &change.changed)?;
-                let each = std::iter::zip(&shown, &base).map(|(a, b)| slope(a, b, change.size));
-                Ok(Response(each.collect()))
-            };
-            return changes.iter().map(one).collect();
-        };
         let groups = self.references.len();
         let origin = |group: usize| point.lines[group].origin(hypothesis).map_err(failed(group));
         let origins = self.parallel(groups, origin);
@@ -301,9 +292,32 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if *hypothesis == point.hypothesis || coordinates.is_empty() {
             return self.responses_to(point, coordinates);
         }
+        if point.lines.is_empty() {
+            return self.responses_one_by_one(point, hypothesis, coordinates);
+        }
         let each = coordinates.iter();
         let changes: Vec<_> = each.map(|c| self.nudged(hypothesis, c)).collect();
         self.responses_beside(point, hypothesis, &changes)
+    }
+
+    /// The same, each computed by itself.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::residuals`].
+    fn responses_one_by_one(
+        &self,
+        point: &LinearizationPoint<N>,
+        hypothesis: &Hypothesis<N>,
+        coordinates: &[Coordinate],
+    ) -> Result<Vec<Response>, GapError> {
+        let base = self.shown(point, hypothesis)?;
+        let one = |c: &Coordinate| {
+            let change = self.nudged(hypothesis, c);
+            let shown = self.shown(point, &change.changed)?;
+            let each = std::iter::zip(&shown, &base).map(|(a, b)| slope(a, b, change.size));
+            Ok(Response(each.collect()))
+        };
+        coordinates.iter().map(one).collect()
     }
 
     /// A hypothesis with one number changed a little.
