@@ -13,6 +13,7 @@ from typing import Any
 
 from armrs.catalogue import FORCE_CHANNELS, Kind, Parameter, catalogue
 from armrs.workflows.experiment import FAULTS, Controller, Devices, Fault, Safety
+from armrs.workflows.interaction import Interaction, Perturbation, Support
 
 FOLDER = Path(__file__).parent.parent / "docs" / "schemas"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -217,6 +218,9 @@ def experiment() -> Any:
             "variation": table({"moment_Nm": list_of(number("[N m]", least=0.0), text="one a joint")}),
             "tolerance": tolerance(),
             "fault": list_of(fault),
+            "interaction": settings(Interaction, law={"enum": ["impedance", "admittance"]}, link_masses_kg=pair("[kg]")),
+            "support": settings(Support, model={"type": "string", "description": "the arm that is carried, as it was identified"}),
+            "perturbation": settings(Perturbation, kind={"enum": ["multisine", "prbs", "ramps"]}),
             "movement": list_of(run, least=1),
         }
         | rig(),

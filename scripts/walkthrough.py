@@ -15,6 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"^```(\w+)(?: ([^\n]+))?\n(.*?)^```", flags=re.M | re.S)
+TARGET = "thumbv7em-none-eabihf"
 TOOLS = {
     "cargo": "from rustup",
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
@@ -24,14 +25,29 @@ TOOLS = {
 }
 
 
+def core_of_the_target() -> str | None:
+    """Return what CMake is told of Rust's core: nothing with rustup's, the folder where it was built from Debian's source, None without."""
+    found = subprocess.run(["rustc", "--print", "sysroot"], capture_output=True, text=True, check=True).stdout.strip()
+    if Path(found, "lib", "rustlib", TARGET).exists():
+        return ""
+    if not Path("/usr/bin/rustc").exists():
+        return None
+    debian = subprocess.run(["/usr/bin/rustc", "--print", "sysroot"], capture_output=True, text=True, check=True).stdout.strip()
+    if not Path(debian, "lib", "rustlib", "src", "rust", "library").exists():
+        return None
+    made = ROOT / "target" / "sysroot-m4"
+    subprocess.run([ROOT / "scripts" / "sysroot.sh", TARGET, made, "-C", "target-cpu=cortex-m4"], check=True)
+    return f"-DARMRS_SYSROOT={made} "
+
+
 def main() -> int:
     """Write its files, run its commands, and look for what it says they print."""
     for tool, package in TOOLS.items():
         if shutil.which(tool) is None:
             print(f"walkthrough: skipped, {tool} is missing (Debian: {package})", file=sys.stderr)
             return 77
-    sysroot = subprocess.run(["rustc", "--print", "sysroot"], capture_output=True, text=True, check=True).stdout.strip()
-    if not Path(sysroot, "lib", "rustlib", "thumbv7em-none-eabihf").exists():
+    core = core_of_the_target()
+    if core is None:
         print("walkthrough: skipped, no Rust for the target (rustup target add thumbv7em-none-eabihf)", file=sys.stderr)
         return 77
     page = (ROOT / "docs" / "firmware.md").read_text(encoding="utf-8")
@@ -40,7 +56,7 @@ def main() -> int:
         commands, promised = ["set -euo pipefail"], []
         for language, name, content in BLOCK.findall(section):
             if language == "sh":
-                commands.append(content.replace("../myproject", folder))
+                commands.append(content.replace("../myproject", folder).replace("-DARMRS_CPU", f"{core}-DARMRS_CPU"))
             elif language == "text":
                 promised.append(content)
             else:

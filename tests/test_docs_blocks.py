@@ -28,7 +28,17 @@ RUN_ELSEWHERE = {
     "index.md": "make demo, which builds",
 }
 """Pages by what runs their blocks; those of all others run here."""
-RUN_HERE = {"README.md", "own-data.md", "notebooks.md", "gap.md", "cosim.md", "other-tools.md", "theory-model.md", "developer.md"}
+RUN_HERE = {
+    "README.md",
+    "own-data.md",
+    "notebooks.md",
+    "gap.md",
+    "cosim.md",
+    "other-tools.md",
+    "theory-model.md",
+    "developer.md",
+    "closed-loop.md",
+}
 
 
 def test_no_page_has_a_block_that_nothing_runs() -> None:
@@ -104,6 +114,19 @@ def test_python_of_the_firmware_page(folder: Path, capsys: pytest.CaptureFixture
         for said in re.findall(r"^print\(.*\)  # (.*)$", content, flags=re.M):
             assert said in printed
     assert "beyond the limit" in printed and Path("replay.html").is_file()
+
+
+def test_a_carried_arm_as_its_page_says(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown = blocks(DOCS / "closed-loop.md")
+    for language, name, content in shown:
+        if language == "toml":
+            (folder / name).write_text(content, encoding="utf-8")
+    for words in commands(DOCS / "closed-loop.md"):
+        assert cli.main(words) == 0, capsys.readouterr().err
+    assert "less by at least" in capsys.readouterr().out
+    (python,) = (content for language, _, content in shown if language == "python")
+    exec(compile(python, "closed-loop.md", "exec"), {})
+    assert (folder / "supported" / "figures" / "stiffness-reach.png").is_file()
 
 
 def test_python_of_the_gap_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

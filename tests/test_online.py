@@ -144,6 +144,30 @@ def test_a_file_is_read_as_it_is(log: online.Log, suffix: str, tmp_path: Path) -
         online.load_log(path, 2)
 
 
+def test_errors_of_sensors_are_taken_out_of_a_log() -> None:
+    """Those that the simulated sensors add, each by the formula of its effect. They were ignored without a word."""
+    errors = (
+        armrs.Effect("angle_offset", 2, parameters={"offset": 0.02}),
+        armrs.Effect("force_bias", channel="Fz", parameters={"bias": 1.5}),
+        armrs.Effect("force_gain", channel="Fy", parameters={"gain": 0.1}),
+        armrs.Effect("force_misalignment", parameters={"angle": 0.05}),
+    )
+    model = TRUTH.replace(effects=(*TRUTH.effects, *errors))
+    movement = armrs.Movement(np.radians([[-60, 60], [-30, 20]]), speed=0.8, acceleration=4.0)
+    moved = armrs.simulate(model, movement, rate=1.0 / PERIOD, sensors=armrs.Sensors(rate=1.0 / PERIOD), seeds=[1])
+    read = moved.readings[0]
+    raw = online.Log(read.time, read.q, read.force_on_arm, read.moment_on_arm)
+    clean = raw.calibrated(model)
+    n = len(clean.t)
+    assert np.abs(raw.q[:, 1] - moved.q[:n, 1]).min() > 0.01 and np.abs(raw.force_on_arm - moved.force_on_arm[:n]).max() > 1.0
+    assert np.abs(clean.q - moved.q[:n]).max() < 1e-12
+    assert np.abs(clean.force_on_arm - moved.force_on_arm[:n]).max() < 1e-10
+    settings = online.default_settings(MODEL, PERIOD)
+    given = MODEL.replace(effects=(*MODEL.effects, *errors))
+    learned = online.replay(raw, given, settings=settings), online.replay(clean, MODEL, settings=settings)
+    assert np.array_equal(learned[0].values, learned[1].values)
+
+
 def test_what_cannot_be_is_refused(log: online.Log, tmp_path: Path) -> None:
     def refused(match: str, call: object, *arguments: object, **named: object) -> None:
         with pytest.raises(armrs.BadInput, match=match) as caught:

@@ -149,6 +149,26 @@ class _Controlled(TypedDict):
     stop: tuple[str, int, float, float, float] | None
 
 @type_check_only
+class _Yielding(TypedDict):
+    law: str
+    stiffness: float
+    handle_damping: float
+    mass: float
+    link_masses: tuple[float, float]
+    hold: float
+
+@type_check_only
+class _Yielded(TypedDict):
+    time: _Array
+    robot_q: _Array
+    q: _Array
+    qd: _Array
+    force_on_arm: _Array
+    support: _Array
+    tracking_error: float
+    stop: tuple[str, int, float, float, float] | None
+
+@type_check_only
 class _Parameter(TypedDict):
     name: str
     unit: str
@@ -1588,6 +1608,14 @@ def control(
     settings: CoreRun,
     watch: _Watch,
 ) -> _Controlled: ...
+def interact(
+    rig: Rig,
+    drive: CoreDrive,
+    settings: CoreRun,
+    device: tuple[_Watch, _Yielding],
+    perturbation: NDArray[np.float64],
+    support: tuple[OnlineCompensation, float, float] | None,
+) -> _Yielded: ...
 def declare(
     name: str,
     summary: str,

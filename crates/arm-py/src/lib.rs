@@ -45,6 +45,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate_in_pieces, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;
+    m.add_function(wrap_pyfunction!(lab::interact, m)?)?;
     m.add_function(wrap_pyfunction!(plan::forecast_py, m)?)?;
     m.add_function(wrap_pyfunction!(plan::design_py, m)?)?;
     m.add_function(wrap_pyfunction!(lab::literature, m)?)?;

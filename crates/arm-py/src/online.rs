@@ -134,7 +134,7 @@ pub fn online_settings<'py>(
 }
 
 /// An arm of some length that tells the torque which carries it.
-trait Carries: Send {
+pub trait Carries: Send {
     fn joints(&self) -> usize;
     /// Torques and standard deviations; None where a device would write none.
     fn carry(&self, time: f64, q: &[f64], qd: &[f64]) -> Option<(Vec<f64>, Vec<f64>)>;
@@ -439,7 +439,7 @@ impl<const N: usize> Carries for Identified<N> {
 /// The compiled part of `armrs.online.Compensation`.
 #[pyclass(frozen, module = "armrs._armrs")]
 pub struct OnlineCompensation {
-    inner: Box<dyn Carries + Sync>,
+    pub inner: Box<dyn Carries + Sync>,
 }
 
 #[pymethods]

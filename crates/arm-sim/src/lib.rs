@@ -2,6 +2,7 @@
 
 mod batch;
 mod controlled;
+mod coupled;
 mod digest;
 mod discontinuities;
 mod divided_step;
@@ -10,6 +11,7 @@ mod error;
 mod experiment;
 mod friction;
 mod input_buffer;
+mod interaction;
 mod linearized;
 mod model;
 pub mod models;
@@ -33,13 +35,15 @@ mod start;
 mod state;
 mod step;
 mod stepper;
+mod supervisor;
 mod terms;
 #[doc(hidden)]
 pub use batch::simulate_batch;
-pub use controlled::{Controlled, Controller, Fault, Safety, control};
+pub use controlled::{Controlled, Controller, Fault, control};
 pub use digest::{Digest, definite, digest, digest_of};
 pub use error::{NoRest, SimulationError};
 pub use experiment::{Coupling, Drive, Experiment, Integrator, Start, altered};
+pub use interaction::{Interaction, Law, Support, Yielded, interact};
 pub use linearized::{Change, Slopes};
 pub use movement::{JointMotion, Movement};
 pub use noise::Normal;
@@ -53,3 +57,4 @@ pub use series::{Interpolation, Jet, Series, cubic_weights};
 pub use simulate::{Engine, simulate, simulate_in_pieces, simulate_partial, simulate_with};
 pub use stability::Vibration;
 pub use stepper::{Outside, Port, Seen, Snapshot, Stepper};
+pub use supervisor::Safety;

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from .. import checks
+from .. import _armrs, checks
 from ..errors import BadInput, Text, not_later
 from ..io import columns
 from ..io.resample import usual_step
 from ..io.samples import read_samples
+from ..model import Model
 
 FARTHEST = 0.25
 """Part of a control period by which a time stamp may be off its place."""
@@ -98,6 +99,18 @@ class Log:
         """Rows without any number, shape (n,)."""
         measured = [a for a in (self.q, self.force_on_arm, self.moment_on_arm, self.tau) if a is not None]
         return np.logical_and.reduce([np.isnan(a).reshape(len(a), -1).all(axis=1) for a in measured])
+
+    def calibrated(self, model: Model) -> Log:
+        """Return the log without constant errors of the sensors that a model has: offsets of angles; bias, gain and misalignment of forces.
+
+        A delay of the force stays: `armrs_model_calibrate` takes none out either.
+        """
+        told = _armrs.firmware(_armrs.Rig(model), model.segment_uncertainty, [])
+        q = self.q - np.array(told["angle_offset"])
+        if self.force_on_arm is None and self.moment_on_arm is None:
+            return replace(self, q=q)
+        hand = (self.hand - np.array(told["force_offset"])) @ np.linalg.inv(np.array(told["force"])).T
+        return replace(self, q=q, force_on_arm=hand[:, :2], moment_on_arm=None if self.moment_on_arm is None else hand[:, 2])
 
     def places(self, period: float) -> np.ndarray:
         """Return the control period of each sample, shape (n,), counted from the first.

@@ -140,7 +140,8 @@ def replay(
 ) -> Replay:
     """Let the estimator of a device learn from a log, and record its states.
 
-    Control periods without a sample in the log are missing samples, as the device would count them.
+    Control periods without a sample in the log are missing samples, as the device would count them. Constant errors of the sensors that the
+    model has are taken out of the log first, as `armrs_model_calibrate` does.
 
     Parameters
     ----------
@@ -168,6 +169,7 @@ def replay(
     data = _log(log, loaded, force_on)
     if data.q.shape[1] != loaded.n_joints:
         raise BadInput("log", Text(f"{data.q.shape[1]} joints"), f"{loaded.n_joints}, as the model has")
+    data = data.calibrated(loaded)
     if settings is None:
         settings = default_settings(loaded, data.period)
     checks.instance("settings", settings, Settings)

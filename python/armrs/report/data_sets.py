@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..io.dataset import Dataset, load_dataset
-from . import figures, live, moving, plain, recording
+from . import figures, interaction, live, moving, plain, recording
 from .tables import Table, how_many
 from .view import View
 
@@ -90,6 +90,11 @@ def recorded_data(result: Recorded) -> dict[str, Any]:
     return {**result.to_dict(), "made_by": plain.origin(None)}
 
 
+def recorded_figures(result: Recorded) -> figures.Figures:
+    """Return the figures of a session of the virtual laboratory."""
+    return {**interaction.figures(result), **recordings(result.dataset)}
+
+
 def first_trial(dataset: Dataset | None) -> live.Live:
     """Return what moves: the first trial."""
     return live.NOTHING if dataset is None or not dataset.trials else moving.recorded(dataset.trials[0], dataset.model)
@@ -97,4 +102,4 @@ def first_trial(dataset: Dataset | None) -> live.Live:
 
 CHECKED = View(checked_data, lambda result, _: recordings(result.dataset), lambda result: first_trial(result.dataset))
 IMPORTED = View(imported_data, lambda result, _: recordings(load_dataset(result.folder), "first"))
-RECORDED = View(recorded_data, lambda result, _: recordings(result.dataset), lambda result: first_trial(result.dataset))
+RECORDED = View(recorded_data, lambda result, _: recorded_figures(result), lambda result: first_trial(result.dataset))

@@ -125,7 +125,7 @@ def write_simulated(result: Run, data: dict[str, Any], folder: Path, *, suffix: 
 
 def write_recorded(result: Recorded, data: dict[str, Any], folder: Path) -> list[Path]:
     """Write `record.json`, figures and `report.html` beside a session of the virtual laboratory; return the files, the report last."""
-    drawn = figures.draw(data_sets.recordings(result.dataset))
+    drawn = figures.draw(data_sets.recorded_figures(result))
     shown = data_sets.first_trial(result.dataset)
     return files.write_whole(folder, lambda out: write_result(out, "record", data, drawn, shown))
 

@@ -335,8 +335,36 @@ def recorded(data: Mapping[str, Any]) -> Table:
     for trial in data["trials"]:
         stop = trial["stop"]
         end = "complete" if stop is None else f"stopped at {stop['at_s']:.4f} s: {stop['what']} {stop['reason']}"
-        rows.append([trial["configuration"], str(trial["repeat"]), f"{1e3 * trial['tracking_error_rad']:.3g}", end])
+        off = trial["tracking_error_rad"]
+        rows.append([trial["configuration"], str(trial["repeat"]), "yields" if off is None else f"{1e3 * off:.3g}", end])
     return Table(["configuration", "repeat", "robot off by [mrad]", "end"], rows)
+
+
+RUNS = {"run": "carried", "without_support": "not carried"}
+"""Runs of a trial with a handle that yields, and how tables and legends name them where there are both."""
+
+
+def run_named(key: str, count: int) -> str:
+    """Name a run of so many."""
+    return RUNS[key] if count > 1 else "the run"
+
+
+def interactions(data: Mapping[str, Any]) -> Table:
+    """Return how each run went."""
+    rows = []
+    for trial in data["trials"]:
+        story = trial["interaction"]
+        count = sum(story[key] is not None for key in RUNS)
+        for key in RUNS:
+            run = story[key]
+            if run is not None:
+                numbers = [f"{run[name]:.3g}" for name in ("force_rms_N", "force_largest_N")]
+                speed = run["speed_at_end_m_s"]
+                far = [f"{1e3 * run['handle_off_m']:.3g}", "–" if speed is None else f"{1e3 * speed:.2g}"]
+                end = "stopped" if speed is None else "at rest" if run["stable"] else "not at rest"
+                rows.append([trial["configuration"], str(trial["repeat"]), run_named(key, count), *numbers, *far, end])
+    head = ["configuration", "repeat", "run", "force, RMS [N]", "largest [N]", "handle off by [mm]", "speed at end [mm/s]", "end"]
+    return Table(head, rows, left=3)
 
 
 def movements(data: Mapping[str, Any]) -> Table:

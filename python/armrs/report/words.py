@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from ..tabular import SYMBOLS as SYMBOLS
@@ -343,7 +344,28 @@ def planar(motion: PlanarMotion, points: Sequence[str], file: Path) -> None:
 def recorded(result: Mapping[str, Any], report: Path) -> None:
     """Print what the virtual laboratory did."""
     show("", tables.recorded(result))
+    if said := interacted(result):
+        print(f"\n{said}")
     print("\n" + "\n".join([*result["files"][:3], str(report)]))
+
+
+def interacted(data: Mapping[str, Any]) -> str:
+    """Return in a sentence what the support does; empty where the handle does not yield."""
+    stories = [t["interaction"] for t in data["trials"] if t.get("interaction")]
+    if not stories:
+        return ""
+    runs = [s["run"] for s in stories]
+    end = f"{sum(r['stable'] for r in runs)} of {len(runs)} came to rest"
+    force = median(r["force_rms_N"] for r in runs)
+    both = [s for s in stories if s["lowered"] is not None]
+    if not both:
+        return f"The robot holds the arm with {force:.3g} N (RMS, median of the runs); {end}."
+    force, before = (median(s[key]["force_rms_N"] for s in both) for key in ("run", "without_support"))
+    lowered = min(s["lowered"] for s in both)
+    return (
+        f"Carried by the model of [support], the arm takes {force:.3g} N at the hand instead of {before:.3g} N (RMS, medians of the runs): "
+        f"less by at least {100 * lowered:.3g} %. {end[0].upper() + end[1:]}."
+    )
 
 
 def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:

@@ -16,11 +16,14 @@ from ..anthropometry import JOINTS, UNCERTAINTY, literature_arm, segments_of
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Subject, Tolerance, load_model
+from .interaction import PERIOD, Interaction, Perturbation, Support
 from .movement import Movement, movement_of
 
 THESIS_ROBOT = Robot(lengths=(0.45, 0.45), base=(1.05, -0.10))
 THESIS_CONTACT = Contact(stiffness=(10_000.0, 10_000.0), damping=(25.0, 25.0))
 FAULTS = ("runaway", "frozen", "nan", "late", "force")
+YIELDING_MARGIN_DEG = 30.0
+"""How far a robot whose handle yields may be outside of the required angles unless `[safety]` says otherwise."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Safety:
     Attributes
     ----------
     angle_margin_deg : float
-        How far an angle of the robot may be outside of the required ones.
+        How far an angle of the robot may be outside of the required ones; 30 where its handle yields, unless given.
     speed_rad_s, acceleration_rad_s2 : float
         Of a joint of the robot.
     force_N : float
@@ -175,6 +178,12 @@ class Experiment:
     tolerance : Tolerance
     file : str, optional
         Where it was read, for refusals.
+    interaction : Interaction, optional
+        How the handle yields; without it the robot follows the movement stiffly.
+    support : Support, optional
+        What carries the arm. Each trial is then run without it as well.
+    perturbation : Perturbation, optional
+        What pushes the handle.
     """
 
     name: str
@@ -190,6 +199,9 @@ class Experiment:
     faults: tuple[Fault, ...]
     tolerance: Tolerance
     file: str | None = None
+    interaction: Interaction | None = None
+    support: Support | None = None
+    perturbation: Perturbation | None = None
 
 
 def load_experiment(path: str | os.PathLike[str]) -> Experiment:
@@ -228,6 +240,9 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
         "variation",
         "tolerance",
         "fault",
+        "interaction",
+        "support",
+        "perturbation",
     ]
     checks.keys("", document, required=["movement"], optional=["name", "seed", "model", "believed", *tables])
     seed = checks.whole("seed", document.get("seed", 1), least=0, most=2**53)
@@ -249,6 +264,8 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
     moments = variation.get("moment_Nm", [0.0] * n)
     if not isinstance(moments, list) or len(moments) != n:
         raise BadInput("[variation], moment_Nm", moments, f"{n} numbers, one a joint")
+    interaction, support, perturbation = _yielding(document, path, n)
+    margin = {} if interaction is None else {"angle_margin_deg": YIELDING_MARGIN_DEG}
     return Experiment(
         name=checks.text("name", document.get("name", path.stem)),
         seed=seed,
@@ -257,13 +274,44 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
         subject=subject,
         runs=runs,
         controller=_settings(Controller, "[controller]", document.get("controller", {})),
-        safety=_settings(Safety, "[safety]", document.get("safety", {})),
+        safety=_settings(Safety, "[safety]", margin | checks.table("[safety]", document.get("safety", {}))),
         devices=_devices(document.get("sensors", {})),
         variation_Nm=np.array([checks.number("[variation], moment_Nm", v, least=0.0, unit="N m") for v in moments]),
         faults=faults,
         tolerance=Tolerance.from_dict(document.get("tolerance", {}), "[tolerance]"),
         file=str(path),
+        interaction=interaction,
+        support=support,
+        perturbation=perturbation,
     )
+
+
+def _yielding(document: Mapping[str, Any], path: Path, n_joints: int) -> tuple[Interaction | None, Support | None, Perturbation | None]:
+    """Return how the handle yields, what carries the arm and what pushes it."""
+    if "interaction" not in document:
+        for key in ("support", "perturbation"):
+            if key in document:
+                raise BadInput(f"[{key}]", Text("a value without [interaction]"), "a handle that yields: [interaction] as well")
+        return None, None, None
+    interaction: Interaction = _part_of(Interaction, "[interaction]", document["interaction"])
+    for key, found in (("fault", document.get("fault")), ("[sensors], emg", document.get("sensors", {}).get("emg"))):
+        if found:
+            raise BadInput(key, Text("a value beside [interaction]"), "none: only a robot that leads stiffly has it")
+    perturbation: Perturbation | None = None
+    if "perturbation" in document:
+        perturbation = _part_of(Perturbation, "[perturbation]", document["perturbation"])
+        if interaction.hold_s < 3.0 * PERIOD:
+            allowed = f"at least {3 * PERIOD:g} s with a perturbation: two of its periods after one in which it settles"
+            raise BadInput("[interaction], hold_s", interaction.hold_s, allowed)
+    if "support" not in document:
+        return interaction, None, perturbation
+    table = checks.table("[support]", document["support"])
+    if "model" not in table:
+        raise BadInput("[support], model", Text("nothing"), "the file of a model that was identified")
+    support: Support = _part_of(Support, "[support]", table | {"model": model_at("[support], model", table["model"], path)})
+    if support.model.n_joints != n_joints:
+        raise BadInput("[support], model", Text(f"{support.model.n_joints} joints"), f"{n_joints}, as the arm")
+    return interaction, support, perturbation
 
 
 def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[Model], Model]) -> tuple[Subject, Model, Model]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
+from .interaction import CONTROL_RATE, Interacted
 from .movement import Movement
 from .simulate import Channel, CoreRun, Sensors, Simulated, driven, simulate
 from .stiction import DEFAULT_DT
@@ -50,12 +52,16 @@ class Recorded(Tabular):
         For each trial: what the supervisor and the robot did, moments drawn, clocks.
     files : tuple of Path
         What was written.
+    interacted : dict of str to tuple of Interacted
+        Where the handle yields, by the file of the trial: the run that was recorded, and where something carries the arm the same run
+        without it.
     """
 
     dataset: Dataset
     experiment: Experiment
     trials: tuple[dict[str, Any], ...]
     files: tuple[Path, ...]
+    interacted: dict[str, tuple[Interacted, ...]]
 
     @property
     def stopped(self) -> list[dict[str, Any]]:
@@ -68,7 +74,7 @@ class Recorded(Tabular):
     def tidy(self) -> Tidy:
         """Return the trials, one a row."""
         columns: dict[str, list[Any]] = {name: [t[name] for t in self.trials] for name in ("configuration", "repeat", "seed")}
-        columns["tracking_error"] = [t["tracking_error_rad"] for t in self.trials]
+        columns["tracking_error"] = [np.nan if t["tracking_error_rad"] is None else t["tracking_error_rad"] for t in self.trials]
         columns["stopped"] = [None if t["stop"] is None else t["stop"]["reason"] for t in self.trials]
         return Tidy(columns, {"tracking_error": "rad"})
 
@@ -117,7 +123,7 @@ def record(
     written = _write(measured, experiment, out)
     for path in former - {*written, *(out / trial.file for trial in measured.dataset.trials)}:
         path.unlink(missing_ok=True)
-    return Recorded(measured.dataset, experiment, measured.trials, written)
+    return Recorded(measured.dataset, experiment, measured.trials, written, measured.interacted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,11 +137,14 @@ class Measured:
         As in `Recorded`.
     markers : dict of str to Markers
         What the cameras saw, by the file of the trial.
+    interacted : dict of str to tuple of Interacted
+        As in `Recorded`.
     """
 
     dataset: Dataset
     trials: tuple[dict[str, Any], ...]
     markers: dict[str, Markers]
+    interacted: dict[str, tuple[Interacted, ...]]
 
 
 def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done: None) -> Measured:
@@ -167,7 +176,8 @@ def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done
         synthetic=True,
         added=_added(experiment.runs, {trial.configuration for trial, _, _ in kept}),
     )
-    return Measured(dataset, tuple(m.story for m in seen), {trial.file: markers for trial, markers, _ in kept})
+    interacted = {m.trial.file: m.interacted for m in seen if m.trial is not None and m.interacted}
+    return Measured(dataset, tuple(m.story for m in seen), {trial.file: markers for trial, markers, _ in kept}, interacted)
 
 
 def check_required(experiment: Experiment) -> None:
@@ -192,6 +202,19 @@ class _Seen:
     trial: Trial | None
     markers: Markers | None
     story: dict[str, Any]
+    interacted: tuple[Interacted, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Reading:
+    """What is true at any time, and what the robot and its force sensor read."""
+
+    t: np.ndarray
+    q: np.ndarray
+    stamps: np.ndarray
+    force_on_arm: np.ndarray | None
+    moment_on_arm: np.ndarray | None
+    robot_q: np.ndarray | None
 
 
 class _Session:
@@ -211,6 +234,8 @@ class _Session:
         model = _wearing(e.truth, run.worn)
         extra = tuple(Effect("constant_moment", j, parameters={"moment": m}) for j, m in enumerate(moments, 1) if m)
         model = model.replace(effects=(*model.effects, *extra))
+        if e.interaction is not None:
+            return self._yield(model, run, repeat, (draw, moments, seed))
         fault = next((f for f in e.faults if (f.configuration, f.repeat) == (run.configuration, repeat)), None)
         led = self._lead(model, run.movement, fault, seed)
         story: dict[str, Any] = {
@@ -219,7 +244,7 @@ class _Session:
             "seed": seed,
             "moment_Nm": list(moments),
             "tracking_error_rad": led["tracking_error"],
-            "stop": _stop(led),
+            "stop": _stop(led["stop"], led),
         }
         if story["stop"] is not None:
             return _Seen(None, None, story)
@@ -237,14 +262,58 @@ class _Session:
         # Sensors read what is recorded.
         rate = RECORDING_RATE if devices.rate_Hz <= RECORDING_RATE else 2.0 * RECORDING_RATE
         true = simulate(model, path, rate=rate, start=run.movement.waypoints[0], sensors=_sensors(devices), seeds=[seed])
-        return self._read(run, repeat, true, (draw, story))
+        read = true.readings[0]
+        reading = _Reading(true.t, true.q, read.time, read.force_on_arm, read.moment_on_arm, read.robot_q)
+        trial, markers = self._read(run, repeat, (reading, model), (draw, story))
+        if trial is not None:
+            tau, emg = _brakes(true, read.time, devices, draw), _emg(true, read.time, draw) if devices.emg else {}
+            trial = dataclasses.replace(trial, tau=tau, emg=emg)
+        return _Seen(trial, markers, story)
+
+    def _yield(self, model: Model, run: Run, repeat: int, drawn: tuple[np.random.Generator, np.ndarray, int]) -> _Seen:
+        """Measure one trial with a handle that yields; where something carries the arm, run it without that as well."""
+        e, devices, (draw, moments, seed) = self.experiment, self.experiment.devices, drawn
+        assert e.interaction is not None and model.robot is not None
+        pushed = np.empty((0, 2)) if e.perturbation is None else e.perturbation.force(np.random.default_rng([seed, 3]))
+        core = CoreRun("rk4", DEFAULT_DT, 1.0 / RECORDING_RATE, q=[float(v) for v in run.movement.waypoints[0]])
+        device = (self._watch(None, seed), e.interaction.core())
+        supports = [None] if e.support is None else [e.support.core(), None]
+        rig, led = _armrs.Rig(model), driven(model, run.movement, "compliant")
+        every = round(CONTROL_RATE / RECORDING_RATE)
+        runs = tuple(Interacted.of(_armrs.interact(rig, led, core, device, pushed, s), model.robot, every) for s in supports)
+        kept = runs[0]
+        story: dict[str, Any] = {
+            "configuration": run.configuration,
+            "repeat": repeat,
+            "seed": seed,
+            "moment_Nm": list(moments),
+            "tracking_error_rad": None,
+            "stop": _stop(kept.stop),
+            "interaction": _compared(runs, self.experiment),
+        }
+        if kept.stop is not None:
+            return _Seen(None, None, story, runs)
+        stamps = np.arange(0.0, kept.t[-1], 1.0 / devices.rate_Hz)
+        force, robot_q = (np.column_stack([np.interp(stamps, kept.t, c) for c in a.T]) for a in (kept.force_on_arm, kept.robot_q))
+        step = 2.0 * devices.force_range_N / 2**devices.force_bits
+        noisy = np.round((force + devices.force_noise_N * draw.standard_normal(force.shape)) / step) * step
+        noisy = np.clip(noisy, -devices.force_range_N, devices.force_range_N)
+        moment = (devices.moment_noise_Nm or 0.0) * draw.standard_normal(len(stamps))
+        trial, markers = self._read(run, repeat, (_Reading(kept.t, kept.q, stamps, noisy, moment, robot_q), model), (draw, story))
+        if trial is not None and e.support is not None:
+            torque = np.column_stack([np.interp(stamps, kept.t, c) for c in kept.support.T])
+            trial = dataclasses.replace(trial, tau=torque + (devices.brake_noise_Nm or 0.0) * draw.standard_normal(torque.shape))
+        return _Seen(trial, markers, story, runs)
 
     def _lead(self, model: Model, movement: Movement, fault: Fault | None, seed: int) -> _Controlled:
         """Let the robot's controller follow the movement; it is programmed with the true lengths."""
-        c, s = self.experiment.controller, self.experiment.safety
         start = [float(v) for v in movement.waypoints[0]]
         run = CoreRun("rk4", DEFAULT_DT, 1.0 / RECORDING_RATE, q=start)
-        watch: _armrs._Watch = {
+        return _armrs.control(_armrs.Rig(model), driven(model, movement, "compliant"), run, self._watch(fault, seed))
+
+    def _watch(self, fault: Fault | None, seed: int) -> _armrs._Watch:
+        c, s = self.experiment.controller, self.experiment.safety
+        return {
             "bandwidth": c.bandwidth_rad_s,
             "damping": c.damping,
             "torque_limit": c.torque_limit_Nm,
@@ -255,16 +324,16 @@ class _Session:
             "fault": None if fault is None else _injected(fault),
             "seed": seed,
         }
-        return _armrs.control(_armrs.Rig(model), driven(model, movement, "compliant"), run, watch)
 
-    def _read(self, run: Run, repeat: int, true: Simulated, state: tuple[np.random.Generator, dict[str, Any]]) -> _Seen:
+    def _read(
+        self, run: Run, repeat: int, true: tuple[_Reading, Model], state: tuple[np.random.Generator, dict[str, Any]]
+    ) -> tuple[Trial | None, Markers]:
         """Let every device read the run."""
-        draw, story = state
-        devices, model = self.experiment.devices, true.model
-        read = true.readings[0]
-        stamps = read.time
+        (read, model), (draw, story) = true, state
+        devices = self.experiment.devices
+        stamps = read.stamps
         seen = (1.0 + devices.clock_drift) * stamps + devices.clock_offset_s + devices.clock_jitter_s * draw.standard_normal(len(stamps))
-        q = np.column_stack([np.interp(seen, true.t, column) for column in true.q.T])
+        q = np.column_stack([np.interp(seen, read.t, column) for column in read.q.T])
         markers = self._markers(model, stamps, q, draw)
         motion = planar_motion(markers, markers.names, up="z", forward="y")
         story["lengths_m"] = list(motion.lengths)
@@ -279,10 +348,8 @@ class _Session:
             force_on_arm=read.force_on_arm,
             moment_on_arm=None if devices.moment_noise_Nm is None else read.moment_on_arm,
             robot_q=read.robot_q,
-            tau=_brakes(true, stamps, devices, draw),
-            emg=_emg(true, stamps, draw) if devices.emg else {},
         )
-        return _Seen(trial if len(stamps) >= FEWEST_SAMPLES else None, markers, story)
+        return trial if len(stamps) >= FEWEST_SAMPLES else None, markers
 
     def _markers(self, model: Model, t: np.ndarray, q: np.ndarray, draw: np.random.Generator) -> Markers:
         """Return what the cameras see of the joints: positions in x (normal to the plane), y, z [m]."""
@@ -363,24 +430,38 @@ def _injected(fault: Fault) -> tuple[float, str, int, tuple[float, float]]:
     return fault.at_s, fault.kind, fault.joint - 1, size
 
 
-def _stop(led: _Controlled) -> dict[str, Any] | None:
-    if led["stop"] is None:
+def _stop(stop: tuple[str, int, float, float, float] | None, led: _Controlled | None = None) -> dict[str, Any] | None:
+    if stop is None:
         return None
-    reason, channel, value, limit, at = led["stop"]
+    reason, channel, value, limit, at = stop
     quantities = ("angle", "speed", "acceleration", "force")
     what = (
         "data" if channel is None else f"{quantities[channel // 2]} {('1', '2')[channel % 2] if channel < 6 else ('Fy', 'Fz')[channel % 2]}"
     )
-    return {
-        "reason": reason,
-        "what": what,
-        "value": value,
-        "limit": limit,
-        "at_s": at,
-        "periods_after_fault": led["periods_to_stop"],
-        "force_after_fault_N": led["force_after_fault"],
-        "way_after_stop_m": led["way_after_stop"],
-    }
+    told: dict[str, Any] = {"reason": reason, "what": what, "value": value, "limit": limit, "at_s": at}
+    if led is not None:
+        told |= {
+            "periods_after_fault": led["periods_to_stop"],
+            "force_after_fault_N": led["force_after_fault"],
+            "way_after_stop_m": led["way_after_stop"],
+        }
+    return told
+
+
+def _compared(runs: tuple[Interacted, ...], experiment: Experiment) -> dict[str, Any]:
+    """Return how a run with a yielding handle went, and without what carries the arm."""
+    told: dict[str, Any] = {"run": runs[0].to_dict(), "without_support": None, "lowered": None}
+    if len(runs) > 1:
+        told["without_support"] = runs[1].to_dict()
+    if len(runs) > 1 and all(run.stop is None for run in runs):
+        told["lowered"] = 1.0 - told["run"]["force_rms_N"] / told["without_support"]["force_rms_N"]
+    if experiment.perturbation is not None and experiment.interaction is not None:
+        for key, run in zip(("run", "without_support"), runs, strict=False):
+            if run.stop is None:
+                tip = run.endpoint(experiment.interaction.hold_s)
+                told[key]["endpoint_stiffness_N_m"] = tip.stiffness.tolist()
+                told[key]["endpoint_stiffness_std_N_m"] = tip.std.tolist()
+    return told
 
 
 def _wearing(model: Model, worn: tuple[AddedMass, ...]) -> Model:

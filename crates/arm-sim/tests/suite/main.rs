@@ -9,6 +9,7 @@ mod friction;
 mod friction_reference;
 mod golden;
 mod heave;
+mod interaction;
 mod long;
 mod pendulum;
 mod pieces;
