@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from armrs import BadInput, cli
-from armrs.report import clinic
+from armrs.report import clinic, session_changes
 from armrs.report.words import verdict
 
 NORMS = """\
@@ -62,7 +62,7 @@ def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic.Norm, ...]) 
     assert stiffness.value == pytest.approx(1.8 * math.radians(10.0))
     assert rest.value == pytest.approx(math.degrees(-1.0))
     assert clinic.words_of(stiffness) == [
-        "shoulder", "Stiffness [N m per 10°]", "0.314", "0.283 to 0.346", "0.087 to 0.244, above it", "higher by 0.157 ± 0.048",
+        "shoulder", "Stiffness [N m per 10°]", "0.314", "0.283 to 0.346", "0.087 to 0.244, above it", "higher by 0.157 ± 0.048 (+100 %)",
     ]  # fmt: skip
     assert clinic.words_of(friction)[2:4] == ["none seen", "at most 0.030"]
     assert speed.value is None and clinic.words_of(speed)[2:4] == ["not measured", ""]
@@ -110,11 +110,34 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
     assert "resting angle differs" not in text
 
 
+def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic.Norm, ...], tmp_path: Path) -> None:
+    """What changed, by how much, whether that is sure and what next are what a therapist asks; the page said it under "unusual"."""
+    change = result()["history"][0]
+    same = change | {"name": "torque", "kind": "coulomb", "since_last": 0.01, "since_last_std": 0.02, "changed_since_last": False}
+    lines = clinic.lines_of(result(history=[change, same]), norms)
+    assert session_changes.said(lines) == [
+        "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",
+        session_changes.SURE,
+        "No clear change: shoulder (friction).",
+    ]
+    assert clinic.words_of(lines[2])[5] == "no clear change: +0.010 ± 0.039"
+    assert session_changes.said(clinic.lines_of(result(history=[]))) == []
+    (tmp_path / "a.json").write_text(json.dumps(result(history=[change, same])), encoding="utf-8")
+    page = clinic.write_summary([tmp_path / "a.json"], tmp_path / "s.html").read_text(encoding="utf-8")
+    heads = [page.index(head) for head in ("What changed since", "What was found", "Over the sessions", "What next")]
+    assert heads == sorted(heads)
+
+
+def test_a_share_of_an_angle_is_not_stated() -> None:
+    """Its zero is a convention."""
+    assert session_changes.trend(-5.0, 1.23, None, clear=True) == "lower by 5.0 ± 1.2"
+    assert session_changes.trend(-5.0, 1.23, 20.0, clear=True) == "lower by 5.0 ± 1.2 (−25 %)"
+
+
 def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> None:
     said = clinic.unusual(clinic.lines_of(result(), norms))
     assert said == [
         "shoulder: stiffness is above the usual range.",
-        "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° than in the session before.",
     ]
     assert clinic.unusual(clinic.lines_of(result(history=[]))) == []
     left = [{"verb": "gap", "verdict": verdict} for verdict in ("explained", "unexplained")]
@@ -188,8 +211,11 @@ def test_intervals_claim_no_more_than_holds(tmp_path: Path) -> None:
         source = tmp_path / f"{name}.json"
         source.write_text(json.dumps(result(**changes)), encoding="utf-8")
         page = clinic.write_summary([source], tmp_path / f"{name}.html").read_text(encoding="utf-8")
-        caption = page.partition("<figcaption>")[2].partition("/figcaption>")[0]
-        assert said in caption, name
+        assert said in page, name
+        # With one session the figure of the joints has the caption.
+        source.write_text(json.dumps(result(**changes, history=[])), encoding="utf-8")
+        alone = clinic.write_summary([source], tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        assert said in alone.partition("<figcaption>")[2].partition("/figcaption>")[0], name
         assert "95 of 100" not in page
 
 

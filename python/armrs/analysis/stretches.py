@@ -1,16 +1,18 @@
 """The stretch reflex in fast and slow stretches of one joint: separated from elastic, viscous and dry resistance.
 
 `R = offset + k1 x + … + k5 x⁵ + b q̇ + c sign(q̇) + ΔI q̈ + s·gain·max(0, s q̇(t−L) − threshold − slope·max(0, s (tonic − q(t−L))))`,
-x the angle from its mean, s = ±1 the direction of the stretch, with an offset of its own in every trial, as tone drifts. The law is that of
-the effect `stretch_reflex` (Lance 1980; Levin and Feldman 1994). For given threshold, latency, tonic angle and slope the rest is linear:
-variable projection (Golub and Pereyra 1973). Intervals are from the scatter of the trials (`cluster_robust`), linearised at the optimum, so
-that neither the colour of the noise nor what differs from trial to trial has to be modelled.
+x the angle from its mean, s = ±1 the direction of the stretch, with an offset of its own in every trial, as tone drifts. At rest the moment
+is free, as dry friction holds a joint with any torque up to its own. The law is that of the effect `stretch_reflex` (Lance 1980; Levin and
+Feldman 1994). For given threshold, latency, tonic angle and slope the rest is linear: variable projection (Golub and Pereyra 1973).
+Intervals, linearised at the optimum, are from the scatter of the trials (`cluster_robust`), so that neither the colour of the noise nor
+what differs from trial to trial has to be modelled, and from the errors that all trials share.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -25,10 +27,14 @@ LEVEL = 0.95
 """Probability of the intervals."""
 NEEDED = 12.0
 """Twice the log-likelihood, beyond its price, that an angle threshold must gain: as an effect must in `armrs gap`."""
-CREEP = 0.03
-"""Speed below which dry friction is taken as proportional to it [rad/s]: it is the sign of a measured speed, with its noise."""
+RESTING = 0.05
+"""Speed below which a joint rests [rad/s]: dry friction then holds it with any torque up to its own."""
+HELD = 0.1
+"""Time for which what holds a joint at rest is taken as constant, and for which a swing is no movement [s]."""
 ELASTIC = 5
 """Degree of the polynomial that stands for the springs of a joint."""
+_SLIGHT = 1e-3
+"""Size beside the largest below which what nobody knows of a trial is rounding."""
 SHAPES = ("threshold", "latency", "tonic", "slope")
 UNITS = {"gain": "N m s/rad", "threshold": "rad/s", "latency": "s", "tonic": "rad", "slope": "1/s"}
 
@@ -53,6 +59,10 @@ class Stretch:
         What errors that all sessions share, each of one standard deviation, do to the moment [N m]: of masses and of the force sensor.
     placed : ndarray, shape (n_errors, n)
         The same of errors that the trials of one session share: of markers, which are placed anew for the next.
+    misread : ndarray, shape (n_errors, n)
+        What the latter do to the angle [rad], and so to the speed that the reflex is said to feel.
+    edge : int
+        Samples at each end that are not fitted: a low-pass knows one side of them only. A reflex still answers to their motion.
     """
 
     t: np.ndarray
@@ -66,6 +76,47 @@ class Stretch:
     coarser: Callable[[np.ndarray], np.ndarray] = field(repr=False)
     shared: np.ndarray = field(repr=False)
     placed: np.ndarray = field(repr=False)
+    misread: np.ndarray = field(repr=False)
+    edge: int = 0
+
+    @cached_property
+    def rests(self) -> tuple[slice, ...]:
+        """The samples of each rest; one that a swing shorter than `HELD` interrupts is one rest."""
+        still = np.flatnonzero(np.abs(self.fine_qd) < RESTING)
+        if not still.size:
+            return ()
+        parts = np.split(still, np.flatnonzero(np.diff(self.t[still]) > HELD) + 1)
+        return tuple(slice(own[0], own[-1] + 1) for own in parts)
+
+    @cached_property
+    def unknown(self) -> np.ndarray:
+        """An orthonormal basis of what nobody knows of a trial: its offset, and what dry friction holds at rest, (n_fitted, k).
+
+        That changes as the joint creeps: it has a level of its own every `HELD`.
+        """
+        held = []
+        for rest in self.rests:
+            part = ((self.t[rest] - self.t[rest.start]) / HELD).astype(int)
+            for k in np.unique(part):
+                column = np.zeros(len(self.t))
+                column[rest] = part == k
+                held.append(self.smooth(column))
+        basis, sizes, _ = np.linalg.svd(self.inner(np.column_stack([np.ones(len(self.t)), *held])), full_matrices=False)
+        return np.asarray(basis[:, sizes > _SLIGHT * sizes[0]])
+
+    def inner(self, values: np.ndarray) -> np.ndarray:
+        """Return the samples that are fitted."""
+        return values[self.edge : len(values) - self.edge]
+
+    def told(self, values: np.ndarray) -> np.ndarray:
+        """Return the samples that are fitted, (n,) or (n, m), less what nobody knows of the trial."""
+        inner = self.inner(values)
+        return np.asarray(inner - self.unknown @ (self.unknown.T @ inner))
+
+    def moved_by(self, error: np.ndarray) -> Stretch:
+        """Return the stretch with an error of the angle, (n,) [rad]."""
+        speed = np.gradient(error, self.t)
+        return replace(self, fine_q=self.fine_q + error, fine_qd=self.fine_qd + speed, qd=self.qd + self.smooth(speed))
 
 
 @dataclass(frozen=True)
@@ -155,11 +206,10 @@ class _Problem:
     def __init__(self, stretches: Sequence[Stretch]) -> None:
         self.stretches = list(stretches)
         self.middle = float(np.mean(np.concatenate([s.q for s in stretches])))
-        self.ends = np.cumsum([len(s.q) for s in stretches])[:-1]
-        self.linear = np.concatenate([_less_mean(_columns(s, self.middle)) for s in stretches])
-        self.moment = np.concatenate([_less_mean(s.moment) for s in stretches])
-        self.shared = np.concatenate([_less_mean(s.shared.T) for s in stretches])
-        self.placed = np.concatenate([_less_mean(s.placed.T) for s in stretches])
+        self.ends = np.cumsum([len(s.q) - 2 * s.edge for s in stretches])[:-1]
+        self.linear = np.concatenate([s.told(_columns(s, self.middle)) for s in stretches])
+        self.moment = np.concatenate([s.told(s.moment) for s in stretches])
+        self.shared = np.concatenate([s.told(s.shared.T) for s in stretches])
         self.basis = np.linalg.qr(self.linear)[0]
         self.rest = self.moment - self.basis @ (self.basis.T @ self.moment)
         self.total = float(self.rest @ self.rest)
@@ -167,7 +217,7 @@ class _Problem:
 
     def column(self, direction: int, shape: np.ndarray) -> np.ndarray:
         """Return what a reflex of gain 1 shows in all trials."""
-        return np.concatenate([_less_mean(drive(s, direction, shape)) for s in self.stretches])
+        return np.concatenate([s.told(drive(s, direction, shape)) for s in self.stretches])
 
     def gain(self, direction: int, shape: np.ndarray) -> tuple[float, float]:
         """Return the best gain, not below zero, and the sum of squares that it leaves."""
@@ -258,24 +308,29 @@ class _Problem:
         found = deviations(np.split(jacobian, self.ends), np.split(self.residual(direction, shape), self.ends))
         none = np.array([0.0, 1.0, 0.0, 0.0])[:, None] * np.ones(4 - free)
         scale = np.linalg.norm(jacobian, axis=0) + 1e-300
-        lost = self._lost(direction, shape)[:, None]
+        lost, placed = self._motion_errors(direction, shape)
         moved = (
             np.linalg.norm(np.linalg.lstsq(jacobian / scale, errors, rcond=None)[0], axis=1) / scale
-            for errors in (self.placed, np.column_stack([self.shared, lost]))
+            for errors in (placed, np.column_stack([self.shared, lost]))
         )
         known = np.array([*found, *moved])
         return np.concatenate([known[:, : 1 + free], none, known[:, 1 + free + ELASTIC : 3 + free + ELASTIC]], axis=1)
 
-    def _lost(self, direction: int, shape: np.ndarray) -> np.ndarray:
-        """Return what a coarser low-pass of the motion changes in reflex and dry friction [N m]."""
-        parts = []
+    def _motion_errors(self, direction: int, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a coarser low-pass of the motion changes, (n,), and what misplaced markers change, (n, n_errors) [N m]."""
         gain = self.gain(direction, shape)[0]
-        dry = np.linalg.lstsq(self.linear, self.moment - gain * self.column(direction, shape), rcond=None)[0][ELASTIC + 1]
+        linear = np.linalg.lstsq(self.linear, self.moment - gain * self.column(direction, shape), rcond=None)[0]
+        lost, placed = [], []
         for own in self.stretches:
             coarse = replace(own, fine_q=own.coarser(own.fine_q), fine_qd=own.coarser(own.fine_qd))
+            dry = linear[ELASTIC + 1]
             seen, told = (gain * drive(s, direction, shape) + dry * _dry(s) for s in (own, coarse))
-            parts.append(_less_mean(seen - told))
-        return np.concatenate(parts)
+            lost.append(own.told(seen - told))
+            own_law, *moved = (
+                _columns(s, self.middle) @ linear + gain * drive(s, direction, shape) for s in (own, *map(own.moved_by, own.misread))
+            )
+            placed.append(own.told(own.placed.T - np.array([law - own_law for law in moved]).T))
+        return np.concatenate(lost), np.concatenate(placed)
 
     def result(self, direction: int, shape: np.ndarray, free: int) -> Reflex:
         """Return what was found."""
@@ -293,24 +348,18 @@ class _Problem:
             Estimated(float(v), float(s), (float(max(v - w, low)), float(v + w)), unit, (float(max(v - h, low)), float(v + h)))
             for v, s, w, h, low, unit in zip(values, std, whole, half, least, units, strict=True)
         ]
-        split = slice(ELASTIC), slice(ELASTIC, ELASTIC + 2)
-        parts = (*(self.linear[:, own] @ linear[own] for own in split), gain * column)
-        elastic, resisting, reflex = (tuple(_from_start(p) for p in np.split(part, self.ends)) for part in parts)
+        told = [(_columns(s, self.middle), gain * drive(s, direction, shape)) for s in self.stretches]
         return Reflex(
             direction=direction,
             parameters=dict(zip(names[: 1 + free], numbers[: 1 + free], strict=True)),
             viscosity=numbers[5],
             dry=numbers[6],
             found=bool(values[0] - half[0] > 0.0),
-            elastic=elastic,
-            resisting=resisting,
-            reflex=reflex,
+            elastic=tuple(_from_start(c[:, :ELASTIC] @ linear[:ELASTIC]) for c, _ in told),
+            resisting=tuple(_from_start(c[:, ELASTIC : ELASTIC + 2] @ linear[ELASTIC : ELASTIC + 2]) for c, _ in told),
+            reflex=tuple(_from_start(late) for _, late in told),
             residual_rms=float(np.sqrt(np.mean(self.residual(direction, shape) ** 2))),
         )
-
-
-def _less_mean(values: np.ndarray) -> np.ndarray:
-    return values - values.mean(axis=0)
 
 
 def _from_start(values: np.ndarray) -> np.ndarray:
@@ -327,5 +376,8 @@ def _columns(stretch: Stretch, middle: float) -> np.ndarray:
 
 
 def _dry(stretch: Stretch) -> np.ndarray:
-    """Return what dry friction of 1 N m shows."""
-    return stretch.smooth(np.tanh(stretch.fine_qd / CREEP))
+    """Return what dry friction of 1 N m shows while the joint moves."""
+    signs = np.sign(stretch.fine_qd)
+    for rest in stretch.rests:
+        signs[rest] = 0.0
+    return stretch.smooth(signs)

@@ -97,6 +97,25 @@ def sensitivity(model: Model, q: np.ndarray, force: np.ndarray | None, deviation
     return np.array(rows)
 
 
+def angle_errors(model: Model, q: np.ndarray, deviations: Deviations, *, markers: bool) -> np.ndarray:
+    """Return what errors of one standard deviation do to the angles along a motion, shape (n_errors, n, n_joints) [rad].
+
+    A marker that sits beside its joint by `LENGTH_STD` along y or z turns the line to the next one by `(cos θ δz − sin θ δy) / length`,
+    θ the angle of the segment from +Y: it misreads speeds as well as angles. What the declared offset of an angle has beyond that is
+    constant.
+    """
+    absolute, n = np.cumsum(q, axis=1), model.n_joints
+    errors = np.zeros((3 * n, *q.shape))
+    for k, segment in enumerate(model.segments if markers else ()):
+        for row, turned in ((2 * k, -np.sin(absolute[:, k])), (2 * k + 1, np.cos(absolute[:, k]))):
+            errors[row, :, k] = turned * LENGTH_STD / segment.length
+            if k + 1 < n:
+                errors[row, :, k + 1] = -errors[row, :, k]
+    beyond = np.sqrt(np.maximum(deviations.angle**2 - np.sum(errors**2, axis=0).mean(axis=0), 0.0))
+    errors[2 * n :] = (beyond * np.eye(n))[:, None]
+    return errors
+
+
 def by_jacobian(parts: np.ndarray) -> np.ndarray:
     """Return standard deviations from derivatives times deviations, which stand along axis 0."""
     return np.sqrt(np.sum(parts**2, axis=0))

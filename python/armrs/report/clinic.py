@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import os
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from .. import checks
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import tomlfile
-from . import figures, html, pages, plotting
+from . import figures, html, pages, plotting, session_changes
 from .words import disturbance, is_synthetic, name
 
 
@@ -88,12 +89,11 @@ AS_ARMRS = (1.0, 0.0)
 """How an angle is counted: sign, and the angle of armrs that is called zero [deg]."""
 ANGLES = ("rest", "tonic")
 """Parameters that are angles."""
-NO_CHANGE = "no clear change"
 ZERO = "the first joint's from the horizontal, the others' from the straight line on, positive counter-clockwise with forward to the right"
 """How armrs counts angles, in words."""
-MOST_TRENDS = 9
-"""Plots over the sessions that find room on a page."""
-MOST_NOTES = 3
+MOST_TRENDS, PANEL, WIDEST = 6, (2.4, 1.55), 20
+"""Plots over the sessions that find room on a page, the size of one [inch], and the letters in a line above it."""
+MOST_NOTES = 2
 """Notes that find room on one page."""
 ANALYSED = ("identify", "passive", "gap", "spasticity")
 """Results of which a summary is made."""
@@ -195,6 +195,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
         found = [line for result in results for line in lines_of(result, norms)]
         joints = results[0]["data"]["joints"]
         lines = sorted(_once(found), key=lambda line: joints.index(line.joint))
+        trends = _trends(results, lines)
         page = {
             "name": name(results[0]),
             "synthetic": any(map(is_synthetic, results)),
@@ -202,14 +203,17 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "lines": lines,
             "words": [words_of(line) for line in lines],
             "estimates": estimates(lines, results),
+            "changes": session_changes.said(lines),
             "unusual": unusual(lines, results),
             "notes": [*_apart(found), *notes(results)],
             "since": max((c["dates"][-2] for r in results for c in r.get("history", ()) if len(c["dates"]) > 1), default=None),
             "not_measured": not_measured(results, lines),
             "next": next_steps(results, lines),
-            "trends": _trends(results),
+            "trends": trends,
             "sources": list(dict.fromkeys(line.norm.source for line in lines if line.norm is not None)),
-            "picture": _picture(lines, [*doubts(results)]),
+            # Plots over the sessions show the same intervals.
+            "picture": None if trends and not norms else _picture(lines, _intervals([*doubts(results)])),
+            "intervals": _intervals([*doubts(results)]),
             "made_by": results[0].get("made_by", {}),
         }
     except BadInput:
@@ -298,10 +302,9 @@ def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: M
     """Return what slow movements say of each joint, of the movement with an interval and with most repeats, which is known best."""
     lines = []
     for j, joint in enumerate(result["data"]["joints"], start=1):
-        own = [c for c in result["curves"] if c["joint"] == j and c.get("half_width_mean_Nm") is not None]
-        if not own:
+        curve = _best_known(result, j)
+        if curve is None:
             continue
-        curve = max(own, key=lambda c: (None not in (c.get("half_width_interval_Nm") or (None,)), c["repeats"]))
         for quantity in SLOW:
             course = courses.get((quantity.kind, f"{quantity.parameter} in {curve['configuration']}", j))
             if quantity is HALF_WIDTH:
@@ -320,14 +323,27 @@ def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: M
                 value, (low, high) = quantity.factor * found["value"], (quantity.factor * x for x in found["interval"])
             interval = None if low is None or high is None else (low, high)
             norm, none_seen = usual.get((quantity.kind, quantity.parameter, j)), quantity is HALF_WIDTH and low is not None and low <= 0.0
-            lines.append(Line(joint, quantity, value, interval, norm, _trend(course, quantity), none_seen))
+            # How far a joint was moved was chosen: that it differs is no change of the arm.
+            trend = None if quantity.parameter == "range" else _trend(course, quantity)
+            lines.append(Line(joint, quantity, value, interval, norm, trend, none_seen))
     return lines
+
+
+def _best_known(result: Mapping[str, Any], joint: int) -> Mapping[str, Any] | None:
+    """Return the curve of a joint from the movement with an interval and with most repeats."""
+    own = [c for c in result["curves"] if c["joint"] == joint and c.get("half_width_mean_Nm") is not None]
+    return max(own, key=lambda c: (None not in (c.get("half_width_interval_Nm") or (None,)), c["repeats"]), default=None)
 
 
 def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]], bare: bool) -> list[Line]:
     """Return the effects of joints that were found, in all trials and without an alternative."""
     lines = []
-    for effect in result["effects"]:
+    besides = [
+        {"kind": kind, "joint": found["joint"], "parameters": {name: found[key]}}
+        for found in result.get("besides", ())
+        for kind, name, key in (("viscous", "viscosity", "viscosity"), ("coulomb", "torque", "dry"))
+    ]
+    for effect in [*result["effects"], *besides]:
         if effect["joint"] is None or not effect.get("decided", True) or effect.get("trial"):
             continue
         for quantity in QUANTITIES:
@@ -369,13 +385,9 @@ def _trend(course: Mapping[str, Any] | None, quantity: Quantity, own: tuple[floa
     if course is None or len(course["dates"]) < 2 or course.get("since_last") is None or not math.isfinite(course["since_last"]):
         return None
     change, either_way = own[0] * quantity.factor * course["since_last"], quantity.factor * 1.96 * course["since_last_std"]
-    if not course["changed_since_last"]:
-        return f"{NO_CHANGE}: {_signed(change)} ± {_number(either_way)}"
-    return f"{'higher' if change > 0.0 else 'lower'} by {_number(abs(change))} ± {_number(either_way)}"
-
-
-def _signed(value: float) -> str:
-    return ("+" if value > 0.0 else "") + _number(value)
+    # The zero of an angle is a convention: a share of it means nothing.
+    before = None if quantity.parameter in ANGLES else quantity.factor * course["values"][-2]
+    return session_changes.trend(change, either_way, before, clear=course["changed_since_last"])
 
 
 def not_measured(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
@@ -390,26 +402,27 @@ def not_measured(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) ->
 def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
     """Return what would answer what is open."""
     said = []
-    unclear = [line for line in lines if line.trend is not None and line.trend.startswith(NO_CHANGE)]
+    unclear = [line for line in lines if line.trend is not None and line.trend.startswith(session_changes.NO_CHANGE)]
     if unclear:
         said.append(
             "Where no clear change is stated, a change smaller than the number behind ± could not have been seen. More repeats of each "
             "movement make that number smaller: four times the repeats halve it."
         )
-    if any(line.trend is not None and line.trend.startswith(("higher", "lower")) for line in lines):
+    if any(line.trend is not None and line.trend.startswith(session_changes.CLEAR) for line in lines):
         said.append("Repeat the session within days before acting on a change: strapping and posture differ from day to day.")
     if lines and all(line.trend is None for line in lines):
         said.append("Keep the sessions of this person in one file (--history FILE): the next page then says what changed.")
     return said
 
 
-def _trends(results: Sequence[Mapping[str, Any]]) -> html.Picture | None:
-    """Draw what is followed over the sessions, where there are several."""
-    known = followed(results)[:MOST_TRENDS]
+def _trends(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> html.Picture | None:
+    """Draw what the table has over the sessions, where there are several."""
+    listed = [f"{line.joint}: {line.quantity.title.lower()}" for line in lines]
+    known = sorted((c for c in followed(results) if c["name"] in listed), key=lambda c: not c["changed"])[:MOST_TRENDS]
     if not known:
         return None
     with plotting.style():
-        drawn = figures.history(known)["history"]()
+        drawn = figures.history([c | {"name": textwrap.fill(c["name"], WIDEST)} for c in known], PANEL)["history"]()
         image = io.BytesIO()
         plotting.write_png(drawn.figure, image)
     return html.Picture("trends.png", drawn.title, drawn.text, html.data_uri(image.getvalue()))
@@ -423,13 +436,16 @@ def followed(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         for course in result.get("history", ()):
             parameter, _, movement = str(course["name"]).partition(" in ")
             quantity = by_name.get((course["kind"], parameter))
-            if quantity is None or len(course["dates"]) < 2:
+            if quantity is None or parameter == "range" or len(course["dates"]) < 2:
+                continue
+            if movement and movement != (_best_known(result, course["joint"]) or {}).get("configuration"):
                 continue
             own = counted(result, course["joint"], quantity)
-            said = f"{result['data']['joints'][course['joint'] - 1]}: {quantity.title.lower()}{movement and f', {movement}'}"
+            said = f"{result['data']['joints'][course['joint'] - 1]}: {quantity.title.lower()}"
             values = [_in_unit(value, quantity, own) for value in course["values"]]
             stds = [quantity.factor * std for std in course["stds"]]
-            found.append({**course, "name": said, "joint": None, "unit": quantity.unit, "values": values, "stds": stds})
+            drawn = {"name": said, "joint": None, "unit": quantity.unit, "values": values, "stds": stds}
+            found.append({**course, **drawn, "changed": course["changed_since_last"]})
     return found
 
 
@@ -469,7 +485,7 @@ def words_of(line: Line) -> list[str]:
 
 
 def unusual(lines: Sequence[Line], results: Sequence[Mapping[str, Any]] = ()) -> list[str]:
-    """Return what is outside of what is usual, what changed, and whether something acts that has no name, in plain words."""
+    """Return what is outside of what is usual, and whether something acts that has no name, in plain words."""
     said = []
     if any(result.get("verb") == "gap" and result.get("verdict") == "unexplained" for result in results):
         said.append("Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it.")
@@ -477,11 +493,8 @@ def unusual(lines: Sequence[Line], results: Sequence[Mapping[str, Any]] = ()) ->
         if result.get("verb") == "gap":
             said += found(result)
     for line in lines:
-        title = f"{line.joint}: {line.quantity.title.lower()}"
         if line.beside_norm in ("below", "above"):
-            said.append(f"{title} is {line.beside_norm} the usual range.")
-        if line.trend is not None and line.trend.startswith(("higher", "lower")):
-            said.append(f"{title} is {line.trend} {line.quantity.unit} than in the session before.")
+            said.append(f"{line.joint}: {line.quantity.title.lower()} is {line.beside_norm} the usual range.")
     return said
 
 
@@ -536,7 +549,13 @@ def _is_dry(kind: str) -> bool:
     return known is not None and known.family == "dry"
 
 
-def _picture(lines: Sequence[Line], doubted: Sequence[str]) -> html.Picture | None:
+def _intervals(doubted: Sequence[str]) -> str:
+    """Return what intervals claim."""
+    beside = f"; here they may be too narrow: {'; '.join(dict.fromkeys(doubted))}" if doubted else ""
+    return f"95 % intervals. They hold where the joint behaves as a spring with resistance and friction{beside}."
+
+
+def _picture(lines: Sequence[Line], intervals: str) -> html.Picture | None:
     """Draw every quantity with its interval, one panel each, the usual range behind."""
     # How far a joint was moved was chosen: the table says it.
     shown = [
@@ -574,7 +593,5 @@ def _picture(lines: Sequence[Line], doubted: Sequence[str]) -> html.Picture | No
         image = io.BytesIO()
         plotting.write_png(figure, image)
     grey = " The grey bar is what is usual." if any(line.norm for line in lines) else ""
-    sure = "The lines are 95 % intervals. They hold where the joint behaves as a spring with resistance and friction"
-    beside = f"; here they may be too narrow: {'; '.join(dict.fromkeys(doubted))}" if doubted else ""
-    text = f"Points are what was measured. {sure}{beside}.{grey}"
+    text = f"Points are what was measured. The lines are {intervals}{grey}"
     return html.Picture("summary.png", "Each joint", text, html.data_uri(image.getvalue()))

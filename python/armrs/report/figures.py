@@ -124,15 +124,15 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
     return Drawn("parameters", "Parameters with intervals", text, figure)
 
 
-def history(courses: Sequence[Mapping[str, Any]]) -> Figures:
-    """Return the figure of a history; nothing where no parameter was followed over two sessions."""
-    return {"history": partial(_history, courses)} if any(len(c["dates"]) > 1 for c in courses) else {}
+def history(courses: Sequence[Mapping[str, Any]], panel: tuple[float, float] = (3.6, 2.4)) -> Figures:
+    """Return the figure of a history, each panel of a size [inch]; nothing where no parameter was followed over two sessions."""
+    return {"history": partial(_history, courses, panel)} if any(len(c["dates"]) > 1 for c in courses) else {}
 
 
-def _history(courses: Sequence[Mapping[str, Any]]) -> Drawn:
+def _history(courses: Sequence[Mapping[str, Any]], panel: tuple[float, float]) -> Drawn:
     """Draw every parameter over sessions, with twice its standard deviation."""
     rows, columns = plotting.grid(len(courses))
-    figure = plotting.figure(3.6 * columns, 2.4 * rows)
+    figure = plotting.figure(panel[0] * columns, panel[1] * rows)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, course in zip(axes, courses, strict=False):
         place = np.arange(len(course["dates"]))

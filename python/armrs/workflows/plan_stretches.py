@@ -120,4 +120,4 @@ def _stretch(movement: Movement, joint: int, rate: float) -> Stretch:
         qd += way / lasts * 30.0 * (s * (1.0 - s)) ** 2
         qdd += way / lasts**2 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
     smooth, none = low_pass(rate, min(DEFAULT_CUTOFF, 0.4 * rate)), np.zeros((0, len(t)))
-    return Stretch(t, q, qd, qdd, np.zeros(len(t)), q, qd, smooth, smooth, none, none)
+    return Stretch(t, q, qd, qdd, np.zeros(len(t)), q, qd, smooth, smooth, none, none, none)

@@ -14,12 +14,13 @@ from .. import _armrs, checks
 from ..analysis import stretches
 from ..analysis.robot_motion import with_robot_motion
 from ..analysis.stretches import Reflex, Stretch
-from ..analysis.uncertainty import Deviations, sensitivity
+from ..analysis.uncertainty import Deviations, angle_errors, sensitivity
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
 from ..io.muscle_activity import co_contraction, onset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import Trial
+from ..model import Model
 from ..tabular import Tabular, Tidy
 from ..telling import telling
 from .identify import Estimate
@@ -33,6 +34,8 @@ FINER_WITH_ROBOT = 10.0
 """The same where the angles of the robot say the fast motion: they have little noise (`armrs.analysis.robot_motion`)."""
 FINEST = 25.0
 """Samples that are looked at in each period of the cutoff: those of the finer motion are not to be lost."""
+EDGE = 1.0
+"""Periods of the cutoff at both ends of a trial that are not fitted: the low-pass knows one side of them only."""
 LEAST_SPEEDS = 1.5
 """The fastest stretch must be faster than the slowest by this factor before a reflex can be told from viscosity."""
 FELT = 0.1
@@ -254,12 +257,27 @@ def _stretch(dataset: Dataset, moments: TrialMoments, joint: int, cutoff: float,
     t, q, qd, qdd, moment, fine_q, fine_qd = (values[::every] for values in (t, q, qd, qdd, moment, fine_q, fine_qd))
     force = None if moments.force is None else moments.force[there][::every]
     model, smooth = dataset.model_of(moments.trial.configuration), low_pass(rate / every, cutoff)
-    errors = sensitivity(model, moments.q[there][::every], force, Deviations.of(dataset))[:, :, joint]
-    n, seen = dataset.model.n_joints, np.array([smooth(e) for e in errors])
+    size, motion = Deviations.of(dataset), moments.q[there][::every]
+    errors = sensitivity(model, motion, force, size)[:, :, joint]
     # As `Deviations.vector` orders them: lengths and angles are those of the markers.
-    shared, placed = np.concatenate([seen[: 2 * n], seen[4 * n :]]), seen[2 * n : 4 * n]
+    n = dataset.model.n_joints
+    shared = np.array([smooth(e) for e in (*errors[: 2 * n], *errors[4 * n :])])
+    # A dynamometer reads the angle at its axis, without markers.
+    turned = angle_errors(model, motion, size, markers=force is not None)
+    still = [_moment(model, t, motion + error, force)[:, joint] for error in (np.zeros_like(motion), *turned)]
+    placed = np.array([smooth(e) for e in (*errors[2 * n : 3 * n], *(seen - still[0] for seen in still[1:]))])
+    misread = np.concatenate([np.zeros((n, len(t))), turned[:, :, joint]])
     coarser = low_pass(rate / every, 0.5 * fine)
-    return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, smooth, coarser, shared, placed)
+    edge = min(round(EDGE * rate / (every * cutoff)), (len(t) - 3) // 2)
+    return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, smooth, coarser, shared, placed, misread, edge)
+
+
+def _moment(model: Model, t: np.ndarray, q: np.ndarray, force: np.ndarray | None) -> np.ndarray:
+    """Return the moments with which joints resist along a motion, (n, n_joints) [N m]."""
+    qd = np.gradient(q, t, axis=0)
+    chain = _armrs.Arm.from_model(model)
+    torque = -chain.inverse_dynamics(q, qd, np.gradient(qd, t, axis=0))
+    return np.asarray(torque if force is None else torque + chain.static_torque(q, force))
 
 
 def low_pass(rate: float, cutoff: float) -> Callable[[np.ndarray], np.ndarray]:

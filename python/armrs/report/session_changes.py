@@ -1,0 +1,71 @@
+"""What changed between sessions, in the words of a page for a clinician: how much, and how sure that is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+NO_CHANGE = "no clear change"
+CLEAR = ("higher", "lower")
+"""How the words of a clear change begin."""
+SURE = "How sure: where nothing changed, each analysis calls something changed in 1 of 20 sessions."
+
+
+class Titled(Protocol):
+    """A quantity with a name and a unit."""
+
+    @property
+    def title(self) -> str:
+        """For people."""
+
+    @property
+    def unit(self) -> str:
+        """Of the value."""
+
+
+class Row(Protocol):
+    """A quantity of one joint with what its trend says."""
+
+    @property
+    def joint(self) -> str:
+        """Name."""
+
+    @property
+    def quantity(self) -> Titled:
+        """What it is."""
+
+    @property
+    def trend(self) -> str | None:
+        """As `trend` says it."""
+
+
+def trend(change: float, either_way: float, before: float | None, *, clear: bool) -> str:
+    """Say a change: by how much, both with the digits of its uncertainty, and as a share of `before`, where that means something."""
+    size = either_way if either_way > 0.0 and math.isfinite(either_way) else abs(change)
+    decimals = max(1 - math.floor(math.log10(size)), 0) if size > 0.0 else 0
+    width = f"{either_way:.{decimals}f}"
+    if not clear:
+        return f"{NO_CHANGE}: {change:+.{decimals}f} ± {width}".replace("-", "−")
+    share = f" ({change / abs(before):+.0%})".replace("%", " %").replace("-", "−") if before else ""
+    return f"{'higher' if change > 0.0 else 'lower'} by {abs(change):.{decimals}f} ± {width}{share}"
+
+
+def said(rows: Sequence[Row]) -> list[str]:
+    """Return what changed since the session before, what did not, and how sure that is; nothing without a session before."""
+    followed = [row for row in rows if row.trend is not None]
+    clear = [row for row in followed if row.trend and row.trend.startswith(CLEAR)]
+    lines = [f"{row.joint}: {row.quantity.title.lower()} is {_with_unit(row)}." for row in clear]
+    same: dict[str, list[str]] = {}
+    for row in followed:
+        if row not in clear:
+            same.setdefault(row.joint, []).append(row.quantity.title.lower())
+    if clear:
+        lines.append(SURE)
+    unclear = "; ".join(f"{joint} ({', '.join(own)})" for joint, own in same.items())
+    return [*lines, *([f"No clear change: {unclear}."] if same else [])]
+
+
+def _with_unit(row: Row) -> str:
+    told, _, share = str(row.trend).partition(" (")
+    return f"{told} {row.quantity.unit}{share and f' ({share}'}"
