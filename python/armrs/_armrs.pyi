@@ -84,6 +84,7 @@ __all__ = [
     "fit_by_simulation",
     "forecast",
     "identify",
+    "interact",
     "literature",
     "load_model",
     "look",
