@@ -109,7 +109,12 @@ class Log:
         q = self.q - np.array(told["angle_offset"])
         if self.force_on_arm is None and self.moment_on_arm is None:
             return replace(self, q=q)
-        hand = (self.hand - np.array(told["force_offset"])) @ np.linalg.inv(np.array(told["force"])).T
+        offset, gains = np.array(told["force_offset"]), np.array(told["force"])
+        if not offset.any() and np.array_equal(gains, np.eye(len(gains))):
+            return replace(self, q=q)
+        # A sample that is not finite stays one: the estimator refuses it.
+        with np.errstate(invalid="ignore"):
+            hand = (self.hand - offset) @ np.linalg.inv(gains).T
         return replace(self, q=q, force_on_arm=hand[:, :2], moment_on_arm=None if self.moment_on_arm is None else hand[:, 2])
 
     def places(self, period: float) -> np.ndarray:

@@ -3,8 +3,6 @@
 //! A change of the rig, an effect or the handle's path leaves a torque over in the equation of motion of the run. The arm answers it as a
 //! linear system with coefficients that follow the run. A hundred candidates cost less than one simulation each.
 
-use std::sync::OnceLock;
-
 use arm_core::effect::{Effect, dry_friction, resisting_besides_dry};
 use arm_core::{Joints, Plane};
 use arm_sim::SimulationError;
@@ -13,29 +11,8 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, smooth};
 use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
+use crate::sensitivity::origin::Origin;
 use crate::sensitivity::plant::{Balance, Hand, Plant, balance, hands};
-
-/// A hypothesis from which changes are told: that of the run, or one beside it.
-pub struct Origin<const N: usize> {
-    pub(super) plant: Plant<N>,
-    /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
-    start: (Joints<f64, N>, Joints<f64, N>),
-    /// What its sensors read of the motion of the run.
-    pub(super) shown: Channels,
-    /// What it says of the motion of the run, where that was asked.
-    balances: OnceLock<Vec<Balance<N>>>,
-}
-
-impl<const N: usize> Origin<N> {
-    pub(super) fn of(plant: Plant<N>, start: (Joints<f64, N>, Joints<f64, N>)) -> Self {
-        Self {
-            plant,
-            start,
-            shown: Channels::new(),
-            balances: OnceLock::new(),
-        }
-    }
-}
 
 /// A change of a hypothesis whose response is asked.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@ use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
 use crate::measurement_model::start::held_at_start;
-use crate::sensitivity::linear_response::Origin;
+use crate::sensitivity::origin::Origin;
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;
 

@@ -6,6 +6,7 @@ pub mod linearization_point;
 pub mod linearized_run;
 mod newton;
 pub mod normal_equations;
+mod origin;
 mod plant;
 pub mod response;
 pub(crate) mod rows;

@@ -1,0 +1,30 @@
+//! The hypothesis from which small changes are told.
+
+use std::sync::OnceLock;
+
+use arm_core::Joints;
+
+use crate::measurement_model::prediction::Channels;
+use crate::sensitivity::plant::{Balance, Plant};
+
+/// A hypothesis from which changes are told: that of the run, or one beside it.
+pub struct Origin<const N: usize> {
+    pub(super) plant: Plant<N>,
+    /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
+    pub(super) start: (Joints<f64, N>, Joints<f64, N>),
+    /// What its sensors read of the motion of the run.
+    pub(super) shown: Channels,
+    /// What it says of the motion of the run, where that was asked.
+    pub(super) balances: OnceLock<Vec<Balance<N>>>,
+}
+
+impl<const N: usize> Origin<N> {
+    pub(super) fn of(plant: Plant<N>, start: (Joints<f64, N>, Joints<f64, N>)) -> Self {
+        Self {
+            plant,
+            start,
+            shown: Channels::new(),
+            balances: OnceLock::new(),
+        }
+    }
+}
