@@ -15,6 +15,7 @@ use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
+use crate::sensitivity::origin::Origin;
 use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::Rows;
 
@@ -203,52 +204,34 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.each_response(point, changes).into_iter().collect()
     }
 
-    /// The same for changes of a hypothesis away from the anchor, along the runs of the anchor.
-    ///
-    /// # Errors
-    /// [`GapError::Simulation`] where the hypothesis or a change is not possible.
-    fn responses_beside(
-        &self,
-        point: &LinearizationPoint<N>,
-        hypothesis: &Hypothesis<N>,
-        changes: &[Change<N>],
-    ) -> Result<Vec<Response>, GapError> {
-        let failed = |group: usize| {
-            let trial = self.references[group];
-            move |source| GapError::Simulation { trial, source }
-        };
-        let groups = self.references.len();
-        let origin = |group: usize| point.lines[group].origin(hypothesis).map_err(failed(group));
-        let origins = self.parallel(groups, origin);
-        let origins = origins.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let one = |job: usize| {
-            let (change, group) = (&changes[job / groups], job % groups);
-            let response = point.lines[group].response_from(&origins[group], change);
-            response.map_err(failed(group))
-        };
-        let all = self.parallel(changes.len() * groups, one);
-        let mut all = all.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter();
-        let each = changes
-            .iter()
-            .map(|_| Response(all.by_ref().take(groups).collect()));
-        Ok(each.collect())
-    }
-
     /// The same, where some of the changes may not be possible.
     pub fn each_response(
         &self,
         point: &LinearizationPoint<N>,
         changes: &[Change<N>],
     ) -> Vec<Result<Response, GapError>> {
+        self.each_response_from(point, (&[], &point.shown), changes)
+    }
+
+    /// The same for changes of another hypothesis, along the runs of the anchor.
+    ///
+    /// * `origins`, `base` - that hypothesis beside each run, or nothing for the anchor's own; and where torques are compared, what it shows
+    fn each_response_from(
+        &self,
+        point: &LinearizationPoint<N>,
+        (origins, base): (&[Origin<N>], &[Channels]),
+        changes: &[Change<N>],
+    ) -> Vec<Result<Response, GapError>> {
         let groups = self.references.len();
         let one = |job: usize| {
             let (change, group) = (&changes[job / groups], job % groups);
             let trial = self.references[group];
-            let response = match point.lines.get(group) {
-                Some(line) => line.response(change),
-                None => self
+            let response = match (point.lines.get(group), origins.get(group)) {
+                (Some(line), Some(origin)) => line.response_from(origin, change),
+                (Some(line), None) => line.response(change),
+                (None, _) => self
                     .follow(point, &change.changed, (group, &self.courses[trial]))
-                    .map(|shown| slope(&shown, &point.shown[group], change.size)),
+                    .map(|shown| slope(&shown, &base[group], change.size)),
             };
             response.map_err(|source| GapError::Simulation { trial, source })
         };
@@ -292,32 +275,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if *hypothesis == point.hypothesis || coordinates.is_empty() {
             return self.responses_to(point, coordinates);
         }
-        if point.lines.is_empty() {
-            return self.responses_one_by_one(point, hypothesis, coordinates);
-        }
         let each = coordinates.iter();
         let changes: Vec<_> = each.map(|c| self.nudged(hypothesis, c)).collect();
-        self.responses_beside(point, hypothesis, &changes)
-    }
-
-    /// The same, each computed by itself.
-    ///
-    /// # Errors
-    /// As [`PreparedSession::residuals`].
-    fn responses_one_by_one(
-        &self,
-        point: &LinearizationPoint<N>,
-        hypothesis: &Hypothesis<N>,
-        coordinates: &[Coordinate],
-    ) -> Result<Vec<Response>, GapError> {
-        let base = self.shown(point, hypothesis)?;
-        let one = |c: &Coordinate| {
-            let change = self.nudged(hypothesis, c);
-            let shown = self.shown(point, &change.changed)?;
-            let each = std::iter::zip(&shown, &base).map(|(a, b)| slope(a, b, change.size));
-            Ok(Response(each.collect()))
+        let origin = |group: usize| {
+            let (line, trial) = (&point.lines[group], self.references[group]);
+            let origin = line.origin(hypothesis);
+            origin.map_err(|source| GapError::Simulation { trial, source })
         };
-        coordinates.iter().map(one).collect()
+        let origins = self.parallel(point.lines.len(), origin);
+        let origins = origins.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let base = match point.lines.is_empty() {
+            true => self.shown(point, hypothesis)?,
+            false => Vec::new(),
+        };
+        let all = self.each_response_from(point, (&origins, &base), &changes);
+        all.into_iter().collect()
     }
 
     /// A hypothesis with one number changed a little.
