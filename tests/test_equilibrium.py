@@ -114,6 +114,36 @@ def test_an_arm_with_dry_friction_stays_in_mujoco_where_it_rests() -> None:
     assert held >= 4
 
 
+def test_what_friction_cannot_hold_slides_in_mujoco_to_where_it_can() -> None:
+    """From where the other joints rest: how they come there would move the dry one as well."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install mujoco")
+    rng = np.random.default_rng(20261126)
+    springs = ((0.0, 0.0), (0.0, 0.0), (1.2, 0.2))
+
+    def resting(friction: float, near: np.ndarray, handle: tuple[float, float]) -> np.ndarray:
+        dry = (Effect("coulomb", joint=3, parameters={"torque": friction, "smoothing": 0.0}),)
+        return angles(Slave(arm(3, springs).replace(effects=dry), port="motion", start=near, rest=True, handle=handle))
+
+    slid = 0
+    for _ in range(12):
+        q = np.array([-1.0, 1.0, 0.3]) + rng.uniform(-0.3, 0.3, 3) + (0.0, 0.0, rng.uniform(-0.5, 0.5))
+        at, lengths = np.cumsum(q), np.array([link[0] for link in LINKS])
+        handle = (float(lengths @ np.cos(at)), float(lengths @ np.sin(at)))
+        near = resting(50.0, q, handle)
+        assert near[2] == q[2]
+        rest = resting(0.3, near, handle)
+        model = world(3, springs, 'damping="2"', handle)
+        model.dof_frictionloss[2] = 0.3
+        # As hard as its solver has it, MuJoCo's friction creeps by half a milliradian meanwhile.
+        model.dof_solref[2], model.dof_solimp[2] = (0.001, 1.0), (0.99999, 0.99999, 0.001, 0.5, 2.0)
+        data = mujoco.MjData(model)
+        data.qpos[:] = near
+        mujoco.mj_step(model, data, nstep=2600)
+        np.testing.assert_allclose(rest, data.qpos, rtol=0.0, atol=2e-3)
+        slid += abs(rest[2] - near[2]) > 0.01
+    assert 4 <= slid < 12
+
+
 @pytest.mark.parametrize("start", ["-60,50", "-60,80", "-45,45", "-90,90", "-10,-20"])
 def test_the_example_hangs_from_every_start_near(start: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     example = Path(__file__).parents[1] / "examples" / "cosim" / "arm.toml"

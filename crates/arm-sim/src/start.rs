@@ -42,11 +42,22 @@ pub(crate) fn given<const N: usize>(
     Ok((state.q, state.qd))
 }
 
+/// What dry friction does in a joint at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Friction {
+    /// It resists nothing, as if the joint was shaken.
+    Shaken,
+    /// It holds the joint where that was given.
+    Holds,
+    /// It could not, and the joint slid, against all that it resists with, until it could: by the sign of the torque that pulled.
+    Slides(f64),
+}
+
 /// The static equilibrium to which an arm comes from given angles: `G + R = τ + Jᵀ F` at rest, and stable.
 ///
 /// Dry friction can hold a joint in a whole range of angles. What the handle leaves free, the last joints first, stays where it
-/// was given if its friction can hold it there; the other joints come to rest as if shaken, where they need no friction. Where
-/// that is nowhere, as few joints as possible are held by friction.
+/// was given if its friction can hold it there, and else slides until it can; the other joints come to rest as if shaken, where they
+/// need no friction. Where that is nowhere, as few joints as possible are held by friction.
 ///
 /// # Errors
 /// [`SimulationError::NoEquilibrium`] where there is none within half a turn of each angle.
@@ -74,40 +85,65 @@ fn nearest<const N: usize>(
     input: &Input<f64, N>,
     near: &Joints<f64, N>,
 ) -> Result<Joints<f64, N>, SimulationError> {
-    let shaken = |held: &[bool; N]| {
-        let x = settled(model, input, (near, held))?;
-        Ok((
-            holds(model, input, (&x, held)),
-            Joints::from_fn(|i, _| x[i]),
-        ))
-    };
     let led = matches!(model.link, Link::Compliant(_) | Link::Rigid);
     let dry = (0..N).filter(|&j| model.dry[j]).count();
     let free = if led { N.saturating_sub(2) } else { N };
     for count in (1..=dry.min(free)).rev() {
-        let mut held = [false; N];
+        let mut friction = [Friction::Shaken; N];
         for joint in (0..N).rev().filter(|&j| model.dry[j]).take(count) {
-            held[joint] = true;
+            friction[joint] = Friction::Holds;
         }
-        if let Ok((true, q)) = shaken(&held) {
+        if let Some(q) = slid(model, input, near, friction) {
             return Ok(q);
         }
     }
-    let found: Result<_, SimulationError> = shaken(&[false; N]).map(|(_, q)| q);
+    let angles = |x: Vec<f64>| Joints::from_fn(|i, _| x[i]);
+    let found = settled(model, input, (near, &[Friction::Shaken; N])).map(angles);
     if found.is_ok() {
         return found;
     }
-    let mut choices: Vec<[bool; N]> = (1..1_usize << N)
-        .map(|code| core::array::from_fn(|j| code >> (N - 1 - j) & 1 == 1))
-        .filter(|held: &[bool; N]| (0..N).all(|j| model.dry[j] || !held[j]))
+    let mut choices: Vec<[Friction; N]> = (1..1_usize << N)
+        .map(|code| {
+            core::array::from_fn(|j| match code >> (N - 1 - j) & 1 {
+                1 => Friction::Holds,
+                _ => Friction::Shaken,
+            })
+        })
+        .filter(|held: &[Friction; N]| (0..N).all(|j| model.dry[j] || held[j] == Friction::Shaken))
         .collect();
-    choices.sort_by_key(|held| held.iter().filter(|&&h| h).count());
+    choices.sort_by_key(|held| held.iter().filter(|&&h| h == Friction::Holds).count());
     for held in &choices {
-        if let Ok((true, q)) = shaken(held) {
-            return Ok(q);
+        if let Ok(x) = settled(model, input, (near, held))
+            && beyond_friction(model, input, (&x, held)).is_empty()
+        {
+            return Ok(angles(x));
         }
     }
     found
+}
+
+/// The equilibrium in which the joints that friction is to hold stay where they are, or slide until it holds them; `None` where there is
+/// none, or where one slid against what pulled it.
+fn slid<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    near: &Joints<f64, N>,
+    mut friction: [Friction; N],
+) -> Option<Joints<f64, N>> {
+    loop {
+        let x = settled(model, input, (near, &friction)).ok()?;
+        let beyond = beyond_friction(model, input, (&x, &friction));
+        if beyond.is_empty() {
+            let along = |j: usize| match friction[j] {
+                Friction::Slides(pull) => (x[j] - near[j]) * pull >= 0.0,
+                _ => true,
+            };
+            return (0..N).all(along).then(|| Joints::from_fn(|i, _| x[i]));
+        }
+        for (joint, pull) in beyond {
+            friction[joint] = Friction::Slides(pull);
+        }
+    }
 }
 
 /// Speeds with which an arm on a heaving base keeps its tip at the handle, with the least energy of motion; none where the base stands still.
@@ -125,26 +161,34 @@ pub(crate) fn following<const N: usize>(
     constraint.response(constraint.force(input.handle.velocity))
 }
 
-/// Whether dry friction can hold what it has to hold.
-fn holds<const N: usize>(
+/// The joints that friction is to hold and cannot, with the sign of the torque that pulls each.
+fn beyond_friction<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
-    (x, held): (&[f64], &[bool; N]),
-) -> bool {
-    if !held.contains(&true) {
-        return true;
+    (x, friction): (&[f64], &[Friction; N]),
+) -> Vec<(usize, f64)> {
+    if !friction.contains(&Friction::Holds) {
+        return Vec::new();
     }
+    let (most, left) = (most_friction(model, input, x), imbalance(model, input, x));
+    (0..N)
+        .filter(|&j| friction[j] == Friction::Holds && left[j].abs() > most[j])
+        .map(|j| (j, -left[j].signum()))
+        .collect()
+}
+
+/// What dry friction resists with at most in each joint \[N m\].
+fn most_friction<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    x: &[f64],
+) -> [f64; N] {
     let (q, rest) = (Joints::from_fn(|i, _| x[i]), Joints::<f64, N>::zeros());
     let force = force(model, input, x);
     let through = model.through_joints(&Pose::new(&q), (&rest, &rest), (force, input));
     let motion = Motion::new(0.0, q, rest).with_joint_force(&through);
-    let most = dry_friction(
-        &model.effects,
-        &motion,
-        &vec![[0.0; MAX_STATES]; model.effects.len()],
-    );
-    let needed = imbalance(model, input, x);
-    (0..N).all(|j| !held[j] || needed[j].abs() <= most[j])
+    let memory = vec![[0.0; MAX_STATES]; model.effects.len()];
+    dry_friction(&model.effects, &motion, &memory)
 }
 
 /// The equilibrium of the joints that friction does not hold where they are given.
@@ -154,9 +198,9 @@ fn holds<const N: usize>(
 fn settled<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
-    (near, held): (&Joints<f64, N>, &[bool; N]),
+    (near, friction): (&Joints<f64, N>, &[Friction; N]),
 ) -> Result<Vec<f64>, SimulationError> {
-    let found = balanced(model, input, (near, held));
+    let found = balanced(model, input, (near, friction));
     let Link::Compliant(contact) = &model.link else {
         return found;
     };
@@ -172,7 +216,7 @@ fn settled<const N: usize>(
     );
     let mut closed = model.clone();
     closed.link = Link::Compliant(tight);
-    let x = balanced(&closed, input, (near, held))?;
+    let x = balanced(&closed, input, (near, friction))?;
     let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
     let stretch = gap(model, input, &q);
     let back = [0, 1].map(|axis| -play[axis].copysign(stretch[axis]));
@@ -194,7 +238,7 @@ fn settled<const N: usize>(
     } else {
         back.map(|b| b / (yy + zz))
     };
-    balanced(model, input, (&(q + along_y * y + along_z * z), held))
+    balanced(model, input, (&(q + along_y * y + along_z * z), friction))
 }
 
 /// The equilibrium to which the joints come that are not held: the angles, and the force of a rigid coupling.
@@ -203,8 +247,9 @@ fn settled<const N: usize>(
 fn balanced<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
-    (near, held): (&Joints<f64, N>, &[bool; N]),
+    (near, friction): (&Joints<f64, N>, &[Friction; N]),
 ) -> Result<Vec<f64>, SimulationError> {
+    let held = &friction.map(|f| f == Friction::Holds);
     let mut x: Vec<f64> = near.iter().copied().collect();
     if matches!(model.link, Link::Rigid) {
         x.extend([0.0; 2]);
@@ -215,8 +260,17 @@ fn balanced<const N: usize>(
     };
     let residual = |x: &[f64]| {
         let mut r = imbalance(model, input, x);
-        for joint in (0..N).filter(|&j| held[j]) {
-            r[joint] = x[joint] - near[joint];
+        let slides = |f: &Friction| matches!(f, Friction::Slides(_));
+        let most = match friction.iter().any(slides) {
+            true => most_friction(model, input, x),
+            false => [0.0; N],
+        };
+        for joint in 0..N {
+            match friction[joint] {
+                Friction::Shaken => {}
+                Friction::Holds => r[joint] = x[joint] - near[joint],
+                Friction::Slides(pull) => r[joint] += pull * most[joint],
+            }
         }
         r
     };

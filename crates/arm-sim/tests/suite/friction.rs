@@ -345,3 +345,25 @@ fn judged<const N: usize>(seed: u64) -> (u64, String, Option<(f64, f64)>, f64) {
         }
     }
 }
+
+/// Its weight pulls with 9.81 · 0.2 · cos q N m, level with more than 1.2 N m of friction hold: it slides down to where these hold it, from
+/// either side, and one that they can hold stays.
+#[test]
+fn a_start_at_rest_beyond_what_friction_holds_is_where_it_first_holds() {
+    let rest = |from: f64| {
+        let mut experiment = free(1.2, 0.0);
+        experiment.setup.gravity = [0.0, -9.81];
+        experiment.start = Start::Equilibrium {
+            near: [from].into(),
+        };
+        let r = run(&experiment);
+        let end = r.len() - 1;
+        assert!((r.q[end] - r.q[0]).abs() < 1e-9, "it stays there");
+        r.q[0]
+    };
+    let edge = libm::acos(1.2 / (9.81 * 0.2));
+    let down = -core::f64::consts::FRAC_PI_2;
+    assert!((rest(0.2) + edge).abs() < 1e-9);
+    assert!((rest(2.0 * down - 0.2) - (2.0 * down + edge)).abs() < 1e-9);
+    assert_eq!(rest(down + 0.3), down + 0.3);
+}
