@@ -7,7 +7,8 @@ import pytest
 
 import armrs
 from armrs.io.dataset import Dataset
-from armrs.workflows.gap.between_samples import unresolved
+from armrs.workflows.gap.between_samples import unresolved, unresolved_movements
+from armrs.workflows.gap.core_input import core_settings
 from armrs.workflows.gap.suspicion import examine
 from gap_sessions import session
 
@@ -37,6 +38,17 @@ def test_a_movement_with_jolts_is_named() -> None:
     assert line.count("where repeats differ by") == 1
     assert f"the force in {first!r} (by " in line and "record the robot at a higher rate" in line
     assert line in examine(jolted(data, {first}, 1e-3), True)
+
+
+def test_samples_of_a_movement_with_jolts_weigh_less() -> None:
+    data = session()
+    first = data.trials[0].configuration
+    jolting = jolted(data, {first}, 1e-3)
+    [(missed, differ)] = unresolved_movements(jolting).values()
+    weights = {t.configuration: w for t, w in zip(jolting.trials, core_settings(jolting, True, 1).weights, strict=True)}
+    assert weights.pop(first) == pytest.approx((1.0 + (missed / differ) ** 2) ** -0.5)
+    assert set(weights.values()) == {1.0}
+    assert set(core_settings(jolting, False, 1).weights) == {1.0}
 
 
 def test_the_force_that_is_foretold_grows_with_the_stiffness_of_the_contact() -> None:

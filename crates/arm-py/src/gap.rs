@@ -31,8 +31,8 @@ pub struct Settings {
     tolerance: Py<model::Tolerance>,
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
-    /// Of which trials the robot's motion between the samples is not known.
-    unresolved: Vec<bool>,
+    /// What the samples of each trial weigh; see [`Session::weights`].
+    weights: Vec<f64>,
     threads: usize,
     /// Names of kinds of one's own that are asked besides the catalogue.
     own: Vec<String>,
@@ -68,7 +68,7 @@ impl<'a, 'py> Call<'a, 'py> {
             } else {
                 ComparisonMode::Torque
             },
-            unresolved: settings.unresolved.clone(),
+            weights: settings.weights.clone(),
             own: settings
                 .own
                 .iter()

@@ -114,7 +114,7 @@ mod tests {
             tolerance: Tolerance::default(),
             trials: lengths.iter().map(at_rest).collect(),
             comparison: ComparisonMode::Led,
-            unresolved: Vec::new(),
+            weights: Vec::new(),
             own: Vec::new(),
             base: Vec::new(),
             start: [[0.0; 3]; 1],

@@ -36,6 +36,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let range = self.ranges(&point.residuals);
         self.noise = if self.repeated {
             self.noise_of((&deviations, &[]), &shifts, (&range, &observed_share))?
+                .weighed(&self.courses)
         } else {
             self.noise_of_residuals(point, (&range, &observed_share))?
         };
@@ -62,7 +63,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         responses.extend(named);
         let spread = factor.spread();
         let (mut deviations, mut taken, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
-        for (residuals, &trial) in fitted.residuals.iter().zip(&self.fitted) {
+        let known = |trial: usize| self.courses[trial].weight == 1.0;
+        let each = fitted.residuals.iter().zip(&self.fitted);
+        for (residuals, &trial) in each.filter(|&(_, &trial)| known(trial)) {
             let (group, samples) = (self.group_of[trial], &self.valid_segments[trial]);
             let picked = |r: &Response| Thinned::of(&r.0[group], samples);
             let columns: Vec<Thinned> = free.iter().map(|&i| picked(&responses[i])).collect();
@@ -70,8 +73,12 @@ impl<const N: usize> PreparedSession<'_, N> {
             deviations.push(Thinned::of(residuals, samples));
             shifts.push(Arc::new(point.own.iter().map(picked).collect()));
         }
+        if deviations.is_empty() {
+            return Ok(());
+        }
         let (range, told) = (self.ranges(&point.residuals), self.observed_share());
-        self.noise = self.noise_of((&deviations, &taken), &shifts, (&range, &told))?;
+        let noise = self.noise_of((&deviations, &taken), &shifts, (&range, &told))?;
+        self.noise = noise.weighed(&self.courses);
         Ok(())
     }
 

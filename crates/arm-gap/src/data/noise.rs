@@ -4,6 +4,8 @@
 //! channels are correlated; both are read off repeats, where the model's errors cancel. Without repeats the residual of a
 //! fit takes their place: what the model lacks is in it too, so that less is seen, not more.
 
+use std::sync::Arc;
+
 /// The one sum of products of this crate.
 pub use arm_numerics::interleaved_dot as dot;
 use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
@@ -11,7 +13,7 @@ use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effecti
 use crate::GapError;
 use crate::data::valid_segments::{ObservableForce, SHORTEST, ValidSegments};
 use crate::data::whitening::{Observed, Whitening};
-use crate::measurement_model::prediction::Channels;
+use crate::measurement_model::prediction::{Channels, Course};
 
 /// Highest order of the autoregressions: every segment has as many samples.
 const ORDER: usize = SHORTEST;
@@ -201,6 +203,20 @@ impl Noise {
         Ok(noise)
     }
 
+    /// The same with what the samples of each trial weigh, where that differs from trial to trial.
+    pub fn weighed<const N: usize>(self, courses: &[Arc<Course<N>>]) -> Self {
+        if courses.iter().all(|course| course.weight == 1.0) {
+            return self;
+        }
+        let channels = self.whiteners.len();
+        let weights =
+            |course: &Arc<Course<N>>| vec![vec![course.weight; course.counted.len()]; channels];
+        Self {
+            weights: courses.iter().map(weights).collect(),
+            ..self
+        }
+    }
+
     /// The same for other trials than those it was read off: there every sample weighs the same.
     pub fn of_others(&self) -> Self {
         Self {
@@ -341,6 +357,23 @@ mod tests {
     use rand_chacha::rand_core::{RngCore, SeedableRng};
 
     use super::*;
+    use crate::measurement_model::prediction::tests::resting;
+
+    #[test]
+    fn samples_of_a_movement_whose_path_is_not_known_weigh_less() {
+        let mut session = resting(100.0);
+        session.trials[0].q[50][0] = 1.0;
+        session.weights = vec![0.25];
+        let course = Arc::new(session.course(0).expect("a course"));
+        let samples = ValidSegments::of(&session.trials[0], &course, &[], Arc::default());
+        let noise = Noise::unknown(4).expect("a model");
+        let noise = noise.weighed(std::slice::from_ref(&course));
+        let compared = (&samples, &noise.whitening(&samples));
+        let weighed = noise.whiten_in(0, &course.seen, compared);
+        let plain = noise.of_others().whiten_in(0, &course.seen, compared);
+        assert!(plain.iter().any(|v| *v != 0.0));
+        assert!(std::iter::zip(&weighed, &plain).all(|(w, p)| *w == 0.25 * p));
+    }
 
     /// Sums of whitened rows vary as much as the rows say, or less: a floor of white noise that is believed in must not be
     /// undone where channels are made independent.

@@ -110,6 +110,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             });
         }
         let (group_of, references) = groups(&session.trials, &courses);
+        let noise = noise.weighed(&courses);
         Ok(Self {
             session,
             courses,

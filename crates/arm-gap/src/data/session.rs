@@ -26,8 +26,9 @@ pub struct Session<const N: usize> {
     pub trials: Vec<Trial<N>>,
     /// What is compared.
     pub comparison: ComparisonMode,
-    /// Whether the robot of each trial moves between its samples in a way that these do not tell; none where there is no entry.
-    pub unresolved: Vec<bool>,
+    /// What the samples of each trial weigh, all where there is no entry: less than one where the robot moves between its own samples in a
+    /// way that these do not tell, by what repeats differ in over that and what the robot's path leaves unknown.
+    pub weights: Vec<f64>,
     /// Kinds of one's own that are asked besides those of the catalogue.
     pub own: Vec<Kind>,
     /// Laws of joints that the model leaves without one; see [`crate::data::identified_base`].

@@ -11,7 +11,9 @@ impl<const N: usize> Session<N> {
     /// known between its samples; torques in the common band, for what differentiated angles say above it is noise.
     pub fn measured_in(&self, course: &Course<N>) -> Channels {
         match self.comparison {
-            ComparisonMode::Led if course.in_band => [&course.raw[..N], &course.seen[N..]].concat(),
+            ComparisonMode::Led if course.weight < 1.0 => {
+                [&course.raw[..N], &course.seen[N..]].concat()
+            }
             ComparisonMode::Led => course.raw.clone(),
             ComparisonMode::Torque => course.seen.clone(),
         }
@@ -28,7 +30,7 @@ impl<const N: usize> Session<N> {
     ) -> Result<Channels, SimulationError> {
         let run = self.run(hypothesis, course)?;
         match self.comparison {
-            ComparisonMode::Led if course.in_band => {
+            ComparisonMode::Led if course.weight < 1.0 => {
                 let raw = self.read_raw(hypothesis, course, &run)?;
                 Ok([&raw[..N], &in_common_band(&raw[N..], course)?].concat())
             }
@@ -50,7 +52,7 @@ mod tests {
         session.trials[0].q[50][0] = 1.0;
         let as_read = session.course(0).expect("a course");
         assert_eq!(session.measured_in(&as_read), as_read.raw);
-        session.unresolved = vec![true];
+        session.weights = vec![0.3];
         let course = session.course(0).expect("a course");
         let compared = session.measured_in(&course);
         assert_eq!(compared[..2], course.raw[..2]);

@@ -47,10 +47,11 @@ pub struct Course<const N: usize> {
     /// Samples over which a gap is measured: those that were measured. Where torques are compared, those [`MARGIN`] away from ends
     /// and gaps, next to which filters and differences have guessed.
     pub counted: Vec<bool>,
-    /// Whether forces are compared in the common band only: above it they hang on what the robot did between its samples.
-    pub(super) in_band: bool,
+    /// What its samples weigh. Where that is less than one, forces are compared in the common band only: above it they hang on what the
+    /// robot did between its samples.
+    pub weight: f64,
     times: Vec<f64>,
-    handle: Vec<Plane<f64>>,
+    pub(super) handle: Vec<Plane<f64>>,
     /// How far the base is from its place \[m\], where its path was measured and drives a simulation.
     pub(crate) base: Option<Series<2>>,
     /// Rhythms of muscles that are in the run of the trial, not in what is compared with it.
@@ -77,11 +78,6 @@ impl<const N: usize> Course<N> {
             .map(|p| [p[0] + shift[0], p[1] + shift[1]])
             .collect();
         HandlePath::through_points(&self.times, &points)
-    }
-
-    /// Angles that are measured where the movement starts, as a hypothesis has them.
-    pub fn start(&self, hypothesis: &Hypothesis<N>) -> Joints<f64, N> {
-        self.start - offsets(&hypothesis.effects())
     }
 
     /// Where the movement goes: the handle of a led arm \[m\], else the joints \[rad\].
@@ -149,7 +145,7 @@ impl<const N: usize> Session<N> {
             rate: trial.rate,
             band,
             counted: away_from_gaps(&trial.valid, margin),
-            in_band: self.unresolved.get(number) == Some(&true),
+            weight: self.weights.get(number).copied().unwrap_or(1.0),
             times,
             handle,
             base,
@@ -226,7 +222,7 @@ impl<const N: usize> Session<N> {
         experiment.effects = [hypothesis.effects(), course.rhythms.clone()].concat();
         experiment.base.clone_from(&course.base);
         experiment.output_interval = Some(interval);
-        let near = course.start(hypothesis);
+        let near = self.near(hypothesis, course)?;
         let limit = friction_limit(&experiment, &near);
         let mut last = None;
         for (i, step) in STEPS.into_iter().enumerate() {
@@ -526,7 +522,7 @@ fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use arm_core::{Contact, models};
+    use arm_core::{Chain, Contact, models};
     use arm_ident::regression::trial::Tolerance;
 
     use super::*;
@@ -540,18 +536,23 @@ pub(crate) mod tests {
             force_on_arm: Some(vec![[0.0; 2]; 200]),
             ..Trial::new(rate, vec![Joints::zeros(); 200])
         };
+        of_one(models::mechanical_arm(), trial)
+    }
+
+    /// A session of one trial that an arm is led through.
+    pub(crate) fn of_one<const N: usize>(chain: Chain<f64, N>, trial: Trial<N>) -> Session<N> {
         Session {
-            chain: models::mechanical_arm(),
+            chain,
             contact: Contact::new([1e4; 2], [25.0; 2]),
             effects: Vec::new(),
             segment_uncertainty: 0.02,
             tolerance: Tolerance::default(),
             trials: vec![trial],
             comparison: ComparisonMode::Led,
-            unresolved: Vec::new(),
+            weights: Vec::new(),
             own: Vec::new(),
             base: Vec::new(),
-            start: [[0.0; 3]; 2],
+            start: [[0.0; 3]; N],
         }
     }
 

@@ -2,14 +2,16 @@
 
 use arm_core::effect::{Effect, Kind, Motion, dry_friction, resisting_besides_dry};
 use arm_core::{
-    Joints, Placement, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque,
+    Chain, Contact, Joints, Placement, Plane, Pose, Reading, Setup, inverse_dynamics, jacobian,
+    joint_force, static_torque, tip,
 };
 use arm_ident::regression::trial::Trial;
 use arm_sim::{Experiment, SimulationError, Start, simulate};
+use nalgebra::{SMatrix, Vector2};
 
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::Course;
+use crate::measurement_model::prediction::{Course, offsets};
 
 /// Samples at the start whose mean tells where the arm was at rest.
 const START: usize = 5;
@@ -32,6 +34,44 @@ impl<const N: usize> Session<N> {
         (start, start_force)
     }
 
+    /// The angles near which a run starts: measured, as a hypothesis has them.
+    ///
+    /// A joint that dry friction holds where it is measured may hardly turn in what the handle leaves free, while others turn much: then its
+    /// angle, and what friction holds, is known from theirs. All angles are moved by as little as brings the hand to where the handle and the
+    /// stretched contact have it.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a rig that cannot be.
+    pub fn near(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Joints<f64, N>, SimulationError> {
+        /// The hand is where it must be to a millionth of what it was off by.
+        const STEPS: usize = 3;
+        let mut q = course.start(hypothesis);
+        let effects = hypothesis.effects();
+        if N <= 2 || !effects.iter().any(is_set_valued_friction) {
+            return Ok(q);
+        }
+        let setup = self.rig(hypothesis)?;
+        let chain = setup.chain()?;
+        let force = felt_at_start(&effects, course);
+        let handle = course.handle_at_start(hypothesis, &setup);
+        let Some(hand) = hand_in_contact(&setup, handle, force) else {
+            return Ok(q);
+        };
+        for _ in 0..STEPS {
+            let (at, moving) = hand_of(&setup, &chain, course, &q);
+            let miss = Vector2::from([0, 1].map(|a| hand[a] - at[a]));
+            let Some(inverse) = (moving * moving.transpose()).try_inverse() else {
+                break;
+            };
+            q += moving.transpose() * (inverse * miss);
+        }
+        Ok(q)
+    }
+
     /// What dry friction resists with at the start, where the handle places a joint \[N m\].
     ///
     /// A joint at rest is held by any torque up to what it resists with in motion, and the force on a resting arm shows which. What the
@@ -51,18 +91,8 @@ impl<const N: usize> Session<N> {
         }
         let setup = self.rig(hypothesis)?;
         let chain = setup.chain()?;
-        let measured = Reading::<f64, N> {
-            time: 0.0,
-            q: course.start,
-            force_on_arm: course.start_force,
-            moment_on_arm: 0.0,
-        };
-        let mut distorted = measured;
-        for effect in &effects {
-            effect.distort(&mut distorted);
-        }
-        let force = [0, 1].map(|a| 2.0 * measured.force_on_arm[a] - distorted.force_on_arm[a]);
-        let q = measured.q * 2.0 - distorted.q;
+        let force = felt_at_start(&effects, course);
+        let q = self.near(hypothesis, course)?;
         let pose = Pose::new(&q);
         let moment = Placement::of(&setup).map_or(0.0, |p| p.moment(&pose, force));
         let through = joint_force(&chain, &pose, (&zero, &zero), force);
@@ -88,7 +118,7 @@ impl<const N: usize> Session<N> {
         course: &Course<N>,
         experiment: &Experiment<N>,
     ) -> Result<Start<N>, SimulationError> {
-        let near = course.start(hypothesis);
+        let near = self.near(hypothesis, course)?;
         let friction = self.friction_at_start(hypothesis, course)?;
         if friction.iter().all(|&torque| torque == 0.0) {
             return Ok(Start::Equilibrium { near });
@@ -116,6 +146,77 @@ impl<const N: usize> Session<N> {
     }
 }
 
+impl<const N: usize> Course<N> {
+    /// Angles that are measured where the movement starts, as a hypothesis has them.
+    pub fn start(&self, hypothesis: &Hypothesis<N>) -> Joints<f64, N> {
+        self.start - offsets(&hypothesis.effects())
+    }
+
+    /// Where the handle stands in the hand at the start, as a hypothesis has it \[m\].
+    fn handle_at_start(&self, hypothesis: &Hypothesis<N>, setup: &Setup<f64, N>) -> Plane<f64> {
+        let [displaced, ..] = setup.displaced.at(0.0);
+        [0, 1].map(|a| self.handle[0][a] + hypothesis.shift[a] + displaced[a])
+    }
+
+    /// How far a base whose path was measured is from its place at the start \[m\].
+    fn base_at_start(&self) -> Plane<f64> {
+        let path = self.base.as_ref();
+        path.map_or([0.0; 2], |path| path.at(0.0).value)
+    }
+}
+
+/// Force on the arm at the start \[N\]: what is measured, less what effects in the sensors add.
+fn felt_at_start<const N: usize>(effects: &[Effect<f64>], course: &Course<N>) -> Plane<f64> {
+    let measured = Reading::<f64, N> {
+        time: 0.0,
+        q: course.start,
+        force_on_arm: course.start_force,
+        moment_on_arm: 0.0,
+    };
+    let mut distorted = measured;
+    for effect in effects {
+        effect.distort(&mut distorted);
+    }
+    [0, 1].map(|a| 2.0 * measured.force_on_arm[a] - distorted.force_on_arm[a])
+}
+
+/// Where a contact that bears a force has the hand \[m\]; `None` where it bears none.
+fn hand_in_contact<const N: usize>(
+    setup: &Setup<f64, N>,
+    handle: Plane<f64>,
+    force: Plane<f64>,
+) -> Option<Plane<f64>> {
+    let Contact {
+        stiffness, play, ..
+    } = setup.contact;
+    let stretch = |a: usize| force[a] / stiffness[a] + play[a].copysign(force[a]);
+    let hand = [0, 1].map(|a| handle[a] - stretch(a));
+    hand.iter().all(|v| v.is_finite()).then_some(hand)
+}
+
+/// Where the hand is \[m\], and its change with each angle \[m/rad\].
+fn hand_of<const N: usize>(
+    setup: &Setup<f64, N>,
+    chain: &Chain<f64, N>,
+    course: &Course<N>,
+    q: &Joints<f64, N>,
+) -> (Plane<f64>, SMatrix<f64, 2, N>) {
+    let pose = Pose::new(q);
+    let (mut at, mut moving) = (tip(chain, &pose), jacobian(chain, &pose));
+    let beside = Placement::of(setup).map_or([0.0; 2], |p| p.arm(&pose));
+    let [heave, ..] = setup.heave.at(0.0);
+    let base = course.base_at_start();
+    for a in 0..2 {
+        at[a] += beside[a] + heave[a] + base[a] + setup.base_motion[a] * (q[0] - setup.base_rest);
+        moving[(a, 0)] += setup.base_motion[a];
+    }
+    for mut turned in moving.column_iter_mut() {
+        turned[0] -= beside[1];
+        turned[1] += beside[0];
+    }
+    (at, moving)
+}
+
 /// Whether an effect is set-valued dry friction that acts.
 pub(crate) fn is_set_valued_friction(effect: &Effect<f64>) -> bool {
     effect.on && effect.is_dry() && effect.parameters[0] > 0.0
@@ -127,4 +228,48 @@ pub(crate) fn held_at_start<const N: usize>(friction: &Joints<f64, N>) -> [bool;
     let dry = (0..N).rev().filter(|&j| friction[j] > 0.0);
     dry.take(N.saturating_sub(2)).for_each(|j| held[j] = true);
     held
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::Segment;
+
+    use super::*;
+    use crate::measurement_model::prediction::tests::of_one;
+
+    /// Three segments in whose null motion the last joint turns twenty times as far as the first, on a contact that bears 10 N forward.
+    #[test]
+    fn an_arm_with_dry_friction_starts_where_the_handle_has_its_hand() {
+        let segment = |length: f64| Segment {
+            length,
+            mass: 1.0,
+            com: [0.5 * length, 0.0],
+            inertia: 0.01,
+        };
+        let segments = [0.3, 0.25, 0.08].map(segment);
+        let chain = Chain::new(segments, [0.0, -9.81], [0.0; 2]).expect("an arm");
+        let truth = Joints::from([-1.05, 1.03, 0.16]);
+        let at = tip(&chain, &Pose::new(&truth));
+        let error = Joints::from([1e-3, -2e-3, 1e-3]);
+        let trial = Trial {
+            handle: Some(vec![[at[0] + 10.0 / 1e4, at[1]]; 50]),
+            force_on_arm: Some(vec![[10.0, 0.0]; 50]),
+            ..Trial::new(100.0, vec![truth + error; 50])
+        };
+        let mut session = of_one(chain, trial);
+        let course = session.course(0).expect("a course");
+        let measured = session.near(&session.given(), &course).expect("a rig");
+        assert_eq!(measured, course.start, "no friction holds it");
+        session.effects = vec![Effect::new(Kind::Coulomb, 0).with(&[0.2, 0.0])];
+        let near = session.near(&session.given(), &course).expect("a rig");
+        let off = near - truth;
+        let hand = tip(&chain, &Pose::new(&near));
+        assert!((0..2).all(|a| (hand[a] - at[a]).abs() < 1e-12));
+        // What is left is what the handle leaves free: the first joint hardly turns in it.
+        assert!(off.norm() < error.norm());
+        assert!(
+            off[0].abs() < 1e-4 && off[2].abs() > 10.0 * off[0].abs(),
+            "{off}"
+        );
+    }
 }

@@ -33,7 +33,8 @@ impl LackOfFit {
     }
 }
 
-/// Lack of fit of a hypothesis over the groups of repeats.
+/// Lack of fit of a hypothesis over the groups of repeats. Movements whose path between the samples of the robot is not known tell none:
+/// what the robot does there is the same in every repeat.
 pub fn lack_of_fit<const N: usize>(
     prepared: &PreparedSession<N>,
     point: &LinearizationPoint<N>,
@@ -42,6 +43,9 @@ pub fn lack_of_fit<const N: usize>(
     let (mut common, mut common_dof, mut trial_specific, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
     let mut runs = Vec::new();
     for group in 0..prepared.references.len() {
+        if prepared.courses[prepared.references[group]].weight < 1.0 {
+            continue;
+        }
         let Some((members, valid_segments)) = prepared.agreeing(group) else {
             continue;
         };

@@ -93,7 +93,7 @@ impl<'a, const N: usize> Contest<'a, N> {
             Some(trial) => {
                 let session = Session {
                     trials: vec![trial.clone()],
-                    unresolved: Vec::new(),
+                    weights: Vec::new(),
                     ..self.prepared.session.clone()
                 };
                 let mut prepared =

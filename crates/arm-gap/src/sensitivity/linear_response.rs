@@ -51,7 +51,7 @@ impl<const N: usize> Linear<'_, N> {
     pub fn origin(&self, hypothesis: &Hypothesis<N>) -> Result<Origin<N>, SimulationError> {
         let plant = Plant::new(self.session, hypothesis, &self.course.rhythms)?;
         let start = (
-            self.course.start(hypothesis),
+            self.session.near(hypothesis, &self.course)?,
             self.session.friction_at_start(hypothesis, &self.course)?,
         );
         let shown = self.sensed(&plant, None, None);
@@ -132,7 +132,7 @@ impl<const N: usize> Linear<'_, N> {
         let (near, friction) = origin.start;
         let most = plant.friction(&self.balances[0].motion, &[]);
         let held = held_at_start(&most);
-        let moved = self.course.start(changed) - near;
+        let moved = self.session.near(changed, &self.course)? - near;
         Ok([
             Joints::from_fn(|j, _| if held[j] { moved[j] } else { 0.0 }),
             friction - self.session.friction_at_start(changed, &self.course)?,

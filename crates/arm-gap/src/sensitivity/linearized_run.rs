@@ -108,7 +108,7 @@ impl<'a, const N: usize> Linear<'a, N> {
             })
             .collect();
         let start = (
-            course.start(hypothesis),
+            session.near(hypothesis, course)?,
             session.friction_at_start(hypothesis, course)?,
         );
         let mut linear = Self {

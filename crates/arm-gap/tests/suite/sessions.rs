@@ -118,7 +118,7 @@ pub fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
         tolerance: Tolerance::default(),
         trials,
         comparison: ComparisonMode::Led,
-        unresolved: Vec::new(),
+        weights: Vec::new(),
         own: Vec::new(),
         base: Vec::new(),
         start: [[0.0; 3]; 2],

@@ -43,7 +43,7 @@ fn swinging(seconds: f64) -> Session<2> {
         tolerance: Tolerance::default(),
         trials: vec![trial],
         comparison: ComparisonMode::Torque,
-        unresolved: Vec::new(),
+        weights: Vec::new(),
         own: Vec::new(),
         base: Vec::new(),
         start: [[0.0; 3]; 2],

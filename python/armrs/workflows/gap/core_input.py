@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,15 +30,15 @@ def channel_names(dataset: Dataset, led: bool) -> list[str]:
 class SearchSettings:
     """What is known beforehand.
 
-    The model, and the body on which forces are stated, are those of the files; `unresolved` says of each trial whether the path of its
-    robot between the samples is not known; `own` are kinds of one's own that are asked besides.
+    The model, and the body on which forces are stated, are those of the files; `weights` says what the samples of each trial
+    weigh, less than one where the path of its robot between the samples is not known; `own` are kinds of one's own that are asked besides.
     """
 
     model: Model
     force_on_robot: bool
     tolerance: Tolerance
     led: bool
-    unresolved: list[bool]
+    weights: list[float]
     own: list[str]
     threads: int
 
@@ -51,12 +52,13 @@ def core_trials(dataset: Dataset) -> list[Trial]:
 def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> SearchSettings:
     """Return what is known beforehand; as many threads as processors when none are given."""
     unknown = unresolved_movements(dataset) if led else {}
+    weights = {name: differ / math.hypot(missed, differ) for name, (missed, differ) in unknown.items()}
     return SearchSettings(
         model=dataset.model,
         force_on_robot=dataset.force_on == "robot",
         tolerance=dataset.tolerance,
         led=led,
-        unresolved=[t.configuration in unknown for t in dataset.trials],
+        weights=[weights.get(t.configuration, 1.0) for t in dataset.trials],
         own=list(own),
         threads=(os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),
     )
