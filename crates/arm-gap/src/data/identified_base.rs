@@ -18,7 +18,7 @@ use arm_numerics::statistics::extent::extent;
 use crate::GapError;
 use crate::data::joint_in_motion::{WithStd, in_motion, laws_in_motion};
 use crate::data::passive_law::{Free, LIKELY, Passive};
-use crate::data::session::{ComparisonMode, Session};
+use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::measurement_model::prediction::Course;
 
 /// Noise of a joint's speed, as a share of the speed, above which the motion is simulated: what measured motion tells of that joint is
@@ -77,7 +77,7 @@ impl<const N: usize> Session<N> {
         }
         let laws = self.hidden_by_friction(estimated(&found), (&found, &model));
         let still = match self.comparison {
-            ComparisonMode::Led => self.hardly_moving(),
+            ComparisonMode::Led => self.hardly_moving(&laws),
             ComparisonMode::Torque => [false; N],
         };
         for (place, (law, std)) in laws.iter().enumerate() {
@@ -211,9 +211,17 @@ impl<const N: usize> Session<N> {
         })
     }
 
-    /// Which joints stay where they are but for noise.
-    fn hardly_moving(&self) -> [bool; N] {
-        self.reach().map(|reach| reach <= STILL)
+    /// Which joints stay where they are but for noise, or move as if in tar: what looks like a viscosity far above any other is friction that
+    /// holds the joint nearly all the time.
+    fn hardly_moving(&self, laws: &[WithStd]) -> [bool; N] {
+        let mut still = self.reach().map(|reach| reach <= STILL);
+        for (law, _) in laws {
+            let expected = law.kind.prior().typical * self.weight_moment(law.index);
+            let in_tar =
+                law.kind.family() == Family::Rate && law.parameters[0] > FURTHEST * expected;
+            still[law.index] |= in_tar;
+        }
+        still
     }
 
     /// Makes of a law of a joint that hardly moves what holds it: friction that sticks, larger than any torque that it must hold. How
@@ -259,6 +267,8 @@ impl<const N: usize> Session<N> {
 
 #[cfg(test)]
 mod tests {
+    use arm_core::Joints;
+
     use super::*;
     use crate::measurement_model::prediction::tests::resting;
 
@@ -270,10 +280,27 @@ mod tests {
             for (i, q) in session.trials[0].q.iter_mut().enumerate() {
                 q[0] = 0.5 * range * libm::sin(core::f64::consts::PI * i as f64 / 100.0);
             }
-            session.hardly_moving()
+            session.hardly_moving(&[])
         };
         assert_eq!(still(0.0095), [true, true]);
         assert_eq!(still(0.0105), [false, true]);
+    }
+
+    /// Typical is a fifth of the weight moment in N m s/rad; no other law is as if in tar.
+    #[test]
+    fn a_joint_with_four_times_the_expected_viscosity_hardly_moves() {
+        let mut session = resting(100.0);
+        session.trials[0].q.iter_mut().zip(0..).for_each(|(q, i)| {
+            let at = libm::sin(core::f64::consts::PI * f64::from(i) / 100.0);
+            *q = Joints::from([at, at]);
+        });
+        let still = |kind, times: f64| {
+            let expected = Kind::Viscous.prior().typical * session.weight_moment(1);
+            session.hardly_moving(&[(Effect::new(kind, 1).with(&[times * expected]), 0.1)])
+        };
+        assert_eq!(still(Kind::Viscous, 3.9), [false, false]);
+        assert_eq!(still(Kind::Viscous, 4.1), [false, true]);
+        assert_eq!(still(Kind::Elastic, 4.1), [false, false]);
     }
 
     #[test]

@@ -229,22 +229,27 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &mut self,
         current: &Fitted<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
-        let before = self.dropped.clone();
+        let (before, first) = (self.dropped.clone(), self.session.effects.len());
         for (slot, own) in current.asked.iter().enumerate() {
             let in_joint = own.kind().info().place == Place::Joint && own.shapes() > 0.0;
+            let (mut start, mut asked) = (current.hypothesis.clone(), current.asked.clone());
+            let instead = start.named.remove(slot);
+            asked.remove(slot);
             let mut back = false;
-            for (dropped, law) in self.dropped.iter_mut().zip(&self.session.base) {
+            for (b, law) in self.session.base.iter().enumerate() {
                 let here = in_joint && law.effect.index == own.effect.index;
-                if *dropped && here && !law.free.is_empty() {
-                    (*dropped, back) = (false, true);
+                if self.dropped[b] && here && !law.free.is_empty() {
+                    (self.dropped[b], back) = (false, true);
+                    start.known[first + b] = law.effect;
+                    if law.effect.kind.family() == instead.kind.family() {
+                        // Of the same unit: without its shapes it would be as large.
+                        start.known[first + b].parameters[0] = instead.parameters[0];
+                    }
                 }
             }
             if !back {
                 continue;
             }
-            let (mut start, mut asked) = (current.hypothesis.clone(), current.asked.clone());
-            start.named.remove(slot);
-            asked.remove(slot);
             let price = self.price_of_shapes(std::slice::from_ref(own));
             if let Ok((fitted, point)) = self.settle(start, asked)
                 && fitted.cost < current.cost + price
