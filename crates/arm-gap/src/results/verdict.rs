@@ -136,4 +136,10 @@ mod tests {
         };
         assert_eq!(of(&unrepeated), Verdict::Explained);
     }
+
+    #[test]
+    fn names_are_those_of_the_json() {
+        let names = Verdict::ALL.map(Verdict::name);
+        assert_eq!(names, ["explained", "nothing_missing", "unexplained"]);
+    }
 }
