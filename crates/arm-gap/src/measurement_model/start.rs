@@ -37,8 +37,8 @@ impl<const N: usize> Session<N> {
     /// The angles near which a run starts: measured, as a hypothesis has them.
     ///
     /// A joint that dry friction holds where it is measured may hardly turn in what the handle leaves free, while others turn much: then its
-    /// angle, and what friction holds, is known from theirs. All angles are moved by as little as brings the hand to where the handle and the
-    /// stretched contact have it.
+    /// angle, and what friction holds, is known from theirs. The joints that turn most there stay where they are measured; the other two are
+    /// moved until the hand is where the handle and the stretched contact have it.
     ///
     /// # Errors
     /// [`SimulationError`] for a rig that cannot be.
@@ -64,10 +64,14 @@ impl<const N: usize> Session<N> {
         for _ in 0..STEPS {
             let (at, moving) = hand_of(&setup, &chain, course, &q);
             let miss = Vector2::from([0, 1].map(|a| hand[a] - at[a]));
-            let Some(inverse) = (moving * moving.transpose()).try_inverse() else {
+            let mut led = moving.transpose();
+            for joint in turning_most(&moving) {
+                led.row_mut(joint).fill(0.0);
+            }
+            let Some(inverse) = (moving * led).try_inverse() else {
                 break;
             };
-            q += moving.transpose() * (inverse * miss);
+            q += led * (inverse * miss);
         }
         Ok(q)
     }
@@ -215,6 +219,19 @@ fn hand_of<const N: usize>(
         turned[1] += beside[0];
     }
     (at, moving)
+}
+
+/// The joints that turn most where the hand stays, all but two.
+fn turning_most<const N: usize>(moving: &SMatrix<f64, 2, N>) -> Vec<usize> {
+    let Some(inverse) = (moving * moving.transpose()).try_inverse() else {
+        return Vec::new();
+    };
+    // What of a turn of the joint alone moves the hand.
+    let leads = |j: usize| (moving.column(j).transpose() * inverse * moving.column(j))[0];
+    let mut joints: Vec<usize> = (0..N).collect();
+    joints.sort_by(|&a, &b| leads(a).total_cmp(&leads(b)));
+    joints.truncate(N.saturating_sub(2));
+    joints
 }
 
 /// Whether an effect is set-valued dry friction that acts.
