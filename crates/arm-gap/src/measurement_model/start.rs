@@ -76,27 +76,28 @@ impl<const N: usize> Session<N> {
         Ok(q)
     }
 
-    /// What dry friction resists with at the start, where the handle places a joint \[N m\].
+    /// The angles near which a run starts \[rad\], see [`Session::near`], and what dry friction resists with there, where the handle places a
+    /// joint \[N m\].
     ///
     /// A joint at rest is held by any torque up to what it resists with in motion, and the force on a resting arm shows which. What the
     /// handle leaves free stays where it is measured instead: see [`held_at_start`].
     ///
     /// # Errors
     /// [`SimulationError`] for a rig that cannot be.
-    pub fn friction_at_start(
+    pub fn at_start(
         &self,
         hypothesis: &Hypothesis<N>,
         course: &Course<N>,
-    ) -> Result<Joints<f64, N>, SimulationError> {
+    ) -> Result<(Joints<f64, N>, Joints<f64, N>), SimulationError> {
+        let q = self.near(hypothesis, course)?;
         let effects = hypothesis.effects();
         let zero = Joints::zeros();
         if !effects.iter().any(is_set_valued_friction) {
-            return Ok(zero);
+            return Ok((q, zero));
         }
         let setup = self.rig(hypothesis)?;
         let chain = setup.chain()?;
         let force = felt_at_start(&effects, course);
-        let q = self.near(hypothesis, course)?;
         let pose = Pose::new(&q);
         let moment = Placement::of(&setup).map_or(0.0, |p| p.moment(&pose, force));
         let through = joint_force(&chain, &pose, (&zero, &zero), force);
@@ -106,10 +107,11 @@ impl<const N: usize> Session<N> {
         let needed = static_torque(&chain, &pose, force, moment)
             - inverse_dynamics(&chain, &pose, &zero, &zero)
             - resisting_besides_dry(&effects, &motion, &[]);
-        Ok(Joints::from_fn(|j, _| match held[j] {
+        let friction = Joints::from_fn(|j, _| match held[j] {
             true => 0.0,
             false => needed[j].clamp(-most[j], most[j]),
-        }))
+        });
+        Ok((q, friction))
     }
 
     /// The start of a run: in equilibrium near the measured angles.
@@ -122,8 +124,7 @@ impl<const N: usize> Session<N> {
         course: &Course<N>,
         experiment: &Experiment<N>,
     ) -> Result<Start<N>, SimulationError> {
-        let near = self.near(hypothesis, course)?;
-        let friction = self.friction_at_start(hypothesis, course)?;
+        let (near, friction) = self.at_start(hypothesis, course)?;
         if friction.iter().all(|&torque| torque == 0.0) {
             return Ok(Start::Equilibrium { near });
         }

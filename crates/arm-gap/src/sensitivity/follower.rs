@@ -31,8 +31,7 @@ impl<const N: usize> Linear<'_, N> {
         // A trial that was broken off needs no more than its own steps.
         let steps = self.steps_until(course.raw[0].len()).min(self.states.len());
         let hands = hands(course, changed, (steps, self.step))?;
-        let near = self.session.near(changed, course)?;
-        let friction = self.session.friction_at_start(changed, course)?;
+        let (near, friction) = self.session.at_start(changed, course)?;
         let answer = self.follow(&plant, &hands, (&near, &friction));
         let answer = answer.ok_or(ASTRAY)?;
         let mut sensed = self.sensed(&plant, Some(&answer), None);

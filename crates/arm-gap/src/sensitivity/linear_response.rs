@@ -50,10 +50,7 @@ impl<const N: usize> Linear<'_, N> {
     /// [`SimulationError`] for a rig that cannot be.
     pub fn origin(&self, hypothesis: &Hypothesis<N>) -> Result<Origin<N>, SimulationError> {
         let plant = Plant::new(self.session, hypothesis, &self.course.rhythms)?;
-        let start = (
-            self.session.near(hypothesis, &self.course)?,
-            self.session.friction_at_start(hypothesis, &self.course)?,
-        );
+        let start = self.session.at_start(hypothesis, &self.course)?;
         let shown = self.sensed(&plant, None, None);
         let origin = Origin::of(plant, start);
         Ok(Origin { shown, ..origin })
@@ -132,10 +129,11 @@ impl<const N: usize> Linear<'_, N> {
         let (near, friction) = origin.start;
         let most = plant.friction(&self.balances[0].motion, &[]);
         let held = held_at_start(&most);
-        let moved = self.session.near(changed, &self.course)? - near;
+        let (place, resisted) = self.session.at_start(changed, &self.course)?;
+        let moved = place - near;
         Ok([
             Joints::from_fn(|j, _| if held[j] { moved[j] } else { 0.0 }),
-            friction - self.session.friction_at_start(changed, &self.course)?,
+            friction - resisted,
         ])
     }
 

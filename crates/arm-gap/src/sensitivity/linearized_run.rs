@@ -107,10 +107,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                 qdd: at(&recording.qdd, i),
             })
             .collect();
-        let start = (
-            session.near(hypothesis, course)?,
-            session.friction_at_start(hypothesis, course)?,
-        );
+        let start = session.at_start(hypothesis, course)?;
         let mut linear = Self {
             session,
             course: Arc::clone(course),
