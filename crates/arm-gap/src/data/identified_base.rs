@@ -233,6 +233,14 @@ impl<const N: usize> Session<N> {
         passive.free.clear();
     }
 
+    /// Joints that move and are held all the same, from 0: what resists them is far above any viscosity.
+    pub fn held_in_motion(&self) -> Vec<usize> {
+        let held = |law: &&Passive| law.likely && law.free.is_empty();
+        let reach = self.reach();
+        let held = self.base.iter().filter(held).map(|law| law.effect.index);
+        held.filter(|&joint| reach[joint] > STILL).collect()
+    }
+
     /// A law with what is known of its numbers beforehand.
     fn passive(&self, effect: Effect<f64>) -> Passive {
         /// Change of a law's size that a response is taken with, as a share of its typical size.
@@ -301,6 +309,11 @@ mod tests {
         assert_eq!(still(Kind::Viscous, 3.9), [false, false]);
         assert_eq!(still(Kind::Viscous, 4.1), [false, true]);
         assert_eq!(still(Kind::Elastic, 4.1), [false, false]);
+
+        let mut dry = session.passive(Effect::new(Kind::Coulomb, 1).with(&[0.1, 0.0]));
+        session.hold(&mut dry);
+        session.base.push(dry);
+        assert_eq!(session.held_in_motion(), [1]);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::{
     SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
 };
 use crate::data::prepared_session::PreparedSession;
-use crate::data::session::ComparisonMode;
+use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::selection::conclusion::Finding;
 use crate::selection::first_order_screening::Look;
 use crate::selection::lack_of_fit::LackOfFit;
@@ -142,7 +142,7 @@ impl GapResult {
             absorbed: absorbed(asked.model, &finding.amended.hypothesis, unknowns),
             lack: finding.lack.each_ref().map(Lack::from),
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
-            warnings: Vec::new(),
+            warnings: held_in_motion(prepared.session),
             model: amended.amended(asked.model, &locked)?,
             calibrated: Fitted::of(&finding.calibrated.hypothesis),
             amended,
@@ -174,6 +174,18 @@ fn effects<const N: usize>(finding: &Finding<N>, asked: &Asked<'_>) -> Vec<Missi
     let mut all: Vec<_> = together.chain(apart).collect();
     all.sort_by(|a, b| b.share.total_cmp(&a.share));
     all
+}
+
+/// A warning for each joint that moves and is held.
+fn held_in_motion<const N: usize>(session: &Session<N>) -> Vec<String> {
+    let line = |joint: usize| {
+        let j = joint + 1;
+        format!(
+            "joint {j} is held by friction nearly all the time: as a viscosity it would be more than {FURTHEST} times what is expected. The \
+             simulation holds the joint where it starts; its laws cannot be told, and amended.toml has none for it"
+        )
+    };
+    session.held_in_motion().into_iter().map(line).collect()
 }
 
 /// An open channel as a row of a list.

@@ -90,7 +90,7 @@ def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progres
         return maps.discrepancies(dataset, led, result.trials, version)
 
     looks_like = maps.shape(lacking("amended")) if result.verdict == "unexplained" else None
-    told = result.replace(places=maps.places(lacking("calibrated")), looks_like=looks_like, warnings=warnings)
+    told = result.replace(places=maps.places(lacking("calibrated")), looks_like=looks_like, warnings=(*warnings, *result.warnings))
     return GapFound(told, dataset)
 
 
